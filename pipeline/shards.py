@@ -1,0 +1,96 @@
+"""Shards on disk: tar files whose bytes depend on their contents alone.
+
+A shard is an uncompressed tar in the WebDataset layout: the members of one sample stand together and are
+named `<key>.<member>`, for example `castle-000017.points.npy`. Entries carry no time, no user and one mode,
+so equal samples make equal files.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["ShardWriter", "array_bytes", "bytes_array", "json_bytes", "read_shard"]
+
+
+def json_bytes(value: Any) -> bytes:
+    """`value` as one line of canonical JSON: sorted keys, no NaN, UTF-8, newline at the end."""
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.encode() + b"\n"
+
+
+def array_bytes(array: npt.NDArray[Any]) -> bytes:
+    """`array` as the bytes of a `.npy` file (never pickled)."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def bytes_array(content: bytes) -> npt.NDArray[Any]:
+    """The array in the bytes of a `.npy` file."""
+    return np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
+
+
+class ShardWriter:
+    """Writes samples to a tar, one after another, to a stream that the caller commits.
+
+    Raises ValueError for a key with a dot, a slash or an upper-case member name: loaders group members by
+    what stands before the first dot of a file name.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._tar = tarfile.open(fileobj=stream, mode="w", format=tarfile.USTAR_FORMAT)
+        self.samples = 0
+        self.offsets: dict[str, int] = {}
+
+    def write(self, key: str, members: Mapping[str, bytes]) -> None:
+        """Append one sample; `members` maps the part after `<key>.` (such as `points.npy`) to its bytes."""
+        if not key or "." in key or "/" in key:
+            raise ValueError(f"sample key {key!r} must be non-empty and hold neither a dot nor a slash")
+        if key in self.offsets:
+            raise ValueError(f"sample key {key!r} is written twice")
+        self.offsets[key] = self._tar.offset
+        for name in members:
+            if name != name.lower():
+                raise ValueError(f"member {name!r} of {key!r} must be lower-case")
+            entry = tarfile.TarInfo(f"{key}.{name}")
+            entry.size = len(members[name])
+            entry.mode, entry.mtime, entry.uid, entry.gid, entry.uname, entry.gname = 0o644, 0, 0, 0, "", ""
+            self._tar.addfile(entry, io.BytesIO(members[name]))
+        self.samples += 1
+
+    def __enter__(self) -> ShardWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self._tar.close()
+
+
+def read_shard(path: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
+    """The samples of a shard in order, `(key, {member: bytes})`, one in memory at a time."""
+    key: str | None = None
+    members: dict[str, bytes] = {}
+    with tarfile.open(path, mode="r:") as tar:
+        for entry in tar:
+            entry_key, _, member = entry.name.partition(".")
+            if key is not None and entry_key != key:
+                yield key, members
+                members = {}
+            key = entry_key
+            content = tar.extractfile(entry)
+            assert content is not None, entry.name
+            members[member] = content.read()
+            tar.members = []  # tarfile keeps every header it has seen; memory stays flat without them
+    if key is not None:
+        yield key, members

@@ -1,0 +1,15 @@
+"""Array aliases. Shapes stand in the docstrings."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["BoolArray", "ByteArray", "Float32Array", "FloatArray", "IntArray", "TypeArray"]
+
+FloatArray = npt.NDArray[np.float64]
+Float32Array = npt.NDArray[np.float32]
+IntArray = npt.NDArray[np.int32]
+TypeArray = npt.NDArray[np.int16]
+BoolArray = npt.NDArray[np.bool_]
+ByteArray = npt.NDArray[np.uint8]

@@ -1,0 +1,140 @@
+"""A kit: the part types of one or more exemplar shapes, and the tiling grammar observed in them (strings §3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from stages.shape.arrays import ByteArray, FloatArray, IntArray, TypeArray
+
+__all__ = ["Assembly", "ContactKind", "Docking", "Exemplar", "Grammar", "Kit", "Multiset", "PartType"]
+
+ContactKind = Literal["point", "line", "face"]
+
+Multiset = tuple[tuple[int, int], ...]
+"""Neighbour counts of a part: `(type index, count)` pairs in ascending order of type index."""
+
+
+@dataclass(frozen=True)
+class PartType:
+    """One building block. Its coordinates are those of its mesh; poses move them into the world.
+
+    vertices: float64 (v, 3); faces: int32 (f, 3); face_colors: uint8 (f, 3) sRGB.
+    frame: float64 (4, 4), the extremal-point coordinate frame (strings §6), in part coordinates.
+    symmetries: float64 (k, 4, 4), the rigid motions that map the part onto itself, the identity first.
+    """
+
+    name: str
+    vertices: FloatArray
+    faces: IntArray
+    face_colors: ByteArray
+    frame: FloatArray
+    symmetries: FloatArray
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of the box around the part in its own coordinates, float64 (2, 3)."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Length of the diagonal of `bounds`."""
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+    @cached_property
+    def centroid(self) -> FloatArray:
+        """Area-weighted centroid of the surface, float64 (3,): unmoved by every symmetry of the part."""
+        corners = self.vertices[self.faces]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        centroid: FloatArray = (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
+        return centroid
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Parts of a kit put together, with their shape graph.
+
+    types: int16 (n,) indices into the kit's types; poses: float64 (n, 4, 4) rigid;
+    edges: int32 (m, 2), contacts as pairs i < j in lexicographic order.
+    """
+
+    types: TypeArray
+    poses: FloatArray
+    edges: IntArray
+
+    def __len__(self) -> int:
+        return len(self.types)
+
+    def neighbours(self) -> list[list[int]]:
+        """For each part the indices of the parts that it touches, ascending."""
+        lists: list[list[int]] = [[] for _ in range(len(self.types))]
+        for i, j in self.edges.tolist():
+            lists[i].append(j)
+            lists[j].append(i)
+        return [sorted(each) for each in lists]
+
+    def multiset(self, neighbours: list[int]) -> Multiset:
+        """The multiset of the types of the parts `neighbours`."""
+        types, counts = np.unique(self.types[neighbours], return_counts=True)
+        return tuple(zip(types.tolist(), counts.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Docking:
+    """One observed way in which a part of type `b` touches a part of type `a` (a <= b): an edge category.
+
+    pose: float64 (4, 4) of the part of type `b` in the coordinates of the part of type `a`, one representative;
+    poses that differ by symmetries of either part are the same docking.
+    depth: deepest penetration seen in any pair of this docking, in the kit's units; 0 where they only touch.
+    """
+
+    a: int
+    b: int
+    pose: FloatArray
+    kind: ContactKind
+    count: int
+    depth: float
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """The tiling grammar (strings §3): what was seen around each type, and how pairs of types dock.
+
+    neighbourhoods: for each type index the observed neighbour multisets with the number of parts that had each.
+    """
+
+    neighbourhoods: Mapping[int, Mapping[Multiset, int]]
+    dockings: tuple[Docking, ...]
+
+
+@dataclass(frozen=True)
+class Exemplar:
+    """An input shape: its assembly, and the name of each part in the file it came from."""
+
+    name: str
+    assembly: Assembly
+    part_names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Kit:
+    """Part types, exemplars and grammar.
+
+    contact_tolerance: largest distance of two parts in contact, in the kit's units.
+    up: the axis that points up in the exemplars' coordinates, `"y"` or `"z"`.
+    """
+
+    name: str
+    types: tuple[PartType, ...]
+    exemplars: tuple[Exemplar, ...]
+    grammar: Grammar
+    contact_tolerance: float
+    up: Literal["y", "z"]
+
+    def type_names(self) -> tuple[str, ...]:
+        """Names of the types, in order."""
+        return tuple(part_type.name for part_type in self.types)

@@ -1,0 +1,138 @@
+"""A kit on disk: `<kit>.json`, the grammar for people to read, and `<kit>.tar`, the arrays for programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
+from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
+
+__all__ = ["describe_kit", "load_kit", "write_kit"]
+
+
+def describe_kit(kit: Kit) -> dict[str, Any]:
+    """The kit as JSON that a person can read: types, exemplars, neighbourhoods and dockings by type name."""
+    names = kit.type_names()
+    return {
+        "kit": kit.name,
+        "up": kit.up,
+        "contact_tolerance": kit.contact_tolerance,
+        "types": [
+            {
+                "name": each.name,
+                "triangles": len(each.faces),
+                "diagonal": round(each.diagonal, 6),
+                "symmetries": len(each.symmetries),
+            }
+            for each in kit.types
+        ],
+        "exemplars": [
+            {"name": each.name, "parts": list(each.part_names), "contacts": each.assembly.edges.tolist()}
+            for each in kit.exemplars
+        ],
+        "neighbourhoods": {
+            names[index]: [
+                {"neighbours": {names[other]: count for other, count in multiset}, "seen": seen}
+                for multiset, seen in sorted(rules.items(), key=lambda rule: (-rule[1], rule[0]))
+            ]
+            for index, rules in sorted(kit.grammar.neighbourhoods.items())
+        },
+        "dockings": [
+            {
+                "a": names[each.a],
+                "b": names[each.b],
+                "kind": each.kind,
+                "seen": each.count,
+                "depth": each.depth,
+                "pose": each.pose.tolist(),
+            }
+            for each in kit.grammar.dockings
+        ],
+    }
+
+
+def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
+    """Write `kit` to two binary streams: the JSON of `describe_kit` to `text`, the tar to `arrays`."""
+    text.write(json.dumps(describe_kit(kit), indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+    with ShardWriter(arrays) as writer:
+        for index, each in enumerate(kit.types):
+            members = {
+                "vertices.npy": array_bytes(each.vertices),
+                "faces.npy": array_bytes(each.faces),
+                "colors.npy": array_bytes(each.face_colors),
+                "frame.npy": array_bytes(each.frame),
+                "symmetries.npy": array_bytes(each.symmetries),
+            }
+            writer.write(f"type-{index:04d}", members)
+        for index, exemplar in enumerate(kit.exemplars):
+            members = {
+                "json": json_bytes({"name": exemplar.name, "part_names": list(exemplar.part_names)}),
+                "types.npy": array_bytes(exemplar.assembly.types),
+                "poses.npy": array_bytes(exemplar.assembly.poses),
+                "edges.npy": array_bytes(exemplar.assembly.edges),
+            }
+            writer.write(f"exemplar-{index:04d}", members)
+
+
+def load_kit(text: Path, arrays: Path) -> Kit:
+    """The kit that `write_kit` wrote to these two files."""
+    described = json.loads(text.read_text())
+    names = [each["name"] for each in described["types"]]
+    index_of = {name: index for index, name in enumerate(names)}
+    types: list[PartType] = []
+    exemplars: list[Exemplar] = []
+    for key, members in read_shard(arrays):
+        if key.startswith("type-"):
+            types.append(
+                PartType(
+                    name=names[len(types)],
+                    vertices=bytes_array(members["vertices.npy"]),
+                    faces=bytes_array(members["faces.npy"]),
+                    face_colors=bytes_array(members["colors.npy"]),
+                    frame=bytes_array(members["frame.npy"]),
+                    symmetries=bytes_array(members["symmetries.npy"]),
+                )
+            )
+        else:
+            header = json.loads(members["json"])
+            exemplars.append(
+                Exemplar(
+                    name=header["name"],
+                    part_names=tuple(header["part_names"]),
+                    assembly=Assembly(
+                        types=bytes_array(members["types.npy"]),
+                        poses=bytes_array(members["poses.npy"]),
+                        edges=bytes_array(members["edges.npy"]),
+                    ),
+                )
+            )
+    neighbourhoods = {
+        index_of[name]: {
+            tuple(sorted((index_of[other], count) for other, count in rule["neighbours"].items())): rule["seen"]
+            for rule in rules
+        }
+        for name, rules in described["neighbourhoods"].items()
+    }
+    dockings = tuple(
+        Docking(
+            a=index_of[each["a"]],
+            b=index_of[each["b"]],
+            pose=np.array(each["pose"]),
+            kind=each["kind"],
+            count=each["seen"],
+            depth=each["depth"],
+        )
+        for each in described["dockings"]
+    )
+    return Kit(
+        name=described["kit"],
+        types=tuple(types),
+        exemplars=tuple(exemplars),
+        grammar=Grammar(neighbourhoods, dockings),
+        contact_tolerance=described["contact_tolerance"],
+        up=described["up"],
+    )

@@ -1,0 +1,64 @@
+"""A sample: one shape of a collection, whatever made it, and its way to and from a shard."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
+from stages.shape.kit import Assembly
+
+__all__ = ["Sample", "read_samples", "write_sample"]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One shape.
+
+    key: unique in its dataset, without a dot; split: `train`, `val` or `test`; producer: the stage that made it;
+    kit: name of the kit that its assembly refers to; lineage: JSON, how it was made (parents, cut, transform);
+    graph: hex digest of its canonical type-coloured shape graph (equal exactly for isomorphic graphs of one kit).
+    """
+
+    key: str
+    split: str
+    producer: str
+    kit: str
+    graph: str
+    assembly: Assembly
+    lineage: Mapping[str, Any]
+
+
+def write_sample(writer: ShardWriter, sample: Sample) -> None:
+    """Append `sample` to a shard: members `json`, `types.npy`, `poses.npy`, `edges.npy`."""
+    described = {
+        "key": sample.key,
+        "split": sample.split,
+        "producer": sample.producer,
+        "kit": sample.kit,
+        "graph": sample.graph,
+        "lineage": dict(sample.lineage),
+    }
+    writer.write(
+        sample.key,
+        {
+            "json": json_bytes(described),
+            "types.npy": array_bytes(sample.assembly.types),
+            "poses.npy": array_bytes(sample.assembly.poses),
+            "edges.npy": array_bytes(sample.assembly.edges),
+        },
+    )
+
+
+def read_samples(path: Path) -> Iterator[Sample]:
+    """The samples of a shard that `write_sample` made, in order, one in memory at a time."""
+    for _, members in read_shard(path):
+        assembly = Assembly(
+            types=bytes_array(members["types.npy"]),
+            poses=bytes_array(members["poses.npy"]),
+            edges=bytes_array(members["edges.npy"]),
+        )
+        yield Sample(assembly=assembly, **json.loads(members["json"]))
