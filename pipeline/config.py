@@ -1,15 +1,24 @@
-"""Configs: one YAML for each dataset, validated as a whole before any work."""
+"""Configs: one YAML for each dataset, validated as a whole before any work.
+
+A config holds the dataset's own facts (`DatasetFacts`) and one section for each stage, by the stage's name, whose
+model the stage declares. A path in a config is relative to the folder in which the command runs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import difflib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-__all__ = ["Config", "StrictModel"]
+from pipeline.errors import ConfigError
+from pipeline.yaml_text import KeyPath, read_yaml
+
+__all__ = ["Config", "DatasetFacts", "ExistingFile", "StrictModel", "existing_file", "load_config", "nearest"]
 
 Section = TypeVar("Section", bound="StrictModel")
 
@@ -18,6 +27,23 @@ class StrictModel(BaseModel):
     """Base of every config section: frozen, no unknown keys, no silent conversion of types."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class DatasetFacts(StrictModel):
+    """The keys of a config that belong to no stage."""
+
+    name: str = Field(
+        pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
+        max_length=64,
+        description="name of the dataset and of its folder; lower-case letters, digits and single dashes",
+    )
+    version: str = Field(
+        "1.0.0", pattern=r"^(0|[1-9]\d*)\.(0|[1-9]\d*)\.(0|[1-9]\d*)$", description="version, major.minor.patch"
+    )
+    seed: int = Field(0, ge=0, lt=2**63, description="where all randomness starts; another seed is another dataset")
+    title: str = Field("", description="title on the dataset's card; the name if empty")
+    description: str = Field("", description="what the dataset is, in a sentence or a few, for its card")
+    license: str = Field("unknown", min_length=1, description="licence of the dataset, as an SPDX id such as CC-BY-4.0")
 
 
 @dataclass(frozen=True)
@@ -29,6 +55,9 @@ class Config:
     seed: int
     sections: Mapping[str, StrictModel]
     path: Path
+    title: str = ""
+    description: str = ""
+    license: str = "unknown"
 
     def section(self, model: type[Section]) -> Section:
         """The section that a stage declared with the config class `model`."""
@@ -36,3 +65,142 @@ class Config:
             if isinstance(section, model):
                 return section
         raise KeyError(f"no stage declares {model.__name__}")
+
+    def only(self, stages: Iterable[str]) -> Config:
+        """This config without the sections of any stage but `stages`."""
+        return replace(self, sections={name: self.sections[name] for name in stages})
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The one of `known` that `word` is most probably meant to be, or None."""
+    matches = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return matches[0] if matches else None
+
+
+def existing_file(path: Path) -> Path:
+    """`path` itself. Raises ValueError, naming the nearest file that is there, when it is no readable file."""
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise ValueError(f"{path} is a folder, not a file")
+    folder = path.parent
+    if not folder.is_dir():
+        while not folder.is_dir() and folder != folder.parent:
+            folder = folder.parent
+        raise ValueError(f"there is no file {path}; of its folders {folder.resolve()} is the last that is there")
+    there = sorted(each.name for each in folder.iterdir() if each.is_file())
+    close = nearest(path.name, there)
+    hint = f"; the nearest file there is {folder / close}" if close else ""
+    raise ValueError(f"there is no file {path}{hint}")
+
+
+ExistingFile = Annotated[Path, AfterValidator(existing_file)]
+"""Type of a config key that names a file which must be there, relative to the folder where the command runs."""
+
+
+def load_config(
+    path: Path, sections: Mapping[str, type[StrictModel]], overrides: Mapping[str, Any] | None = None
+) -> Config:
+    """The config in the YAML file `path`, with `overrides` (such as `{"seed": 7}`) in place of its own facts.
+
+    `sections` maps the name of each stage to the model of its section; a section that the file leaves out takes
+    its defaults. Raises ConfigError with one line for each mistake: file, line, key, what is wrong, what would be
+    right.
+    """
+    values, lines = read_yaml(path)
+    mistakes: list[str] = []
+    facts = {key: value for key, value in values.items() if key in DatasetFacts.model_fields} | dict(overrides or {})
+    for key in values:
+        if key not in facts and key not in sections:
+            known = [*DatasetFacts.model_fields, *sections]
+            mistakes.append(f"{_where(path, lines, (key,))}: {key}: unknown key; {_known(key, known)}")
+    header = _validate(path, lines, (), DatasetFacts, facts, mistakes)
+    validated: dict[str, StrictModel] = {}
+    for name, model in sections.items():
+        section = _validate(path, lines, (name,), model, values.get(name) or {}, mistakes)
+        if section is not None:
+            validated[name] = section
+    if mistakes or header is None:
+        raise ConfigError("\n".join(mistakes))
+    return Config(
+        name=header.name,
+        version=header.version,
+        seed=header.seed,
+        sections=validated,
+        path=path,
+        title=header.title or header.name,
+        description=header.description,
+        license=header.license,
+    )
+
+
+def _validate(
+    path: Path,
+    lines: Mapping[KeyPath, int],
+    place: KeyPath,
+    model: type[Section],
+    values: Any,
+    mistakes: list[str],
+) -> Section | None:
+    # Through JSON: there a strict model takes a list for a tuple and text for a path, which YAML cannot write.
+    try:
+        return model.model_validate_json(json.dumps(values))
+    except ValidationError as error:
+        schema = model.model_json_schema()
+        for each in error.errors(include_url=False):
+            key = (*place, *each["loc"])
+            dotted = ".".join(str(step) for step in key) or "(the file)"
+            mistakes.append(f"{_where(path, lines, key)}: {dotted}: {_explain(schema, each)}")
+        return None
+
+
+def _where(path: Path, lines: Mapping[KeyPath, int], key: KeyPath) -> str:
+    for length in range(len(key), 0, -1):
+        if key[:length] in lines:
+            return f"{path}:{lines[key[:length]]}"
+    return str(path)
+
+
+def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
+    kind, loc = error["type"], error["loc"]
+    if kind == "extra_forbidden":
+        known = _schema_at(schema, loc[:-1]).get("properties", {})
+        return f"unknown key; {_known(str(loc[-1]), known)}"
+    field = _schema_at(schema, loc)
+    described = f" ({field['description']})" if field.get("description") else ""
+    if kind == "missing":
+        return f"is missing{described}"
+    if kind == "value_error":
+        return str(error["ctx"]["error"])
+    wanted = error["msg"][0].lower() + error["msg"][1:]
+    if kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
+        wanted = f"must lie in {_range(field)}" if _range(field) else wanted
+    return f"{wanted}, and is {json.dumps(error['input'])}{described}"
+
+
+def _known(key: str, known: Iterable[str]) -> str:
+    close = nearest(key, known)
+    return f"did you mean {close}?" if close else f"known keys are {', '.join(known)}"
+
+
+def _range(field: Mapping[str, Any]) -> str:
+    low = f"[{field['minimum']}" if "minimum" in field else f"({field.get('exclusiveMinimum', '-inf')}"
+    high = f"{field['maximum']}]" if "maximum" in field else f"{field.get('exclusiveMaximum', 'inf')})"
+    return "" if (low, high) == ("(-inf", "inf)") else f"{low}, {high}"
+
+
+def _schema_at(schema: Mapping[str, Any], loc: tuple[str | int, ...]) -> Mapping[str, Any]:
+    """The part of a JSON schema that describes the place `loc`; empty where the schema branches on the value."""
+    here: Mapping[str, Any] = schema
+    for step in (*loc, None):
+        while "$ref" in here:
+            target = schema["$defs"][here["$ref"].rpartition("/")[2]]
+            here = {**target, **{key: value for key, value in here.items() if key != "$ref"}}
+        if step is None:
+            return here
+        if isinstance(step, int):
+            here = here.get("items", {})
+        else:
+            below = here.get("properties", {}).get(step, here.get("additionalProperties", {}))
+            here = below if isinstance(below, dict) else {}
+    return here

@@ -91,6 +91,6 @@ def read_shard(path: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
             content = tar.extractfile(entry)
             assert content is not None, entry.name
             members[member] = content.read()
-            tar.members = []  # tarfile keeps every header it has seen; memory stays flat without them
+            tar.members = []  # type: ignore[attr-defined]  # tarfile keeps every header it has seen; memory stays flat without them
     if key is not None:
         yield key, members

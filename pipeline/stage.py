@@ -1,13 +1,33 @@
 """What a stage is to the mill: a name, a config, a plan, and a pure function that makes one shard.
 
-A stage's `stage.py` holds one module-level `STAGE = Stage(...)`. The mill finds it by the stage's name, asks it
+A stage's `stage.py` holds one module-level `STAGE = Stage(...)`. The mill finds it by the folder's name, asks it
 for its plan, runs every planned shard that has no matching record, and asks again until nothing is missing (so
 a later part of a plan may depend on the records of an earlier part, as the rounds of a search do).
+
+The contract for who writes a stage:
+
+- `plan(plan) -> list[Shard]` runs in the parent, often; it is cheap, has no side effects and is a function of the
+  config and of finished records alone. Asked again after more records are there it may answer with more shards,
+  and keeps the shards it has named before. While a record that the rest of a plan depends on is missing
+  (`plan.summary` answers None), leave the rest out.
+- `run_shard(task) -> Outcome` runs in a worker. What it writes depends on `task.config`, `task.shard`, the files of
+  `task.shard.inputs` and `task.rng(...)`, and on nothing else: no clock, no global randomness, no order of a set.
+- A shard is made again when its fingerprint changes: stage name and version, the stage's own config section,
+  dataset name, version and seed, shard name and params, the fingerprints of its inputs. Whatever else its bytes
+  depend on goes into `params`: the sha256 of a mesh that it reads, the title that a card shows.
+- `task.config` and `plan.config` hold only the sections of the stage and of the stages it can read (its `inputs`,
+  and theirs), because a shard could not be made again for a change of any other.
+- Files of a shard are named `<shard>.<anything>`. They appear all at once when `run_shard` returns, or not at all.
+- Raise ShardFailed when the shard cannot be made now and may succeed later: it is tried again, twice by default.
+  ConfigError or Rejected set it aside at once. Any other exception counts as ShardFailed. An OSError that says
+  "disk full" or "no permission" is Fatal: everything stops. Do not catch those.
+- Import native libraries inside functions. One thread a worker: the environment is set for BLAS, OpenMP and
+  numba before Python starts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
@@ -70,7 +90,7 @@ class Task(Protocol):
         """A file that an input shard has committed. Raises ShardFailed if no input record lists it."""
 
     def output(self, file: str) -> BinaryIO:
-        """A stream to a new file of this shard, `file` being a bare name; committed with the shard, or not at all."""
+        """A stream to a new file of this shard, named `<shard>.<anything>`; committed with it, or not at all."""
 
     def reject(self, item: str, reason: str, detail: str = "", count: int = 1) -> None:
         """Record that `count` items were refused for `reason`; counted in the record, listed in rejects.jsonl."""
@@ -79,9 +99,23 @@ class Task(Protocol):
         """Tell the bar how far this shard is."""
 
 
+def _no_report(_: Plan) -> Sequence[str]:
+    return ()
+
+
+def _nothing_published(_: Plan) -> Mapping[str, str]:
+    return {}
+
+
 @dataclass(frozen=True)
 class Stage:
-    """One stage of the mill. `version` is part of every fingerprint: raise it when the stage's bytes change."""
+    """One stage of the mill. `version` is part of every fingerprint: raise it when the stage's bytes change.
+
+    `estimate_bytes` answers how much disk the whole stage will take at most about. `report`: lines about the
+    finished part of the stage, for people, shown after a run and by `status`. `publish`: asked when every shard
+    is done, which files stand in the output folder itself, `{path below OUT: file of a shard}`; the mill links
+    them there (or copies, where the disk has no links) and takes away what it published before and no more.
+    """
 
     name: str
     version: int
@@ -90,3 +124,5 @@ class Stage:
     plan: Callable[[Plan], list[Shard]]
     run_shard: Callable[[Task], Outcome]
     estimate_bytes: Callable[[Plan], int]
+    report: Callable[[Plan], Sequence[str]] = _no_report
+    publish: Callable[[Plan], Mapping[str, str]] = _nothing_published

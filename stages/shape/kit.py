@@ -105,10 +105,12 @@ class Grammar:
     """The tiling grammar (strings §3): what was seen around each type, and how pairs of types dock.
 
     neighbourhoods: for each type index the observed neighbour multisets with the number of parts that had each.
+    nested: for pairs of types (a <= b) the greatest depth at which parts lay within each other without contact.
     """
 
     neighbourhoods: Mapping[int, Mapping[Multiset, int]]
     dockings: tuple[Docking, ...]
+    nested: Mapping[tuple[int, int], float]
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,7 @@ class Kit:
     """Part types, exemplars and grammar.
 
     contact_tolerance: largest distance of two parts in contact, in the kit's units.
+    pose_tolerance: largest displacement of relative poses that are one docking, in the kit's units.
     up: the axis that points up in the exemplars' coordinates, `"y"` or `"z"`.
     """
 
@@ -133,6 +136,7 @@ class Kit:
     exemplars: tuple[Exemplar, ...]
     grammar: Grammar
     contact_tolerance: float
+    pose_tolerance: float
     up: Literal["y", "z"]
 
     def type_names(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         "kit": kit.name,
         "up": kit.up,
         "contact_tolerance": kit.contact_tolerance,
+        "pose_tolerance": kit.pose_tolerance,
         "types": [
             {
                 "name": each.name,
@@ -52,6 +53,7 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
             }
             for each in kit.grammar.dockings
         ],
+        "nested": [{"a": names[a], "b": names[b], "depth": depth} for (a, b), depth in kit.grammar.nested.items()],
     }
 
 
@@ -128,11 +130,13 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         )
         for each in described["dockings"]
     )
+    nested = {(index_of[each["a"]], index_of[each["b"]]): each["depth"] for each in described["nested"]}
     return Kit(
         name=described["kit"],
         types=tuple(types),
         exemplars=tuple(exemplars),
-        grammar=Grammar(neighbourhoods, dockings),
+        grammar=Grammar(neighbourhoods, dockings, nested),
         contact_tolerance=described["contact_tolerance"],
+        pose_tolerance=described["pose_tolerance"],
         up=described["up"],
     )

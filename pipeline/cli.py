@@ -1,0 +1,165 @@
+"""The command line: `python -m pipeline run|status|verify|inspect|doctor`.
+
+Exit codes: 0 all is well; 1 shards were set aside, or something that was checked is not as it should be; 2 nothing
+started, because of a mistake in the config or the command; 3 everything had to stop (disk full, no permission);
+130 stopped by Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import shutil
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipeline.config import Config, load_config, nearest
+from pipeline.errors import ConfigError, Fatal
+from pipeline.places import Places
+from pipeline.registry import find_stages
+from pipeline.stage import Stage
+
+__all__ = ["main"]
+
+app = typer.Typer(
+    name="pipeline",
+    help="The mill of Shapemill.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+_PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+
+DEFAULT_CONFIG = Path("configs/default.yaml")
+DEFAULT_OUT = Path("datasets")
+DEFAULT_WORKERS = os.cpu_count() or 1
+
+ConfigOption = Annotated[Path, typer.Option("--config", help="the dataset's YAML")]
+OutOption = Annotated[Path, typer.Option("--out", help="folder that datasets are made in")]
+WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="worker processes")]
+SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="instead of the config's seed")]
+
+
+@app.command()
+def run(
+    context: typer.Context,
+    stage: Annotated[str, typer.Argument(help="the stage to run")],
+    config: ConfigOption = DEFAULT_CONFIG,
+    out: OutOption = DEFAULT_OUT,
+    workers: WorkersOption = DEFAULT_WORKERS,
+    seed: SeedOption = None,
+    shards: Annotated[str, typer.Option(help="make part i of n, from 1, as one job of a job array: i/n")] = "1/1",
+    retries: Annotated[int, typer.Option(min=0, help="how often a shard that failed is tried again")] = 2,
+) -> None:
+    """Make what is missing of one stage."""
+    from pipeline.run import Slice, run_stage
+
+    part = Slice(*_slice(shards))
+    stages = find_stages(context.obj)
+    if stage not in stages:
+        close = nearest(stage, stages)
+        hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
+        raise ConfigError(f"there is no stage {stage}; {hint}")
+    loaded = _load(stages, config, seed)
+    result = run_stage(stage, stages, loaded, Places(out, loaded.name), workers, part, retries)
+    if result.failed:
+        print(f"{stage}: set aside: {', '.join(result.failed)}; run again to try them again", file=sys.stderr)
+        raise typer.Exit(1)
+
+
+@app.command()
+def status(
+    context: typer.Context,
+    config: ConfigOption = DEFAULT_CONFIG,
+    out: OutOption = DEFAULT_OUT,
+    workers: WorkersOption = DEFAULT_WORKERS,
+    seed: SeedOption = None,
+) -> None:
+    """Show for each stage what is done, failed, rejected and left, from the records."""
+    from pipeline.status import status_lines
+
+    stages = find_stages(context.obj)
+    loaded = _load(stages, config, seed)
+    for line in status_lines(loaded, stages, Places(out, loaded.name), workers):
+        print(line)
+
+
+@app.command(context_settings=_PASS_ON)
+def verify(
+    context: typer.Context, config: ConfigOption = DEFAULT_CONFIG, out: OutOption = DEFAULT_OUT, seed: SeedOption = None
+) -> None:
+    """Check every byte against the records, then the finished dataset from its meshes."""
+    from pipeline.check import damaged_shards
+
+    stages = find_stages(context.obj)
+    loaded = _load(stages, config, seed)
+    damages = list(damaged_shards(loaded, stages, Places(out, loaded.name)))
+    for line in damages:
+        print(line)
+    arguments = ["--config", str(config), "--out", str(out), *context.args]
+    if seed is not None:
+        arguments += ["--seed", str(seed)]
+    code = _entry(context, "package.verify")(arguments)
+    raise typer.Exit(code or int(bool(damages)))
+
+
+@app.command(context_settings=_PASS_ON)
+def inspect(context: typer.Context) -> None:
+    """Show what Shapemill sees in a mesh: parts, types, contacts, grammar, warnings, a picture."""
+    raise typer.Exit(_entry(context, "exemplars.inspect")(context.args))
+
+
+@app.command()
+def doctor(out: OutOption = DEFAULT_OUT) -> None:
+    """Try everything that Shapemill needs on this machine, and say how to mend what fails."""
+    from pipeline.doctor import examine
+
+    raise typer.Exit(examine(out))
+
+
+@app.command()
+def clean(context: typer.Context, config: ConfigOption = DEFAULT_CONFIG, out: OutOption = DEFAULT_OUT) -> None:
+    """Remove the work folder of a dataset: records and shards, not the finished dataset."""
+    loaded = _load(find_stages(context.obj), config, None)
+    work = Places(out, loaded.name).work
+    if work.is_dir():
+        shutil.rmtree(work)
+    print(f"removed {work}")
+
+
+def _slice(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)/(\d+)", text)
+    index, count = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not 1 <= index <= count:
+        raise ConfigError(f"--shards {text}: must be i/n with 1 <= i <= n, such as 2/8")
+    return index, count
+
+
+def _load(stages: Mapping[str, Stage], config: Path, seed: int | None) -> Config:
+    overrides = {} if seed is None else {"seed": seed}
+    return load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
+
+
+def _entry(context: typer.Context, module: str) -> Callable[[list[str]], int]:
+    # By name: the mill imports no stage, and finds this as it finds their STAGE.
+    entry: Callable[[list[str]], int] = importlib.import_module(f"{context.obj}.{module}").main
+    return entry
+
+
+def main(package: str = "stages") -> None:
+    """Run the command line on the stages of a package, and exit with its code."""
+    try:
+        app(obj=package)
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
+    except Fatal as error:
+        print(f"stopped: {error}\nwhat is done is kept; run again to go on", file=sys.stderr)
+        sys.exit(3)

@@ -1,0 +1,139 @@
+"""Where things lie on disk, and how a file gets there whole.
+
+    OUT/.work/<dataset>/log.txt                    what the mill did, by the minute
+    OUT/.work/<dataset>/workers.txt                what workers and native libraries printed
+    OUT/.work/<dataset>/<stage>/<shard>.<...>      the files of finished shards
+    OUT/.work/<dataset>/<stage>/records/           one record a finished shard
+    OUT/.work/<dataset>/<stage>/rejects/           refused items, one JSON line each
+    OUT/.work/<dataset>/<stage>/failed/            shards set aside, with their tracebacks
+    OUT/.work/<dataset>/<stage>/progress/          how far running shards are
+    OUT/.work/<dataset>/<stage>/mill/              manifest.json (written last: all shards of the finished stage with
+                                                   their fingerprints), published.json (the files that it has put in
+                                                   OUT itself), locks
+
+A file that begins with a dot and ends in `.tmp` is being written; every other file is whole.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.errors import Fatal
+
+__all__ = ["Places", "StagePlaces", "file_digest", "stops_everything", "sync_folder", "temporary", "write_whole"]
+
+_FATAL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM}
+
+
+@dataclass(frozen=True)
+class StagePlaces:
+    """The folders of one stage."""
+
+    root: Path
+
+    @property
+    def records(self) -> Path:
+        return self.root / "records"
+
+    @property
+    def rejects(self) -> Path:
+        return self.root / "rejects"
+
+    @property
+    def failed(self) -> Path:
+        return self.root / "failed"
+
+    @property
+    def progress(self) -> Path:
+        return self.root / "progress"
+
+    @property
+    def mill(self) -> Path:
+        return self.root / "mill"
+
+    @property
+    def manifest(self) -> Path:
+        return self.mill / "manifest.json"
+
+    @property
+    def published(self) -> Path:
+        return self.mill / "published.json"
+
+    def make(self) -> None:
+        """Make the folders. Raises Fatal when the disk does not let us."""
+        try:
+            for folder in (self.records, self.rejects, self.failed, self.progress, self.mill):
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise Fatal(f"cannot make folders under {self.root}: {error.strerror}") from error
+
+
+@dataclass(frozen=True)
+class Places:
+    """The folders of one dataset under an output folder."""
+
+    out: Path
+    dataset: str
+
+    @property
+    def work(self) -> Path:
+        return self.out / ".work" / self.dataset
+
+    @property
+    def log(self) -> Path:
+        return self.work / "log.txt"
+
+    @property
+    def worker_output(self) -> Path:
+        return self.work / "workers.txt"
+
+    def stage(self, name: str) -> StagePlaces:
+        return StagePlaces(self.work / name)
+
+
+def temporary(path: Path) -> Path:
+    """Where `path` is written before it is whole: beside it, so that the rename is atomic."""
+    return path.with_name(f".{path.name}.tmp")
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring renames in `folder` to the disk."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a small file so that it is there whole or not at all, after a power cut too."""
+    beside = temporary(path)
+    try:
+        with open(beside, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(beside, path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def file_digest(path: Path) -> str:
+    """The sha256 of a file's bytes, in hex."""
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def stops_everything(error: BaseException | None) -> OSError | None:
+    """The error in the chain of causes of `error` that no other shard would survive either: disk full, no right."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _FATAL:
+            return error
+        error = error.__cause__ or error.__context__
+    return None

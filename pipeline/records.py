@@ -1,0 +1,77 @@
+"""Records: what the mill knows of a finished shard. A shard is done when its record matches, and nothing else."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.places import StagePlaces
+from pipeline.shards import json_bytes
+from pipeline.stage import Shard, Stage
+
+__all__ = ["ShardRecord", "fingerprint", "read_record"]
+
+
+@dataclass(frozen=True)
+class ShardRecord:
+    """One finished shard.
+
+    files: `{file: {"sha256", "bytes"}}`; rejects: refused items by reason; seconds: time that the shard took;
+    peak_bytes: the largest memory that its worker had held until then; summary: the stage's own facts.
+    """
+
+    stage: str
+    shard: str
+    fingerprint: str
+    files: Mapping[str, Mapping[str, Any]]
+    samples: int
+    rejects: Mapping[str, int]
+    seconds: float
+    peak_bytes: int
+    summary: Mapping[str, Any]
+
+    def to_bytes(self) -> bytes:
+        """The record as one line of JSON."""
+        return json_bytes(asdict(self))
+
+    def bytes_on_disk(self) -> int:
+        """Bytes of all its files."""
+        return sum(int(each["bytes"]) for each in self.files.values())
+
+    def is_whole(self, places: StagePlaces) -> bool:
+        """Whether all its files are there with the recorded size (`make verify` reads the bytes as well)."""
+        try:
+            return all((places.root / name).stat().st_size == each["bytes"] for name, each in self.files.items())
+        except FileNotFoundError:
+            return False
+
+
+def read_record(path: Path) -> ShardRecord | None:
+    """The record in a file, or None if there is none, or none that this version of the mill wrote."""
+    try:
+        return ShardRecord(**json.loads(path.read_bytes()))
+    except (FileNotFoundError, ValueError, TypeError):
+        return None
+
+
+def fingerprint(
+    stage: Stage, section: Mapping[str, Any], dataset: tuple[str, str, int], shard: Shard, inputs: Mapping[str, str]
+) -> str:
+    """The sha256 over all that a shard's bytes depend on.
+
+    `section` is the stage's config as JSON, `dataset` name, version and seed, `inputs` the fingerprint of each
+    record that the shard reads. What else the bytes depend on (the bytes of a mesh, the title on a card) the
+    stage puts in the shard's `params`.
+    """
+    described = {
+        "stage": [stage.name, stage.version],
+        "config": section,
+        "dataset": dataset,
+        "shard": [shard.name, dict(shard.params)],
+        "inputs": dict(inputs),
+    }
+    return hashlib.sha256(json_bytes(described)).hexdigest()

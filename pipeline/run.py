@@ -1,0 +1,269 @@
+"""Running a stage: every planned shard without a matching record is made, until the plan has no more to ask."""
+
+from __future__ import annotations
+
+import fcntl
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from pipeline.config import Config
+from pipeline.errors import ConfigError, Fatal
+from pipeline.finish import finish_stage
+from pipeline.journal import Journal, span
+from pipeline.places import Places, StagePlaces, stops_everything, write_whole
+from pipeline.registry import upstream
+from pipeline.shards import json_bytes
+from pipeline.space import check_space
+from pipeline.stage import Shard, Stage
+from pipeline.survey import StageSurvey, Survey
+from pipeline.task import Job, Report
+from pipeline.workers import DIED, Workers
+
+__all__ = ["WHOLE", "RunResult", "Slice", "run_stage"]
+
+_DEATHS_BEFORE_ALONE = 3
+_LOOK_EVERY = 0.5
+"""Seconds between two looks at how far the running shards are."""
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Part `index` of `count` of every plan, from 1: what one job of a job array makes."""
+
+    index: int = 1
+    count: int = 1
+
+    def __contains__(self, position: object) -> bool:
+        return isinstance(position, int) and position % self.count == self.index - 1
+
+
+WHOLE = Slice()
+
+
+@dataclass
+class RunResult:
+    """How a run ended: shards made now, shards set aside and why, shards left to the other slices."""
+
+    made: int = 0
+    failed: dict[str, str] = field(default_factory=dict)
+    left: int = 0
+
+
+def run_stage(
+    name: str,
+    stages: Mapping[str, Stage],
+    config: Config,
+    places: Places,
+    workers: int,
+    part: Slice = WHOLE,
+    retries: int = 2,
+) -> RunResult:
+    """Make all shards of stage `name` that have no matching record; the stages that it reads must be finished.
+
+    A shard that raises is tried again `retries` times, then set aside; one that has killed its worker three times
+    is run once more with nothing beside it, then set aside. The rest goes on.
+
+    Raises ConfigError when nothing can start (an earlier stage is unfinished, the disk is too small, another run
+    is at work here) and Fatal when everything had to stop; whole files and their records are left, and the next
+    run goes on from there.
+    """
+    own = places.stage(name)
+    own.make()
+    journal = Journal(name, places.log)
+    try:
+        with _locked(own, part) as lock:
+            return _Run(name, stages, config, places, part, retries, journal).through(workers, lock)
+    except OSError as error:
+        if stops_everything(error) is None:
+            raise
+        raise Fatal(f"{error.strerror}: {error.filename or own.root}") from error
+    finally:
+        journal.close()
+
+
+@contextmanager
+def _locked(own: StagePlaces, part: Slice) -> Iterator[BinaryIO]:
+    """One run at a time: a whole run excludes every other, a slice the same slice and whole runs."""
+    with open(own.mill / "lock", "ab") as whole, open(own.mill / f"lock-{part.index}-{part.count}", "ab") as slot:
+        try:
+            fcntl.flock(whole, fcntl.LOCK_NB | (fcntl.LOCK_EX if part.count == 1 else fcntl.LOCK_SH))
+            fcntl.flock(slot, fcntl.LOCK_NB | fcntl.LOCK_EX)
+        except BlockingIOError as error:
+            raise ConfigError(f"another run is at work in {own.root}: wait for it, or end it") from error
+        yield whole
+
+
+class _Run:
+    def __init__(
+        self,
+        name: str,
+        stages: Mapping[str, Stage],
+        config: Config,
+        places: Places,
+        part: Slice,
+        retries: int,
+        journal: Journal,
+    ) -> None:
+        self._name = name
+        self._stages = stages
+        self._places = places
+        self._part = part
+        self._tries = retries + 1
+        self._journal = journal
+        self._survey = Survey(config, stages, places)
+        self._result = RunResult()
+        self._failures: Counter[str] = Counter()
+        self._deaths: Counter[str] = Counter()
+
+    def through(self, count: int, lock: BinaryIO) -> RunResult:
+        """Make what is missing with `count` workers, then finish the stage if it is complete."""
+        self._check_upstream()
+        surveyed = self._survey.stage(self._name)
+        self._take_away(surveyed, surveyed.places.failed, "*")
+        self._take_away_unfinished(surveyed)
+        if surveyed.missing:
+            surveyed.places.manifest.unlink(missing_ok=True)
+            self._journal.note(check_space(surveyed, self._places.out))
+            self._make_missing(surveyed, count)
+        if not surveyed.missing:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            finish_stage(self._survey, self._name, self._places)
+        self._close(surveyed)
+        return self._result
+
+    def _check_upstream(self) -> None:
+        for each in upstream(self._stages, self._name):
+            missing = [] if each == self._name else self._survey.stage(each).missing
+            if missing:
+                planned = len(self._survey.stage(each).shards)
+                raise ConfigError(
+                    f"{self._name} reads {each}, and {len(missing)} of its {planned} shards are not made "
+                    f"(the first is {missing[0].name}): run stage {each} first"
+                )
+
+    def _take_away_unfinished(self, surveyed: StageSurvey) -> None:
+        """Take away what this part left half written; a worker that was killed could not do it."""
+        for folder in (surveyed.places.root, surveyed.places.rejects, surveyed.places.records):
+            self._take_away(surveyed, folder, ".*.tmp")
+        self._take_away(surveyed, surveyed.places.progress, "*")
+
+    def _take_away(self, surveyed: StageSurvey, folder: Path, pattern: str) -> None:
+        mine = {shard.name for index, shard in enumerate(surveyed.shards) if index in self._part}
+        for path in folder.glob(pattern):
+            if self._part == WHOLE or path.name.lstrip(".").partition(".")[0] in mine:
+                path.unlink(missing_ok=True)
+
+    def _mine(self, surveyed: StageSurvey) -> list[Shard]:
+        done, failed = surveyed.records, self._result.failed
+        return [
+            shard
+            for index, shard in enumerate(surveyed.shards)
+            if index in self._part and shard.name not in done and shard.name not in failed
+        ]
+
+    def _make_missing(self, surveyed: StageSurvey, count: int) -> None:
+        workers = Workers(count, self._places.worker_output)
+        try:
+            while True:
+                ready = deque(self._job(surveyed, shard) for shard in self._mine(surveyed) if surveyed.ready(shard))
+                if not ready:
+                    break
+                self._make(workers, ready, surveyed)
+                self._survey.refresh(self._name)
+            workers.stop(kill=False)
+        except BaseException as error:
+            workers.stop(kill=True)
+            self._take_away_unfinished(surveyed)
+            self._journal.note(f"stopped: {type(error).__name__}: {error}")
+            raise
+
+    def _job(self, surveyed: StageSurvey, shard: Shard) -> Job:
+        stage = surveyed.stage
+        return Job(stage.name, stage.run_shard, shard, surveyed.config, self._places, surveyed.fingerprints[shard.name])
+
+    def _make(self, workers: Workers, ready: deque[Job], surveyed: StageSurvey) -> None:
+        """Make the `ready` shards, each until it is done or set aside."""
+        alone: deque[Job] = deque()
+        while ready or alone or workers.jobs:
+            while ready and workers.idle:
+                workers.submit(ready.popleft())
+            if alone and not workers.jobs:
+                workers.submit(alone.popleft())
+            for job, report in workers.finished(_LOOK_EVERY):
+                if report is None:
+                    self._count_death(job, ready, alone)
+                elif report.status == "done":
+                    self._result.made += 1
+                    self._survey.accept(self._name, job.shard.name)
+                else:
+                    self._count_failure(job, report, ready)
+            self._show(surveyed, workers)
+
+    def _count_death(self, job: Job, ready: deque[Job], alone: deque[Job]) -> None:
+        self._deaths[job.shard.name] += 1
+        deaths = self._deaths[job.shard.name]
+        self._journal.note(f"{job.shard.name}: {DIED}, time {deaths}")
+        if deaths < _DEATHS_BEFORE_ALONE:
+            ready.append(job)
+        elif deaths == _DEATHS_BEFORE_ALONE:
+            alone.append(job)
+        else:
+            self._set_aside(job, Report(job.shard.name, "failed", f"{DIED}, {deaths} times, at last alone"))
+
+    def _count_failure(self, job: Job, report: Report, ready: deque[Job]) -> None:
+        if report.status == "fatal":
+            self._journal.note(report.trace)
+            raise Fatal(f"shard {job.shard.name} of {self._name}: {report.message}")
+        self._failures[job.shard.name] += 1
+        if report.status == "failed" and self._failures[job.shard.name] < self._tries:
+            self._journal.note(f"{job.shard.name} failed and is tried again: {report.message}\n{report.trace}")
+            ready.append(job)
+        else:
+            self._set_aside(job, report)
+
+    def _set_aside(self, job: Job, report: Report) -> None:
+        name = job.shard.name
+        self._result.failed[name] = report.message
+        self._journal.say(f"shard {name} is set aside: {report.message}")
+        self._journal.note(report.trace)
+        described = {"fingerprint": job.fingerprint, "message": report.message, "trace": report.trace}
+        write_whole(self._places.stage(self._name).failed / f"{name}.json", json_bytes(described))
+
+    def _show(self, surveyed: StageSurvey, workers: Workers) -> None:
+        records = surveyed.records.values()
+        underway = sum(_how_far(surveyed.places, job.shard.name) for job in workers.jobs)
+        self._journal.show(
+            len(records) + underway,
+            len(surveyed.shards),
+            sum(record.samples for record in records),
+            sum(sum(record.rejects.values()) for record in records),
+            len(self._result.failed),
+        )
+
+    def _close(self, surveyed: StageSurvey) -> None:
+        result, planned = self._result, len(surveyed.shards)
+        result.left = len(surveyed.missing) - len(result.failed)
+        seconds = sum(record.seconds for record in surveyed.records.values())
+        samples = sum(record.samples for record in surveyed.records.values())
+        text = f"{len(surveyed.records)} of {planned} shards, {samples:,} samples"
+        text += f", {result.made} made now" if result.made else ", nothing to make"
+        text += f" ({span(seconds)} of worker time in all)"
+        if result.failed:
+            text += f"; {len(result.failed)} set aside: {', '.join(result.failed)}"
+        if result.left:
+            text += f"; {result.left} not made"
+        self._journal.say(text)
+        for line in surveyed.stage.report(surveyed.view):
+            self._journal.say(line)
+
+
+def _how_far(places: StagePlaces, shard: str) -> float:
+    try:
+        done, total = (places.progress / shard).read_text().split()
+        return min(int(done) / int(total), 1.0)
+    except (FileNotFoundError, ValueError, ZeroDivisionError):
+        return 0.0

@@ -1,0 +1,36 @@
+"""Disk space: asked for before the start, so that a long run does not end on a full disk."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from pipeline.errors import ConfigError
+from pipeline.survey import StageSurvey
+
+__all__ = ["byte_size", "check_space"]
+
+
+def byte_size(count: float) -> str:
+    """A number of bytes for people: `512 B`, `3.4 GB` (powers of 1000)."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
+        count /= 1000
+    return f"{count:.1f} TB"
+
+
+def check_space(surveyed: StageSurvey, out: Path) -> str:
+    """What the stage still needs on disk, as a sentence. Raises ConfigError when `out` has less than that free."""
+    estimate = surveyed.stage.estimate_bytes(surveyed.view)
+    needed = max(0, estimate - sum(record.bytes_on_disk() for record in surveyed.records.values()))
+    samples = sum(int(shard.params.get("samples", 0)) for shard in surveyed.shards)
+    each = f", {byte_size(estimate / samples)} a sample" if samples else ""
+    free = shutil.disk_usage(out).free
+    sentence = f"needs about {byte_size(needed)} more ({byte_size(estimate)} in all{each})"
+    if needed > free:
+        raise ConfigError(
+            f"{out}: stage {surveyed.stage.name} {sentence}, and {byte_size(free)} are free: "
+            "free some space, choose another OUT, or ask for less in the config"
+        )
+    return sentence

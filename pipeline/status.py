@@ -1,0 +1,80 @@
+"""How far a dataset is and what failed, from the plans and the records alone."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+from pipeline.config import Config
+from pipeline.journal import span
+from pipeline.places import Places
+from pipeline.space import byte_size
+from pipeline.stage import Stage
+from pipeline.survey import StageSurvey, Survey
+
+__all__ = ["status_lines"]
+
+_HEADER = ("stage", "done", "failed", "samples", "rejects", "time", "left", "memory", "disk")
+
+
+def status_lines(config: Config, stages: Mapping[str, Stage], places: Places, workers: int) -> Iterator[str]:
+    """A table with a row for each stage, then its rejects by reason, its own report and the shards set aside.
+
+    `time` is worker time; `left` is for `workers` workers, from the mean of the finished shards; `memory` is the
+    largest that any worker of the stage has held.
+    """
+    survey = Survey(config, stages, places)
+    rows: list[tuple[str, ...]] = [_HEADER]
+    notes: list[str] = []
+    for name, stage in stages.items():
+        unfinished = [each for each in stage.inputs if not survey.complete(each)]
+        if unfinished:
+            rows.append((name, f"waits for {unfinished[0]}", *[""] * 7))
+            continue
+        surveyed = survey.stage(name)
+        failures = _failures(surveyed)
+        rejects = sum((Counter(record.rejects) for record in surveyed.records.values()), Counter[str]())
+        rows.append(_row(surveyed, len(failures), sum(rejects.values()), workers))
+        notes += [f"{name}: {line}" for line in stage.report(surveyed.view)]
+        notes += [f"{name}: {count:,} rejected: {reason}" for reason, count in rejects.most_common()]
+        notes += [f"{name}: {shard} is set aside: {message}" for shard, message in failures.items()]
+    # A long cell that ends its row (a stage that waits) may run over the columns after it.
+    widths = [max(len(row[column]) for row in rows if row[column + 1 :] != ("",) * 7) for column in range(len(_HEADER))]
+    for row in rows:
+        cells = [
+            cell.ljust(width) if not column else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        yield "  ".join(cells).rstrip()
+    yield from notes
+
+
+def _row(surveyed: StageSurvey, failed: int, rejects: int, workers: int) -> tuple[str, ...]:
+    records = surveyed.records.values()
+    seconds = sum(record.seconds for record in records)
+    left = seconds / len(records) * len(surveyed.missing) / workers if records else 0.0
+    unknown = bool(surveyed.missing) and not records
+    return (
+        surveyed.stage.name,
+        f"{len(records)}/{len(surveyed.shards)}",
+        str(failed),
+        f"{sum(record.samples for record in records):,}",
+        f"{rejects:,}",
+        span(seconds),
+        "?" if unknown else span(left),
+        byte_size(max((record.peak_bytes for record in records), default=0)),
+        byte_size(sum(record.bytes_on_disk() for record in records)),
+    )
+
+
+def _failures(surveyed: StageSurvey) -> dict[str, str]:
+    """The message of each shard that was set aside and has not been made since."""
+    failures = {}
+    for shard in surveyed.missing:
+        path = surveyed.places.failed / f"{shard.name}.json"
+        if path.is_file():
+            noted = json.loads(path.read_bytes())
+            if noted["fingerprint"] == surveyed.fingerprints[shard.name]:
+                failures[shard.name] = noted["message"]
+    return failures

@@ -1,0 +1,138 @@
+"""What is planned and what is done, read from the config and the records alone. Nothing here writes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pipeline.config import Config
+from pipeline.places import Places, StagePlaces
+from pipeline.records import ShardRecord, fingerprint, read_record
+from pipeline.registry import upstream
+from pipeline.stage import Plan, Shard, Stage
+
+__all__ = ["StageSurvey", "Survey"]
+
+_SHARD_NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@dataclass
+class StageSurvey:
+    """One stage: its plan as far as it is known, the fingerprint of each shard, the records that match."""
+
+    stage: Stage
+    config: Config
+    places: StagePlaces
+    view: Plan
+    shards: list[Shard] = field(default_factory=list)
+    fingerprints: dict[str, str] = field(default_factory=dict)
+    records: dict[str, ShardRecord] = field(default_factory=dict)
+
+    @property
+    def missing(self) -> list[Shard]:
+        """Planned shards without a matching record, in plan order."""
+        return [shard for shard in self.shards if shard.name not in self.records]
+
+    def ready(self, shard: Shard) -> bool:
+        """Whether what `shard` reads of its own stage is done."""
+        own = f"{self.stage.name}/"
+        return all(each.removeprefix(own) in self.records for each in shard.inputs if each.startswith(own))
+
+
+class Survey:
+    """Plans and records of the stages of a dataset, each read when first asked for."""
+
+    def __init__(self, config: Config, stages: Mapping[str, Stage], places: Places) -> None:
+        self.config = config
+        self._stages = stages
+        self._places = places
+        self._surveyed: dict[str, StageSurvey] = {}
+
+    def stage(self, name: str) -> StageSurvey:
+        """What is known of stage `name`."""
+        if name not in self._surveyed:
+            reads = upstream(self._stages, name)
+            config = self.config.only(reads)
+            view = _View(self, name, config, frozenset(reads))
+            self._surveyed[name] = StageSurvey(self._stages[name], config, self._places.stage(name), view)
+            self.refresh(name)
+        return self._surveyed[name]
+
+    def refresh(self, name: str) -> StageSurvey:
+        """Ask the plan of stage `name` and read its records, again and again until neither brings news.
+
+        Raises ValueError for a plan that breaks its contract.
+        """
+        surveyed = self._surveyed[name]
+        section = surveyed.config.sections[name].model_dump(mode="json")
+        dataset = (self.config.name, self.config.version, self.config.seed)
+        while True:
+            surveyed.shards = surveyed.stage.plan(surveyed.view)
+            known: dict[str, str] = {}
+            for shard in surveyed.shards:
+                if not _SHARD_NAME.fullmatch(shard.name) or shard.name in known:
+                    raise ValueError(f"plan of {name}: shard name {shard.name!r} is malformed or stands twice")
+                inputs = {each: self._input_fingerprint(name, known, shard, each) for each in shard.inputs}
+                known[shard.name] = fingerprint(surveyed.stage, section, dataset, shard, inputs)
+            surveyed.fingerprints = known
+            news = self._read_records(surveyed)
+            if not news:
+                return surveyed
+
+    def accept(self, name: str, shard: str) -> None:
+        """Take in the record of a shard that was made just now."""
+        surveyed = self._surveyed[name]
+        record = read_record(surveyed.places.records / f"{shard}.json")
+        if record is not None and record.fingerprint == surveyed.fingerprints[shard]:
+            surveyed.records[shard] = record
+
+    def complete(self, name: str) -> bool:
+        """Whether stage `name` and every stage it reads is done."""
+        return all(not self.stage(each).missing for each in upstream(self._stages, name))
+
+    def _input_fingerprint(self, name: str, known: Mapping[str, str], shard: Shard, wanted: str) -> str:
+        stage, _, other = wanted.partition("/")
+        if stage != name and stage not in self._surveyed[name].config.sections:
+            raise ValueError(f"plan of {name}: shard {shard.name} reads {wanted}, but {stage} is no input of {name}")
+        fingerprints = known if stage == name else self.stage(stage).fingerprints
+        if other not in fingerprints:
+            raise ValueError(f"plan of {name}: shard {shard.name} reads {wanted}, which is not planned before it")
+        return fingerprints[other]
+
+    @staticmethod
+    def _read_records(surveyed: StageSurvey) -> bool:
+        before = set(surveyed.records)
+        matching: dict[str, ShardRecord] = {}
+        for name, wanted in surveyed.fingerprints.items():
+            record = surveyed.records.get(name)
+            if record is None or record.fingerprint != wanted:
+                record = read_record(surveyed.places.records / f"{name}.json")
+            if record is not None and record.fingerprint == wanted and record.is_whole(surveyed.places):
+                matching[name] = record
+        surveyed.records = matching
+        return set(matching) != before
+
+
+class _View:
+    """The Plan that a stage's functions see."""
+
+    def __init__(self, survey: Survey, name: str, config: Config, reads: frozenset[str]) -> None:
+        self._survey = survey
+        self._name = name
+        self._reads = reads
+        self.config = config
+
+    def _stage(self, stage: str) -> StageSurvey:
+        if stage not in self._reads:
+            raise ValueError(f"plan of {self._name} looks at stage {stage}, which is not among its inputs")
+        # Its own survey is under way while the plan is asked; what is known so far is what the plan may know.
+        return self._survey._surveyed[stage] if stage == self._name else self._survey.stage(stage)
+
+    def shards(self, stage: str) -> list[str]:
+        return [shard.name for shard in self._stage(stage).shards]
+
+    def summary(self, stage: str, shard: str) -> Mapping[str, Any] | None:
+        record = self._stage(stage).records.get(shard)
+        return None if record is None else record.summary

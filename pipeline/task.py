@@ -1,0 +1,191 @@
+"""One shard inside a worker: its inputs, its randomness, its files, and the commit that makes them count."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, Literal
+
+import numpy as np
+
+from pipeline.config import Config
+from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
+from pipeline.places import Places, StagePlaces, file_digest, stops_everything, sync_folder, temporary, write_whole
+from pipeline.randomness import decision_rng
+from pipeline.records import ShardRecord, read_record
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Shard, Task
+
+__all__ = ["Job", "Report", "make_shard"]
+
+_PROGRESS_EVERY = 0.5
+"""Seconds between two notes on how far a shard is."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a worker must know to make one shard; small, because it is sent to another process."""
+
+    stage: str
+    run_shard: Callable[[Task], Outcome]
+    shard: Shard
+    config: Config
+    places: Places
+    fingerprint: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """How a shard ended.
+
+    done: committed; failed: may be tried again; refused: would fail again; fatal: nothing else may start.
+    """
+
+    shard: str
+    status: Literal["done", "failed", "refused", "fatal"]
+    message: str = ""
+    trace: str = ""
+
+
+def make_shard(job: Job) -> Report:
+    """Make and commit one shard. Never raises: an exception becomes the status of the report."""
+    task = _ShardTask(job)
+    try:
+        outcome = job.run_shard(task)
+        task.commit(outcome)
+        return Report(job.shard.name, "done")
+    except BaseException as error:
+        task.withdraw()
+        trace = traceback.format_exc()
+        culprit = stops_everything(error)
+        if culprit is not None:
+            return Report(job.shard.name, "fatal", str(culprit), trace)
+        if isinstance(error, Fatal):
+            return Report(job.shard.name, "fatal", str(error), trace)
+        if isinstance(error, ConfigError | Rejected):
+            return Report(job.shard.name, "refused", str(error), trace)
+        message = str(error) if isinstance(error, ShardFailed) else f"{type(error).__name__}: {error}"
+        return Report(job.shard.name, "failed", message, trace)
+
+
+class _ShardTask:
+    """The Task that `run_shard` sees."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._places: StagePlaces = job.places.stage(job.stage)
+        self._streams: dict[str, BinaryIO] = {}
+        self._rejects: Counter[str] = Counter()
+        self._reject_stream: BinaryIO | None = None
+        self._start = time.perf_counter()
+        self._noted = 0.0
+
+    @property
+    def shard(self) -> Shard:
+        return self._job.shard
+
+    @property
+    def config(self) -> Config:
+        return self._job.config
+
+    def rng(self, *decision: str | int) -> np.random.Generator:
+        return decision_rng(self.config.seed, self._job.stage, self.shard.name, *decision)
+
+    def input(self, stage: str, file: str) -> Path:
+        source = f"{stage}/{file.partition('.')[0]}"
+        path = self._job.places.stage(stage).root / file
+        if source not in self.shard.inputs:
+            raise ShardFailed(f"{stage}/{self.shard.name} reads {file}, but {source} is not among its inputs")
+        if not path.is_file():
+            raise ShardFailed(f"{source} has no file {file}")
+        return path
+
+    def output(self, file: str) -> BinaryIO:
+        if "/" in file or not file.startswith(f"{self.shard.name}."):
+            raise ValueError(f"file {file!r} of shard {self.shard.name} must be named {self.shard.name}.<anything>")
+        if file in self._streams:
+            raise ValueError(f"file {file!r} is opened twice")
+        self._streams[file] = open(temporary(self._places.root / file), "wb")
+        return self._streams[file]
+
+    def reject(self, item: str, reason: str, detail: str = "", count: int = 1) -> None:
+        if self._reject_stream is None:
+            self._reject_stream = open(temporary(self._reject_path), "wb")
+        refused = {"item": item, "reason": reason, "detail": detail, "count": count}
+        self._reject_stream.write(json_bytes(refused))
+        self._rejects[reason] += count
+
+    def progress(self, done: int, total: int) -> None:
+        now = time.perf_counter()
+        if now - self._noted >= _PROGRESS_EVERY:
+            self._noted = now
+            (self._places.progress / self.shard.name).write_text(f"{done} {total}")
+
+    @property
+    def _reject_path(self) -> Path:
+        return self._places.rejects / f"{self.shard.name}.jsonl"
+
+    def commit(self, outcome: Outcome) -> None:
+        """Bring the files to disk under their names, then the record that makes them count."""
+        record_path = self._places.records / f"{self.shard.name}.json"
+        old = read_record(record_path)
+        files = {name: self._finish(stream, self._places.root / name) for name, stream in self._streams.items()}
+        if self._reject_stream is not None:
+            self._finish(self._reject_stream, self._reject_path)
+        record = ShardRecord(
+            stage=self._job.stage,
+            shard=self.shard.name,
+            fingerprint=self._job.fingerprint,
+            files=files,
+            samples=outcome.samples,
+            rejects=dict(self._rejects),
+            seconds=round(time.perf_counter() - self._start, 3),
+            peak_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+            summary=dict(outcome.summary),
+        )
+        content = record.to_bytes()
+        # The old record goes first: killed between two renames, the shard must not look like the old one.
+        record_path.unlink(missing_ok=True)
+        sync_folder(self._places.records)
+        for name in files:
+            os.replace(temporary(self._places.root / name), self._places.root / name)
+        if self._reject_stream is not None:
+            os.replace(temporary(self._reject_path), self._reject_path)
+        else:
+            self._reject_path.unlink(missing_ok=True)
+        for name in old.files if old else ():
+            if name not in files:
+                (self._places.root / name).unlink(missing_ok=True)
+        sync_folder(self._places.root)
+        write_whole(record_path, content)
+        self._forget_progress()
+
+    def withdraw(self) -> None:
+        """Take away what is not committed."""
+        streams = {self._places.root / name: stream for name, stream in self._streams.items()}
+        if self._reject_stream is not None:
+            streams[self._reject_path] = self._reject_stream
+        for path, stream in streams.items():
+            temporary(path).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # closing flushes, which fails again on a full disk
+                stream.close()
+        self._forget_progress()
+
+    def _forget_progress(self) -> None:
+        (self._places.progress / self.shard.name).unlink(missing_ok=True)
+
+    @staticmethod
+    def _finish(stream: BinaryIO, path: Path) -> dict[str, str | int]:
+        if not stream.closed:
+            stream.close()
+        beside = temporary(path)
+        with open(beside, "rb+") as written:
+            os.fsync(written.fileno())
+        return {"sha256": file_digest(beside), "bytes": beside.stat().st_size}

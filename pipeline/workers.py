@@ -1,0 +1,126 @@
+"""Workers: each is a loky executor of one process, so that a death has one culprit and harms no other shard.
+
+One executor with many processes would break as a whole when one of them dies, and could not say which shard it
+was that killed it. Native libraries do kill (a segmentation fault, memory), so even one worker is a process of
+its own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import os
+import signal
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from pathlib import Path
+
+from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor, TerminatedWorkerError
+
+from pipeline.task import Job, Report, make_shard
+
+__all__ = ["DIED", "Workers"]
+
+DIED = "its worker process died (out of memory, or a crash in a native library)"
+
+_RECYCLED_AFTER = 64
+"""Shards that a worker makes before a fresh process takes its place: native libraries leak."""
+
+_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMEXPR_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
+    "PYTHONHASHSEED": "0",
+}
+
+_PR_SET_PDEATHSIG = 1
+
+
+def _start_worker(parent: int, output: Path) -> None:
+    """Runs first in each worker: dies with its parent, leaves Ctrl-C to it, prints into a file of the dataset."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)  # the parent died before it could be watched
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    except OSError:
+        return  # a full disk is found, and named, by the first shard that writes
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    os.close(descriptor)
+    faulthandler.enable()
+
+
+class _Worker:
+    def __init__(self, output: Path) -> None:
+        self._output = output
+        self._executor: ProcessPoolExecutor | None = None
+        self._made = 0
+
+    def submit(self, job: Job) -> Future[Report]:
+        if self._executor is not None and self._made >= _RECYCLED_AFTER:
+            self.stop(kill=False)
+        if self._executor is None:
+            self._made = 0
+            self._executor = ProcessPoolExecutor(
+                max_workers=1,
+                timeout=None,
+                initializer=_start_worker,
+                initargs=(os.getpid(), self._output),
+                env=_ENVIRONMENT,
+            )
+        self._made += 1
+        future: Future[Report] = self._executor.submit(make_shard, job)
+        return future
+
+    def stop(self, kill: bool) -> None:
+        if self._executor is not None:
+            self._executor.shutdown(wait=True, kill_workers=kill)
+            self._executor = None
+
+
+class Workers:
+    """A fixed number of workers that stay alive between the waves of a plan."""
+
+    def __init__(self, count: int, output: Path) -> None:
+        self._idle = [_Worker(output) for _ in range(count)]
+        self._busy: dict[Future[Report], tuple[_Worker, Job]] = {}
+
+    @property
+    def idle(self) -> int:
+        """How many workers wait for a job."""
+        return len(self._idle)
+
+    @property
+    def jobs(self) -> list[Job]:
+        """The jobs that run now."""
+        return [job for _, job in self._busy.values()]
+
+    def submit(self, job: Job) -> None:
+        """Start a job on an idle worker. Raises IndexError when none is idle."""
+        worker = self._idle.pop()
+        self._busy[worker.submit(job)] = (worker, job)
+
+    def finished(self, timeout: float) -> Iterator[tuple[Job, Report | None]]:
+        """Jobs that end within `timeout` seconds, with None for one that has killed its worker."""
+        for future in wait(self._busy, timeout=timeout, return_when=FIRST_COMPLETED).done:
+            worker, job = self._busy.pop(future)
+            try:
+                report: Report | None = future.result()
+            except TerminatedWorkerError:
+                worker.stop(kill=True)
+                report = None
+            except BrokenProcessPool as error:
+                worker.stop(kill=True)
+                report = Report(job.shard.name, "failed", f"the job did not reach its worker: {error}", repr(error))
+            self._idle.append(worker)
+            yield job, report
+
+    def stop(self, kill: bool) -> None:
+        """End all workers: at once, or after what they do now."""
+        for worker in [*self._idle, *(worker for worker, _ in self._busy.values())]:
+            worker.stop(kill)
+        self._busy.clear()

@@ -1,0 +1,73 @@
+"""Face colours: sRGB bytes from material factors, textures and vertex colours."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from stages.shape.arrays import ByteArray, FloatArray, IntArray
+
+__all__ = [
+    "color_bytes",
+    "decode_image",
+    "face_paint",
+    "linear_from_srgb",
+    "sample_texture",
+    "srgb_from_linear",
+    "unit_colors",
+]
+
+
+def linear_from_srgb(colors: ByteArray) -> FloatArray:
+    """sRGB bytes as linear intensities in [0, 1] (IEC 61966-2-1)."""
+    value = colors / 255.0
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_from_linear(linear: FloatArray) -> ByteArray:
+    """Linear intensities as sRGB bytes (IEC 61966-2-1)."""
+    value = np.clip(linear, 0.0, 1.0)
+    return color_bytes(np.where(value <= 0.0031308, value * 12.92, 1.055 * value ** (1 / 2.4) - 0.055))
+
+
+def color_bytes(colors: FloatArray) -> ByteArray:
+    """Values in [0, 1] as bytes, to the nearest."""
+    return np.rint(np.clip(np.nan_to_num(colors), 0.0, 1.0) * 255).astype(np.uint8)
+
+
+def unit_colors(colors: np.ndarray) -> FloatArray:
+    """Red, green and blue of `colors` (n, 3 or 4) in [0, 1], whether they came as floats or as whole numbers."""
+    rgb = np.asarray(colors)[:, :3]
+    if rgb.dtype.kind in "ui":
+        return rgb / float(np.iinfo(rgb.dtype).max)
+    return rgb.astype(np.float64)
+
+
+def decode_image(content: bytes) -> ByteArray:
+    """The pixels of an image file, uint8 (h, w, 3), first row at the top. Raises OSError if it is no image."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(content)) as image:
+            return np.asarray(image.convert("RGB"))
+    except (ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise OSError(str(error)) from None
+
+
+def sample_texture(image: ByteArray, uv: FloatArray, faces: IntArray) -> ByteArray:
+    """The pixel of `image` (h, w, 3) under the centroid of each face, uint8 (f, 3).
+
+    uv: float64 (n, 2), origin at the lower left of the image, repeating outside [0, 1]; faces: int32 (f, 3) into uv.
+    """
+    height, width = image.shape[:2]
+    centroid = np.nan_to_num(uv[faces].mean(axis=1))
+    column = np.floor((centroid[:, 0] % 1.0) * width).astype(np.int64)
+    row = np.floor(((1.0 - centroid[:, 1]) % 1.0) * height).astype(np.int64)
+    return image[np.minimum(row, height - 1), np.minimum(column, width - 1)]
+
+
+def face_paint(vertex_colors: ByteArray, faces: IntArray) -> ByteArray:
+    """One colour a face out of vertex colours (n, 3), none of them mixed: the commonest of its three, else the first."""
+    first, second, third = vertex_colors[faces].transpose(1, 0, 2)
+    return np.where((second == third).all(axis=1)[:, None], second, first)

@@ -1,0 +1,108 @@
+"""Connected components of triangles that were written as one mesh, though they are several solids."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+
+__all__ = ["connected_corners", "connected_faces", "joined_corners"]
+
+
+def joined_corners(vertices: FloatArray, faces: IntArray, kinds: IntArray) -> np.ndarray:
+    """Pairs of face corners that are one vertex of one surface, int64 (p, 2); corner `3 * face + k`.
+
+    Vertices at equal positions count as one, whatever the file's indices. Two faces of one kind (`kinds` int (f,))
+    that are alone at an edge are joined along it. Where more than two meet in an edge, solids stand side by side:
+    going around the edge, the two faces with the inside between them belong together. A face that repeats another
+    goes with it.
+    """
+    positions, place = np.unique(vertices, axis=0, return_inverse=True)
+    places = place.reshape(-1)[faces]
+    turn = (places.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    turned = np.take_along_axis(places, turn, axis=1)
+    _, original, copy_of = np.unique(np.column_stack([turned, kinds]), axis=0, return_index=True, return_inverse=True)
+    numbers = 3 * np.arange(len(faces))[:, None] + turn
+    pairs = [np.column_stack([numbers[original[copy_of.reshape(-1)]].ravel(), numbers.ravel()])]
+
+    first_of = np.sort(original)
+    from_corner = (3 * first_of[:, None] + np.arange(3)).ravel()
+    to_corner = (3 * first_of[:, None] + (1, 2, 0)).ravel()
+    start, end = places.ravel()[from_corner], places.ravel()[to_corner]
+    forward = start < end
+    # each side of a face as (kind, lower place, higher place, corner at the lower, corner at the higher)
+    sides = np.column_stack(
+        [
+            np.repeat(kinds[first_of], 3),
+            np.minimum(start, end),
+            np.maximum(start, end),
+            np.where(forward, from_corner, to_corner),
+            np.where(forward, to_corner, from_corner),
+        ]
+    )[start != end]
+    forward = forward[start != end]
+    order = np.lexsort(sides.T[::-1])
+    sides, forward = sides[order], forward[order]
+    first = np.flatnonzero(np.r_[True, (sides[1:, :3] != sides[:-1, :3]).any(axis=1)][: len(sides)])
+    size = np.diff(np.r_[first, len(sides)])
+    matched = [np.column_stack([first[size == 2], first[size == 2] + 1])]
+    for begin, count in zip(first[size > 2].tolist(), size[size > 2].tolist(), strict=True):
+        around = slice(begin, begin + count)
+        triangles = positions[places[sides[around, 3] // 3]]
+        wedges = _wedges(positions[sides[begin, 1:3]], triangles, forward[around])
+        matched += [np.array([wedge]) + begin for wedge in wedges]
+    one, other = np.concatenate(matched).T
+    pairs += [np.column_stack([sides[one, column], sides[other, column]]) for column in (3, 4)]
+    return np.concatenate(pairs)
+
+
+def connected_corners(vertices: FloatArray, faces: IntArray, kinds: IntArray) -> IntArray:
+    """For each face corner the vertex that it is, int32 (f, 3), in a mesh where no edge has more than two faces."""
+    return _numbered(joined_corners(vertices, faces, kinds), 3 * len(faces)).reshape(-1, 3)
+
+
+def connected_faces(vertices: FloatArray, faces: IntArray, kinds: IntArray) -> IntArray:
+    """The component of each face, int32 (f,), numbered in the order of their first faces."""
+    return _numbered(joined_corners(vertices, faces, kinds) // 3, len(faces))
+
+
+def _numbered(pairs: np.ndarray, count: int) -> IntArray:
+    """Connected components of a graph on `count` nodes, numbered in the order of their first nodes."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    _, component = connected_components(graph, directed=False)
+    _, appearance, inverse = np.unique(component, return_index=True, return_inverse=True)
+    rank = np.empty(len(appearance), dtype=np.int32)
+    rank[np.argsort(appearance)] = np.arange(len(appearance), dtype=np.int32)
+    return rank[inverse.reshape(-1)]
+
+
+def _wedges(ends: FloatArray, triangles: FloatArray, forward: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs of faces around an edge with the inside of a solid between them, as indices into `triangles`.
+
+    ends: float64 (2, 3); triangles: float64 (k, 3, 3), all on that edge; forward: bool (k,), whether each runs
+    along the edge from its first end to its second. Seen with the edge pointing at the eye, the inside of a solid
+    lies clockwise from its forward face.
+    """
+    axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    across = triangles.sum(axis=1) - ends.sum(axis=0) - ends[0]  # from the edge to the corner off it
+    across = across - np.outer(across @ axis, axis)
+    if not np.linalg.norm(across, axis=1).all():
+        return []
+    counterclockwise = np.arctan2(across @ np.cross(axis, across[0]), across @ across[0])
+    # wedges thinner than 1e-4 radians are rounding: there, the solid that ends comes before the one that begins
+    clockwise = np.round(-counterclockwise, 4) % np.round(2 * np.pi, 4)
+    free = np.lexsort((forward, clockwise)).tolist()
+    pairs: list[tuple[int, int]] = []
+    place = 0
+    while place < len(free) > 1:
+        here, after = free[place], free[(place + 1) % len(free)]
+        if forward[here] and not forward[after]:
+            pairs.append((here, after))
+            free = [each for each in free if each not in (here, after)]
+            place = 0
+        else:
+            place += 1
+    return pairs

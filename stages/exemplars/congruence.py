@@ -1,0 +1,144 @@
+"""Congruence: the rigid motions that move one part's surface onto another's, or onto itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.pose import rotation_angle
+
+__all__ = ["Surface", "congruences", "surface"]
+
+QUICK_CHECK = 24
+CANDIDATES = 4096
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A mesh made ready for comparison.
+
+    vertices: float64 (v, 3), distinct corners relative to the centroid; centroid: float64 (3,), area-weighted;
+    tree: box tree of the mesh relative to the centroid; probes: float64 (p, 3), corners and triangle centres.
+    """
+
+    vertices: FloatArray
+    centroid: FloatArray
+    area: float
+    tree: tuple[FloatArray, FloatArray, np.ndarray]
+    probes: FloatArray
+    diagonal: float
+
+
+def surface(vertices: FloatArray, faces: IntArray) -> Surface:
+    """The mesh `vertices` (v, 3), `faces` (f, 3) made ready for `congruences`."""
+    from stages.shape.triangles import build_tree
+
+    corners = vertices[faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    centroid = (corners.mean(axis=1) * areas[:, None]).sum(axis=0) / areas.sum()
+    used = vertices[np.unique(faces)] - centroid
+    diagonal = float(np.linalg.norm(np.ptp(used, axis=0)))
+    distinct = _distinct(used, 1e-5 * diagonal)
+    centres = corners.mean(axis=1) - centroid
+    return Surface(
+        vertices=distinct,
+        centroid=centroid,
+        area=float(areas.sum()),
+        tree=build_tree(vertices - centroid, faces),
+        probes=np.ascontiguousarray(np.concatenate([distinct, centres])),
+        diagonal=diagonal,
+    )
+
+
+def congruences(source: Surface, target: Surface, tolerance: float, reflections: bool) -> FloatArray:
+    """All rigid motions (k, 4, 4) that move `source` onto `target` within `tolerance`; with `reflections` also
+    those that turn a part into its mirror image.
+
+    `tolerance` is a share of the diagonal. With `source is target` this is the part's group of symmetries, the
+    identity first. The result is empty where the surfaces are not congruent. A motion is accepted when every
+    corner and triangle centre of each surface falls on the other, so an open box is not as symmetric as a closed
+    one. Motions of surfaces of revolution are those that their tessellation allows.
+    """
+    slack = tolerance * source.diagonal
+    if abs(source.area - target.area) > max(8 * slack * source.diagonal, 1e-2 * source.area):
+        return np.empty((0, 4, 4))
+    accepted: list[FloatArray] = []
+    for rotation in _candidate_rotations(source.vertices, target.vertices, slack, reflections):
+        if _maps_onto(source, target, rotation, slack) and not any(
+            np.abs(rotation - each).max() * source.diagonal < 4 * slack for each in accepted
+        ):
+            accepted.append(rotation)
+    motions = np.tile(np.eye(4), (len(accepted), 1, 1))
+    for motion, rotation in zip(motions, accepted, strict=True):
+        motion[:3, :3] = rotation
+        motion[:3, 3] = target.centroid - rotation @ source.centroid
+    if source is target and len(motions):
+        motions[np.argmin(rotation_angle(motions))] = np.eye(4)
+    # Ordered by angle, then by the matrix itself, so that the identity is first and nothing depends on the search.
+    rank = np.round(np.concatenate([rotation_angle(motions)[:, None], motions[:, :3, :3].reshape(-1, 9)], axis=1), 3)
+    return motions[np.lexsort(rank.T[::-1])]
+
+
+def _maps_onto(source: Surface, target: Surface, rotation: FloatArray, slack: float) -> bool:
+    from stages.shape.triangles import points_on_surface
+
+    step = max(len(source.vertices) // QUICK_CHECK, 1)
+    for probes, onto, turn in (
+        (source.vertices[::step], target, rotation),
+        (source.probes, target, rotation),
+        (target.probes, source, rotation.T),
+    ):
+        if not points_on_surface(*onto.tree, np.ascontiguousarray(probes @ turn.T), slack):
+            return False
+    return True
+
+
+def _candidate_rotations(
+    source: FloatArray, target: FloatArray, slack: float, reflections: bool
+) -> list[FloatArray]:
+    """Rotations that take two chosen corners of `source`, both relative to the centroid, to corners of `target`."""
+    radius, target_radius = np.linalg.norm(source, axis=1), np.linalg.norm(target, axis=1)
+    reach = radius.max()
+    off_centre = np.flatnonzero(radius > 0.1 * reach)
+    sizes = _shell_sizes(radius, target_radius, slack)
+    p = min(off_centre, key=lambda i: (sizes[i] == 0, sizes[i], -radius[i]))
+    sideways = np.linalg.norm(np.cross(source, source[p] / radius[p]), axis=1)
+    off_axis = np.flatnonzero(sideways > 0.1 * sideways.max())
+    q = min(off_axis, key=lambda i: (sizes[i] == 0, sizes[i], -sideways[i]))
+    frame = _frame(source[p], source[q])
+    gap = np.linalg.norm(source[p] - source[q])
+    rotations: list[FloatArray] = []
+    second = np.flatnonzero(np.abs(target_radius - radius[q]) <= 2 * slack)
+    for image in np.flatnonzero(np.abs(target_radius - radius[p]) <= 2 * slack):
+        distance = np.linalg.norm(target[second] - target[image], axis=1)
+        for other in second[np.abs(distance - gap) <= 4 * slack]:
+            if np.linalg.norm(np.cross(target[image], target[other])) > 1e-9 * reach * reach:
+                image_frame = _frame(target[image], target[other])
+                rotations.append(image_frame @ frame.T)
+                if reflections:
+                    rotations.append(image_frame @ np.diag([1.0, 1.0, -1.0]) @ frame.T)
+        if len(rotations) > CANDIDATES:
+            break
+    return rotations
+
+
+def _shell_sizes(radius: FloatArray, target_radius: FloatArray, slack: float) -> IntArray:
+    """For each source corner the number of target corners at the same distance from the centroid."""
+    ranked = np.sort(target_radius)
+    high = np.searchsorted(ranked, radius + 2 * slack, side="right")
+    return (high - np.searchsorted(ranked, radius - 2 * slack, side="left")).astype(np.int32)
+
+
+def _frame(p: FloatArray, q: FloatArray) -> FloatArray:
+    x = p / np.linalg.norm(p)
+    z = np.cross(p, q)
+    z /= np.linalg.norm(z)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _distinct(points: FloatArray, spacing: float) -> FloatArray:
+    """`points` with those that fall into the same cell of size `spacing` merged, in order of first appearance."""
+    _, first = np.unique(np.round(points / spacing).astype(np.int64), axis=0, return_index=True)
+    return np.ascontiguousarray(points[np.sort(first)])

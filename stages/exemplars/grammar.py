@@ -1,0 +1,116 @@
+"""The tiling grammar observed in exemplars: neighbourhoods and docking configurations (strings §3, §6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.contact import ContactTest, overlapping_boxes, world_boxes
+from stages.shape.docking import DockingTable, symmetric_images
+from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType
+from stages.shape.penetration import PenetrationTest
+from stages.shape.pose import invert, pose_vectors
+
+__all__ = ["observe", "observe_dockings", "observe_neighbourhoods"]
+
+
+def observe_neighbourhoods(assemblies: Sequence[Assembly]) -> dict[int, dict[Multiset, int]]:
+    """For each type the multisets of neighbour types around its parts, with the number of parts that have each."""
+    seen: dict[int, dict[Multiset, int]] = {}
+    for assembly in assemblies:
+        for part, neighbours in enumerate(assembly.neighbours()):
+            rules = seen.setdefault(int(assembly.types[part]), {})
+            multiset = assembly.multiset(neighbours)
+            rules[multiset] = rules.get(multiset, 0) + 1
+    return {index: dict(sorted(rules.items())) for index, rules in sorted(seen.items())}
+
+
+def observe_dockings(types: Sequence[PartType], assemblies: Sequence[Assembly], tolerance: float) -> list[Docking]:
+    """The classes of relative poses of parts in contact, modulo the symmetries of both parts.
+
+    Poses within `tolerance` of the first seen pose of a class belong to it. `kind` and `depth` are not measured
+    here: they are `face` and 0.
+    """
+    classes: dict[tuple[int, int], list[tuple[Docking, FloatArray]]] = {}
+    for assembly in assemblies:
+        for i, j in assembly.edges.tolist():
+            if assembly.types[i] > assembly.types[j]:
+                i, j = j, i
+            a, b = int(assembly.types[i]), int(assembly.types[j])
+            pose = invert(assembly.poses[i]) @ assembly.poses[j]
+            length = types[b].diagonal / 2
+            vector = pose_vectors(pose[None], length)
+            found = classes.setdefault((a, b), [])
+            for index, (docking, images) in enumerate(found):
+                if np.linalg.norm(images - vector, axis=1).min() <= tolerance:
+                    found[index] = replace(docking, count=docking.count + 1), images
+                    break
+            else:
+                poses = symmetric_images(types[a], types[b], pose)
+                if a == b:
+                    poses = np.concatenate([poses, symmetric_images(types[a], types[b], invert(pose))])
+                found.append((Docking(a, b, pose, "face", 1, 0.0), pose_vectors(poses, length)))
+    return [docking for _, found in sorted(classes.items()) for docking, _ in found]
+
+
+def observe(
+    types: Sequence[PartType],
+    assemblies: Sequence[Assembly],
+    contact: ContactTest,
+    tolerance: float,
+    kinds: Sequence[ContactKind],
+) -> tuple[list[Assembly], Grammar, Mapping[ContactKind, int]]:
+    """The grammar of `assemblies`, counting only contacts of the given `kinds`.
+
+    Returns the assemblies with the edges that count, the grammar, and the number of contacts of each kind found.
+    """
+    dockings = _measure_dockings(types, observe_dockings(types, assemblies, tolerance), contact)
+    table = DockingTable(types, dockings, tolerance)
+    found: dict[ContactKind, int] = {"point": 0, "line": 0, "face": 0}
+    kept: list[Assembly] = []
+    for assembly in assemblies:
+        labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
+        for label in labels.tolist():
+            found[dockings[label].kind] += 1
+        counted = np.array([dockings[label].kind in kinds for label in labels], dtype=bool)
+        kept.append(replace(assembly, edges=assembly.edges[counted]))
+    usable = tuple(each for each in dockings if each.kind in kinds)
+    return kept, Grammar(observe_neighbourhoods(kept), usable, _observe_nested(types, assemblies, contact)), found
+
+
+def _observe_nested(
+    types: Sequence[PartType], assemblies: Sequence[Assembly], contact: ContactTest
+) -> dict[tuple[int, int], float]:
+    """For pairs of types the greatest depth of parts that reach into each other without any contact of surfaces."""
+    penetration = PenetrationTest(types)
+    nested: dict[tuple[int, int], float] = {}
+    for assembly in assemblies:
+        touching = set(map(tuple, assembly.edges.tolist()))
+        boxes = world_boxes(types, assembly.types, assembly.poses)
+        for i, j in overlapping_boxes(boxes, 0.0).tolist():
+            if (i, j) not in touching:
+                if assembly.types[i] > assembly.types[j]:
+                    i, j = j, i
+                a, b = int(assembly.types[i]), int(assembly.types[j])
+                depth = penetration.depth(a, b, invert(assembly.poses[i]) @ assembly.poses[j])
+                if depth > 0.0:
+                    nested[a, b] = max(nested.get((a, b), 0.0), round(depth, 6))
+    return dict(sorted(nested.items()))
+
+
+def _measure_dockings(
+    types: Sequence[PartType], dockings: Sequence[Docking], contact: ContactTest
+) -> tuple[Docking, ...]:
+    """`dockings` with their kind of contact and their penetration depth."""
+    penetration = PenetrationTest(types)
+    return tuple(
+        replace(
+            each,
+            kind=contact.kind(each.a, each.b, each.pose) or "point",
+            depth=round(penetration.depth(each.a, each.b, each.pose), 6),
+        )
+        for each in dockings
+    )

@@ -1,0 +1,328 @@
+"""The castle: towers on a square lattice, joined by walls, gates and halls, with bridges out of the gates.
+
+Towers are 5.0 apart and 2.0 wide, so that whatever joins two of them is 3.0 long, and a bridge span of 4.0 leads from
+a gate to a pier or to the gate of the next ward, always back onto the lattice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.exemplars.kits.layout import Layout
+from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
+from stages.exemplars.kits.solid import Solid, bar, box, extruded, revolved, stacked
+
+__all__ = ["shapes"]
+
+PITCH = 5.0
+BITE = 0.03
+"""How deep a part reaches into the part that it is joined to."""
+
+STONE, STONE_LIGHT, STONE_DARK = (196, 184, 164), (219, 209, 190), (150, 139, 124)
+SLIT, PLASTER, TIMBER, WOOD = (66, 62, 70), (238, 226, 200), (112, 76, 52), (146, 103, 66)
+SLATE, SLATE_DARK, TILE, TILE_DARK = (78, 112, 150), (62, 92, 128), (190, 88, 66), (160, 70, 54)
+GOLD, BANNER, GLASS = (228, 178, 74), (206, 62, 62), (120, 152, 170)
+
+
+def shapes() -> dict[str, Layout]:
+    """The two example castles by name."""
+    return {"river_wards": _river_wards(), "high_keep": _high_keep()}
+
+
+def _types() -> dict[str, Solid]:
+    return {
+        "tower_base": _tower_base(),
+        "tower_shaft": _tower_shaft(),
+        "tower_crown": _tower_crown(),
+        "roof_cone": _roof_cone(),
+        "roof_spire": _roof_spire(),
+        "flag": _flag(),
+        "turret": _turret(),
+        "wall": _wall(),
+        "wall_gate": _wall_gate(),
+        "hall": _hall(),
+        "cottage": _cottage(),
+        "bridge_span": _bridge_span(),
+        "bridge_pier": _bridge_pier(),
+        "bridge_ramp": _bridge_ramp(),
+    }
+
+
+def _tower_base() -> Solid:
+    levels = [(0.08, 0.0), (0.08, 0.36), (0.0, 0.46), (0.0, 2.26), (0.07, 2.34), (0.07, 2.46), (0.02, 2.5)]
+    colors = [STONE_DARK, STONE_DARK, STONE, STONE_LIGHT, STONE_LIGHT, STONE_LIGHT]
+    tower = stacked(chamfered(2.0, 2.0, 0.5), levels, colors)
+    for height in (0.95, 1.65):
+        at = (0.75, height, 0.75)
+        tower = tower.inset(at, chamfered(0.13, 0.44, 0.05), 0.1, STONE_DARK, SLIT, copies=4)
+    return tower
+
+
+def _tower_shaft() -> Solid:
+    levels = [(0.05, 0.0), (0.05, 0.12), (0.0, 0.18), (0.0, 1.5)]
+    shaft = stacked(chamfered(1.84, 1.84, 0.46), levels, [STONE_LIGHT, STONE_LIGHT, STONE])
+    frame = arch(0.46, 0.78, 0.3, y=-0.36)
+    shaft = shaft.inset((0.92, 0.82, 0.0), frame, -0.05, STONE_LIGHT, copies=4)
+    return shaft.inset((0.97, 0.82, 0.0), arch(0.28, 0.6, 0.22, y=-0.28), 0.16, STONE_DARK, SLIT, copies=4)
+
+
+def _tower_crown() -> Solid:
+    outline = chamfered(1.84, 1.84, 0.46)
+    levels = [(0.0, 0.0), (0.0, 0.06), (0.2, 0.36), (0.2, 0.44), (0.24, 0.48), (0.24, 0.84)]
+    crown = stacked(outline, levels, [STONE, STONE_DARK, STONE, STONE_LIGHT, STONE])
+    crown = crown.inset((0.0, 0.84, 0.0), chamfered(1.86, 1.86, 0.52), 0.34, STONE_DARK, WOOD)
+    crown = crown.inset((1.045, 0.84, 0.0), rectangle(0.18, 0.62), -0.3, STONE, STONE_LIGHT, shrink=0.015, copies=4)
+    turned = rectangle(0.16, 0.44) @ np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2.0)
+    return crown.inset((0.793, 0.84, -0.793), turned, -0.3, STONE, STONE_LIGHT, shrink=0.015, copies=4)
+
+
+def _roof_cone() -> Solid:
+    """Stands on the floor of the crown, half a unit above the crown's foot."""
+    outline = chamfered(1.4, 1.4, 0.38)
+    drum = [(0.0, 0.0), (0.0, 0.86)]
+    eaves = [(0.5, 0.78), (0.52, 0.86), (0.2, 1.34), (0.22, 1.4), (-0.1, 1.94), (-0.08, 2.0)]
+    roof = stacked(outline, [*drum, *eaves, (-0.4, 2.66), (-0.6, 2.9)], [PLASTER, TIMBER, TILE_DARK, *[TILE, TILE_DARK] * 3])
+    roof = roof.inset((0.7, 0.46, 0.0), arch(0.3, 0.44, 0.15, 4, y=-0.2), 0.1, TIMBER, SLIT, copies=4)
+    return roof
+
+
+def _roof_spire() -> Solid:
+    drum = [(0.72, 0.0), (0.72, 1.0), (0.98, 0.94), (1.0, 1.02)]
+    steps = [(0.74, 1.62), (0.76, 1.67), (0.5, 2.36), (0.52, 2.41), (0.25, 3.2), (0.27, 3.25), (0.1, 3.9)]
+    colors = [STONE_LIGHT, TIMBER, SLATE_DARK, *[SLATE, SLATE_DARK] * 3, SLATE]
+    spire = revolved([*drum, *steps], 8, colors)
+    for turn in (0.0, 45.0):
+        spire = spire.turned(turn).inset((0.72, 0.5, 0.0), arch(0.22, 0.56, 0.14, 4, y=-0.26), 0.1, STONE_DARK, SLIT, copies=4)
+    # Four dormers keep the spire from turning by an eighth.
+    dormer = box((0.3, 0.26, 0.3), (0.78, 1.2, 0.0), PLASTER) + _gable(0.4, 0.2, 0.4, SLATE_DARK).moved(0.8, 1.46, 0.0)
+    return spire + dormer.around(4)
+
+
+def _gable(width: float, height: float, length: float, color: tuple[int, int, int]) -> Solid:
+    """A small roof with its ridge along x."""
+    return extruded(np.array([[-width / 2, 0.0], [width / 2, 0.0], [0.0, height]]), -length / 2, length / 2, color).turned(90.0)
+
+
+def _flag() -> Solid:
+    """A gilt ball, a pole and a swallow-tailed banner; its foot goes over the tip of a roof."""
+    ball = revolved([(0.0, -0.06), (0.13, 0.0), (0.17, 0.14), (0.13, 0.28), (0.05, 0.33)], 8, GOLD)
+    pole = revolved([(0.035, 0.3), (0.035, 1.46), (0.0, 1.56)], 6, TIMBER)
+    cloth = np.array([[0.0, 0.82], [0.86, 0.86], [0.62, 1.1], [0.86, 1.34], [0.0, 1.38]])
+    stripe = np.array([[0.16, 0.99], [0.56, 1.0], [0.48, 1.1], [0.56, 1.2], [0.16, 1.21]])
+    return ball + pole + extruded(cloth, -0.022, 0.022, BANNER) + extruded(stripe, -0.036, 0.036, GOLD)
+
+
+def _turret() -> Solid:
+    """A bartizan on a slanted corner of a shaft: its axis is 1.27 from the shaft's, outward along x."""
+    profile = [(0.0, 0.12), (0.2, 0.24), (0.26, 0.34), (0.34, 0.44), (0.34, 0.84), (0.44, 0.82), (0.45, 0.88), (0.0, 1.4)]
+    colors = [STONE_DARK, STONE_DARK, STONE_LIGHT, PLASTER, TIMBER, SLATE_DARK, SLATE]
+    turret = revolved(profile, 8, colors)
+    turret = turret.inset((0.34, 0.64, 0.0), rectangle(0.12, 0.2), 0.06, TIMBER, SLIT)
+    return turret.moved(1.27)
+
+
+def _wall() -> Solid:
+    half = PITCH / 2 - 1.0 + BITE
+    section = [
+        (-0.43, 0.0), (0.43, 0.0), (0.43, 0.3), (0.35, 0.38), (0.35, 1.6), (0.43, 1.7), (0.43, 2.06), (0.25, 2.06),
+        (0.25, 1.82), (-0.25, 1.82), (-0.25, 2.06), (-0.43, 2.06), (-0.43, 1.7), (-0.35, 1.6), (-0.35, 0.38), (-0.43, 0.3),
+    ]  # fmt: skip
+    wall = extruded(np.array(section), -half, half, STONE).turned(90.0)
+    wall = _tinted(wall, STONE_DARK, below=0.39)
+    for x in (-1.1, -0.66, -0.22, 0.22, 0.66, 1.1):
+        wall = wall.inset((x, 2.06, 0.34), rectangle(0.26, 0.14), -0.26, STONE, STONE_LIGHT, shrink=0.015, copies=2)
+    for x in (-1.0, 0.0, 1.0):
+        wall = wall.inset((x, 1.06, 0.35), chamfered(0.12, 0.5, 0.05), 0.09, STONE_DARK, SLIT, copies=2)
+    for x in (-0.5, 0.5):
+        wall = wall.inset((x, 0.98, 0.35), rectangle(0.16, 1.16), -0.06, STONE_LIGHT, shrink=0.02, copies=2)
+    return wall
+
+
+def _tinted(solid: Solid, color: tuple[int, int, int], below: float) -> Solid:
+    """The solid with the faces that lie wholly below a height in another colour."""
+    from dataclasses import replace
+
+    faces = tuple(
+        replace(face, color=color) if solid.points[list(face.loops[0]), 1].max() < below else face for face in solid.faces
+    )
+    return replace(solid, faces=faces)
+
+
+def _wall_gate() -> Solid:
+    half = PITCH / 2 - 1.0 + BITE
+    head = arch(1.0, 1.5, 0.55, 8)[2:]
+    outline = np.array([(-0.5, 0.0), (-half, 0.0), (-half, 2.06), (-1.04, 2.06), (-0.94, 2.18), (-0.94, 2.78), (0.94, 2.78), (0.94, 2.18), (1.04, 2.06), (half, 2.06), (half, 0.0), (0.5, 0.0)])
+    gate = extruded(np.concatenate([outline[::-1], head[::-1]]), -0.5, 0.5, STONE)
+    for x in (-0.72, -0.24, 0.24, 0.72):
+        gate = gate.inset((x, 2.78, 0.4), rectangle(0.28, 0.15), -0.26, STONE, STONE_LIGHT, shrink=0.015, copies=2)
+    for x in (-1.28, 1.28):
+        gate = gate.inset((x, 2.06, 0.4), rectangle(0.24, 0.15), -0.26, STONE, STONE_LIGHT, shrink=0.015, copies=2)
+        gate = gate.inset((x, 1.2, 0.5), chamfered(0.12, 0.5, 0.05), 0.09, STONE_DARK, SLIT, copies=2)
+    shield = np.array([(0.0, -0.26), (0.2, -0.06), (0.2, 0.2), (-0.2, 0.2), (-0.2, -0.06)])
+    gate = gate.inset((0.0, 2.16, 0.5), shield, -0.05, GOLD, BANNER, shrink=0.03, copies=2)
+    for x in (-0.8, 0.8):
+        gate = gate.inset((x, 1.2, 0.5), rectangle(0.24, 1.9), -0.07, STONE_LIGHT, shrink=0.02, copies=2)
+    sill = box((1.06, 0.36, 0.996), (0.0, 0.02, 0.0), STONE_DARK)
+    posts = [bar((x, 0.3, 0.0), (x, 1.62, 0.0), 0.035, TIMBER, 4) for x in (-0.3, -0.1, 0.1, 0.3)]
+    rails = [bar((-0.56, y, 0.0), (0.56, y, 0.0), 0.03, TIMBER, 4) for y in (0.72, 1.0, 1.28)]
+    for piece in (sill, *posts, *rails):
+        gate = gate + piece
+    return gate
+
+
+def _hall() -> Solid:
+    half = PITCH / 2 - 1.0 + BITE
+    hall = box((2 * half, 0.5, 1.16), (0.0, 0.0, 0.0), STONE)
+    upper = box((2 * half - 0.02, 1.04, 1.3), (0.0, 0.48, 0.0), PLASTER)
+    for x in (-0.99, -0.33, 0.33, 0.99):
+        upper = upper.inset((x, 1.02, 0.65), arch(0.34, 0.62, 0.14, 4, y=-0.3), -0.04, TIMBER, copies=2)
+        upper = upper.inset((x, 1.02, 0.69), arch(0.22, 0.48, 0.09, 4, y=-0.23), 0.08, TIMBER, GLASS, copies=2)
+    for x in (-1.34, -0.66, 0.0, 0.66, 1.34):
+        upper = upper.inset((x, 1.0, 0.65), rectangle(0.1, 0.92), -0.03, TIMBER, copies=2)
+    roof = np.array([(-0.82, 1.42), (0.82, 1.42), (0.82, 1.5), (0.42, 1.96), (0.44, 2.02), (0.06, 2.42), (-0.06, 2.42), (-0.44, 2.02), (-0.42, 1.96), (-0.82, 1.5)])
+    tiles = extruded(roof, -half + 0.005, half - 0.005, TILE).turned(90.0)
+    chimney = [box((0.2, 0.7, 0.2), (x, 1.94, z), STONE_LIGHT, 0.03) for x, z in ((0.8, 0.36), (-0.8, -0.36))]
+    return hall + upper + tiles + chimney[0] + chimney[1]
+
+
+def _cottage() -> Solid:
+    """Leans on a wall: the wall's axis is the line z = 0, the cottage stands at positive z."""
+    body = box((1.1, 0.86, 0.78), (0.0, 0.0, 0.79), PLASTER)
+    body = body.inset((0.0, 0.36, 1.18), rectangle(0.26, 0.6), -0.03, TIMBER, WOOD, shrink=0.03)
+    for x in (-0.36, 0.36):
+        body = body.inset((x, 0.5, 1.18), rectangle(0.24, 0.28), -0.03, TIMBER)
+        body = body.inset((x, 0.5, 1.21), rectangle(0.16, 0.2), 0.05, TIMBER, GLASS)
+    for side in (-1.0, 1.0):
+        body = body.inset((side * 0.55, 0.5, 0.8), rectangle(0.22, 0.28), 0.05, TIMBER, GLASS)
+    ridge = np.array([(-0.65, 0.76), (0.65, 0.76), (0.65, 0.84), (0.3, 1.16), (0.31, 1.21), (0.04, 1.44), (-0.04, 1.44), (-0.31, 1.21), (-0.3, 1.16), (-0.65, 0.84)])
+    roof = extruded(ridge, 0.38, 1.26, TILE)
+    chimney = box((0.16, 0.5, 0.16), (0.36, 1.02, 0.62), STONE_LIGHT, 0.02)
+    return body + roof + chimney
+
+
+def _bridge_span() -> Solid:
+    """Lies along z; the gate or pier faces are 4.0 apart."""
+    half = 2.0 + BITE
+    under = arch(2.8, 0.46, 0.4, 8)[2:] * [1.0, 1.0] - [0.0, 0.12]
+    outline = np.concatenate([[(half, -0.1), (half, 0.38), (-half, 0.38), (-half, -0.1), (-1.4, -0.1)], under[::-1][1:-1], [(1.4, -0.1)]])
+    span = extruded(outline, -0.42, 0.42, STONE).turned(90.0)
+    rail = box((0.12, 0.26, 2 * half - 0.02), (0.0, 0.36, 0.0), STONE_LIGHT, 0.03)
+    span = span + rail.moved(-0.36) + rail.moved(0.36)
+    for z in (-1.2, 0.0, 1.2):
+        post = box((0.2, 0.36, 0.2), (0.0, 0.34, z), STONE, 0.05)
+        span = span + post.moved(-0.36) + post.moved(0.36)
+    return span
+
+
+def _bridge_pier() -> Solid:
+    pier = stacked(chamfered(1.0, 1.0, 0.16), [(0.16, -0.1), (0.16, 0.06), (0.0, 0.16), (0.0, 0.42)], [STONE_DARK, STONE_DARK, STONE])
+    pier = pier.inset((0.0, 0.42, 0.0), regular(8, 0.22), 0.03, STONE_DARK, STONE_LIGHT)
+    lamp = box((0.15, 0.46, 0.15), (0.36, 0.4, 0.36), STONE_LIGHT, 0.02) + revolved([(0.0, 0.84), (0.08, 0.9), (0.09, 0.98), (0.0, 1.1)], 6, GOLD).moved(0.36, 0.0, 0.36)
+    return pier + lamp.around(4)
+
+
+def _bridge_ramp() -> Solid:
+    """Comes down from a gate or a pier: their face is the plane z = 0, the ramp runs towards positive z."""
+    outline = np.array([(BITE, -0.1), (BITE, 0.38), (-0.3, 0.38), (-1.6, -0.04), (-1.6, -0.1)])
+    ramp = extruded(outline, -0.42, 0.42, STONE).turned(90.0)
+    for t in (0.2, 0.4, 0.6, 0.8):
+        tread = box((0.7, 0.05, 0.1), (0.0, 0.35 - 0.42 * t, 0.3 + 1.3 * t), STONE_LIGHT)
+        ramp = ramp + tread
+    post = stacked(rectangle(0.2, 0.2), [(0.0, -0.1), (0.0, 0.42), (-0.05, 0.5)], STONE_LIGHT).moved(0.36, 0.0, 1.46)
+    return ramp + post + post.moved(-0.72)
+
+
+class _Castle(Layout):
+    """Places castle parts by lattice coordinates: (i, j) stands at x = 5 i, z = 5 j."""
+
+    def __init__(self) -> None:
+        super().__init__(_types())
+
+    def tower(self, i: float, j: float, shafts: int, top: str = "", turrets: tuple[int, ...] = ()) -> None:
+        """A tower of so many shafts; `top` is a roof, with `+flag` behind it; turrets sit on the top shaft's corners."""
+        x, z = PITCH * i, PITCH * j
+        self.put("tower_base", x, 0.0, z)
+        for level in range(shafts):
+            self.put("tower_shaft", x, 2.5 + 1.5 * level, z)
+        for corner in turrets:
+            self.put("turret", x, 2.5 + 1.5 * (shafts - 1), z, 45.0 + 90.0 * corner)
+        height = 2.5 + 1.5 * shafts
+        self.put("tower_crown", x, height, z)
+        roof, _, flag = top.partition("+")
+        if roof:
+            self.put(f"roof_{roof}", x, height + 0.5, z)
+        if flag:
+            self.put("flag", x, height + 0.5 + {"cone": 2.9, "spire": 3.9}[roof], z)
+
+    def join(self, name: str, i: float, j: float, k: float, m: float) -> None:
+        """A wall, gate or hall between two neighbouring towers."""
+        self.put(name, PITCH * (i + k) / 2, 0.0, PITCH * (j + m) / 2, 0.0 if j == m else 90.0)
+
+
+def _river_wards() -> Layout:
+    """Two wards on either side of a river, a bridge between their gates, a wall running out to a watchtower."""
+    castle = _Castle()
+    castle.tower(0, 0, 1, "cone")
+    castle.tower(1, 0, 2, "spire+flag", (0, 2))
+    castle.tower(2, 0, 1)
+    castle.tower(0, 1, 1)
+    castle.tower(1, 1, 1, "cone+flag")
+    castle.tower(2, 1, 1, "cone")
+    castle.join("wall", 0, 0, 1, 0)
+    castle.join("hall", 1, 0, 2, 0)
+    castle.join("wall", 0, 0, 0, 1)
+    castle.join("wall", 2, 0, 2, 1)
+    castle.join("wall_gate", 0, 1, 1, 1)
+    castle.join("wall", 1, 1, 2, 1)
+    castle.join("wall", 1, 0, 1, 1)
+    castle.put("cottage", 7.5, 0.0, 5.0, 180.0)
+    castle.put("cottage", 5.0, 0.0, 2.5, 270.0)
+    castle.put("bridge_span", 2.5, 0.0, 7.5)
+    castle.tower(0, 2, 1, "cone")
+    castle.tower(1, 2, 1)
+    castle.tower(0, 3, 2)
+    castle.tower(1, 3, 1, "cone")
+    castle.join("wall_gate", 0, 2, 1, 2)
+    castle.join("wall", 0, 2, 0, 3)
+    castle.join("hall", 1, 2, 1, 3)
+    castle.join("wall", 0, 3, 1, 3)
+    castle.join("wall", 1, 3, 2, 3)
+    castle.tower(2, 3, 1, "", (1,))
+    castle.put("cottage", 0.0, 0.0, 12.5, 90.0)
+    return castle
+
+
+def _high_keep() -> Layout:
+    """Three wards around a high keep, a gate with a ramp, and a bridge that turns on its piers towards the far bank."""
+    castle = _Castle()
+    castle.tower(1, 1, 3, "spire+flag")
+    castle.tower(0, 0, 2, "cone", (2,))
+    castle.tower(1, 0, 1)
+    castle.tower(2, 0, 1, "spire")
+    castle.tower(0, 1, 1)
+    castle.tower(2, 1, 1, "", (0,))
+    castle.tower(0, 2, 1, "cone")
+    castle.tower(1, 2, 1, "cone+flag", (3,))
+    castle.join("wall", 0, 0, 1, 0)
+    castle.join("hall", 1, 0, 2, 0)
+    castle.join("wall", 0, 0, 0, 1)
+    castle.join("wall", 2, 0, 2, 1)
+    castle.join("wall", 1, 1, 2, 1)
+    castle.join("wall", 1, 0, 1, 1)
+    castle.join("wall", 0, 1, 1, 1)
+    castle.join("hall", 0, 1, 0, 2)
+    castle.join("wall", 1, 1, 1, 2)
+    castle.join("wall_gate", 0, 2, 1, 2)
+    castle.put("cottage", 5.0, 0.0, 2.5, 90.0)
+    castle.put("cottage", 2.5, 0.0, 5.0, 0.0)
+    castle.put("bridge_span", 2.5, 0.0, 12.5)
+    castle.put("bridge_pier", 2.5, 0.0, 15.0)
+    castle.put("bridge_span", 5.0, 0.0, 15.0, 90.0)
+    castle.put("bridge_pier", 7.5, 0.0, 15.0)
+    castle.put("bridge_ramp", 7.5, 0.0, 14.5, 180.0)
+    castle.join("wall", 2, 1, 3, 1)
+    castle.tower(3, 1, 2, "cone+flag")
+    castle.join("wall_gate", 3, 1, 3, 2)
+    castle.put("bridge_ramp", 15.5, 0.0, 7.5, 90.0)
+    castle.tower(3, 2, 1)
+    return castle

@@ -1,0 +1,87 @@
+"""Which side of a surface is its outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
+
+__all__ = ["turn_outward", "turned_faces"]
+
+
+def turn_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> IntArray:
+    """`faces` int32 (f, 3), one orientation in each sheet already, with whole sheets turned around where needed.
+
+    original: int32 (f, 3), the same faces as the file had them. An open sheet shows the side that most of its faces
+    showed. A closed shell faces outward; if it lies inside another one, it keeps its relation to the outermost around
+    it, so that a cavity goes on facing into the cavity.
+    """
+    if not len(faces):
+        return faces
+    sheet, closed = _sheets(faces)
+    turn = np.bincount(sheet, np.where(turned_faces(faces, original), 1.0, -1.0)) > 0
+    corners = vertices[faces] - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    parts = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    volume = np.bincount(sheet, parts) * np.where(turn, -1.0, 1.0)
+    solid = closed & (volume != 0)
+    around = _outermost(vertices, faces, sheet, solid)
+    turn ^= solid & (volume[around] < 0)
+    return np.where(turn[sheet][:, None], faces[:, ::-1], faces)
+
+
+def turned_faces(faces: IntArray, original: IntArray) -> BoolArray:
+    """Whether each face runs around its corners the other way than in `original`; both int32 (f, 3)."""
+    first = (original == faces[:, :1]).argmax(axis=1)
+    following = np.take_along_axis(original, (first[:, None] + 1) % 3, axis=1)[:, 0]
+    turned: BoolArray = following != faces[:, 1]
+    return turned
+
+
+def _sheets(faces: IntArray) -> tuple[IntArray, BoolArray]:
+    """The sheet of each face, connected across edges that two faces share, and whether each sheet has no border."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    first = np.flatnonzero(np.r_[True, (edges[1:] != edges[:-1]).any(axis=1)])
+    size = np.diff(np.r_[first, len(edges)])
+    inner = first[size == 2]
+    graph = coo_array((np.ones(len(inner)), (owner[inner], owner[inner + 1])), shape=(len(faces), len(faces)))
+    count, sheet = connected_components(graph, directed=False)
+    closed = np.ones(count, dtype=bool)
+    closed[sheet[owner[first[size != 2]]]] = False
+    return sheet.astype(np.int32), closed
+
+
+def _outermost(vertices: FloatArray, faces: IntArray, sheet: IntArray, solid: BoolArray) -> IntArray:
+    """For each sheet the outermost `solid` one that encloses it, else itself."""
+    around = np.arange(len(solid), dtype=np.int32)
+    shells = np.flatnonzero(solid)
+    if len(shells) < 2:
+        return around
+    order = np.argsort(sheet, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(sheet[order])) + 1)
+    corners = [vertices[faces[groups[index]]] for index in shells]
+    low = np.array([each.min(axis=(0, 1)) for each in corners])
+    high = np.array([each.max(axis=(0, 1)) for each in corners])
+    size = np.prod(high - low, axis=1)
+    for place in range(len(shells)):
+        boxes = np.flatnonzero((low < low[place]).all(axis=1) & (high > high[place]).all(axis=1))
+        probes = corners[place][[0, len(corners[place]) // 2, -1], 0]
+        for outer in boxes[np.argsort(-size[boxes], kind="stable")].tolist():
+            if all(abs(_winding(corners[outer], probe)) > 0.5 for probe in probes):
+                around[shells[place]] = shells[outer]
+                break
+    return around
+
+
+def _winding(corners: FloatArray, point: FloatArray) -> float:
+    """How often a closed surface of triangles (f, 3, 3) goes around a point: solid angles over 4 pi."""
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+    dot = np.einsum
+    under = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
+    return float(np.arctan2(dot("ij,ij->i", a, np.cross(b, c)), under).sum() / (2 * np.pi))

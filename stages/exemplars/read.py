@@ -1,0 +1,177 @@
+"""Reading exemplars: from a model file to parts with rigid poses."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import ConfigError
+from stages.exemplars.dae import read_dae
+from stages.exemplars.enclosure import Enclosure
+from stages.exemplars.gltf import read_gltf
+from stages.exemplars.off import read_off
+from stages.exemplars.placing import bake, centre, distance_from_origin
+from stages.exemplars.ply import read_ply
+from stages.exemplars.scene import Placement, Scene, Surface, unique_name
+from stages.exemplars.segment import Segmentation, count_parts, pick, segment
+from stages.exemplars.stl import read_stl
+from stages.exemplars.wavefront import read_wavefront
+from stages.shape.arrays import ByteArray, FloatArray, IntArray
+
+__all__ = ["FORMATS", "Model", "RawPart", "read_model"]
+
+FORMATS: dict[str, Callable[[Path, Enclosure], Scene]] = {
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".obj": read_wavefront,
+    ".ply": read_ply,
+    ".stl": lambda path, _: read_stl(path),
+    ".off": lambda path, _: read_off(path),
+    ".dae": read_dae,
+}
+
+FAR = 1e3
+"""How many of its own diagonals a model stands from the origin when it is moved there."""
+
+COARSE = 1e-3
+"""Spacing of 32-bit floats, as a share of the median part's diagonal, at which contacts begin to be lost."""
+
+
+@dataclass(frozen=True)
+class RawPart:
+    """One part as the file has it.
+
+    name: unique in the model. mesh_name: the mesh that the part places, equal exactly for parts that share one (and
+    its scale); their arrays are then the same objects. label: the file's own word for the part's type, if any.
+    pose: float64 (4, 4), rigid, determinant +1. vertices: float64 (v, 3) in part coordinates, the origin in the middle
+    of the part's box; faces: int32 (f, 3); face_colors: uint8 (f, 3) sRGB.
+    """
+
+    name: str
+    mesh_name: str
+    label: str | None
+    pose: FloatArray
+    vertices: FloatArray
+    faces: IntArray
+    face_colors: ByteArray
+
+
+@dataclass(frozen=True)
+class Model:
+    """The parts of a model file in the file's order.
+
+    segmentation: the source of the parts, what `auto` picked; why: one sentence on that; warnings: one sentence each.
+    """
+
+    path: Path
+    parts: tuple[RawPart, ...]
+    segmentation: Segmentation
+    why: str
+    warnings: tuple[str, ...]
+
+
+def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
+    """The parts of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE.
+
+    Opens nothing outside the folder of `path`. Scale, shear and mirroring of the scene are in the vertices, so that
+    poses are rigid. A model far from the origin is moved there, with a warning.
+    Raises ConfigError, with the file, the element and the mend, for a file of which no parts can be made.
+    """
+    scene = _read(path)
+    _check_numbers(path, scene)
+    warnings = list(scene.warnings)
+    if segmentation == "auto":
+        source, why = pick(scene)
+    else:
+        source, why = segmentation, "as the config says"
+        counts = count_parts(scene)
+        if source not in counts:
+            offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
+            raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
+    parted = segment(scene, source)
+    surfaces, placements = bake(*centre(parted.surfaces, parted.placements))
+    shift = _shift_to_origin(surfaces, placements, warnings)
+    names: set[str] = set()
+    parts = []
+    for placement in placements:
+        surface = surfaces[placement.surface]
+        name = unique_name(placement.name, names)
+        names.add(name)
+        pose = placement.pose.copy()
+        pose[:3, 3] -= shift
+        parts.append(
+            RawPart(name, surface.name, placement.label, pose, surface.vertices, surface.faces, surface.face_colors)
+        )
+    return Model(path, tuple(parts), source, why, tuple(warnings))
+
+
+def _read(path: Path) -> Scene:
+    """The scene in a file, once it is known to be a readable file of a known format."""
+    reader = FORMATS.get(path.suffix.lower())
+    if reader is None:
+        near = difflib.get_close_matches(path.suffix.lower(), FORMATS, n=1, cutoff=0.4)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise ConfigError(
+            f"{path}: {path.suffix or 'a name without an extension'} is no model format; {hint}"
+            f"Shapemill reads {', '.join(FORMATS)}"
+        )
+    if not path.exists():
+        beside = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = difflib.get_close_matches(path.name, beside, n=1)
+        raise ConfigError(f"{path}: no such file" + (f"; did you mean {near[0]}?" if near else ""))
+    if not path.is_file():
+        raise ConfigError(f"{path}: is {'a folder' if path.is_dir() else 'no regular file'}; name one model file")
+    if not os.access(path, os.R_OK):
+        raise ConfigError(f"{path}: may not be read; give this user permission to read it (chmod u+r)")
+    if path.stat().st_size == 0:
+        raise ConfigError(f"{path}: the file is empty; copy or export it again")
+    try:
+        scene = reader(path, Enclosure(path))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
+    filled = tuple(each for each in scene.placements if len(scene.surfaces[each.surface].faces))
+    if not filled:
+        reasons = f" ({'; '.join(scene.warnings)})" if scene.warnings else ""
+        raise ConfigError(f"{path}: holds no triangles{reasons}; export it as a triangle mesh")
+    used = sorted({each.surface for each in filled})
+    surfaces = tuple(scene.surfaces[index].select(np.arange(len(scene.surfaces[index].faces))) for index in used)
+    placements = tuple(Placement(each.name, each.label, used.index(each.surface), each.pose) for each in filled)
+    return Scene(scene.kind, surfaces, placements, scene.warnings)
+
+
+def _check_numbers(path: Path, scene: Scene) -> None:
+    checked: set[int] = set()
+    for placement in scene.placements:
+        if placement.surface in checked:
+            continue
+        checked.add(placement.surface)
+        bad = np.count_nonzero(~np.isfinite(scene.surfaces[placement.surface].vertices).all(axis=1))
+        if bad:
+            raise ConfigError(
+                f"{path}: part {placement.name!r} has {bad} vertices that are not finite numbers; mend the part in the "
+                "modelling tool (delete loose or broken vertices) and export it again"
+            )
+        if not np.isfinite(placement.pose).all():
+            raise ConfigError(f"{path}: part {placement.name!r} has a transform that is not finite; export it again")
+
+
+def _shift_to_origin(surfaces: list[Surface], placements: list[Placement], warnings: list[str]) -> FloatArray:
+    """What is to be taken off all poses, float64 (3,): zero unless the model stands far from the origin."""
+    middle, diagonal = distance_from_origin(surfaces, placements)
+    distance = float(np.linalg.norm(middle))
+    if distance <= FAR * diagonal:
+        return np.zeros(3)
+    spacing = float(np.spacing(np.float32(np.abs(middle).max())))
+    diagonals = [float(np.linalg.norm(np.ptp(surfaces[each.surface].vertices, axis=0))) for each in placements]
+    share = spacing / (float(np.median(diagonals)) or 1.0)
+    advice = "; contacts may be lost, move it to the origin before the export" if share > COARSE else ""
+    warnings.append(
+        f"the model stands {distance:.4g} units from the origin and is moved there; 32-bit floats are {spacing:.2g} "
+        f"units apart at that place, {share:.2g} of the median part{advice}"
+    )
+    return middle

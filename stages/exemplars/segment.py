@@ -1,0 +1,130 @@
+"""What is a part: scene nodes, named objects, or the pieces of a mesh by material, colour or connection."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from stages.exemplars.components import connected_faces
+from stages.exemplars.scene import Placement, Scene, Surface, unique_name
+from stages.shape.arrays import IntArray
+
+__all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
+
+Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components"]
+SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")
+
+PALETTE = 64
+"""More colours than this are shading, not labels."""
+
+_WORDS = {
+    "nodes": "scene nodes",
+    "objects": "named objects",
+    "materials": "materials",
+    "colors": "face or vertex colours",
+    "components": "connected components",
+}
+
+
+def count_parts(scene: Scene) -> dict[Segmentation, int]:
+    """How many parts each source of parts would make of a scene; a source that the scene does not have is left out."""
+    counts: dict[Segmentation, int] = {scene.kind: len(scene.placements)}
+    for source in SOURCES[2:]:
+        pieces = [_pieces(each, source) for each in scene.surfaces]
+        if any(each is not None for each in pieces):
+            sizes = [1 if each is None else len(each) for each in pieces]
+            counts[source] = sum(sizes[placement.surface] for placement in scene.placements)
+    return counts
+
+
+def pick(scene: Scene) -> tuple[Segmentation, str]:
+    """The source that `auto` takes, and one sentence that says why.
+
+    Scene nodes or named objects if there are at least two, for they are their author's parts; then materials, then
+    colours, unless they are too many to be labels; then connected components.
+    """
+    if len(scene.placements) > 1:
+        return scene.kind, f"{len(scene.placements)} {_WORDS[scene.kind]}"
+    counts = count_parts(scene)
+    passed = [f"one {_WORDS[scene.kind][:-1]}"]
+    for source in SOURCES[2:]:
+        labels = _label_count(scene, source)
+        if labels < 2 and source != "components":
+            passed.append(f"one of the {_WORDS[source]}" if labels else f"no {_WORDS[source]}")
+        elif source == "colors" and labels > PALETTE:
+            passed.append(f"{labels} colours, which are shading and not labels")
+        elif counts[source] > 1:
+            pieces = f"{counts[source]} {_WORDS[source]}"
+            if source != "components":
+                pieces = f"{counts[source]} connected pieces of {labels} {_WORDS[source]}"
+            return source, f"{', '.join(passed)}; {pieces}"
+        else:
+            passed.append("one connected component")
+    return scene.kind, f"{', '.join(passed)}: nothing tells parts apart"
+
+
+def segment(scene: Scene, source: Segmentation) -> Scene:
+    """The scene with one placement for each part.
+
+    Nodes and objects are what the scene already has. The pieces of one material or of one colour are the connected
+    regions of its faces, named and labelled by it; pieces of a surface that several nodes place stay shared.
+    """
+    if source == scene.kind:
+        return scene
+    surfaces: list[Surface] = []
+    cut: list[list[tuple[str, str | None, int]]] = []
+    for surface in scene.surfaces:
+        named: list[tuple[str, str | None, int]] = []
+        for name, label, faces in _pieces(surface, source) or [("rest", None, np.arange(len(surface.faces)))]:
+            named.append((name, label, len(surfaces)))
+            surfaces.append(replace(surface.select(faces), name=f"{surface.name}/{name}"))
+        cut.append(named)
+    alone = len(scene.placements) == 1
+    placements = [
+        Placement(name if alone else f"{placement.name}/{name}", label, index, placement.pose)
+        for placement in scene.placements
+        for name, label, index in cut[placement.surface]
+    ]
+    return replace(scene, surfaces=tuple(surfaces), placements=tuple(placements))
+
+
+def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | None, IntArray]] | None:
+    """Name, label and faces of each piece of a surface, in the order of their first faces; None without a source."""
+    labels: list[str | None]
+    kinds = np.zeros(len(surface.faces), dtype=np.int64)
+    if source == "materials":
+        if surface.face_material is None or surface.face_material.max(initial=-1) < 0:
+            return None
+        kinds = surface.face_material.astype(np.int64) + 1
+        labels = ["no material", *surface.materials]
+    elif source == "colors":
+        if surface.paint is None:
+            return None
+        palette, kinds = np.unique(surface.paint, axis=0, return_inverse=True)
+        kinds = kinds.reshape(-1)
+        labels = ["#{:02x}{:02x}{:02x}".format(*color) for color in palette.tolist()]
+    else:
+        labels = [None]
+    component = connected_faces(surface.vertices, surface.faces, kinds)
+    order = np.argsort(component, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(component[order])) + 1) if len(order) else []
+    width = max(3, len(str(len(groups))))
+    taken: set[str] = set()
+    pieces: list[tuple[str, str | None, IntArray]] = []
+    for number, faces in enumerate(groups):
+        label = labels[kinds[faces[0]]]
+        name = unique_name(label, taken) if label is not None else f"component-{number:0{width}d}"
+        taken.add(name)
+        pieces.append((name, label, faces.astype(np.int32)))
+    return pieces
+
+
+def _label_count(scene: Scene, source: Segmentation) -> int:
+    """How many materials or colours the faces of a scene have."""
+    if source == "materials":
+        of_faces = [each.face_material for each in scene.surfaces if each.face_material is not None]
+    else:
+        of_faces = [each.paint for each in scene.surfaces if each.paint is not None]
+    return len(np.unique(np.concatenate(of_faces), axis=0)) if of_faces else 0

@@ -1,0 +1,75 @@
+"""Stage `exemplars`: model files in, one kit a shard out: `<kit>.json`, `<kit>.tar`, `<kit>.png`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.places import file_digest
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.exemplars.build import build_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.kit_files import write_kit
+
+__all__ = ["STAGE"]
+
+BYTES_A_KIT = 8_000_000
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """One shard a kit; the digests of its model files make it anew when they change."""
+    kits = plan.config.section(ExemplarsConfig).kits
+    return [
+        Shard(kit.name, {"kit": kit.name, "digests": [file_digest(shape) for shape in kit.shapes]}) for kit in kits
+    ]
+
+
+def run_shard(task: Task) -> Outcome:
+    """Read, repair, identify, observe, write."""
+    kits = task.config.section(ExemplarsConfig).kits
+    config = next(kit for kit in kits if kit.name == task.shard.params["kit"])
+    models = [read_model(shape, config.parts) for shape in config.shapes]
+    kit, report = build_kit(config, models)
+    with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
+        write_kit(kit, text, arrays)
+    return Outcome(
+        samples=len(kit.exemplars),
+        summary={
+            "kit": kit.name,
+            "types": len(kit.types),
+            "parts": [len(each.assembly) for each in kit.exemplars],
+            "contacts": report.contacts,
+            "rules": sum(len(rules) for rules in kit.grammar.neighbourhoods.values()),
+            "dockings": len(kit.grammar.dockings),
+            "segmentation": list(report.segmentation),
+            "repairs": report.repairs,
+            "warnings": list(report.warnings),
+        },
+    )
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """A line for each kit."""
+    lines = []
+    for name in plan.shards("exemplars"):
+        seen = plan.summary("exemplars", name)
+        if seen is not None:
+            parts = " + ".join(str(count) for count in seen["parts"])
+            lines.append(
+                f"{name}: {parts} parts of {seen['types']} types, {seen['rules']} neighbourhoods, "
+                f"{seen['dockings']} dockings"
+            )
+            lines.extend(f"{name}: warning: {warning}" for warning in seen["warnings"])
+    return lines
+
+
+STAGE = Stage(
+    name="exemplars",
+    version=1,
+    config=ExemplarsConfig,
+    inputs=(),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=lambda plan: BYTES_A_KIT * len(plan.config.section(ExemplarsConfig).kits),
+    report=report,
+)

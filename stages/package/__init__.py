@@ -1,0 +1,1 @@
+"""The dataset folder that users load: merged shards, index, card, Croissant, manifest, checksums, preview."""

@@ -1,0 +1,64 @@
+"""`manifest.json` and `checksums.txt`: what the dataset consists of, and what it was made from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+from pipeline.config import Config
+
+__all__ = ["checksums", "config_sections", "manifest"]
+
+
+def config_sections(config: Config) -> dict[str, Any]:
+    """All sections of the config as JSON; of a file's path only the name, since folders differ from machine to
+    machine."""
+    return {name: _portable(section.model_dump()) for name, section in config.sections.items()}
+
+
+def manifest(
+    facts: Mapping[str, Any],
+    sections: Mapping[str, Any],
+    shards: Sequence[Mapping[str, Any]],
+    index: Mapping[str, Any],
+    package_version: int,
+) -> dict[str, Any]:
+    """What `manifest.json` holds. `shards` are the summaries of the package's shards; `index` has `path` (relative
+    to the dataset's folder), `bytes` and `sha256`."""
+    kits: Counter[str] = Counter()
+    splits: Counter[str] = Counter()
+    for shard in shards:
+        kits.update(shard["kits"])
+        splits[shard["split"]] += shard["samples"]
+    return {
+        "name": facts["name"],
+        "version": facts["version"],
+        "seed": facts["seed"],
+        "package": package_version,
+        "samples": sum(splits.values()),
+        "splits": dict(splits),
+        "kits": dict(kits),
+        "members": list(shards[0]["members"]),
+        "shards": [
+            {name: shard[name] for name in ("path", "split", "samples", "bytes", "sha256", "kits")} for shard in shards
+        ],
+        "index": dict(index),
+        "config": dict(sections),
+    }
+
+
+def checksums(digests: Mapping[str, str]) -> str:
+    """The text that `sha256sum -c` reads, for `{file: sha256}`, sorted by file."""
+    return "".join(f"{digest}  {file}\n" for file, digest in sorted(digests.items()))
+
+
+def _portable(value: Any) -> Any:
+    if isinstance(value, PurePath):
+        return value.name
+    if isinstance(value, Mapping):
+        return {name: _portable(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_portable(each) for each in value]
+    return value

@@ -1,0 +1,135 @@
+"""One shard of the dataset: what the stages made of each sample, put together under the sample's key."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any, BinaryIO, cast
+
+from pipeline.errors import ShardFailed
+from pipeline.shards import ShardWriter, json_bytes, read_shard
+from pipeline.stage import Outcome, Task
+from stages.package.glb import GlbWriter
+from stages.package.layout import shard_path
+from stages.package.record import describe_sample
+from stages.points.frame import upright
+from stages.shape.collection import collection_kits
+from stages.shape.sample import Sample, read_samples
+
+__all__ = ["MERGED", "merge_shard"]
+
+MERGED = ("points", "sketches", "strings")
+"""The stages whose members a sample gets, in this order; their `json` member goes into the sample's."""
+
+
+def merge_shard(task: Task) -> Outcome:
+    """Files of the shard: `.tar`, the dataset's, and `.jsonl`, its rows of the index.
+
+    A sample that one of the stages has refused is left out and counted. Raises ShardFailed where samples differ in
+    their members.
+    """
+    config, split = task.config, str(task.shard.params["split"])
+    path = shard_path(config, split, int(task.shard.name.rpartition("-")[2]))
+    kits = collection_kits(task)
+    writers = {name: GlbWriter(kit.types) for name, kit in kits.items()}
+    total, rows = int(task.shard.params["samples"]), []
+    members_of_all: list[str] = []
+    counts: Counter[str] = Counter()
+    with task.output(f"{task.shard.name}.tar") as file:
+        stream = HashingStream(file)
+        with ShardWriter(cast(BinaryIO, stream)) as writer:
+            for sample, made in _samples(task):
+                kit = kits[sample.kit]
+                assembly = upright(sample.assembly, kit)
+                if len(assembly.edges) == 0:
+                    task.reject(sample.key, "no contact between parts")
+                    continue
+                described = {stage: json.loads(made[stage].pop("json")) for stage in MERGED if "json" in made[stage]}
+                record = describe_sample(sample, kit, assembly, described)
+                members = {"glb": writers[kit.name].write(assembly)}
+                for stage in MERGED:
+                    members.update(made[stage])
+                members["json"] = json_bytes(record)
+                if members_of_all and list(members) != members_of_all:
+                    raise ShardFailed(f"{sample.key} has members {list(members)}, others have {members_of_all}")
+                members_of_all = list(members)
+                writer.write(sample.key, members)
+                counts[kit.name] += 1
+                rows.append(_row(record, path, writer.offsets[sample.key], members))
+                task.progress(writer.samples, total)
+    with task.output(f"{task.shard.name}.jsonl") as listing:
+        listing.writelines(json_bytes(row) for row in rows)
+    summary = {
+        "path": path,
+        "split": split,
+        "samples": writer.samples,
+        "bytes": stream.written,
+        "sha256": stream.digest(),
+        "members": members_of_all,
+        "kits": dict(counts),
+    }
+    return Outcome(samples=writer.samples, summary=summary)
+
+
+class HashingStream:
+    """What a tar is written to: passes all on to `stream`, and knows its length and SHA-256."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._hash = hashlib.sha256()
+        self.written = 0
+
+    def write(self, content: bytes) -> int:
+        """Write all of `content`."""
+        self._hash.update(content)
+        self.written += len(content)
+        return self._stream.write(content)
+
+    def tell(self) -> int:
+        """How many bytes have been written."""
+        return self.written
+
+    def digest(self) -> str:
+        """SHA-256 of what has been written, in hexadecimal."""
+        return self._hash.hexdigest()
+
+
+def _samples(task: Task) -> Iterator[tuple[Sample, dict[str, dict[str, bytes]]]]:
+    """Each sample with what each stage made of it. The stages keep the order of the collection, with gaps."""
+    name = f"{task.shard.name}.tar"
+    readers = {stage: read_shard(task.input(stage, name)) for stage in MERGED}
+    heads = {stage: next(reader, None) for stage, reader in readers.items()}
+    for sample in read_samples(task.input("variations", name)):
+        made: dict[str, dict[str, bytes]] = {}
+        for stage, reader in readers.items():
+            head = heads[stage]
+            if head is not None and head[0] == sample.key:
+                made[stage] = head[1]
+                heads[stage] = next(reader, None)
+        missing = [stage for stage in MERGED if stage not in made]
+        if missing:
+            task.reject(sample.key, f"refused by {missing[0]}")
+        else:
+            yield sample, made
+    left = [f"{head[0]} of {stage}" for stage, head in heads.items() if head is not None]
+    if left:
+        raise ShardFailed(f"no sample of the collection has this key: {', '.join(left)}")
+
+
+def _row(record: Mapping[str, Any], path: str, offset: int, members: Mapping[str, bytes]) -> dict[str, Any]:
+    """The sample's row in the index. From `offset` on, `bytes` bytes of the shard are the sample, tar headers too."""
+    sizes = (512 + (len(content) + 511) // 512 * 512 for content in members.values())
+    return {
+        "key": record["key"],
+        "split": record["split"],
+        "kit": record["kit"],
+        "graph": record["graph"],
+        "producer": record["producer"],
+        "shard": path,
+        "offset": offset,
+        "bytes": sum(sizes),
+        **record["counts"],
+        "string": members["txt"].decode().split("\n")[0],
+    }

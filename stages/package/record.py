@@ -1,0 +1,67 @@
+"""The JSON member of a sample: everything that is known of it, with the same fields in every sample."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from stages.package.glb import node_names
+from stages.points.frame import assembly_bounds
+from stages.shape.kit import Assembly, Kit
+from stages.shape.sample import Sample
+
+__all__ = ["cycle_count", "describe_sample"]
+
+
+def describe_sample(
+    sample: Sample, kit: Kit, assembly: Assembly, described: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """What the JSON says. `assembly` is the sample's, upright; `described` is what the stages after the search say
+    of the sample, by stage, and stands in it under the stage's name.
+
+    Nothing is null or empty: loaders guess a field's type from the first samples they see. The lineage differs from
+    sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it.
+    """
+    names = kit.type_names()
+    parts = [
+        {"name": name, "label": names[kind], "type": kind, "instance": instance, "pose": pose}
+        for instance, (name, kind, pose) in enumerate(
+            zip(node_names(names, assembly), assembly.types.tolist(), (assembly.poses + 0.0).tolist(), strict=True)
+        )
+    ]
+    return {
+        "key": sample.key,
+        "split": sample.split,
+        "producer": sample.producer,
+        "kit": sample.kit,
+        "graph": sample.graph,
+        "parents": list(sample.lineage.get("parents", ())) or [sample.kit],
+        "lineage": json.dumps(sample.lineage, sort_keys=True, allow_nan=False),
+        "parts": parts,
+        "contacts": assembly.edges.tolist(),
+        "counts": {
+            "parts": len(assembly),
+            "contacts": len(assembly.edges),
+            "cycles": cycle_count(assembly),
+            "types": len(set(assembly.types.tolist())),
+        },
+        "bounds": assembly_bounds(kit.types, assembly).tolist(),
+        **described,
+    }
+
+
+def cycle_count(assembly: Assembly) -> int:
+    """Number of independent cycles of the shape graph: contacts that close a ring."""
+    neighbours = assembly.neighbours()
+    seen = [False] * len(assembly)
+    components = 0
+    for start in range(len(assembly)):
+        components += not seen[start]
+        waiting = [start]
+        while waiting:
+            part = waiting.pop()
+            if not seen[part]:
+                seen[part] = True
+                waiting.extend(neighbours[part])
+    return len(assembly.edges) - len(assembly) + components

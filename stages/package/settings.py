@@ -1,0 +1,27 @@
+"""The `package` section of a config: what the dataset's card says beside the dataset's own name and version."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pipeline.config import StrictModel
+
+__all__ = ["PackageConfig"]
+
+
+class PackageConfig(StrictModel):
+    """What the card, `croissant.json` and the preview picture say and show."""
+
+    creator: str = Field("Shapemill", min_length=1, description="who made the dataset: a person or an organization")
+    published: str = Field(
+        "2026-01-01",
+        pattern=r"^\d{4}-\d{2}-\d{2}$",
+        description="date that the card and croissant.json state, year-month-day; no clock is ever asked",
+    )
+    tags: tuple[str, ...] = Field(
+        ("3d", "shapes", "shape-graphs", "procedural"), description="tags of the card, besides the names of the kits"
+    )
+    task_categories: tuple[str, ...] = Field(
+        ("image-to-3d", "text-to-3d"), min_length=1, description="Hugging Face task categories of the card"
+    )
+    previewed: int = Field(24, ge=1, le=96, description="variants that the preview picture shows; unit: variants")

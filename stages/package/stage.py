@@ -1,0 +1,104 @@
+"""Stage `package`: the dataset folder that users load, made of what the stages before it made of each sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.package.compose import compose_dataset
+from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
+from stages.package.manifest import config_sections
+from stages.package.merge import MERGED, merge_shard
+from stages.package.preview import draw_preview
+from stages.package.settings import PackageConfig
+from stages.shape.collection import collection_shards
+
+__all__ = ["STAGE"]
+
+VERSION = 1
+WHOLE = "dataset"
+PICTURE = "preview"
+PICTURE_SHARDS = 8
+"""The preview picture chooses from the samples of at most so many shards."""
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """One shard for each of the collection; when these are done, the picture, and the files about the whole."""
+    merged = collection_shards(plan, *MERGED)
+    summaries = [plan.summary("package", shard.name) for shard in merged]
+    if not merged or any(summary is None for summary in summaries):
+        return merged
+    described = [{"name": shard.name, **(summary or {})} for shard, summary in zip(merged, summaries, strict=True)]
+    filled = [shard for shard in described if shard["samples"]]
+    kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
+    shown = [shard["name"] for shard in filled[:PICTURE_SHARDS]]
+    stages = ("variations", "points", "sketches")
+    picture = Shard(PICTURE, {"shards": shown}, (*kits, *(f"{stage}/{name}" for name in shown for stage in stages)))
+    params = {
+        "facts": _facts(plan),
+        "sections": config_sections(plan.config),
+        "shards": filled,
+        "search": [],
+        "rejects": {},
+        "preview": PICTURE,
+        "package": VERSION,
+    }
+    inputs = (*kits, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
+    return [*merged, picture, Shard(WHOLE, params, inputs)]
+
+
+def run_shard(task: Task) -> Outcome:
+    """Make one shard of the plan."""
+    if task.shard.name == WHOLE:
+        return compose_dataset(task)
+    if task.shard.name == PICTURE:
+        return draw_preview(task)
+    return merge_shard(task)
+
+
+def publish(plan: Plan) -> Mapping[str, str]:
+    """The dataset's folder and the index beside it, by the files of the shards."""
+    name = plan.config.name
+    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, MANIFEST, CHECKSUMS)}
+    files[f"{name}/{PREVIEW}"] = f"{PICTURE}.png"
+    files[index_path(plan.config)] = f"{WHOLE}.parquet"
+    for shard in plan.shards("package"):
+        summary = plan.summary("package", shard)
+        if summary is not None and summary.get("path") and summary["samples"]:
+            files[f"{name}/{summary['path']}"] = f"{shard}.tar"
+    return files
+
+
+def estimate_bytes(plan: Plan) -> int:
+    """Bytes of all shards: what the stages before have made of each sample, and a mesh of a usual size."""
+    samples = sum(int(shard.params["samples"]) for shard in collection_shards(plan))
+    return samples * 300_000
+
+
+def _facts(plan: Plan) -> dict[str, Any]:
+    config, section = plan.config, plan.config.section(PackageConfig)
+    return {
+        "name": config.name,
+        "version": config.version,
+        "seed": config.seed,
+        "title": config.title or config.name,
+        "description": config.description or f"3D shapes made of the parts of {len(plan.shards('exemplars'))} kits.",
+        "license": config.license,
+        "creator": section.creator,
+        "published": section.published,
+        "tags": list(section.tags),
+        "task_categories": list(section.task_categories),
+    }
+
+
+STAGE = Stage(
+    name="package",
+    version=VERSION,
+    config=PackageConfig,
+    inputs=("exemplars", "variations", "strings", "points", "sketches"),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=estimate_bytes,
+    publish=publish,
+)

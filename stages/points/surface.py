@@ -1,0 +1,167 @@
+"""Points on surfaces, uniform by area: on one mesh, or on all parts of an assembly without building its mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from stages.shape.arrays import FloatArray, IntArray, TypeArray
+from stages.shape.kit import Assembly, PartType
+
+__all__ = ["SurfacePoints", "SurfaceTable", "sample_assembly", "sample_surface", "surface_table", "type_table"]
+
+
+@dataclass(frozen=True)
+class SurfaceTable:
+    """The triangles of one or more meshes, laid out so that a random number finds a triangle by its area.
+
+    vertices: float64 (v, 3); faces: int64 (f, 3), rows of `vertices`; reach: float64 (f,), running sum of the areas
+    inside each mesh; first: int64 (m + 1,), where each mesh's triangles start; area: float64 (m,), of each mesh.
+    """
+
+    vertices: FloatArray
+    faces: npt.NDArray[np.int64]
+    reach: FloatArray
+    first: npt.NDArray[np.int64]
+    area: FloatArray
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points on an assembly: points and normals float64 (n, 3); labels int16 (n,), the index of the part's type;
+    instances int16 (n,), the index of the part."""
+
+    points: FloatArray
+    normals: FloatArray
+    labels: TypeArray
+    instances: TypeArray
+
+    def take(self, chosen: npt.NDArray[np.int64]) -> SurfacePoints:
+        """The points of these indices, in their order."""
+        return SurfacePoints(self.points[chosen], self.normals[chosen], self.labels[chosen], self.instances[chosen])
+
+    def followed_by(self, other: SurfacePoints) -> SurfacePoints:
+        """These points, then those of `other`."""
+        return SurfacePoints(
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.normals, other.normals]),
+            np.concatenate([self.labels, other.labels]),
+            np.concatenate([self.instances, other.instances]),
+        )
+
+
+def surface_table(meshes: Sequence[tuple[FloatArray, IntArray]]) -> SurfaceTable:
+    """The table of `meshes`, each `(vertices float64 (v, 3), faces int32 (f, 3))`.
+
+    Raises ValueError if a mesh has no triangle of positive area, or one that is not finite.
+    """
+    counts = [len(vertices) for vertices, _ in meshes]
+    starts = np.cumsum([0, *counts[:-1]])
+    vertices = np.ascontiguousarray(np.concatenate([each for each, _ in meshes]), dtype=np.float64)
+    faces = np.concatenate([each.astype(np.int64) + start for (_, each), start in zip(meshes, starts, strict=True)])
+    first = np.cumsum([0, *(len(each) for _, each in meshes)])
+    reach = _reach(vertices, faces, first)
+    area = np.array([reach[end - 1] if end > begin else 0.0 for begin, end in pairwise(first.tolist())])
+    if not (np.isfinite(area) & (area > 0.0)).all():
+        raise ValueError("a surface to sample needs a positive, finite area")
+    return SurfaceTable(vertices, faces, reach, first, area)
+
+
+def sample_surface(
+    vertices: FloatArray, faces: IntArray, n: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int64]]:
+    """`n` independent points on a mesh, uniform by area; triangles of zero area are never hit.
+
+    vertices: float64 (v, 3); faces: int32 (f, 3). Returns points float64 (n, 3), unit face normals by the winding
+    float64 (n, 3), and the index of each point's face int64 (n,). Raises ValueError if the mesh has no area.
+    """
+    table = surface_table([(vertices, faces)])
+    return _points_of_meshes(table, np.zeros(n, dtype=np.int64), rng)
+
+
+def sample_assembly(table: SurfaceTable, assembly: Assembly, n: int, rng: np.random.Generator) -> SurfacePoints:
+    """`n` independent points on all parts of `assembly`, uniform by area over the parts together.
+
+    `table` is the surface table of the kit's types, in order (`type_table`). Surface that lies inside another
+    part, or where two parts meet, counts like any other: nothing is removed.
+    """
+    poses = assembly.poses
+    part_reach = np.cumsum(table.area[assembly.types])
+    parts = np.searchsorted(part_reach, rng.random(n) * part_reach[-1], side="right")
+    parts = np.minimum(parts, len(part_reach) - 1)
+    labels = assembly.types[parts]
+    points, normals, _ = _points_of_meshes(table, labels.astype(np.int64), rng)
+    rotations = poses[parts, :3, :3]
+    points = np.einsum("nij,nj->ni", rotations, points) + poses[parts, :3, 3]
+    normals = np.einsum("nij,nj->ni", rotations, normals)
+    return SurfacePoints(points, normals, labels, parts.astype(np.int16))
+
+
+def type_table(types: Sequence[PartType]) -> SurfaceTable:
+    """The surface table of a kit's part types, in their order."""
+    return surface_table([(each.vertices, each.faces) for each in types])
+
+
+def _points_of_meshes(
+    table: SurfaceTable, meshes: npt.NDArray[np.int64], rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int64]]:
+    """A random point on each of the meshes `meshes` (n,): points, normals (n, 3), and faces counted from the mesh's
+    first (n,)."""
+    points, normals = np.empty((len(meshes), 3)), np.empty((len(meshes), 3))
+    hit = np.empty(len(meshes), dtype=np.int64)
+    draws = rng.random((3, len(meshes)))
+    _draw(table.vertices, table.faces, table.reach, table.first, meshes, draws, points, normals, hit)
+    return points, normals, hit
+
+
+@numba.njit(cache=True, inline="always")
+def _edges(vertices, face):  # type: ignore[no-untyped-def]
+    """First and second edge of a triangle, and their cross product."""
+    o, p, q = face[0], face[1], face[2]
+    ax, ay, az = vertices[p, 0] - vertices[o, 0], vertices[p, 1] - vertices[o, 1], vertices[p, 2] - vertices[o, 2]
+    bx, by, bz = vertices[q, 0] - vertices[o, 0], vertices[q, 1] - vertices[o, 1], vertices[q, 2] - vertices[o, 2]
+    return (ax, ay, az), (bx, by, bz), (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+
+
+@numba.njit(cache=True)
+def _reach(vertices, faces, first):  # type: ignore[no-untyped-def]
+    """Running sums of the triangles' areas, each mesh from zero."""
+    reach = np.empty(len(faces))
+    for mesh in range(len(first) - 1):
+        total = 0.0
+        for face in range(first[mesh], first[mesh + 1]):
+            _, _, (x, y, z) = _edges(vertices, faces[face])
+            total += 0.5 * (x * x + y * y + z * z) ** 0.5
+            reach[face] = total
+    return reach
+
+
+@numba.njit(cache=True)
+def _draw(vertices, faces, reach, first, meshes, draws, points, normals, hit):  # type: ignore[no-untyped-def]
+    """Fill `points`, `normals` and `hit`: the first triangle whose running sum exceeds the draw, so none of zero area."""
+    for i in range(len(meshes)):
+        low, high = first[meshes[i]], first[meshes[i] + 1] - 1
+        # a draw that rounds up to the whole area belongs to the last triangle that has any
+        target = min(draws[0, i] * reach[high], np.nextafter(reach[high], 0.0))
+        begin = low
+        while low < high:
+            middle = (low + high) // 2
+            if reach[middle] > target:
+                high = middle
+            else:
+                low = middle + 1
+        (ax, ay, az), (bx, by, bz), (x, y, z) = _edges(vertices, faces[low])
+        size = (x * x + y * y + z * z) ** 0.5
+        normals[i, 0], normals[i, 1], normals[i, 2] = x / size, y / size, z / size
+        spread = draws[1, i] ** 0.5
+        a, b = spread * (1.0 - draws[2, i]), spread * draws[2, i]
+        origin = faces[low, 0]
+        points[i, 0] = vertices[origin, 0] + a * ax + b * bx
+        points[i, 1] = vertices[origin, 1] + a * ay + b * by
+        points[i, 2] = vertices[origin, 2] + a * az + b * bz
+        hit[i] = low - begin

@@ -1,0 +1,395 @@
+"""Compiled kernels on pairs of triangle meshes: box trees, triangle distance, pairs within a tolerance.
+
+A mesh is a tuple `(corners, boxes, links)`: triangle corners float64 (f, 3, 3) in tree order, node boxes float64
+(k, 6) as centre and half extents, and node links int64 (k, 2): `(-first - 1, count)` for a leaf, else the indices
+of the two children. The root is node 0.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+
+__all__ = ["build_tree", "contact_patches", "first_contact", "near_pairs", "points_on_surface"]
+
+LEAF = 4
+
+
+def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
+    """The box tree of a mesh: median split along the longest axis of the triangle centres."""
+    corners = np.ascontiguousarray(vertices[faces])
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    centres = (low + high) / 2
+    order: list[np.ndarray] = []
+    boxes: list[np.ndarray] = []
+    links: list[list[int]] = []
+    placed = 0
+    stack = [(np.arange(len(faces)), -1, 0)]
+    while stack:
+        chosen, parent, side = stack.pop()
+        node = len(boxes)
+        if parent >= 0:
+            links[parent][side] = node
+        bottom, top = low[chosen].min(axis=0), high[chosen].max(axis=0)
+        boxes.append(np.concatenate([(bottom + top) / 2, (top - bottom) / 2]))
+        if len(chosen) <= LEAF:
+            links.append([-placed - 1, len(chosen)])
+            order.append(chosen)
+            placed += len(chosen)
+            continue
+        axis = int(np.argmax(np.ptp(centres[chosen], axis=0)))
+        ranked = chosen[np.argsort(centres[chosen, axis], kind="stable")]
+        links.append([0, 0])
+        stack.append((ranked[len(ranked) // 2 :], node, 1))
+        stack.append((ranked[: len(ranked) // 2], node, 0))
+    return np.ascontiguousarray(corners[np.concatenate(order)]), np.array(boxes), np.array(links, dtype=np.int64)
+
+
+@numba.njit(cache=True, inline="always")
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@numba.njit(cache=True)
+def _segment_distance2(p0, p1, q0, q1):
+    """Squared distance of two segments."""
+    d1x, d1y, d1z = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
+    d2x, d2y, d2z = q1[0] - q0[0], q1[1] - q0[1], q1[2] - q0[2]
+    rx, ry, rz = p0[0] - q0[0], p0[1] - q0[1], p0[2] - q0[2]
+    a = d1x * d1x + d1y * d1y + d1z * d1z
+    e = d2x * d2x + d2y * d2y + d2z * d2z
+    f = d2x * rx + d2y * ry + d2z * rz
+    c = d1x * rx + d1y * ry + d1z * rz
+    b = d1x * d2x + d1y * d2y + d1z * d2z
+    s, t = 0.0, 0.0
+    if a <= 0.0 and e <= 0.0:
+        return rx * rx + ry * ry + rz * rz
+    if a <= 0.0:
+        t = min(max(f / e, 0.0), 1.0)
+    elif e <= 0.0:
+        s = min(max(-c / a, 0.0), 1.0)
+    else:
+        denominator = a * e - b * b
+        if denominator > 1e-14 * a * e:
+            s = min(max((b * f - c * e) / denominator, 0.0), 1.0)
+        t = (b * s + f) / e
+        if t < 0.0:
+            t = 0.0
+            s = min(max(-c / a, 0.0), 1.0)
+        elif t > 1.0:
+            t = 1.0
+            s = min(max((b - c) / a, 0.0), 1.0)
+    x = rx + s * d1x - t * d2x
+    y = ry + s * d1y - t * d2y
+    z = rz + s * d1z - t * d2z
+    return x * x + y * y + z * z
+
+
+@numba.njit(cache=True)
+def _inside_prism(p, tri, n):
+    """Whether `p` projects into the triangle `tri` with (unnormalised) normal `n`."""
+    for k in range(3):
+        o, w = tri[k], tri[(k + 1) % 3]
+        ex, ey, ez = w[0] - o[0], w[1] - o[1], w[2] - o[2]
+        px, py, pz = p[0] - o[0], p[1] - o[1], p[2] - o[2]
+        side = n[0] * (ey * pz - ez * py) + n[1] * (ez * px - ex * pz) + n[2] * (ex * py - ey * px)
+        if side < 0.0:
+            return False
+    return True
+
+
+@numba.njit(cache=True)
+def _normal(tri, out):
+    ax, ay, az = tri[1, 0] - tri[0, 0], tri[1, 1] - tri[0, 1], tri[1, 2] - tri[0, 2]
+    bx, by, bz = tri[2, 0] - tri[0, 0], tri[2, 1] - tri[0, 1], tri[2, 2] - tri[0, 2]
+    out[0] = ay * bz - az * by
+    out[1] = az * bx - ax * bz
+    out[2] = ax * by - ay * bx
+    return (out[0] * out[0] + out[1] * out[1] + out[2] * out[2]) ** 0.5
+
+
+@numba.njit(cache=True)
+def _plane_sides(n, length, origin, tri, out):
+    """Signed distances of the corners of `tri` to the plane; False where all three lie off one side."""
+    for k in range(3):
+        out[k] = (
+            n[0] * (tri[k, 0] - origin[0]) + n[1] * (tri[k, 1] - origin[1]) + n[2] * (tri[k, 2] - origin[2])
+        ) / length
+    return None
+
+
+@numba.njit(cache=True)
+def _pierces(tri, sides, other, n):
+    """Whether an edge of `tri` passes through the interior of `other` (normal n); `sides` are its plane distances."""
+    hit = np.empty(3)
+    for k in range(3):
+        l = (k + 1) % 3
+        if (sides[k] <= 0.0 and sides[l] >= 0.0) or (sides[k] >= 0.0 and sides[l] <= 0.0):
+            span = sides[k] - sides[l]
+            if span == 0.0:
+                continue
+            t = sides[k] / span
+            for axis in range(3):
+                hit[axis] = tri[k, axis] + t * (tri[l, axis] - tri[k, axis])
+            if _inside_prism(hit, other, n):
+                return True
+    return False
+
+
+@numba.njit(cache=True)
+def _triangles_within(p, q, tolerance, np_, nq, sp, sq):
+    """Whether two triangles are at most `tolerance` apart or intersect; np_, nq, sp, sq are scratch (3,)."""
+    lp = _normal(p, np_)
+    lq = _normal(q, nq)
+    if lq > 0.0:
+        _plane_sides(nq, lq, q[0], p, sp)
+        if min(sp[0], sp[1], sp[2]) > tolerance or max(sp[0], sp[1], sp[2]) < -tolerance:
+            return False
+    if lp > 0.0:
+        _plane_sides(np_, lp, p[0], q, sq)
+        if min(sq[0], sq[1], sq[2]) > tolerance or max(sq[0], sq[1], sq[2]) < -tolerance:
+            return False
+    limit = tolerance * tolerance
+    if lq > 0.0:
+        for k in range(3):
+            if abs(sp[k]) <= tolerance and _inside_prism(p[k], q, nq):
+                return True
+        if _pierces(p, sp, q, nq):
+            return True
+    if lp > 0.0:
+        for k in range(3):
+            if abs(sq[k]) <= tolerance and _inside_prism(q[k], p, np_):
+                return True
+        if _pierces(q, sq, p, np_):
+            return True
+    for i in range(3):
+        for j in range(3):
+            if _segment_distance2(p[i], p[(i + 1) % 3], q[j], q[(j + 1) % 3]) <= limit:
+                return True
+    return False
+
+
+@numba.njit(cache=True)
+def _boxes_apart(a, b, r, ar, t, tolerance):
+    """Whether box `a` and box `b` (moved by rotation `r`, translation `t`; `ar` = |r|) are surely apart."""
+    dx = r[0, 0] * b[0] + r[0, 1] * b[1] + r[0, 2] * b[2] + t[0] - a[0]
+    dy = r[1, 0] * b[0] + r[1, 1] * b[1] + r[1, 2] * b[2] + t[1] - a[1]
+    dz = r[2, 0] * b[0] + r[2, 1] * b[1] + r[2, 2] * b[2] + t[2] - a[2]
+    if abs(dx) > a[3] + ar[0, 0] * b[3] + ar[0, 1] * b[4] + ar[0, 2] * b[5] + tolerance:
+        return True
+    if abs(dy) > a[4] + ar[1, 0] * b[3] + ar[1, 1] * b[4] + ar[1, 2] * b[5] + tolerance:
+        return True
+    if abs(dz) > a[5] + ar[2, 0] * b[3] + ar[2, 1] * b[4] + ar[2, 2] * b[5] + tolerance:
+        return True
+    ex = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
+    if abs(ex) > b[3] + ar[0, 0] * a[3] + ar[1, 0] * a[4] + ar[2, 0] * a[5] + tolerance:
+        return True
+    ey = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
+    if abs(ey) > b[4] + ar[0, 1] * a[3] + ar[1, 1] * a[4] + ar[2, 1] * a[5] + tolerance:
+        return True
+    ez = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
+    return abs(ez) > b[5] + ar[0, 2] * a[3] + ar[1, 2] * a[4] + ar[2, 2] * a[5] + tolerance
+
+
+@numba.njit(cache=True)
+def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
+    """Number of triangle pairs within tolerance; their indices go to `pairs` as far as it has rows."""
+    r = np.ascontiguousarray(pose[:3, :3])
+    ar = np.abs(r) + 1e-12
+    t = pose[:3, 3].copy()
+    stack = np.empty((512, 2), dtype=np.int64)
+    moved = np.empty((3, 3))
+    scratch = np.empty((4, 3))
+    found = 0
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    size = 1
+    while size > 0:
+        size -= 1
+        i, j = stack[size, 0], stack[size, 1]
+        if _boxes_apart(ba[i], bb[j], r, ar, t, tolerance):
+            continue
+        leaf_a, leaf_b = la[i, 0] < 0, lb[j, 0] < 0
+        if leaf_a and leaf_b:
+            for v in range(-lb[j, 0] - 1, -lb[j, 0] - 1 + lb[j, 1]):
+                for k in range(3):
+                    for axis in range(3):
+                        moved[k, axis] = (
+                            r[axis, 0] * cb[v, k, 0] + r[axis, 1] * cb[v, k, 1] + r[axis, 2] * cb[v, k, 2] + t[axis]
+                        )
+                for u in range(-la[i, 0] - 1, -la[i, 0] - 1 + la[i, 1]):
+                    if _triangles_within(ca[u], moved, tolerance, scratch[0], scratch[1], scratch[2], scratch[3]):
+                        if found < len(pairs):
+                            pairs[found, 0] = u
+                            pairs[found, 1] = v
+                        found += 1
+                        if stop_at_first:
+                            return found
+        elif leaf_b or (not leaf_a and ba[i, 3] + ba[i, 4] + ba[i, 5] > bb[j, 3] + bb[j, 4] + bb[j, 5]):
+            for child in range(2):
+                stack[size, 0], stack[size, 1] = la[i, child], j
+                size += 1
+        else:
+            for child in range(2):
+                stack[size, 0], stack[size, 1] = i, lb[j, child]
+                size += 1
+    return found
+
+
+_NO_PAIRS = np.empty((0, 2), dtype=np.int64)
+
+
+def first_contact(a, b, pose: FloatArray, tolerance: float) -> bool:
+    """Whether mesh `b`, moved by `pose` (4, 4) into the coordinates of mesh `a`, comes within `tolerance` of it."""
+    return bool(_walk(*a, *b, pose, tolerance, True, _NO_PAIRS))
+
+
+def near_pairs(a, b, pose: FloatArray, tolerance: float) -> np.ndarray:
+    """All pairs of triangles within `tolerance`, int64 (p, 2) in tree order of `a` and `b`."""
+    pairs = np.empty((4096, 2), dtype=np.int64)
+    found = _walk(*a, *b, pose, tolerance, False, pairs)
+    if found > len(pairs):
+        pairs = np.empty((found, 2), dtype=np.int64)
+        _walk(*a, *b, pose, tolerance, False, pairs)
+    return pairs[:found]
+
+
+@numba.njit(cache=True)
+def _clip(polygon, count, n, offset, out):
+    """The part of a polygon where n . x <= offset (Sutherland and Hodgman); its corner count."""
+    kept = 0
+    for k in range(count):
+        l = (k + 1) % count
+        dk = _dot(n, polygon[k]) - offset
+        dl = _dot(n, polygon[l]) - offset
+        if dk <= 0.0:
+            out[kept] = polygon[k]
+            kept += 1
+        if (dk < 0.0 and dl > 0.0) or (dk > 0.0 and dl < 0.0):
+            t = dk / (dk - dl)
+            for axis in range(3):
+                out[kept, axis] = polygon[k, axis] + t * (polygon[l, axis] - polygon[k, axis])
+            kept += 1
+    return kept
+
+
+@numba.njit(cache=True)
+def contact_patches(ca, cb, pairs, pose, tolerance):
+    """Where mesh `b` touches mesh `a`: for each pair of near triangles the share of the first near the second.
+
+    Returns points float64 (q, 3), corners of the shares; area float64 (p,), the area of each share where the two
+    triangles are parallel within 8 degrees, else 0; crossing bool (p,), whether each triangle reaches to more than
+    twice the tolerance on both sides of the other's plane; all in coordinates of `a`.
+    """
+    r, t = pose[:3, :3], pose[:3, 3]
+    points = np.empty((12 * len(pairs) + 1, 3))
+    area = np.zeros(len(pairs))
+    crossing = np.zeros(len(pairs), dtype=np.bool_)
+    total = 0
+    one = np.empty((16, 3))
+    two = np.empty((16, 3))
+    tri = np.empty((3, 3))
+    na, nb, edge, sides = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for index in range(len(pairs)):
+        first = ca[pairs[index, 0]]
+        for k in range(3):
+            for axis in range(3):
+                c = cb[pairs[index, 1], k]
+                tri[k, axis] = r[axis, 0] * c[0] + r[axis, 1] * c[1] + r[axis, 2] * c[2] + t[axis]
+        la, lb = _normal(first, na), _normal(tri, nb)
+        if la <= 0.0 or lb <= 0.0:
+            continue
+        for axis in range(3):
+            na[axis] /= la
+            nb[axis] /= lb
+        _plane_sides(nb, 1.0, tri[0], first, sides)
+        cross_a = sides.min() < -2 * tolerance and sides.max() > 2 * tolerance
+        _plane_sides(na, 1.0, first[0], tri, sides)
+        cross_b = sides.min() < -2 * tolerance and sides.max() > 2 * tolerance
+        crossing[index] = cross_a and cross_b
+        for k in range(3):
+            one[k] = first[k]
+        base = _dot(nb, tri[0])
+        count = _clip(one, 3, nb, base + tolerance, two)
+        for axis in range(3):
+            nb[axis] = -nb[axis]
+        count = _clip(two, count, nb, -base + tolerance, one)
+        for k in range(3):
+            if count == 0:
+                break
+            l = (k + 1) % 3
+            ex, ey, ez = tri[l, 0] - tri[k, 0], tri[l, 1] - tri[k, 1], tri[l, 2] - tri[k, 2]
+            # nb points backwards here, so edge x nb points out of the triangle with its sign turned
+            edge[0] = ez * nb[1] - ey * nb[2]
+            edge[1] = ex * nb[2] - ez * nb[0]
+            edge[2] = ey * nb[0] - ex * nb[1]
+            length = (edge[0] * edge[0] + edge[1] * edge[1] + edge[2] * edge[2]) ** 0.5
+            if length == 0.0:
+                continue
+            for axis in range(3):
+                edge[axis] /= length
+            count = _clip(one, count, edge, _dot(edge, tri[k]) + tolerance, two)
+            one, two = two, one
+        if count == 0:
+            continue
+        if abs(_dot(na, nb)) > 0.99:
+            x, y, z = 0.0, 0.0, 0.0
+            for k in range(1, count - 1):
+                ux, uy, uz = one[k, 0] - one[0, 0], one[k, 1] - one[0, 1], one[k, 2] - one[0, 2]
+                vx, vy, vz = one[k + 1, 0] - one[0, 0], one[k + 1, 1] - one[0, 1], one[k + 1, 2] - one[0, 2]
+                x += uy * vz - uz * vy
+                y += uz * vx - ux * vz
+                z += ux * vy - uy * vx
+            area[index] = (x * x + y * y + z * z) ** 0.5 / 2
+        for k in range(count):
+            points[total] = one[k]
+            total += 1
+    return points[:total], area, crossing
+
+
+@numba.njit(cache=True)
+def _point_triangle_distance2(p, tri, n, sides):
+    """Squared distance of a point and a triangle; n, sides are scratch (3,)."""
+    length = _normal(tri, n)
+    if length > 0.0 and _inside_prism(p, tri, n):
+        h = (n[0] * (p[0] - tri[0, 0]) + n[1] * (p[1] - tri[0, 1]) + n[2] * (p[2] - tri[0, 2])) / length
+        return h * h
+    best = np.inf
+    for k in range(3):
+        best = min(best, _segment_distance2(p, p, tri[k], tri[(k + 1) % 3]))
+    return best
+
+
+@numba.njit(cache=True)
+def points_on_surface(corners, boxes, links, points, tolerance):
+    """Whether every one of `points` (q, 3) lies within `tolerance` of the mesh."""
+    stack = np.empty(512, dtype=np.int64)
+    n, sides = np.empty(3), np.empty(3)
+    for index in range(len(points)):
+        p = points[index]
+        stack[0] = 0
+        size, near = 1, False
+        while size > 0 and not near:
+            size -= 1
+            node = stack[size]
+            box = boxes[node]
+            if (
+                abs(p[0] - box[0]) > box[3] + tolerance
+                or abs(p[1] - box[1]) > box[4] + tolerance
+                or abs(p[2] - box[2]) > box[5] + tolerance
+            ):
+                continue
+            if links[node, 0] < 0:
+                first = -links[node, 0] - 1
+                for u in range(first, first + links[node, 1]):
+                    if _point_triangle_distance2(p, corners[u], n, sides) <= tolerance * tolerance:
+                        near = True
+                        break
+            else:
+                stack[size], stack[size + 1] = links[node, 0], links[node, 1]
+                size += 2
+        if not near:
+            return False
+    return True

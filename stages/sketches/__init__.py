@@ -1,0 +1,1 @@
+"""Stage `sketches`: any shape as line drawings."""

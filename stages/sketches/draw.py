@@ -1,0 +1,54 @@
+"""One line drawing of a scene."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.errors import ShardFailed
+from stages.shape.arrays import ByteArray
+from stages.sketches.settings import SketchView, StrokeOptions
+from stages.views.buffers import Backend, visible_triangles
+from stages.views.camera import Camera
+from stages.views.scene import Scene
+
+__all__ = ["draw_sketch", "jittered_camera"]
+
+
+def jittered_camera(view: SketchView, rng: np.random.Generator) -> Camera:
+    """The camera of a view for one sample: each jittered value drawn uniformly, in a fixed order, from `rng`."""
+    azimuth, elevation, fov, distance = rng.uniform(-1.0, 1.0, 4).tolist()
+    return Camera(
+        azimuth=view.azimuth + azimuth * view.azimuth_jitter,
+        elevation=view.elevation + elevation * view.elevation_jitter,
+        projection=view.projection,
+        fov=view.fov + fov * view.fov_jitter,
+        distance=None if view.distance is None else view.distance * (1.0 + distance * view.distance_jitter),
+        margin=view.margin,
+    )
+
+
+def draw_sketch(
+    scene: Scene, camera: Camera, size: int, supersample: int, options: StrokeOptions, backend: Backend
+) -> ByteArray:
+    """Dark lines on white, uint8 (size, size).
+
+    Raises ShardFailed where nothing is seen or nothing would be drawn: a blank drawing is never a sample.
+    """
+    from stages.views.ink import ink_strokes
+    from stages.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
+
+    seen = visible_triangles(scene, camera, (size * supersample, size * supersample), backend)
+    strokes = find_strokes(
+        seen, options.crease_angle, options.step * supersample, options.shortest * supersample
+    )
+    widths = {
+        OUTLINE: options.outline,
+        CONTOUR: options.contour,
+        BOUNDARY: options.boundary,
+        CREASE: options.crease,
+    }
+    ink = ink_strokes(strokes, widths, size, size, 1.0 / supersample, options.crowding)
+    drawing = np.rint(255.0 * (1.0 - options.ink * ink)).astype(np.uint8)
+    if drawing.min() == drawing.max():
+        raise ShardFailed(f"blank drawing: no line of {len(scene)} parts is seen from {camera}")
+    return drawing

@@ -1,0 +1,96 @@
+"""Drawings as images: augmentations and PNG, both by OpenImageIO."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import ShardFailed
+from stages.shape.arrays import ByteArray
+from stages.sketches.settings import Augmentation
+
+__all__ = ["augment", "dilate", "erode", "flip", "png_array", "png_bytes"]
+
+
+def augment(drawing: ByteArray, chances: Augmentation, rng: np.random.Generator) -> ByteArray:
+    """The drawing (h, w), mirrored, thickened or thinned by the chances given; always two draws from `rng`."""
+    mirror, morphology = rng.random(2)
+    if mirror < chances.flip:
+        drawing = flip(drawing)
+    if morphology < chances.dilate:
+        drawing = dilate(drawing, chances.size)
+    elif morphology < chances.dilate + chances.erode:
+        drawing = erode(drawing, chances.size)
+    return drawing
+
+
+def flip(drawing: ByteArray) -> ByteArray:
+    """Left and right changed over."""
+    return np.ascontiguousarray(drawing[:, ::-1])
+
+
+def dilate(drawing: ByteArray, size: int) -> ByteArray:
+    """Lines thicker: each pixel as dark as the darkest in the square of side `size` around it."""
+    import OpenImageIO as oiio
+
+    return _pixels(oiio.ImageBufAlgo.erode(_buffer(drawing), size, size))
+
+
+def erode(drawing: ByteArray, size: int) -> ByteArray:
+    """Lines thinner: each pixel as light as the lightest in the square of side `size` around it."""
+    import OpenImageIO as oiio
+
+    return _pixels(oiio.ImageBufAlgo.dilate(_buffer(drawing), size, size))
+
+
+def png_bytes(drawing: ByteArray) -> bytes:
+    """The drawing (h, w) as a single-channel 8-bit PNG; equal drawings give equal bytes."""
+    import OpenImageIO as oiio
+
+    height, width = drawing.shape
+    spec = oiio.ImageSpec(width, height, 1, "uint8")
+    # OpenImageIO writes to files only.
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "drawing.png"
+        output = oiio.ImageOutput.create(str(path))
+        written = output is not None and output.open(str(path), spec)
+        written = written and output.write_image(np.ascontiguousarray(drawing)) and output.close()
+        if not written:
+            raise ShardFailed(f"OpenImageIO cannot write a PNG: {oiio.geterror() if output is None else output.geterror()}")
+        return path.read_bytes()
+
+
+def png_array(content: bytes) -> ByteArray:
+    """The pixels uint8 (h, w) of a single-channel PNG. Raises ValueError for anything else."""
+    import OpenImageIO as oiio
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "drawing.png"
+        path.write_bytes(content)
+        image = oiio.ImageInput.open(str(path))
+        if image is None:
+            raise ValueError(f"not an image: {oiio.geterror()}")
+        spec = image.spec()
+        pixels = image.read_image(oiio.UINT8)
+        image.close()
+    if spec.nchannels != 1:
+        raise ValueError(f"the image has {spec.nchannels} channels instead of 1")
+    drawing: ByteArray = np.asarray(pixels)[:, :, 0]
+    return drawing
+
+
+def _buffer(drawing: ByteArray) -> Any:
+    import OpenImageIO as oiio
+
+    return oiio.ImageBuf(np.ascontiguousarray(drawing)[:, :, None])
+
+
+def _pixels(buffer: Any) -> ByteArray:
+    import OpenImageIO as oiio
+
+    if buffer.has_error:
+        raise ShardFailed(f"OpenImageIO: {buffer.geterror()}")
+    return np.ascontiguousarray(buffer.get_pixels(oiio.UINT8)[:, :, 0])

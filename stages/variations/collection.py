@@ -1,0 +1,130 @@
+"""The collection: which variants become samples, in which split and shard (splits by structure, not by row)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import ShardFailed
+from pipeline.shards import ShardWriter, array_bytes
+from pipeline.stage import Outcome, Plan, Shard, Task
+from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.sample import Sample, write_sample
+from stages.variations.pool import FoundVariants
+from stages.variations.rounds import pool_entries
+from stages.variations.settings import SplitConfig, VariationsConfig
+
+__all__ = ["assignment_shard", "collection_shards_of", "run_assignment", "run_collection"]
+
+SPLITS = ("train", "val", "test")
+
+
+def assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
+    """The shard that shares out the variants, once the search of every kit has ended."""
+    kits = [kit.name for kit in plan.config.section(ExemplarsConfig).kits]
+    inputs = (*(f"exemplars/{kit}" for kit in kits), *(f"variations/{each.name}" for each in search))
+    return Shard(f"{plan.config.name}-assignment", {"job": "assignment", "kits": kits}, inputs)
+
+
+def collection_shards_of(plan: Plan, assignment: Shard) -> list[Shard]:
+    """The shards of the collection, `<dataset>-<split>-<index>`, empty until the assignment is made."""
+    summary = plan.summary("variations", assignment.name)
+    if summary is None:
+        return []
+    lanes = tuple(each for each in assignment.inputs if not each.endswith("-pool"))
+    return [
+        Shard(
+            f"{plan.config.name}-{split}-{number:06d}",
+            {"job": "collection", "split": split, "number": number},
+            (*lanes, f"variations/{assignment.name}"),
+        )
+        for split in SPLITS
+        for number in range(summary["shards"][split])
+    ]
+
+
+def run_assignment(task: Task) -> Outcome:
+    """Give every variant its split, shard and place.
+
+    Variants of one kit with equal canonical graphs stand in one split. Writes rows int64 (k, 6): kit, row of
+    `lanes.txt`, index there, place in the kit, split, shard, in the order of the samples.
+    """
+    config = task.config.section(VariationsConfig)
+    rows: list[tuple[int, int, int, int]] = []
+    groups: dict[tuple[int, bytes], list[int]] = {}
+    lanes: dict[str, int] = {}
+    for number, kit in enumerate(task.shard.params["kits"]):
+        for place, (found, index) in enumerate(pool_entries(task, kit)):
+            if place == config.per_kit:
+                break
+            lane = lanes.setdefault(found.name, len(lanes))
+            groups.setdefault((number, found.digest(index, docked=False)), []).append(len(rows))
+            rows.append((number, lane, index, place))
+    if not rows:
+        raise ShardFailed("the search found no variant of any kit; see `python -m pipeline status` for the reasons")
+    split_of = _share_out(list(groups.values()), config.splits, task.rng("splits"))
+    order = task.rng("order").permutation(len(rows))
+    placed: list[np.ndarray] = []
+    shards: dict[str, int] = {}
+    for split, name in enumerate(SPLITS):
+        members = order[split_of[order] == split]
+        wanted = max(config.splits.shards, -(-len(members) // config.splits.samples_per_shard))
+        shards[name] = min(wanted, len(members))
+        shard = np.arange(len(members)) * shards[name] // max(len(members), 1)
+        placed.append(
+            np.concatenate([np.array(rows)[members], np.full((len(members), 1), split), shard[:, None]], axis=1)
+        )
+    with task.output(f"{task.shard.name}.rows.npy") as stream:
+        stream.write(array_bytes(np.concatenate(placed).astype(np.int64)))
+    with task.output(f"{task.shard.name}.lanes.txt") as stream:
+        stream.write("".join(f"{name}\n" for name in lanes).encode())
+    return Outcome(0, {"shards": shards, "variants": len(rows), "graphs": len(groups)})
+
+
+def _share_out(groups: list[list[int]], config: SplitConfig, rng: np.random.Generator) -> np.ndarray:
+    """The split of each row: 0 train, 1 val, 2 test. Whole groups go to val and test until these have their share."""
+    total = sum(len(group) for group in groups)
+    split_of = np.zeros(total, dtype=np.int64)
+    left = {1: round(config.val * total), 2: round(config.test * total)}
+    for number in rng.permutation(len(groups)).tolist():
+        split = max(left, key=lambda each: (left[each], -each))
+        # A group much larger than what is left would swamp a small split; it stays in train.
+        if left[split] > 0 and len(groups[number]) <= max(2 * left[split], 1):
+            split_of[groups[number]] = split
+            left[split] -= len(groups[number])
+    return split_of
+
+
+def run_collection(task: Task) -> Outcome:
+    """Write the samples of one shard."""
+    assignment = f"{task.config.name}-assignment"
+    rows = np.load(task.input("variations", f"{assignment}.rows.npy"), allow_pickle=False)
+    lanes = task.input("variations", f"{assignment}.lanes.txt").read_text().splitlines()
+    kits = [kit.name for kit in task.config.section(ExemplarsConfig).kits]
+    split: str = task.shard.params["split"]
+    mine = rows[(rows[:, 4] == SPLITS.index(split)) & (rows[:, 5] == task.shard.params["number"])]
+    found: dict[int, FoundVariants] = {}
+    counts: Counter[str] = Counter()
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for kit, lane, index, place in mine[:, :4].tolist():
+            if lane not in found:
+                found[lane] = FoundVariants.of(task, lanes[lane])
+            write_sample(writer, _sample(kits[kit], place, split, found[lane], index))
+            counts[kits[kit]] += 1
+    summary: dict[str, Any] = {"split": split, "samples": len(mine), "kits": dict(sorted(counts.items()))}
+    return Outcome(len(mine), summary)
+
+
+def _sample(kit: str, place: int, split: str, found: FoundVariants, index: int) -> Sample:
+    assembly, _ = found.assembly(index)
+    return Sample(
+        key=f"{kit}-{place:06d}",
+        split=split,
+        producer="variations",
+        kit=kit,
+        graph=found.digest(index, docked=False).hex(),
+        assembly=assembly,
+        lineage={"name": f"{found.name}-{index}", **found.described(index)},
+    )

@@ -1,0 +1,65 @@
+"""Stage `variations`: kits in; many valid new assemblies out, as the shards `<dataset>-<split>-<index>.tar`.
+
+Its shards are the lanes and pools of each kit's search, the assignment of variants to splits, and the collection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
+from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
+from stages.variations.settings import VariationsConfig
+
+__all__ = ["STAGE"]
+
+BYTES_A_VARIANT = 60_000
+
+_JOBS = {"lane": run_lane, "pool": run_pool, "assignment": run_assignment, "collection": run_collection}
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """The rounds of every kit as far as they are known, then the assignment and the collection."""
+    search: list[Shard] = []
+    ended = True
+    for kit in plan.shards("exemplars"):
+        shards, kit_ended = search_shards(plan, kit)
+        search.extend(shards)
+        ended = ended and kit_ended
+    if not ended:
+        return search
+    assignment = assignment_shard(plan, search)
+    return [*search, assignment, *collection_shards_of(plan, assignment)]
+
+
+def run_shard(task: Task) -> Outcome:
+    """One lane, pool, assignment or collection shard."""
+    return _JOBS[task.shard.params["job"]](task)
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """How far the search of each kit is, and why it ended."""
+    wanted = plan.config.section(VariationsConfig).per_kit
+    lines = []
+    for kit in plan.shards("exemplars"):
+        state = last_pool(plan, kit)
+        if state:
+            counts = f"{state['graphs']:,} distinct graphs, {state['histograms']:,} distinct histograms"
+            why = state["why"] or f"{kit}: {state['found']:,} of {wanted:,} variants after {state['tries']:,} tries"
+            lines.append(f"{why}; {counts}")
+    return lines
+
+
+STAGE = Stage(
+    name="variations",
+    version=1,
+    config=VariationsConfig,
+    inputs=("exemplars",),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=lambda plan: (
+        2 * BYTES_A_VARIANT * plan.config.section(VariationsConfig).per_kit * len(plan.shards("exemplars"))
+    ),
+    report=report,
+)

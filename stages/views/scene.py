@@ -1,0 +1,177 @@
+"""Scenes: meshes that are stored once, and the posed instances of them that make a shape."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.kit import Assembly, Kit
+
+__all__ = ["MeshSet", "Scene", "mesh_scene", "scene_of"]
+
+WELD = 2e-6
+"""Vertices closer than this share of half their mesh's longest side are one vertex to `neighbours`."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSet:
+    """Meshes in one block, compared by identity, so that a renderer keeps what it has uploaded.
+
+    vertices: float64 (v, 3), each mesh around the middle of its own box (a model far from the origin keeps its
+    digits in single precision); faces: int32 (f, 3) into `vertices`; colors: uint8 (f, 3) sRGB;
+    vertex_first, face_first: int64 (m + 1,), where each mesh begins and ends; centers: float64 (m, 3), the middles.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    colors: ByteArray
+    vertex_first: np.ndarray
+    face_first: np.ndarray
+    centers: FloatArray
+
+    @staticmethod
+    def of(meshes: Sequence[tuple[FloatArray, IntArray, ByteArray]]) -> MeshSet:
+        """The set of `(vertices (v, 3), faces (f, 3), face colors (f, 3))`."""
+        middles = [(v.min(axis=0) + v.max(axis=0)) / 2 if len(v) else np.zeros(3) for v, _, _ in meshes]
+        vertex_first = np.cumsum([0, *(len(v) for v, _, _ in meshes)])
+        face_first = np.cumsum([0, *(len(f) for _, f, _ in meshes)])
+        faces = [f + first for (_, f, _), first in zip(meshes, vertex_first, strict=False)]
+        return MeshSet(
+            vertices=np.concatenate([v - c for (v, _, _), c in zip(meshes, middles, strict=True)]).astype(np.float64),
+            faces=np.concatenate(faces).astype(np.int32),
+            colors=np.concatenate([c for _, _, c in meshes]).astype(np.uint8),
+            vertex_first=vertex_first,
+            face_first=face_first,
+            centers=np.array(middles, dtype=np.float64).reshape(-1, 3),
+        )
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """Unit normal of each face in mesh coordinates, float64 (f, 3); zero for a face without area."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        unit: FloatArray = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+        return unit
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """For each face the face across each of its edges (0-1, 1-2, 2-0), int32 (f, 3); -1 where none is alone.
+
+        Vertices at the same place (within a millionth of the mesh) count as one, so that seams of texture or
+        shading are no borders. An edge of more than two faces has no single surface across it: -1.
+        """
+        mesh_of = np.repeat(np.arange(len(self.centers)), np.diff(self.vertex_first))
+        size = np.zeros(len(self.centers))
+        np.maximum.at(size, mesh_of, np.abs(self.vertices).max(axis=1))
+        places = np.rint(self.vertices / np.maximum(size[mesh_of, None] * WELD, np.finfo(float).tiny))
+        welded = np.unique(np.column_stack([mesh_of, places + 0.0]), axis=0, return_inverse=True)[1].ravel()
+        corners = welded[self.faces]
+        starts, ends = corners.ravel(), corners[:, [1, 2, 0]].ravel()
+        keys = np.minimum(starts, ends) * (len(self.vertices) + 1) + np.maximum(starts, ends)
+        order = np.argsort(keys, kind="stable")
+        ordered = keys[order]
+        new = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]]) if len(order) else np.empty(0, dtype=np.int64)
+        pairs = new[np.diff(np.r_[new, len(order)]) == 2]
+        first, second = order[pairs], order[pairs + 1]
+        neighbours = np.full(len(keys), -1, dtype=np.int32)
+        neighbours[first], neighbours[second] = second // 3, first // 3
+        return neighbours.reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Posed instances of meshes.
+
+    mesh_of: int32 (n,), the mesh of each part; poses: float64 (n, 4, 4), rigid; up: the axis that points up.
+    layers: int32 (n,): where faces of two parts lie in one plane, the part of the lower layer is seen.
+    """
+
+    meshes: MeshSet
+    mesh_of: IntArray
+    poses: FloatArray
+    layers: IntArray
+    up: Literal["y", "z"]
+
+    def __len__(self) -> int:
+        return len(self.mesh_of)
+
+    @cached_property
+    def placed(self) -> FloatArray:
+        """Poses that also undo the centering of the meshes, float64 (n, 4, 4)."""
+        placed = self.poses.copy()
+        placed[:, :3, 3] += np.einsum("nij,nj->ni", self.poses[:, :3, :3], self.meshes.centers[self.mesh_of])
+        return placed
+
+    @cached_property
+    def triangle_first(self) -> np.ndarray:
+        """Number of the first triangle of each part, and of all, int64 (n + 1,)."""
+        counts = np.diff(self.meshes.face_first)[self.mesh_of]
+        return np.concatenate([[0], np.cumsum(counts)])
+
+    @cached_property
+    def triangle_part(self) -> IntArray:
+        """The part of each triangle, int32 (t,)."""
+        return np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.triangle_first))
+
+    @cached_property
+    def triangle_face(self) -> IntArray:
+        """The face of each triangle in the mesh set, int32 (t,)."""
+        shift = self.meshes.face_first[self.mesh_of] - self.triangle_first[:-1]
+        return (np.arange(self.triangle_first[-1]) + np.repeat(shift, np.diff(self.triangle_first))).astype(np.int32)
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """All vertices of all parts in the world, float64 (p, 3), part by part."""
+        points = []
+        for mesh, pose in zip(self.mesh_of.tolist(), self.placed, strict=True):
+            local = self.meshes.vertices[self.meshes.vertex_first[mesh] : self.meshes.vertex_first[mesh + 1]]
+            points.append(local @ pose[:3, :3].T + pose[:3, 3])
+        return np.concatenate(points) if points else np.empty((0, 3))
+
+
+def scene_of(assembly: Assembly, kit: Kit) -> Scene:
+    """The scene of an assembly. Scenes of one kit object share its mesh set."""
+    layers = _layers(len(assembly), assembly.edges)
+    return Scene(_kit_meshes(kit), assembly.types.astype(np.int32), assembly.poses, layers, kit.up)
+
+
+def mesh_scene(vertices: FloatArray, faces: IntArray, face_colors: ByteArray, up: Literal["y", "z"]) -> Scene:
+    """A scene of one part, vertices (v, 3), faces (f, 3), face_colors uint8 (f, 3)."""
+    single = np.zeros(1, dtype=np.int32)
+    return Scene(MeshSet.of([(vertices, faces, face_colors)]), single, np.eye(4)[None], single, up)
+
+
+_KNOWN: dict[int, tuple[weakref.ref[Kit], MeshSet]] = {}
+
+
+def _kit_meshes(kit: Kit) -> MeshSet:
+    """The mesh set of a kit, made once for each kit object (kits hold arrays and cannot be hashed)."""
+    known = _KNOWN.get(id(kit))
+    if known is None or known[0]() is not kit:
+        for key in [key for key, (ref, _) in _KNOWN.items() if ref() is None]:
+            del _KNOWN[key]
+        meshes = MeshSet.of([(each.vertices, each.faces, each.face_colors) for each in kit.types])
+        known = _KNOWN[id(kit)] = weakref.ref(kit), meshes
+    return known[1]
+
+
+def _layers(parts: int, edges: IntArray) -> IntArray:
+    """A small number for each part that differs from those of all parts it touches, int32 (parts,)."""
+    lower: list[list[int]] = [[] for _ in range(parts)]
+    for i, j in edges.tolist():
+        lower[max(i, j)].append(min(i, j))
+    layers: list[int] = []
+    for part in range(parts):
+        taken = {layers[other] for other in lower[part]}
+        layer = 0
+        while layer in taken:
+            layer += 1
+        layers.append(layer)
+    return np.array(layers, dtype=np.int32)

@@ -1,0 +1,62 @@
+"""Points a second: uniform and farthest, beside trimesh and Open3D on the same mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from stages.points.farthest import farthest_points
+from stages.points.surface import sample_surface
+from tests.bench.measure import Measure, rate
+
+UNIFORM, PICKED, POOL = 2048, 1500, 30_000
+
+
+def bumpy_sheet(cells: int = 71) -> tuple[np.ndarray, np.ndarray]:
+    """A sheet of 2 * cells^2 triangles (10,082 at 71) with hills, so that areas and normals differ."""
+    x, y = np.meshgrid(np.linspace(0, 1, cells + 1), np.linspace(0, 1, cells + 1), indexing="ij")
+    vertices = np.stack([x, y, 0.2 * np.sin(9 * x) * np.cos(7 * y)], axis=-1).reshape(-1, 3)
+    corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    lower = np.stack([corner, corner + cells + 1, corner + 1], axis=1)
+    upper = np.stack([corner + 1, corner + cells + 1, corner + cells + 2], axis=1)
+    return vertices, np.concatenate([lower, upper]).astype(np.int32)
+
+
+def bench() -> Iterator[Measure]:
+    """Clouds a second and core. Each peer does what its users call; trimesh keeps the areas from call to call."""
+    import open3d
+    import trimesh
+
+    vertices, faces = bumpy_sheet()
+    rng = np.random.default_rng(0)
+    peer_mesh = trimesh.Trimesh(vertices, faces, process=False)
+    open3d_mesh = open3d.geometry.TriangleMesh(
+        open3d.utility.Vector3dVector(vertices), open3d.utility.Vector3iVector(faces)
+    )
+
+    def uniform() -> int:
+        return len(sample_surface(vertices, faces, UNIFORM, rng)[0]) // UNIFORM
+
+    def uniform_trimesh() -> int:
+        return len(trimesh.sample.sample_surface(peer_mesh, UNIFORM, seed=0)[0]) // UNIFORM
+
+    def uniform_open3d() -> int:
+        return len(open3d_mesh.sample_points_uniformly(UNIFORM).points) // UNIFORM
+
+    ours = rate(uniform, seconds=0.5)
+    name = f"points, {UNIFORM} uniform of {len(faces)} triangles"
+    yield Measure(name, "clouds", ours, "trimesh", rate(uniform_trimesh, seconds=0.5))
+    yield Measure(name, "clouds", ours, "Open3D", rate(uniform_open3d, seconds=0.5))
+
+    pool = sample_surface(vertices, faces, POOL, rng)[0]
+    open3d_pool = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(pool))
+
+    def farthest() -> int:
+        return len(farthest_points(pool, PICKED, start=0)) // PICKED
+
+    def farthest_open3d() -> int:
+        return len(open3d_pool.farthest_point_down_sample(PICKED).points) // PICKED
+
+    name = f"points, {PICKED} farthest of {POOL}"
+    yield Measure(name, "clouds", rate(farthest, 0.5), "Open3D", rate(farthest_open3d, 0.5), "one core each")

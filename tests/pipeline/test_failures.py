@@ -1,0 +1,215 @@
+"""What goes wrong, and what each failure costs: one item, one shard, or everything."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import ConfigError, Fatal
+from tests.pipeline.conftest import WriteConfig, made
+from tests.pipeline.turn import turn
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = Path(".work/mill")
+
+
+def mill(config: Path, out: Path, stage: str, workers: int = 1) -> list[str]:
+    command = [sys.executable, "-m", "tests.pipeline.turn", "run", stage]
+    return [*command, "--config", str(config), "--out", str(out), "--workers", str(workers)]
+
+
+def wait_until(true: Callable[[], object], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+def descendants(pid: int) -> set[int]:
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except FileNotFoundError:
+        return set()
+    return {int(child) for child in children}.union(*(descendants(int(child)) for child in children))
+
+
+def alive(pids: set[int]) -> bool:
+    return any(Path(f"/proc/{pid}/cmdline").exists() and Path(f"/proc/{pid}/cmdline").read_bytes() for pid in pids)
+
+
+def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "whole")
+    config = write_config(flour={"seconds": 0.1})
+    out = tmp_path / "killed"
+    turn(config, out, "salt", "grain")
+    with subprocess.Popen(mill(config, out, "flour", workers=2), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
+        flour = out / WORK / "flour"
+        wait_until(lambda: list(flour.glob("records/*.json")) and list(flour.glob(".*.tmp")))
+        workers = descendants(run.pid)
+        run.send_signal(signal.SIGKILL)
+    assert len(workers) >= 2
+    wait_until(lambda: not alive(workers), seconds=10)
+    assert 0 < len(list(flour.glob("records/*.json"))) < 6
+    result = turn(config, out)["flour"]
+    assert 0 < result.made < 6
+    untimed = made(turn_again(write_config(), out))
+    assert untimed == made(tmp_path / "whole")
+
+
+def turn_again(config: Path, out: Path) -> Path:
+    turn(config, out)
+    return out
+
+
+def test_shard_whose_worker_dies_once_is_made_by_another(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "calm", "salt", "grain", "flour")
+    config = write_config(flour={"trouble": {"harvest1-0": "dies once"}})
+    results = turn(config, tmp_path / "troubled", "salt", "grain", "flour", workers=2)
+    assert not results["flour"].failed
+    shards = [made(tmp_path / out)[str(WORK / "flour/harvest1-0.tar")] for out in ("calm", "troubled")]
+    assert shards[0] == shards[1]
+    assert (tmp_path / "marks/harvest1-0").read_text() == "xx" + "x"
+
+
+def test_shard_that_keeps_killing_its_worker_is_set_aside_and_the_rest_is_made(
+    tmp_path: Path, write_config: WriteConfig
+) -> None:
+    config = write_config(flour={"trouble": {"harvest0-1": "dies"}})
+    turn(config, tmp_path / "out", "salt", "grain")
+    run = subprocess.run(
+        mill(config, tmp_path / "out", "flour", workers=2), cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    assert "flour: set aside: harvest0-1" in run.stderr
+    assert (tmp_path / "marks/harvest0-1").read_text() == "xxxx", "three times beside others, once alone"
+    flour = tmp_path / "out" / WORK / "flour"
+    assert len(list(flour.glob("*.tar"))) == 5
+    assert not list(flour.glob(".*.tmp"))
+    assert "worker process died" in json.loads((flour / "failed/harvest0-1.json").read_bytes())["message"]
+    with pytest.raises(ConfigError, match="bread reads flour, and 1 of its 6 shards"):
+        turn(config, tmp_path / "out", "bread")
+
+
+def test_shard_set_aside_is_tried_again_by_the_next_run(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"trouble": {"harvest0-1": "fails once"}})
+    loaded_once = turn(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
+    assert not loaded_once.failed
+    assert (tmp_path / "marks/harvest0-1").read_text() == "xx"
+
+
+def test_failing_shard_is_tried_three_times_then_set_aside(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"trouble": {"harvest2-0": "fails"}})
+    result = turn(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
+    assert result.failed == {"harvest2-0": "the stones are blunt"}
+    assert result.made == 5
+    assert (tmp_path / "marks/harvest2-0").read_text() == "xxx"
+    failed = tmp_path / "out" / WORK / "flour/failed/harvest2-0.json"
+    assert "ShardFailed: the stones are blunt" in json.loads(failed.read_bytes())["trace"]
+    (tmp_path / "marks/harvest2-0").unlink()
+    healed = write_config(flour={"trouble": {"harvest2-0": "fails once"}})
+    assert not turn(healed, tmp_path / "out", "flour")["flour"].failed
+    assert not failed.exists()
+
+
+def test_shard_refused_as_a_whole_is_not_tried_again(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"trouble": {"harvest2-0": "refuses"}})
+    result = turn(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
+    assert result.failed == {"harvest2-0": "stones in the grain"}
+    assert (tmp_path / "marks/harvest2-0").read_text() == "x"
+
+
+def test_no_space_stops_everything_and_leaves_whole_files(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"trouble": {"harvest0-1": "no space"}})
+    with pytest.raises(Fatal, match="shard harvest0-1 of flour: .*No space left on device"):
+        turn(config, tmp_path / "out", "salt", "grain", "flour")
+    flour = tmp_path / "out" / WORK / "flour"
+    assert [path.name for path in flour.glob("*.tar")] == ["harvest0-0.tar"]
+    assert not [path for path in flour.rglob("*") if path.suffix == ".tmp"]
+    assert not list((flour / "progress").iterdir())
+
+
+def test_file_over_the_limit_of_the_machine_stops_everything(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"trouble": {"harvest0-1": "big"}})
+    turn(config, tmp_path / "out", "salt", "grain")
+    run = subprocess.run(
+        mill(config, tmp_path / "out", "flour"),
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (8_000_000, 8_000_000)),
+    )
+    assert run.returncode == 3, run.stderr
+    assert "File too large" in run.stderr
+    flour = tmp_path / "out" / WORK / "flour"
+    assert sorted(path.name for path in flour.glob("*.*")) == ["harvest0-0.tar"]
+    assert not list(flour.glob(".*.tmp"))
+
+
+@pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare to mount a small disk")
+def test_full_disk_stops_everything_and_the_next_run_goes_on(tmp_path: Path, write_config: WriteConfig) -> None:
+    disk, config = tmp_path / "disk", write_config(flour={"trouble": {"harvest0-1": "big"}})
+    disk.mkdir()
+    turn(config, tmp_path / "out", "salt", "grain")
+    flour = " ".join(mill(config, disk / "out", "flour"))
+    script = f"mount -t tmpfs -o size=8m none {disk} || exit 77; cp -a {tmp_path}/out {disk}/out; {flour}; code=$?; "
+    script += f"find {disk}/out -name '*.tmp'; ls {disk}/out/.work/mill/flour; exit $code"
+    run = subprocess.run(
+        ["unshare", "--map-root-user", "--mount", "sh", "-c", script],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if run.returncode in {1, 77} and "ount" in run.stderr + "ount" and "unshare:" in run.stderr:
+        pytest.skip("this machine lets nobody mount a small disk")
+    assert run.returncode == 3, run.stderr
+    assert "No space left on device" in run.stderr
+    assert run.stdout.split() == ["failed", "harvest0-0.tar", "mill", "progress", "records", "rejects"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_folder_that_cannot_be_written_stops_everything(tmp_path: Path, write_config: WriteConfig) -> None:
+    tmp_path.joinpath("out").mkdir(mode=0o500)
+    with pytest.raises(Fatal, match="cannot make folders"):
+        turn(write_config(), tmp_path / "out", "salt")
+
+
+def test_out_that_is_a_file_is_told(tmp_path: Path, write_config: WriteConfig) -> None:
+    (tmp_path / "out").write_text("not a folder")
+    with pytest.raises(Fatal, match="cannot make folders under .*out"):
+        turn(write_config(), tmp_path / "out", "salt")
+
+
+def test_second_run_in_the_same_place_is_refused(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"seconds": 0.5})
+    out = tmp_path / "out"
+    turn(config, out, "salt", "grain")
+    with subprocess.Popen(mill(config, out, "flour"), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
+        wait_until(lambda: list((out / WORK / "flour").glob(".*.tmp")))
+        with pytest.raises(ConfigError, match="another run is at work"):
+            turn(config, out, "flour")
+        run.kill()
+
+
+def test_ctrl_c_stops_with_130_and_leaves_whole_files(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"seconds": 0.5})
+    out = tmp_path / "out"
+    turn(config, out, "salt", "grain")
+    with subprocess.Popen(
+        mill(config, out, "flour"), cwd=ROOT, stderr=subprocess.DEVNULL, start_new_session=True
+    ) as run:
+        wait_until(lambda: list((out / WORK / "flour").glob(".*.tmp")))
+        os.killpg(run.pid, signal.SIGINT)
+        assert run.wait(timeout=30) == 130
+    assert not list((out / WORK / "flour").rglob("*.tmp"))

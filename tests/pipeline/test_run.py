@@ -1,0 +1,178 @@
+"""A run makes what is missing, and the same bytes whoever makes them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import ConfigError
+from pipeline.run import Slice
+from tests.pipeline.conftest import WriteConfig, made, record_times
+from tests.pipeline.turn import turn
+
+WORK = Path(".work/mill")
+
+
+def test_one_and_two_workers_make_the_same_bytes(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config()
+    turn(config, tmp_path / "one", workers=1)
+    turn(config, tmp_path / "two", workers=2)
+    assert len(made(tmp_path / "one")) > 30
+    assert made(tmp_path / "one") == made(tmp_path / "two")
+
+
+def test_another_seed_makes_other_bytes(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "three", "grain")
+    turn(write_config(seed=4), tmp_path / "four", "grain")
+    first, second = (tmp_path / out / WORK / "grain/harvest0-0.tar" for out in ("three", "four"))
+    assert first.read_bytes() != second.read_bytes()
+
+
+def test_shards_of_one_stage_draw_different_numbers(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "out", "grain")
+    tars = [path.read_bytes() for path in (tmp_path / "out" / WORK / "grain").glob("*.tar")]
+    assert len({tar[512:] for tar in tars}) == len(tars) == 6
+
+
+def test_plan_grows_until_enough_is_made_and_no_further(tmp_path: Path, write_config: WriteConfig) -> None:
+    # Four good grains a shard, two shards a harvest: 20 are reached with the third harvest.
+    result = turn(write_config(grain={"wanted": 20}), tmp_path / "out", "grain")["grain"]
+    assert result.made == 6
+    names = sorted(path.name for path in (tmp_path / "out" / WORK / "grain").glob("*.tar"))
+    assert names == [f"harvest{harvest}-{field}.tar" for harvest in range(3) for field in range(2)]
+
+
+def test_second_run_makes_nothing_and_touches_nothing(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config()
+    turn(config, tmp_path / "out")
+    times = record_times(tmp_path / "out")
+    results = turn(config, tmp_path / "out")
+    assert [result.made for result in results.values()] == [0, 0, 0, 0]
+    assert record_times(tmp_path / "out") == times
+
+
+def test_rejects_are_counted_by_reason_and_listed(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "out", "grain")
+    grain = tmp_path / "out" / WORK / "grain"
+    record = json.loads((grain / "records/harvest0-1.json").read_bytes())
+    assert record["rejects"] == {"hollow": 2}
+    assert record["samples"] == 4
+    lines = [json.loads(line) for line in (grain / "rejects/harvest0-1.jsonl").read_text().splitlines()]
+    assert [line["item"] for line in lines] == ["harvest0-1-2", "harvest0-1-5"]
+    assert lines[0] == {"item": "harvest0-1-2", "reason": "hollow", "detail": "grain 2", "count": 1}
+    assert json.loads((grain / "mill/manifest.json").read_bytes())["rejects"] == {"hollow": 12}
+
+
+def test_config_edit_rebuilds_the_stages_that_read_it_and_nothing_else(
+    tmp_path: Path, write_config: WriteConfig
+) -> None:
+    turn(write_config(), tmp_path / "out")
+    before = record_times(tmp_path / "out")
+    results = turn(write_config(flour={"fineness": 3.0}), tmp_path / "out")
+    assert {name: result.made for name, result in results.items()} == {"salt": 0, "grain": 0, "flour": 6, "bread": 6}
+    after = record_times(tmp_path / "out")
+    assert {name for name in before if before[name] == after[name]} == {
+        name for name in before if name.startswith(("grain/", "salt/"))
+    }
+
+
+def test_edited_config_gives_the_bytes_of_a_fresh_run(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "edited")
+    edited = write_config(grain={"wanted": 10}, flour={"fineness": 3.0})
+    turn(edited, tmp_path / "edited")
+    turn(edited, tmp_path / "fresh")
+    assert made(tmp_path / "edited") == made(tmp_path / "fresh")
+
+
+def test_edit_and_edit_back_gives_the_first_bytes_again(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "out")
+    first = made(tmp_path / "out")
+    turn(write_config(salt={"spoons": 2}), tmp_path / "out")
+    assert made(tmp_path / "out") != first
+    turn(write_config(), tmp_path / "out")
+    assert made(tmp_path / "out") == first
+
+
+def test_shards_no_longer_planned_are_removed(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(salt={"bags": 3}), tmp_path / "out", "salt")
+    turn(write_config(salt={"bags": 1}), tmp_path / "out", "salt")
+    salt = tmp_path / "out" / WORK / "salt"
+    assert [path.name for path in salt.glob("*.txt")] == ["bag-0.txt"]
+    assert [path.name for path in (salt / "records").iterdir()] == ["bag-0.json"]
+
+
+def test_missing_or_shortened_file_is_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config()
+    turn(config, tmp_path / "out", "grain")
+    whole = made(tmp_path / "out")
+    grain = tmp_path / "out" / WORK / "grain"
+    (grain / "harvest0-0.tar").unlink()
+    (grain / "harvest2-1.tar").write_bytes(b"short")
+    assert turn(config, tmp_path / "out", "grain")["grain"].made == 2
+    assert made(tmp_path / "out") == whole
+
+
+def test_unreadable_record_counts_as_none(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config()
+    turn(config, tmp_path / "out", "grain")
+    record = tmp_path / "out" / WORK / "grain/records/harvest0-0.json"
+    record.write_bytes(record.read_bytes()[:40])
+    assert turn(config, tmp_path / "out", "grain")["grain"].made == 1
+
+
+def test_files_left_half_written_are_removed(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config()
+    turn(config, tmp_path / "out", "grain")
+    whole = made(tmp_path / "out")
+    grain = tmp_path / "out" / WORK / "grain"
+    (grain / ".harvest0-0.tar.tmp").write_bytes(b"half")
+    (grain / "records/.harvest9-9.json.tmp").write_bytes(b"half")
+    (grain / "progress/harvest0-0").write_text("1 6")
+    turn(config, tmp_path / "out", "grain")
+    assert made(tmp_path / "out") == whole
+
+
+def test_stage_does_not_start_before_the_stages_it_reads_are_done(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config()
+    turn(config, tmp_path / "out", "salt")
+    with pytest.raises(ConfigError, match=r"bread reads grain, and 2 of its 2 .* harvest0-0.* run stage grain first"):
+        turn(config, tmp_path / "out", "bread")
+
+
+def test_disk_too_small_is_told_before_the_start(tmp_path: Path, write_config: WriteConfig) -> None:
+    with pytest.raises(ConfigError, match=r"salt needs about 900\.0 TB .* a sample.*are free"):
+        turn(write_config(salt={"spoons": 900_000}), tmp_path / "out", "salt")
+    assert not list((tmp_path / "out" / WORK / "salt").glob("*.txt"))
+
+
+def test_parts_of_a_job_array_together_make_the_whole(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(salt={"bags": 5})
+    turn(config, tmp_path / "whole", "salt")
+    first = turn(config, tmp_path / "parts", "salt", part=Slice(1, 2))["salt"]
+    assert (first.made, first.left) == (3, 2)
+    salt = tmp_path / "parts" / WORK / "salt"
+    assert not (salt / "mill/manifest.json").exists()
+    second = turn(config, tmp_path / "parts", "salt", part=Slice(2, 2))["salt"]
+    assert (second.made, second.left) == (2, 0)
+    assert made(tmp_path / "parts") == made(tmp_path / "whole")
+
+
+def test_published_files_follow_the_config(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "out")
+    loaves = tmp_path / "out/mill/loaves"
+    assert sorted(path.name for path in loaves.iterdir()) == ["0.bin", "1.bin", "2.bin", "3.bin"]
+    assert loaves.joinpath("1.bin").samefile(tmp_path / "out" / WORK / "bread/loaf-harvest0-1.bin")
+    (loaves / "mine.txt").write_text("a user's own")
+    turn(write_config(bread={"loaves": 2}), tmp_path / "out")
+    assert sorted(path.name for path in loaves.iterdir()) == ["0.bin", "1.bin", "mine.txt"]
+
+
+def test_published_file_that_went_missing_is_put_back(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config()
+    turn(config, tmp_path / "out")
+    whole = made(tmp_path / "out")
+    (tmp_path / "out/mill/loaves/0.bin").unlink()
+    turn(config, tmp_path / "out", "bread")
+    assert made(tmp_path / "out") == whole

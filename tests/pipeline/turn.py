@@ -1,0 +1,33 @@
+"""The mill of the tests: `turn` runs its stages, and `python -m tests.pipeline.turn` is its command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.cli import main
+from pipeline.config import Config, load_config
+from pipeline.places import Places
+from pipeline.registry import find_stages
+from pipeline.run import WHOLE, RunResult, Slice, run_stage
+
+__all__ = ["STAGES", "load", "turn"]
+
+PACKAGE = "tests.pipeline.mill_stages"
+STAGES = find_stages(PACKAGE)
+
+
+def load(config: Path) -> Config:
+    """The config in a file, with the sections of the test stages."""
+    return load_config(config, {name: stage.config for name, stage in STAGES.items()})
+
+
+def turn(config: Path, out: Path, *stages: str, workers: int = 1, part: Slice = WHOLE) -> dict[str, RunResult]:
+    """Run `stages` (all of them, if none is named) in order, in this process and its workers."""
+    loaded = load(config)
+    return {
+        name: run_stage(name, STAGES, loaded, Places(out, loaded.name), workers, part) for name in stages or STAGES
+    }
+
+
+if __name__ == "__main__":
+    main(PACKAGE)

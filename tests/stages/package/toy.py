@@ -1,0 +1,193 @@
+"""A small dataset of boxes, made through the mill: toy stages before the real `points` and `package`."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.config import Config, StrictModel
+from pipeline.places import Places
+from pipeline.run import run_stage
+from pipeline.shards import ShardWriter, json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.package.settings import PackageConfig
+from stages.package.stage import STAGE as PACKAGE
+from stages.points.stage import STAGE as POINTS
+from stages.points.stage import PointsConfig
+from stages.shape.collection import collection_shards
+from stages.shape.kit import Assembly, Exemplar, Grammar, Kit, PartType
+from stages.shape.kit_files import write_kit
+from stages.shape.sample import Sample, read_samples, write_sample
+
+BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+BOX_FACES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
+    + [[1, 5, 7], [1, 7, 3]],
+    dtype=np.int32,
+)
+SPLITS = ("train", "val", "test")
+KITS = {"blocks": "y", "planks": "z"}
+
+
+def box(name: str, size: tuple[float, float, float], color: tuple[int, int, int]) -> PartType:
+    """A box with one corner at the origin; its top is white."""
+    colors = np.tile(np.array(color, dtype=np.uint8), (12, 1))
+    colors[10:] = 255
+    return PartType(name, BOX * size, BOX_FACES, colors, np.eye(4), np.eye(4)[None])
+
+
+def chain(length: int, first: int) -> Assembly:
+    """`length` boxes in a row along x, of types 0 and 1 in turn; the boxes of every type are one wide."""
+    poses = np.tile(np.eye(4), (length, 1, 1))
+    poses[:, 0, 3] = np.arange(length)
+    edges = np.stack([np.arange(length - 1), np.arange(1, length)], axis=1).astype(np.int32)
+    return Assembly(((np.arange(length) + first) % 2).astype(np.int16), poses, edges)
+
+
+def toy_kit(name: str) -> Kit:
+    """Two types of boxes; the kit `planks` has z up."""
+    types = (box("tower", (1.0, 1.0, 3.0), (200, 40, 40)), box("long.wall", (1.0, 0.5, 2.0), (40, 40, 200)))
+    exemplar = Exemplar("row", chain(6, 0), tuple(f"part{index}" for index in range(6)))
+    rules = {kind: {((1 - kind, 1),): 1, ((1 - kind, 2),): 4} for kind in (0, 1)}
+    return Kit(
+        name=name,
+        types=types,
+        exemplars=(exemplar,),
+        grammar=Grammar(rules, (), {}),
+        contact_tolerance=0.001,
+        pose_tolerance=0.01,
+        up="z" if KITS[name] == "z" else "y",
+    )
+
+
+def toy_samples(split: str, index: int, count: int) -> list[Sample]:
+    """The samples of one shard, of both kits in turn."""
+    samples = []
+    for item in range(count):
+        number = (SPLITS.index(split) * 100 + index) * 10 + item
+        kit = list(KITS)[number % 2]
+        assembly = chain(2 + number % 5, number % 2)
+        lineage: dict[str, Any] = {"parents": ["row"]} if item else {}
+        samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, f"{number:032x}", assembly, lineage))
+    return samples
+
+
+class ToyConfig(StrictModel):
+    """Shards a split, samples a shard, and which item the sketches refuse."""
+
+    shards: int = 8
+    samples: int = 2
+    refused: str = ""
+
+
+class NoConfig(StrictModel):
+    """Nothing to set."""
+
+
+class OtherNoConfig(StrictModel):
+    """Nothing to set."""
+
+
+class SketchConfig(StrictModel):
+    """How many views."""
+
+    views: int = 2
+
+
+def _make_kit(task: Task) -> Outcome:
+    with task.output(f"{task.shard.name}.json") as text, task.output(f"{task.shard.name}.tar") as arrays:
+        write_kit(toy_kit(task.shard.name), text, arrays)
+    return Outcome(1)
+
+
+def _plan_collection(plan: Plan) -> list[Shard]:
+    config = plan.config.section(ToyConfig)
+    return [
+        Shard(f"{plan.config.name}-{split}-{index:06d}", {"split": split, "index": index, "samples": config.samples})
+        for split in SPLITS
+        for index in range(config.shards)
+    ]
+
+
+def _make_collection(task: Task) -> Outcome:
+    split, index, count = (task.shard.params[name] for name in ("split", "index", "samples"))
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for sample in toy_samples(split, index, count):
+            write_sample(writer, sample)
+    return Outcome(count, {"split": split, "samples": count})
+
+
+def _make_strings(task: Task) -> Outcome:
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
+            text = "".join("AB"[kind] for kind in sample.assembly.types)
+            members = {"txt": f"{text}\n{text[::-1]}\n".encode(), "json": json_bytes({"canonical": text, "count": 2})}
+            writer.write(sample.key, members)
+    return Outcome(writer.samples)
+
+
+def _make_sketches(task: Task) -> Outcome:
+    import PIL.Image
+
+    views, refused = task.config.section(SketchConfig).views, task.config.section(ToyConfig).refused
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
+            if sample.key == refused:
+                task.reject(sample.key, "blank drawing")
+                continue
+            members = {}
+            for view in range(views):
+                pixels = np.full((24, 24), 255, dtype=np.uint8)
+                pixels[4 + view : 8 + view, 2 : 2 + len(sample.assembly)] = 0
+                png = io.BytesIO()
+                PIL.Image.fromarray(pixels).save(png, "png")
+                members[f"sketch{view}.png"] = png.getvalue()
+            writer.write(sample.key, members)
+    return Outcome(writer.samples)
+
+
+def _no_bytes(_: Plan) -> int:
+    return 0
+
+
+TOY_STAGES: Mapping[str, Stage] = {
+    "exemplars": Stage(
+        "exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes
+    ),
+    "variations": Stage("variations", 1, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
+    "strings": Stage(
+        "strings", 1, OtherNoConfig, ("exemplars", "variations"), collection_shards, _make_strings, _no_bytes
+    ),
+    "points": POINTS,
+    "sketches": Stage(
+        "sketches", 1, SketchConfig, ("exemplars", "variations"), collection_shards, _make_sketches, _no_bytes
+    ),
+    "package": PACKAGE,
+}
+
+
+def toy_config(**toy: Any) -> Config:
+    """The config of the toy dataset; `toy` are fields of ToyConfig."""
+    sections = {
+        "exemplars": NoConfig(),
+        "variations": ToyConfig(**toy),
+        "strings": OtherNoConfig(),
+        "points": PointsConfig(uniform=64, farthest=16, pool=256),
+        "sketches": SketchConfig(),
+        "package": PackageConfig(previewed=6),
+    }
+    return Config(
+        name="toy", version="1.2.0", seed=7, sections=sections, path=Path("toy.yaml"), title="Toy boxes", license="MIT"
+    )
+
+
+def make_toy(out: Path, config: Config, workers: int = 1) -> Path:
+    """Run every stage below `out`; the dataset's folder."""
+    for name in TOY_STAGES:
+        result = run_stage(name, TOY_STAGES, config, Places(out, config.name), workers)
+        assert not result.failed, result.failed
+    return out / config.name
