@@ -24,9 +24,9 @@ Section = TypeVar("Section", bound="StrictModel")
 
 
 class StrictModel(BaseModel):
-    """Base of every config section: frozen, no unknown keys, no silent conversion of types."""
+    """Base of every config section: frozen, no unknown keys, no silent conversion of types, no NaN."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class DatasetFacts(StrictModel):

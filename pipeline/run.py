@@ -177,9 +177,10 @@ class _Run:
             workers.stop(kill=False)
         except BaseException as error:
             workers.stop(kill=True)
-            self._take_away_unfinished(surveyed)
             self._journal.note(f"stopped: {type(error).__name__}: {error}")
             raise
+        finally:
+            self._take_away_unfinished(surveyed)
 
     def _job(self, surveyed: StageSurvey, shard: Shard) -> Job:
         stage = surveyed.stage

@@ -64,10 +64,12 @@ def sample_texture(image: ByteArray, uv: FloatArray, faces: IntArray) -> ByteArr
     centroid = np.nan_to_num(uv[faces].mean(axis=1))
     column = np.floor((centroid[:, 0] % 1.0) * width).astype(np.int64)
     row = np.floor(((1.0 - centroid[:, 1]) % 1.0) * height).astype(np.int64)
-    return image[np.minimum(row, height - 1), np.minimum(column, width - 1)]
+    pixels: ByteArray = image[np.minimum(row, height - 1), np.minimum(column, width - 1)]
+    return pixels
 
 
 def face_paint(vertex_colors: ByteArray, faces: IntArray) -> ByteArray:
-    """One colour a face out of vertex colours (n, 3), none of them mixed: the commonest of its three, else the first."""
+    """One colour a face out of vertex colours (n, 3), unmixed: the commonest of its three, else the first."""
     first, second, third = vertex_colors[faces].transpose(1, 0, 2)
-    return np.where((second == third).all(axis=1)[:, None], second, first)
+    paint: ByteArray = np.where((second == third).all(axis=1)[:, None], second, first)
+    return paint

@@ -9,7 +9,7 @@ from stages.shape.arrays import FloatArray, IntArray
 __all__ = ["connected_corners", "connected_faces", "joined_corners"]
 
 
-def joined_corners(vertices: FloatArray, faces: IntArray, kinds: IntArray) -> np.ndarray:
+def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> np.ndarray:
     """Pairs of face corners that are one vertex of one surface, int64 (p, 2); corner `3 * face + k`.
 
     Vertices at equal positions count as one, whatever the file's indices. Two faces of one kind (`kinds` int (f,))
@@ -56,12 +56,12 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: IntArray) -> np
     return np.concatenate(pairs)
 
 
-def connected_corners(vertices: FloatArray, faces: IntArray, kinds: IntArray) -> IntArray:
+def connected_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> IntArray:
     """For each face corner the vertex that it is, int32 (f, 3), in a mesh where no edge has more than two faces."""
     return _numbered(joined_corners(vertices, faces, kinds), 3 * len(faces)).reshape(-1, 3)
 
 
-def connected_faces(vertices: FloatArray, faces: IntArray, kinds: IntArray) -> IntArray:
+def connected_faces(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> IntArray:
     """The component of each face, int32 (f,), numbered in the order of their first faces."""
     return _numbered(joined_corners(vertices, faces, kinds) // 3, len(faces))
 

@@ -68,9 +68,6 @@ class _Reader:
                 place_of[key] = len(surfaces)
                 surfaces.append(self.surface(geometries))
             name = getattr(node, "name", None) or node.id or surfaces[place_of[key]].name
-            if not len(surfaces[place_of[key]].faces):
-                self.warnings.append(f"node {name!r} has no triangles and is left out")
-                continue
             placements.append(Placement(name, type_label(name), place_of[key], pose))
         return Scene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
 

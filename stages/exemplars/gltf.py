@@ -6,8 +6,6 @@ breaks a node with several materials into parts with random names, and loses wha
 
 from __future__ import annotations
 
-import json
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,15 +22,13 @@ from stages.exemplars.colors import (
     unit_colors,
 )
 from stages.exemplars.enclosure import Enclosure
+from stages.exemplars.gltf_file import COMPRESSED, GltfFile
 from stages.exemplars.scene import GREY, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 __all__ = ["read_gltf"]
 
-_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_COMPRESSED = "export it again without compression"
 
 
 def read_gltf(path: Path, enclosure: Enclosure) -> Scene:
@@ -42,30 +38,20 @@ def read_gltf(path: Path, enclosure: Enclosure) -> Scene:
     Raises ConfigError for a file that is cut off, malformed, or compressed beyond what is read here.
     """
     try:
-        return _Reader(path, enclosure).scene()
+        return _Reader(GltfFile(path, enclosure)).scene()
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, MemoryError) as error:
         raise ConfigError(
-            f"{path}: malformed glTF ({type(error).__name__}: {error}); check it with a glTF validator and export it again"
+            f"{path}: malformed glTF ({type(error).__name__}: {error}); check it with a glTF validator and export it "
+            "again"
         ) from error
 
 
 class _Reader:
-    def __init__(self, path: Path, enclosure: Enclosure) -> None:
-        self.path = path
-        self.enclosure = enclosure
+    def __init__(self, file: GltfFile) -> None:
+        self.file = file
+        self.header = file.header
         self.warnings: list[str] = []
-        self.header, self.chunk = _container(path)
-        version = str(self.header.get("asset", {}).get("version", ""))
-        if not version.startswith("2."):
-            raise ConfigError(
-                f"{path}: glTF version {version or 'unknown'}; only 2.x is read, export it again as glTF 2.0"
-            )
-        self.buffers: dict[int, bytes] = {}
         self.images: dict[int, ByteArray | None] = {}
-        for kind in ("buffer", "image"):
-            for index, each in enumerate(self.header.get(f"{kind}s", [])):
-                if "uri" in each:
-                    enclosure.check(each["uri"], f"{kind} {index}", encoded=True)
 
     def scene(self) -> Scene:
         nodes = list(self.walk())
@@ -75,20 +61,11 @@ class _Reader:
         placements = []
         for index, pose in nodes:
             node = self.header["nodes"][index]
-            surface = surfaces[place_of[node["mesh"]]]
             mesh_name = self.header["meshes"][node["mesh"]].get("name")
             name = node.get("name") or mesh_name or f"node{index}"
             if "skin" in node:
                 self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken as it stands")
-            if not len(surface.faces):
-                self.warnings.append(f"node {name!r} has no triangles and is left out")
-                continue
-            if np.linalg.matrix_rank(pose[:3, :3]) < 3:
-                self.warnings.append(f"node {name!r} is scaled to nothing along an axis and is left out")
-                continue
-            label = type_label(node["name"]) if node.get("name") else mesh_name
-            if label == node.get("name") and mesh_name:
-                label = mesh_name
+            label = type_label(name) if type_label(name) != name else mesh_name or node.get("name")
             placements.append(Placement(name, label, place_of[node["mesh"]], pose))
         return Scene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
 
@@ -113,11 +90,13 @@ class _Reader:
             node = nodes[index]
             pose = parent @ _local_matrix(node)
             if not np.isfinite(pose).all():
-                raise ConfigError(f"{self.path}: node {node.get('name', index)!r} has a transform that is not finite")
+                raise ConfigError(
+                    f"{self.file.path}: node {node.get('name', index)!r} has a transform that is not finite"
+                )
             if "EXT_mesh_gpu_instancing" in node.get("extensions", {}):
                 raise ConfigError(
-                    f"{self.path}: node {node.get('name', index)!r} is instanced on the GPU (EXT_mesh_gpu_instancing), "
-                    "which is not read; export it again with one node for each instance"
+                    f"{self.file.path}: node {node.get('name', index)!r} is instanced on the GPU "
+                    "(EXT_mesh_gpu_instancing), which is not read; export it again with one node for each instance"
                 )
             if "mesh" in node:
                 yield index, pose
@@ -165,13 +144,13 @@ class _Reader:
         attributes = primitive["attributes"]
         if "POSITION" not in attributes:
             return None
-        if "KHR_draco_mesh_compression" in primitive.get("extensions", {}) and not self.is_stored(
+        if "KHR_draco_mesh_compression" in primitive.get("extensions", {}) and not self.file.is_stored(
             attributes["POSITION"]
         ):
-            raise ConfigError(f"{self.path}: {element} is compressed with Draco, which is not read; {_COMPRESSED}")
-        vertices = self.accessor(attributes["POSITION"], element).astype(np.float64)
+            raise ConfigError(f"{self.file.path}: {element} is compressed with Draco, which is not read; {COMPRESSED}")
+        vertices = self.file.accessor(attributes["POSITION"], element).astype(np.float64)
         if "indices" in primitive:
-            corners = self.accessor(primitive["indices"], element).astype(np.int64).ravel()
+            corners = self.file.accessor(primitive["indices"], element).astype(np.int64).ravel()
         else:
             corners = np.arange(len(vertices))
         if len(corners) and corners.max() >= len(vertices):
@@ -199,7 +178,7 @@ class _Reader:
         else:
             linear = np.tile(linear_from_srgb(np.array(GREY, np.uint8)), (len(faces), 1))
         if "COLOR_0" in attributes:
-            vertex_colors = unit_colors(self.accessor(attributes["COLOR_0"], element))
+            vertex_colors = unit_colors(self.file.accessor(attributes["COLOR_0"], element))
             linear = linear * vertex_colors[faces].mean(axis=1)
             paint = face_paint(srgb_from_linear(vertex_colors), faces)
         return linear, paint
@@ -220,7 +199,7 @@ class _Reader:
         image = self.image(self.header["textures"][texture["index"]])
         if image is None or coordinates not in attributes:
             return linear
-        uv = self.accessor(attributes[coordinates], element).astype(np.float64)
+        uv = self.file.accessor(attributes[coordinates], element).astype(np.float64)
         turn = placing.get("rotation", 0.0)
         spin = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         uv = uv * placing.get("scale", (1.0, 1.0)) @ spin.T + placing.get("offset", (0.0, 0.0))
@@ -237,112 +216,14 @@ class _Reader:
             image = self.header["images"][index]
             try:
                 if "bufferView" in image:
-                    content = self.view(image["bufferView"], f"image {index}")[0]
+                    content = self.file.view(image["bufferView"], f"image {index}")[0]
                 else:
-                    content = self.enclosure.read(image["uri"], f"image {index}", encoded=True)
+                    content = self.file.enclosure.read(image["uri"], f"image {index}", encoded=True)
                 self.images[index] = decode_image(content)
             except OSError as error:
                 self.images[index] = None
                 self.warnings.append(f"image {index} ({image.get('uri', 'embedded')[:80]}) cannot be read: {error}")
         return self.images[index]
-
-    def is_stored(self, accessor: int) -> bool:
-        stored: dict[str, Any] = self.header["accessors"][accessor]
-        return "bufferView" in stored or "sparse" in stored
-
-    def accessor(self, index: int, element: str) -> np.ndarray:
-        """The values of an accessor (count, width), sparse ones filled in, normalised ones as float64."""
-        accessor = self.header["accessors"][index]
-        width, dtype = _WIDTHS[accessor["type"]], np.dtype(_COMPONENTS[accessor["componentType"]])
-        values = np.zeros((accessor["count"], width), dtype)
-        if "bufferView" in accessor:
-            values = self.packed(accessor["bufferView"], accessor.get("byteOffset", 0), values.shape, dtype, element)
-        if sparse := accessor.get("sparse"):
-            at, new = sparse["indices"], sparse["values"]
-            where = self.packed(
-                at["bufferView"],
-                at.get("byteOffset", 0),
-                (sparse["count"], 1),
-                _COMPONENTS[at["componentType"]],
-                element,
-            )
-            values[where[:, 0]] = self.packed(
-                new["bufferView"], new.get("byteOffset", 0), (sparse["count"], width), dtype, element
-            )
-        if accessor.get("normalized") and dtype.kind in "iu":
-            return np.maximum(values / np.iinfo(dtype).max, -1.0)
-        return values
-
-    def packed(self, view: int, offset: int, shape: tuple[int, int], dtype: Any, element: str) -> np.ndarray:
-        content, stride = self.view(view, element)
-        row = shape[1] * np.dtype(dtype).itemsize
-        if offset < 0 or shape[0] < 0 or (shape[0] and offset + (shape[0] - 1) * (stride or row) + row > len(content)):
-            raise ValueError(f"{element} needs more bytes than bufferView {view} has")
-        return np.ndarray(shape, dtype, content, offset, (stride or row, np.dtype(dtype).itemsize)).copy()
-
-    def view(self, index: int, element: str) -> tuple[bytes, int]:
-        """Bytes and stride (0 for none) of a buffer view."""
-        view = self.header["bufferViews"][index]
-        buffer = self.buffer(view["buffer"], element, "EXT_meshopt_compression" in view.get("extensions", {}))
-        start, length = view.get("byteOffset", 0), view["byteLength"]
-        if start < 0 or length < 0 or start + length > len(buffer):
-            raise ConfigError(
-                f"{self.path}: cut off: {element} reads bytes {start} to {start + length} of buffer {view['buffer']}, "
-                f"which has {len(buffer)}; copy or export the file again"
-            )
-        return buffer[start : start + length], view.get("byteStride", 0)
-
-    def buffer(self, index: int, element: str, compressed: bool) -> bytes:
-        if index not in self.buffers:
-            uri = self.header["buffers"][index].get("uri")
-            if uri is not None:
-                try:
-                    self.buffers[index] = self.enclosure.read(uri, f"buffer {index}", encoded=True)
-                except FileNotFoundError:
-                    raise ConfigError(
-                        f"{self.path}: buffer {index} is the file {uri!r}, which is not there; put it beside the model"
-                    ) from None
-            elif index == 0 and self.chunk is not None:
-                self.buffers[index] = self.chunk
-            elif compressed:
-                raise ConfigError(
-                    f"{self.path}: {element} is compressed with meshopt, which is not read; {_COMPRESSED}"
-                )
-            else:
-                raise ConfigError(f"{self.path}: buffer {index} has no content; export the file again")
-        return self.buffers[index]
-
-
-def _container(path: Path) -> tuple[dict[str, Any], bytes | None]:
-    """The JSON header and the binary chunk of a file."""
-    content = path.read_bytes()
-    chunk = None
-    if content[:4] == b"glTF":
-        if len(content) < 20 or len(content) < struct.unpack_from("<I", content, 8)[0]:
-            said = struct.unpack_from("<I", content, 8)[0] if len(content) >= 12 else "more"
-            raise ConfigError(
-                f"{path}: truncated GLB: its header says {said} bytes, the file has {len(content)}; "
-                "copy or export it again"
-            )
-        version, _, length = struct.unpack_from("<III", content, 4)
-        if version != 2:
-            raise ConfigError(f"{path}: GLB container version {version}; only 2 is read, export it again as glTF 2.0")
-        text, rest = content[20 : 20 + length], 20 + length
-        if len(text) < length:
-            raise ConfigError(f"{path}: truncated GLB: its JSON chunk is cut off; copy or export it again")
-        if rest + 8 <= len(content):
-            size, kind = struct.unpack_from("<I4s", content, rest)
-            if kind == b"BIN\0":
-                chunk = content[rest + 8 : rest + 8 + size]
-    else:
-        text = content
-    try:
-        header = json.loads(text)
-    except ValueError as error:
-        raise ConfigError(f"{path}: not a glTF file: its JSON is broken ({error}); export it again") from None
-    if not isinstance(header, dict):
-        raise ConfigError(f"{path}: not a glTF file: its JSON is no object; export it again")
-    return header, chunk
 
 
 def _local_matrix(node: dict[str, Any]) -> FloatArray:

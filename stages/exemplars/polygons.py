@@ -9,7 +9,7 @@ from stages.shape.arrays import FloatArray, IntArray
 __all__ = ["triangulate"]
 
 
-def triangulate(vertices: FloatArray, corners: IntArray, counts: IntArray) -> tuple[IntArray, IntArray]:
+def triangulate(vertices: FloatArray, corners: np.ndarray, counts: np.ndarray) -> tuple[IntArray, IntArray]:
     """Triangles of polygons, concave ones too, in the order of the polygons.
 
     vertices: float64 (v, 3); corners: (c,) vertex indices, polygon after polygon; counts: (p,) corners of each.
@@ -31,7 +31,7 @@ def triangulate(vertices: FloatArray, corners: IntArray, counts: IntArray) -> tu
     return np.concatenate(triangles)[order].astype(np.int32), owner[order].astype(np.int32)
 
 
-def _split_quads(vertices: FloatArray, corners: IntArray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _split_quads(vertices: FloatArray, corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     place = starts[:, None] + np.arange(4)
     points = vertices[corners[place]]
     normal = np.cross(points[:, 2] - points[:, 0], points[:, 3] - points[:, 1])  # along the area vector, concave or not
@@ -76,6 +76,7 @@ def _is_ear(flat: FloatArray, left: list[int], k: int) -> bool:
     return not inside.any()
 
 
-def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> np.ndarray:
+def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     """Twice the signed area of triangles a, b, c; `c` may be a stack of points."""
-    return (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])
+    area: FloatArray = (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])
+    return area

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +83,6 @@ def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
     Raises ConfigError, with the file, the element and the mend, for a file of which no parts can be made.
     """
     scene = _read(path)
-    _check_numbers(path, scene)
     warnings = list(scene.warnings)
     if segmentation == "auto":
         source, why = pick(scene)
@@ -134,30 +133,43 @@ def _read(path: Path) -> Scene:
         scene = reader(path, Enclosure(path))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
-    filled = tuple(each for each in scene.placements if len(scene.surfaces[each.surface].faces))
-    if not filled:
-        reasons = f" ({'; '.join(scene.warnings)})" if scene.warnings else ""
-        raise ConfigError(f"{path}: holds no triangles{reasons}; export it as a triangle mesh")
-    used = sorted({each.surface for each in filled})
-    surfaces = tuple(scene.surfaces[index].select(np.arange(len(scene.surfaces[index].faces))) for index in used)
-    placements = tuple(Placement(each.name, each.label, used.index(each.surface), each.pose) for each in filled)
-    return Scene(scene.kind, surfaces, placements, scene.warnings)
+    return _solid_placements(path, scene)
 
 
-def _check_numbers(path: Path, scene: Scene) -> None:
-    checked: set[int] = set()
+def _solid_placements(path: Path, scene: Scene) -> Scene:
+    """The scene without placements that show no triangle, and without vertices that no face uses.
+
+    Raises ConfigError if nothing is left, or for coordinates that are not finite.
+    """
+    warnings = list(scene.warnings)
+    surfaces = [each.select(np.arange(len(each.faces))) for each in scene.surfaces]
+    placements = []
     for placement in scene.placements:
-        if placement.surface in checked:
-            continue
-        checked.add(placement.surface)
-        bad = np.count_nonzero(~np.isfinite(scene.surfaces[placement.surface].vertices).all(axis=1))
-        if bad:
+        surface = surfaces[placement.surface]
+        broken = int(np.count_nonzero(~np.isfinite(surface.vertices).all(axis=1)))
+        if broken:
             raise ConfigError(
-                f"{path}: part {placement.name!r} has {bad} vertices that are not finite numbers; mend the part in the "
-                "modelling tool (delete loose or broken vertices) and export it again"
+                f"{path}: part {placement.name!r} has {broken} vertices that are not finite numbers; mend the part in "
+                "the modelling tool (delete broken vertices) and export it again"
             )
         if not np.isfinite(placement.pose).all():
             raise ConfigError(f"{path}: part {placement.name!r} has a transform that is not finite; export it again")
+        if not len(surface.faces):
+            warnings.append(f"part {placement.name!r} has no triangles and is left out")
+        elif np.linalg.matrix_rank(placement.pose[:3, :3]) < 3:
+            warnings.append(f"part {placement.name!r} is scaled to nothing along an axis and is left out")
+        else:
+            placements.append(placement)
+    if not placements:
+        reasons = f" ({'; '.join(warnings)})" if warnings else ""
+        raise ConfigError(f"{path}: holds no triangles{reasons}; export it as a triangle mesh")
+    used = sorted({each.surface for each in placements})
+    return Scene(
+        kind=scene.kind,
+        surfaces=tuple(surfaces[index] for index in used),
+        placements=tuple(replace(each, surface=used.index(each.surface)) for each in placements),
+        warnings=tuple(warnings),
+    )
 
 
 def _shift_to_origin(surfaces: list[Surface], placements: list[Placement], warnings: list[str]) -> FloatArray:

@@ -89,7 +89,8 @@ def _coherent(vertices: FloatArray, faces: IntArray) -> IntArray:
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertices, faces))
     meshes.meshing_re_orient_faces_coherently()
-    return meshes.current_mesh().face_matrix().astype(np.int32)
+    oriented: IntArray = meshes.current_mesh().face_matrix().astype(np.int32)
+    return oriented
 
 
 def _distinct_corners(vertices: FloatArray, faces: IntArray) -> np.ndarray:

@@ -9,7 +9,6 @@ import numpy as np
 
 from stages.exemplars.components import connected_faces
 from stages.exemplars.scene import Placement, Scene, Surface, unique_name
-from stages.shape.arrays import IntArray
 
 __all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
 
@@ -73,15 +72,15 @@ def segment(scene: Scene, source: Segmentation) -> Scene:
     """
     if source == scene.kind:
         return scene
+    alone = len(scene.placements) == 1
     surfaces: list[Surface] = []
     cut: list[list[tuple[str, str | None, int]]] = []
     for surface in scene.surfaces:
         named: list[tuple[str, str | None, int]] = []
         for name, label, faces in _pieces(surface, source) or [("rest", None, np.arange(len(surface.faces)))]:
             named.append((name, label, len(surfaces)))
-            surfaces.append(replace(surface.select(faces), name=f"{surface.name}/{name}"))
+            surfaces.append(replace(surface.select(faces), name=name if alone else f"{surface.name}/{name}"))
         cut.append(named)
-    alone = len(scene.placements) == 1
     placements = [
         Placement(name if alone else f"{placement.name}/{name}", label, index, placement.pose)
         for placement in scene.placements
@@ -90,7 +89,7 @@ def segment(scene: Scene, source: Segmentation) -> Scene:
     return replace(scene, surfaces=tuple(surfaces), placements=tuple(placements))
 
 
-def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | None, IntArray]] | None:
+def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | None, np.ndarray]] | None:
     """Name, label and faces of each piece of a surface, in the order of their first faces; None without a source."""
     labels: list[str | None]
     kinds = np.zeros(len(surface.faces), dtype=np.int64)
@@ -112,19 +111,17 @@ def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | Non
     groups = np.split(order, np.flatnonzero(np.diff(component[order])) + 1) if len(order) else []
     width = max(3, len(str(len(groups))))
     taken: set[str] = set()
-    pieces: list[tuple[str, str | None, IntArray]] = []
+    pieces: list[tuple[str, str | None, np.ndarray]] = []
     for number, faces in enumerate(groups):
         label = labels[kinds[faces[0]]]
         name = unique_name(label, taken) if label is not None else f"component-{number:0{width}d}"
         taken.add(name)
-        pieces.append((name, label, faces.astype(np.int32)))
+        pieces.append((name, label, faces))
     return pieces
 
 
 def _label_count(scene: Scene, source: Segmentation) -> int:
     """How many materials or colours the faces of a scene have."""
-    if source == "materials":
-        of_faces = [each.face_material for each in scene.surfaces if each.face_material is not None]
-    else:
-        of_faces = [each.paint for each in scene.surfaces if each.paint is not None]
-    return len(np.unique(np.concatenate(of_faces), axis=0)) if of_faces else 0
+    of_faces = [each.face_material if source == "materials" else each.paint for each in scene.surfaces]
+    found = [each for each in of_faces if each is not None]
+    return len(np.unique(np.concatenate(found), axis=0)) if found else 0

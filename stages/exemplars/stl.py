@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,21 +19,19 @@ def read_stl(path: Path) -> Scene:
     import trimesh
 
     content = path.read_bytes()
-    text = content.lstrip().startswith(b"solid") and b"facet" in content
-    if text and content.lower().count(b"solid") < 2 * content.lower().count(b"endsolid") + content.lower().count(
-        b"\nsolid"
-    ):
-        raise _cut_off(path, "its last solid does not end")
-    if not text and len(content) >= 84 and len(content) != 84 + 50 * int.from_bytes(content[80:84], "little"):
-        raise _cut_off(
-            path,
-            f"{int.from_bytes(content[80:84], 'little')} triangles are announced, the file has {len(content)} bytes",
-        )
+    announced = int.from_bytes(content[80:84], "little")
+    if len(content) != 84 + 50 * announced:
+        opened, ended = (len(re.findall(rb"^\s*%s\b" % word, content, re.M | re.I)) for word in (b"solid", b"endsolid"))
+        if not opened:
+            raise _cut_off(path, f"{announced} triangles are announced, the file has {len(content)} bytes")
+        if ended < opened:
+            raise _cut_off(path, "its last solid does not end")
     try:
         scene = trimesh.load_scene(io.BytesIO(content), file_type="stl", process=False)
     except Exception as error:
         raise _cut_off(path, str(error)) from None
-    surfaces, placements = [], []
+    surfaces: list[Surface] = []
+    placements: list[Placement] = []
     for name, mesh in scene.geometry.items():
         faces = np.asarray(mesh.faces, dtype=np.int32).reshape(-1, 3)
         grey = np.tile(np.array(GREY, np.uint8), (len(faces), 1))

@@ -7,7 +7,7 @@ reads one material library only, takes negative indices from the end of the file
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -60,9 +60,9 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
     material_of = np.array(
         [-1 if state[2] is None else names.index(state[2]) for state in lines.states], dtype=np.int32
     )
-    for name in names:
-        if name not in materials:
-            warnings.append(f"material {name!r} is not in its library; its faces are grey")
+    warnings += [
+        f"material {name!r} is not in its library; its faces are grey" for name in names if name not in materials
+    ]
     faces = corners[triangles].astype(np.int32)
     face_material = material_of[polygon]
     paint = None
@@ -81,12 +81,10 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
     )
     owner, objects = _objects(lines.states, path.stem)
     face_owner = owner[polygon]
-    surfaces = [whole.select(np.flatnonzero(face_owner == index)) for index in range(len(objects))]
-    placements = [
-        Placement(name, type_label(name), index, np.eye(4))
-        for index, name in enumerate(objects)
-        if len(surfaces[index].faces)
+    surfaces = [
+        replace(whole.select(np.flatnonzero(face_owner == index)), name=name) for index, name in enumerate(objects)
     ]
+    placements = [Placement(name, type_label(name), index, np.eye(4)) for index, name in enumerate(objects)]
     return Scene("objects", tuple(surfaces), tuple(placements), tuple(warnings))
 
 

@@ -125,9 +125,7 @@ def _kit_table(kits: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, An
         own = [row for row in rows if row["kit"] == kit["name"]]
         spans = " | ".join(_span([row[name] for row in own]) for name in ("parts", "contacts", "cycles"))
         graphs = len({row["graph"] for row in own})
-        lines.append(
-            f"| {kit['name']} | {len(own):,} | {graphs:,} | {kit['exemplars']} | {kit['types']} | {spans} |"
-        )
+        lines.append(f"| {kit['name']} | {len(own):,} | {graphs:,} | {kit['exemplars']} | {kit['types']} | {spans} |")
     return "\n".join(lines) + "\n\nParts, contacts and independent cycles: least, median, most."
 
 

@@ -143,7 +143,7 @@ def _reach(vertices, faces, first):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _draw(vertices, faces, reach, first, meshes, draws, points, normals, hit):  # type: ignore[no-untyped-def]
-    """Fill `points`, `normals` and `hit`: the first triangle whose running sum exceeds the draw, so none of zero area."""
+    """Fill `points`, `normals`, `hit`: the first triangle whose running sum exceeds the draw, so none of zero area."""
     for i in range(len(meshes)):
         low, high = first[meshes[i]], first[meshes[i] + 1] - 1
         # a draw that rounds up to the whole area belongs to the last triangle that has any

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.pose import rigid_fit
-from stages.variations.kernels import BOUNDARY, Outcome, ShapeTables, Workspace
+from stages.variations.kernels import BOUNDARY, UPRIGHT, KitTables, Outcome, ShapeTables, Workspace
 
 __all__ = ["match_centroids"]
 
@@ -14,7 +14,7 @@ STEPS = 2000
 
 
 def match_centroids(
-    rng: np.random.Generator, a: ShapeTables, b: ShapeTables, ws: Workspace, tolerance: float
+    rng: np.random.Generator, kit: KitTables, a: ShapeTables, b: ShapeTables, ws: Workspace
 ) -> int:
     """Find parts of B with the types and the pairwise centroid distances of the boundary in `ws`.
 
@@ -22,7 +22,7 @@ def match_centroids(
     centroids without reflection, to `ws.motion`. One boundary part, or several in a row, leave turns undecided that
     nothing but luck settles: this is the rule's known weakness. Mirrored matches are refused by the fit's residual.
     """
-    count = int(ws.counts[BOUNDARY])
+    count, tolerance = int(ws.counts[BOUNDARY]), kit.limits[0]
     boundary = ws.boundary[:count]
     places = a.places[boundary]
     gaps = np.linalg.norm(places[:, None] - places[None], axis=2)
@@ -59,6 +59,8 @@ def match_centroids(
     motion = rigid_fit(places, b.places[images])
     moved = places @ motion[:3, :3].T + motion[:3, 3]
     if np.linalg.norm(moved - b.places[images], axis=1).max() > tolerance:
+        return Outcome.NO_MATCH
+    if kit.up >= 0 and motion[kit.up, kit.up] < UPRIGHT:
         return Outcome.NO_MATCH
     ws.images[:count] = images
     ws.motion[:3] = motion[:3, :3]

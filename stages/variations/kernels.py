@@ -35,7 +35,8 @@ class KitTables(NamedTuple):
     symmetry_starts int64 (types + 1,), symmetries float64 (s, 3, 3): rotations of each type's group;
     boxes float64 (types, 2, 3): centre and half extents in part coordinates; reach float64 (types,): half diagonals;
     weights uint64 (types,): multiset weights; allowed uint64 (r,): sorted keys of the grammar's neighbourhoods;
-    limits float64 (3,): pose tolerance, contact tolerance, quantum of the answers.
+    limits float64 (3,): pose tolerance, contact tolerance, quantum of the answers; up: the axis that docking motions
+    must keep upright, or -1.
     """
 
     symmetry_starts: np.ndarray
@@ -45,6 +46,7 @@ class KitTables(NamedTuple):
     weights: np.ndarray
     allowed: np.ndarray
     limits: np.ndarray
+    up: int
 
 
 class ShapeTables(NamedTuple):
@@ -118,6 +120,7 @@ EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY = 0, 1, 2, 3, 4
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 LABELS = 1 << 20
 CHOICES = 64
+UPRIGHT = 0.999
 
 
 @numba.njit(cache=True)
@@ -428,6 +431,8 @@ def match_poses(rng, kit, a, b, same_shape, ws):
                 for k in range(3):
                     x += between[i, k] * a.turns[anchor, j, k]
                 motion[i, j] = x
+        if kit.up >= 0 and motion[kit.up, kit.up] < UPRIGHT:
+            continue
         for i in range(3):
             motion[3, i] = b.places[image, i]
             for j in range(3):

@@ -70,7 +70,7 @@ class Search:
         neighbourhoods = [
             (index, dict(multiset)) for index, rules in kit.grammar.neighbourhoods.items() for multiset in rules
         ]
-        self.tables = kit_tables(kit, neighbourhoods)
+        self.tables = kit_tables(kit, neighbourhoods, config.upright)
         self._ws = workspace(max(self.largest, *sizes))
         self.exemplars = [self.parent(each.name, each.assembly) for each in kit.exemplars]
         self.parents: list[Parent] = []
@@ -126,7 +126,7 @@ class Search:
             if self.config.matching == "pose":
                 outcome = kernels.match_poses(rng, kit, a.tables, b.tables, a is b, ws)
             else:
-                outcome = match_centroids(rng, a.tables, b.tables, ws, self.kit.pose_tolerance)
+                outcome = match_centroids(rng, kit, a.tables, b.tables, ws)
         if outcome == Outcome.OK:
             outcome = kernels.join(rng, kit, a.tables, b.tables, ws, self.smallest, self.largest)
         if outcome == Outcome.OK and self.config.matching == "centroid":

@@ -24,11 +24,15 @@ class SearchConfig(StrictModel):
         description="When two shapes are the same: same graph and docking configurations, same graph, or (the paper's "
         "rule) same numbers of parts of each type.",
     )
+    upright: bool = Field(
+        True,
+        description="Whether pieces are turned about the vertical only; set it to false for what floats in space.",
+    )
     smallest: float = Field(
         0.5, gt=0, le=1, description="Fewest parts of a variant, as a share of the smallest exemplar's."
     )
     largest: float = Field(
-        1.5, ge=1, le=20, description="Most parts of a variant, as a share of the largest exemplar's."
+        2.0, ge=1, le=20, description="Most parts of a variant, as a share of the largest exemplar's."
     )
     growth_share: float = Field(
         0.3, ge=0, le=1, description="Share of pieces grown part by part; the rest are cut by half-space, slab or box."

@@ -14,8 +14,11 @@ QUANTUM = 1 / 64
 """Step of the poses by which contact answers are looked up, as a share of the contact tolerance."""
 
 
-def kit_tables(kit: Kit, neighbourhoods: list[tuple[int, dict[int, int]]]) -> KitTables:
-    """The kit for the kernels, with `(type, neighbour counts)` of every allowed neighbourhood."""
+def kit_tables(kit: Kit, neighbourhoods: list[tuple[int, dict[int, int]]], upright: bool) -> KitTables:
+    """The kit for the kernels, with `(type, neighbour counts)` of every allowed neighbourhood.
+
+    With `upright` a docking motion may turn a piece about the vertical only.
+    """
     bounds = np.stack([each.bounds for each in kit.types])
     weights = np.random.Generator(np.random.PCG64(len(kit.types))).integers(1, 2**63, len(kit.types), dtype=np.uint64)
     allowed = []
@@ -32,6 +35,7 @@ def kit_tables(kit: Kit, neighbourhoods: list[tuple[int, dict[int, int]]]) -> Ki
         weights=weights,
         allowed=np.unique(np.array(allowed, dtype=np.uint64)),
         limits=np.array([kit.pose_tolerance, kit.contact_tolerance, kit.contact_tolerance * QUANTUM]),
+        up={"y": 1, "z": 2}[kit.up] if upright else -1,
     )
 
 

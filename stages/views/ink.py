@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.views.strokes import BOUNDARY, CONTOUR, CREASE, Strokes
+from stages.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, Strokes
 
 __all__ = ["ink_strokes"]
 
@@ -16,8 +16,8 @@ CROWD_CELL = 4.0
 """Side of the cells, in pixels of the image, in which the length of lines is summed to see how crowded they are."""
 
 FADING = np.zeros(256)
-"""How strongly each kind of stroke gives way where lines are crowded: outlines not at all, contours by half."""
-FADING[[CREASE, BOUNDARY, CONTOUR]] = 1.0, 1.0, 0.5
+"""How strongly each kind of stroke gives way where lines are crowded: the proportion is taken to this power."""
+FADING[[CREASE, BOUNDARY, CONTOUR, OUTLINE]] = 1.0, 1.0, 0.5, 0.5
 
 
 def ink_strokes(
@@ -27,43 +27,40 @@ def ink_strokes(
 
     widths: line width of each kind of stroke, in pixels of the image; a kind without a width is not drawn.
     scale: pixels of the image for each pixel of the view the strokes were found in.
-    crowding: where lines stand closer than this, in pixels of the image, all but outlines are drawn thinner in
-    proportion, so that fine detail turns into a light hatch and not into a black patch; 0 keeps all widths.
+    crowding: where lines stand closer than this, in pixels of the image, they are drawn thinner in
+    proportion (contours and outlines less so), so that fine detail turns into a light hatch and not into a black patch; 0 keeps all widths.
     """
     ends = strokes.ends * scale
     table = np.zeros(256)
     for kind, line in widths.items():
         table[kind] = line
-    lines = table[strokes.kinds]
-    if crowding > 0.0:
-        spacing = _spacing(ends[lines > 0.0], width, height)
-        room = np.minimum(_at(spacing, ends) / crowding, 1.0)
-        lines = lines * room ** FADING[strokes.kinds]
-    return _draw(ends, lines, width, height)
+    return _draw(ends, _fade(ends, strokes.kinds, table, FADING, width, height, crowding), width, height)
 
 
-def _spacing(ends: FloatArray, width: int, height: int) -> FloatArray:
-    """Mean spacing of lines around each cell, float64 (rows, columns): area over length, in pixels."""
-    shape = int(height / CROWD_CELL) + 1, int(width / CROWD_CELL) + 1
-    rows, columns = _cells(ends, shape)
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    total = np.bincount(rows * shape[1] + columns, weights=lengths, minlength=shape[0] * shape[1]).reshape(shape)
-    padded = np.pad(total, 1, mode="edge")
-    summed = sum(padded[r : r + shape[0], c : c + shape[1]] for r in range(3) for c in range(3))
-    spacing: FloatArray = 9 * CROWD_CELL**2 / np.maximum(summed, 1e-9)
-    return spacing
-
-
-def _at(grid: FloatArray, ends: FloatArray) -> FloatArray:
-    values: FloatArray = grid[_cells(ends, grid.shape)]
-    return values
-
-
-def _cells(ends: FloatArray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Row and column of the cell of the middle of each segment."""
-    middles = ends.mean(axis=1) / CROWD_CELL
-    rows = np.clip(middles[:, 1].astype(np.int64), 0, shape[0] - 1)
-    return rows, np.clip(middles[:, 0].astype(np.int64), 0, shape[1] - 1)
+@numba.njit(cache=True, error_model="numpy")
+def _fade(ends, kinds, table, fading, width, height, crowding):
+    """Width of each segment (n,): thinner where the mean spacing of lines (area over length) around it is small."""
+    lines = table[kinds]
+    if crowding == 0.0:
+        return lines
+    # A border of empty cells on all sides saves a case distinction.
+    total = np.zeros((int(height / CROWD_CELL) + 4, int(width / CROWD_CELL) + 4))
+    rows, columns = np.empty(len(ends), dtype=np.int32), np.empty(len(ends), dtype=np.int32)
+    for k in range(len(ends)):
+        rows[k] = int((ends[k, 0, 1] + ends[k, 1, 1]) / (2 * CROWD_CELL)) + 1
+        columns[k] = int((ends[k, 0, 0] + ends[k, 1, 0]) / (2 * CROWD_CELL)) + 1
+        if lines[k] > 0.0:
+            dx, dy = ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1]
+            total[rows[k], columns[k]] += np.sqrt(dx * dx + dy * dy)
+    for k in range(len(ends)):
+        length = 0.0
+        for row in range(rows[k] - 1, rows[k] + 2):
+            for column in range(columns[k] - 1, columns[k] + 2):
+                length += total[row, column]
+        room = 9 * CROWD_CELL**2 / (length * crowding)
+        if room < 1.0:
+            lines[k] *= room ** fading[kinds[k]]
+    return lines
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -84,7 +81,10 @@ def _draw(ends, widths, width, height):
                 x, y = column + 0.5 - ax, row + 0.5 - ay
                 along = min(max((x * dx + y * dy) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
                 x, y = x - along * dx, y - along * dy
-                cover = full * min(reach - np.sqrt(x * x + y * y), 1.0)
+                apart = x * x + y * y
+                if apart >= reach * reach:
+                    continue
+                cover = full * min(reach - np.sqrt(apart), 1.0)
                 if cover > ink[row, column]:
                     ink[row, column] = cover
     return ink

@@ -210,6 +210,24 @@ def _on_one_surface(p, q, sharp, normals, rounded):
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _runs_on(p, q, screen, normals, face_of, neighbours, cosine):
+    """Whether two triangles of one part share an edge that is neither sharp nor one where the surface turns away.
+
+    Most pairs are like that, and need no walk.
+    """
+    if _cosine(normals, p, q) < cosine:
+        return False
+    for edge in range(3):
+        if neighbours[face_of[p], edge] == face_of[q]:
+            for back in range(3):
+                if neighbours[face_of[q], back] == face_of[p]:
+                    near, far = (edge + 2) % 3, (back + 2) % 3
+                    side = _side(screen, p, edge, screen[p, near, 0], screen[p, near, 1])
+                    return side * _side(screen, p, edge, screen[q, far, 0], screen[q, far, 1]) < 0.0
+    return False
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _crossings(
     triangles, screen, normals, parts, face_of, part_first, face_first, neighbours, layers,
     projection, pixel, perspective, cosine, step,
@@ -229,7 +247,9 @@ def _crossings(
                 if r2 == height or c2 == width:
                     continue
                 q = triangles[r2, c2]
-                if p == q:
+                if p == q or (p >= 0 and q >= 0 and parts[p] == parts[q] and _runs_on(
+                    p, q, screen, normals, face_of, neighbours, cosine
+                )):
                     continue
                 kind, s = _between(
                     p, q, c + 0.5, r + 0.5, c2 + 0.5, r2 + 0.5, screen, normals, parts, face_of, part_first,

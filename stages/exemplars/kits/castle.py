@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.exemplars.kits.layout import Layout
 from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
-from stages.exemplars.kits.solid import Solid, bar, box, extruded, revolved, stacked
+from stages.exemplars.kits.solid import Solid, bar, box, extruded, joined, revolved, stacked
 
 __all__ = ["shapes"]
 
@@ -128,7 +128,7 @@ def _wall() -> Solid:
         (0.25, 1.82), (-0.25, 1.82), (-0.25, 2.06), (-0.43, 2.06), (-0.43, 1.7), (-0.35, 1.6), (-0.35, 0.38), (-0.43, 0.3),
     ]  # fmt: skip
     wall = extruded(np.array(section), -half, half, STONE).turned(90.0)
-    wall = _tinted(wall, STONE_DARK, below=0.39)
+    wall = wall.tinted(STONE_DARK, lambda _, corners: bool(corners[:, 1].max() < 0.39))
     for x in (-1.1, -0.66, -0.22, 0.22, 0.66, 1.1):
         wall = wall.inset((x, 2.06, 0.34), rectangle(0.26, 0.14), -0.26, STONE, STONE_LIGHT, shrink=0.015, copies=2)
     for x in (-1.0, 0.0, 1.0):
@@ -136,16 +136,6 @@ def _wall() -> Solid:
     for x in (-0.5, 0.5):
         wall = wall.inset((x, 0.98, 0.35), rectangle(0.16, 1.16), -0.06, STONE_LIGHT, shrink=0.02, copies=2)
     return wall
-
-
-def _tinted(solid: Solid, color: tuple[int, int, int], below: float) -> Solid:
-    """The solid with the faces that lie wholly below a height in another colour."""
-    from dataclasses import replace
-
-    faces = tuple(
-        replace(face, color=color) if solid.points[list(face.loops[0]), 1].max() < below else face for face in solid.faces
-    )
-    return replace(solid, faces=faces)
 
 
 def _wall_gate() -> Solid:
@@ -165,9 +155,7 @@ def _wall_gate() -> Solid:
     sill = box((1.06, 0.36, 0.996), (0.0, 0.02, 0.0), STONE_DARK)
     posts = [bar((x, 0.3, 0.0), (x, 1.62, 0.0), 0.035, TIMBER, 4) for x in (-0.3, -0.1, 0.1, 0.3)]
     rails = [bar((-0.56, y, 0.0), (0.56, y, 0.0), 0.03, TIMBER, 4) for y in (0.72, 1.0, 1.28)]
-    for piece in (sill, *posts, *rails):
-        gate = gate + piece
-    return gate
+    return joined(gate, sill, *posts, *rails)
 
 
 def _hall() -> Solid:
@@ -182,7 +170,7 @@ def _hall() -> Solid:
     roof = np.array([(-0.82, 1.42), (0.82, 1.42), (0.82, 1.5), (0.42, 1.96), (0.44, 2.02), (0.06, 2.42), (-0.06, 2.42), (-0.44, 2.02), (-0.42, 1.96), (-0.82, 1.5)])
     tiles = extruded(roof, -half + 0.005, half - 0.005, TILE).turned(90.0)
     chimney = [box((0.2, 0.7, 0.2), (x, 1.94, z), STONE_LIGHT, 0.03) for x, z in ((0.8, 0.36), (-0.8, -0.36))]
-    return hall + upper + tiles + chimney[0] + chimney[1]
+    return joined(hall, upper, tiles, *chimney)
 
 
 def _cottage() -> Solid:

@@ -6,15 +6,15 @@ several closed shells. Plan outlines (n, 2) are read as (x, -z): counter-clockwi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stages.exemplars.kits.polygon import grown, rectangle, regular, triangulate
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["Color", "Face", "Solid", "bar", "box", "extruded", "loft", "revolved", "rotation", "stacked", "swept"]
+__all__ = ["Color", "Face", "Solid", "bar", "box", "extruded", "joined", "loft", "revolved", "rotation", "stacked", "swept"]
 
 Color = tuple[int, int, int]
 """sRGB, 0 to 255."""
@@ -52,6 +52,14 @@ class Solid:
     def turned(self, degrees: float, axis: str = "y") -> Solid:
         """The solid turned about a coordinate axis."""
         return Solid(self.points @ rotation(degrees, axis).T, self.faces)
+
+    def tinted(self, color: Color, where: Callable[[int, FloatArray], bool]) -> Solid:
+        """The faces for which `where(index, corners of the outer loop)` holds, in another colour."""
+        faces = tuple(
+            replace(face, color=color) if where(index, self.points[list(face.loops[0])]) else face
+            for index, face in enumerate(self.faces)
+        )
+        return Solid(self.points, faces)
 
     def around(self, count: int) -> Solid:
         """`count` copies of the solid, evenly turned about the up axis."""
@@ -132,6 +140,14 @@ class Solid:
                 if _winds_around_origin(flat[0]) and not any(_winds_around_origin(hole) for hole in flat[1:]):
                     return index
         raise ValueError(f"no face at {at.tolist()}")
+
+
+def joined(*solids: Solid) -> Solid:
+    """All shells of the solids as one solid."""
+    whole = solids[0]
+    for solid in solids[1:]:
+        whole = whole + solid
+    return whole
 
 
 def loft(rings: Sequence[FloatArray], colors: Color | Sequence[Color]) -> Solid:

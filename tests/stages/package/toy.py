@@ -24,11 +24,8 @@ from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
 
 BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-BOX_FACES = np.array(
-    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
-    + [[1, 5, 7], [1, 7, 3]],
-    dtype=np.int32,
-)
+BOX_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+BOX_FACES = np.array([face for a, b, c, d in BOX_SIDES for face in ((a, b, c), (a, c, d))], dtype=np.int32)
 SPLITS = ("train", "val", "test")
 KITS = {"blocks": "y", "planks": "z"}
 
@@ -155,9 +152,7 @@ def _no_bytes(_: Plan) -> int:
 
 
 TOY_STAGES: Mapping[str, Stage] = {
-    "exemplars": Stage(
-        "exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes
-    ),
+    "exemplars": Stage("exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
     "variations": Stage("variations", 1, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
     "strings": Stage(
         "strings", 1, OtherNoConfig, ("exemplars", "variations"), collection_shards, _make_strings, _no_bytes

@@ -51,8 +51,12 @@ def test_all_points_of_one_triangle_lie_in_it_and_fill_it_evenly() -> None:
         TRIANGLE, np.array([[0, 1, 2]], dtype=np.int32), 20_000, np.random.default_rng(1)
     )
     x, y, z = points.T
-    assert (x >= 0).all() and (y >= 0).all() and (x / 4 + y / 2 <= 1 + 1e-12).all() and (z == 0).all()
-    assert (normals == [0, 0, 1]).all() and (faces == 0).all()
+    assert (x >= 0).all()
+    assert (y >= 0).all()
+    assert (x / 4 + y / 2 <= 1 + 1e-12).all()
+    assert (z == 0).all()
+    assert (normals == [0, 0, 1]).all()
+    assert (faces == 0).all()
     assert np.abs(points.mean(axis=0) - TRIANGLE.mean(axis=0)).max() < 0.03
     middle = binomtest(int(((x < 2) & (y < 1) & (x / 2 + y < 1)).sum()), 20_000, 0.25)
     assert middle.pvalue > 1e-4

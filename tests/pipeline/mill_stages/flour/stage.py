@@ -50,6 +50,8 @@ def run_shard(task: Task) -> Outcome:
 
 def _meet(config: FlourConfig, task: Task) -> None:
     trouble = config.trouble.get(task.shard.name)
+    if trouble is None:
+        return
     config.marks.mkdir(exist_ok=True)
     with open(config.marks / task.shard.name, "a") as marks:
         marks.write("x")

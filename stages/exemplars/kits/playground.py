@@ -1,0 +1,351 @@
+"""The playground: eight-sided decks on posts, joined gate to gate by bridges, and sandboxes on the ground between them.
+
+Decks and sandboxes stand on one lattice with a pitch of 4.0 in eight directions: square loops, octagons and all that
+lies between. A deck is left through a gate, so bridges, slides, ladders and poles are exchangeable; slides lead down
+to a sandbox exactly one pitch away, and balance beams join sandboxes. Towers grow only upward, on rings.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.exemplars.kits.layout import Layout
+from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
+from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, revolved, stacked, swept
+
+__all__ = ["shapes"]
+
+PITCH = 4.0
+APOTHEM = 1.0
+"""Of a deck, from its middle to a gate."""
+GATE = 0.16
+"""Thickness of a gate."""
+FLOOR = 1.3
+"""Height of a deck above the ground."""
+POSTS, RING, STOREY = 2.5, 0.16, 1.5
+"""Height of the posts of a deck, of the ring on them, and of a storey."""
+SAND = 0.9
+"""Apothem of a sandbox."""
+BITE = 0.03
+"""How deep a part reaches into the part that it is joined to."""
+
+WOOD, WOOD_DARK, WOOD_LIGHT = (206, 160, 106), (164, 118, 76), (228, 190, 138)
+RED, RED_DARK, YELLOW, YELLOW_DARK = (222, 82, 74), (188, 62, 58), (248, 200, 84), (222, 168, 56)
+BLUE, BLUE_DARK, GREEN, GREEN_DARK = (78, 150, 212), (56, 118, 178), (112, 184, 104), (82, 150, 82)
+STEEL, ROPE, SANDY, WHITE = (176, 188, 198), (232, 214, 178), (240, 220, 166), (244, 242, 236)
+
+Spot = tuple[float, float]
+
+
+def shapes() -> dict[str, Layout]:
+    """The two example playgrounds by name."""
+    return {"square": _square(), "octagon": _octagon()}
+
+
+def _types() -> dict[str, Solid]:
+    return {
+        "deck": _deck(),
+        "gate": _gate(),
+        "ring": _ring(),
+        "storey": _storey(),
+        "roof_tent": _roof_tent(),
+        "roof_cap": _roof_cap(),
+        "pennant": _pennant(),
+        "bridge_planks": _bridge_planks(),
+        "bridge_tube": _bridge_tube(),
+        "bridge_bars": _bridge_bars(),
+        "slide": _slide(),
+        "ladder": _ladder(),
+        "pole": _pole(),
+        "climbing_wall": _climbing_wall(),
+        "sandbox": _sandbox(),
+        "balance_beam": _balance_beam(),
+        "parasol": _parasol(),
+    }
+
+
+def _posts(low: float, high: float, color: Color) -> Solid:
+    """Eight posts at the corners of a deck."""
+    reach = APOTHEM / np.cos(np.pi / 8) - 0.03
+    return revolved([(0.06, low), (0.06, high)], 6, color).moved(reach).turned(22.5).around(8)
+
+
+def _deck() -> Solid:
+    planks = stacked(regular(8, APOTHEM), [(-0.04, FLOOR - 0.16), (0.0, FLOOR - 0.12), (0.0, FLOOR)], [WOOD_DARK, WOOD])
+    planks = planks.inset((0.0, FLOOR, 0.0), regular(8, 0.8), -0.02, WOOD_LIGHT, WOOD_LIGHT)
+    planks = planks.inset((0.0, FLOOR + 0.02, 0.0), regular(8, 0.34), -0.015, YELLOW_DARK, YELLOW)
+    feet = revolved([(0.13, 0.0), (0.13, 0.06), (0.08, 0.12)], 6, STEEL).moved(APOTHEM / np.cos(np.pi / 8) - 0.03)
+    return planks + _posts(0.05, POSTS, WOOD_DARK) + feet.turned(22.5).around(8)
+
+
+def _gate() -> Solid:
+    """Stands on the edge of a deck at x = 0 and opens along x; its foot is on the ground below."""
+    half = 0.34
+    opening = arch(0.52, 0.94, 0.26, 6, y=FLOOR + 0.02)[2:]
+    outline = np.array([(-0.26, FLOOR - 0.14), (-half, FLOOR - 0.14), (-half, FLOOR + 0.98), (-0.2, FLOOR + 1.12), (0.2, FLOOR + 1.12), (half, FLOOR + 0.98), (half, FLOOR - 0.14), (0.26, FLOOR - 0.14)])
+    frame = extruded(np.concatenate([outline[::-1], opening[::-1]]), -BITE, GATE, GREEN).turned(90.0)
+    sill = box((GATE + BITE - 0.01, 0.15, 0.56), ((GATE - BITE) / 2, FLOOR - 0.145, 0.0), WOOD_LIGHT)
+    star = revolved([(0.06, 0.0), (0.05, 0.03)], 6, YELLOW).turned(-90.0, "z").moved(GATE - 0.01, FLOOR + 1.03)
+    return frame + sill + star
+
+
+def _ring() -> Solid:
+    """A hoop on the posts of a deck or a storey; carries what comes above."""
+    hoop = stacked(regular(8, APOTHEM), [(0.06, 0.0), (0.08, 0.04), (0.08, RING - 0.04), (0.05, RING)], [BLUE_DARK, BLUE, BLUE])
+    hoop = hoop.inset((0.0, RING, 0.0), regular(8, 0.86), RING - 0.02, BLUE_DARK, WOOD_LIGHT)
+    return hoop
+
+
+def _storey() -> Solid:
+    """An upper deck with a parapet all around, on a ring; its posts carry the next ring."""
+    floor = stacked(regular(8, APOTHEM), [(0.0, 0.0), (0.04, 0.05), (0.04, 0.12)], [WOOD_DARK, WOOD])
+    floor = floor.inset((0.0, 0.12, 0.0), regular(8, 0.9), -0.5, WOOD, WOOD_LIGHT)
+    floor = floor.inset((0.0, 0.62, 0.0), regular(8, 0.8), 0.44, WOOD_DARK, WOOD_LIGHT)
+    for turn in range(2):
+        floor = floor.turned(45.0 * turn).inset((0.9, 0.37, 0.0), regular(8, 0.13), 0.06, WOOD_DARK, (RED, YELLOW)[turn], copies=4)
+    return floor + _posts(0.02, STOREY, WOOD_DARK)
+
+
+def _roof_tent() -> Solid:
+    """A striped tent roof on a ring."""
+    roof = revolved([(1.2, 0.0), (1.22, 0.1), (0.62, 0.66), (0.1, 1.34)], 8, RED)
+    roof = roof.tinted(WHITE, lambda index, _: index < 24 and index % 2 == 1)
+    return roof + revolved([(0.13, 1.3), (0.16, 1.38), (0.08, 1.48)], 8, YELLOW)
+
+
+def _roof_cap() -> Solid:
+    """A rounded roof on a ring."""
+    angles = np.radians([4.0, 28.0, 52.0, 74.0])
+    dome = [(1.08 * float(np.cos(a)), 0.06 + 0.98 * float(np.sin(a))) for a in angles]
+    cap = revolved([(0.98, 0.0), (1.2, 0.0), (1.22, 0.08), *dome, (0.12, 1.06)], 16, [GREEN_DARK, GREEN_DARK, GREEN_DARK, GREEN, GREEN, GREEN, GREEN])
+    cap = cap + revolved([(0.1, 1.02), (0.16, 1.12), (0.12, 1.24), (0.08, 1.26)], 8, YELLOW)
+    return cap
+
+
+def _pennant() -> Solid:
+    """A pole with a pennant on the knob of a roof."""
+    pole = revolved([(0.035, -0.03), (0.035, 0.86), (0.06, 0.88), (0.06, 0.96), (0.0, 1.0)], 6, [STEEL, STEEL, YELLOW, YELLOW])
+    cloth = extruded(np.array([(0.0, 0.44), (0.6, 0.62), (0.0, 0.8)]), -0.02, 0.02, BLUE)
+    return pole + cloth
+
+
+def _length() -> float:
+    """Of what lies between the gates of two neighbouring decks."""
+    return PITCH - 2 * (APOTHEM + GATE)
+
+
+def _bridge_planks() -> Solid:
+    """A hanging bridge of planks along x."""
+    half = _length() / 2 + BITE
+    xs = np.linspace(-half, half, 9)
+    sag = [float(0.14 * (x / half) ** 2 - 0.14) for x in xs]
+    path = [(float(x), FLOOR - 0.1 + s, 0.0) for x, s in zip(xs, sag, strict=True)]
+    bridge = swept([(x, y, 0.2) for x, y, _ in path], rectangle(0.06, 0.06), ROPE) + swept([(x, y, -0.2) for x, y, _ in path], rectangle(0.06, 0.06), ROPE)
+    for x, y, _ in path[:-1]:
+        bridge = bridge + box((0.15, 0.05, 0.56), (x + half / 8, y + 0.03, 0.0), WOOD_LIGHT, 0.01)
+    for z in (-0.29, 0.29):
+        bridge = bridge + swept([(x, y + 0.62, z) for x, y, _ in path], regular(5, 0.035), ROPE)
+        for x, y, _ in path[1:-1:2]:
+            bridge = bridge + bar((x, y + 0.02, 0.9 * z), (x, y + 0.62, z), 0.02, ROPE, 4)
+    return bridge
+
+
+def _bridge_tube() -> Solid:
+    """A crawling tube along x."""
+    half = _length() / 2 + BITE
+    rims = [(0.36, -half), (0.36, 0.1 - half), (0.31, 0.12 - half), (0.31, -0.06), (0.35, -0.04), (0.35, 0.04), (0.31, 0.06), (0.31, half - 0.12), (0.36, half - 0.1), (0.36, half)]
+    hull = revolved(rims, 8, [YELLOW_DARK, YELLOW_DARK, YELLOW, YELLOW_DARK, YELLOW_DARK, YELLOW_DARK, YELLOW, YELLOW_DARK, YELLOW_DARK])
+    tube = hull.turned(-90.0, "z")
+    for x in (-0.46, 0.46):
+        tube = tube.inset((x, 0.0, 0.31), regular(8, 0.1), 0.06, BLUE_DARK, BLUE, copies=2)
+    handle = box((0.4, 0.08, 0.08), (0.46, 0.29, 0.0), RED, 0.02)
+    return (tube + handle + handle.moved(-0.92)).moved(0.0, FLOOR + 0.36)
+
+
+def _bridge_bars() -> Solid:
+    """Monkey bars along x over a walk of two beams."""
+    half = _length() / 2 + BITE
+    pieces = []
+    for z in (-0.24, 0.24):
+        pieces.append(box((2 * half, 0.08, 0.1), (0.0, FLOOR - 0.12, z), RED, 0.02))
+        pieces.append(bar((-half, FLOOR + 0.9, z), (half, FLOOR + 0.9, z), 0.045, BLUE))
+        for x in (-0.44, 0.44):
+            pieces.append(bar((x, FLOOR - 0.06, z), (x, FLOOR + 0.9, z), 0.03, BLUE, 5))
+    for x in np.linspace(-0.66, 0.66, 5):
+        pieces.append(bar((float(x), FLOOR + 0.9, -0.24), (float(x), FLOOR + 0.9, 0.24), 0.028, STEEL, 5))
+    for x in np.linspace(-0.7, 0.7, 6):
+        pieces.append(box((0.14, 0.05, 0.56), (float(x), FLOOR - 0.06, 0.0), WOOD_LIGHT, 0.01))
+    return joined(*pieces)
+
+
+def _slide() -> Solid:
+    """Runs along x from a gate at x = 0 down to a sandbox, whose middle is one pitch from that of the deck."""
+    end = PITCH - APOTHEM - GATE - SAND + 0.06
+    path = [(-BITE, FLOOR + 0.0, 0.0), (0.26, FLOOR - 0.02, 0.0), (0.6, FLOOR - 0.26, 0.0), (1.3, FLOOR - 0.86, 0.0), (1.62, 0.3, 0.0), (end, 0.22, 0.0)]
+    trough = np.array([(-0.3, -0.06), (0.3, -0.06), (0.3, 0.16), (0.23, 0.16), (0.19, 0.0), (-0.19, 0.0), (-0.23, 0.16), (-0.3, 0.16)])
+    slide = swept(path, trough, YELLOW)
+    legs = bar((1.0, 0.04, 0.2), (1.0, FLOOR - 0.64, 0.2), 0.045, STEEL) + bar((1.0, 0.04, -0.2), (1.0, FLOOR - 0.64, -0.2), 0.045, STEEL)
+    hoop = swept([(0.12, FLOOR + 0.1, -0.27), (0.12, FLOOR + 0.56, -0.27), (0.12, FLOOR + 0.72, -0.1), (0.12, FLOOR + 0.72, 0.1), (0.12, FLOOR + 0.56, 0.27), (0.12, FLOOR + 0.1, 0.27)], regular(6, 0.035), RED)
+    return slide + legs + hoop
+
+
+def _ladder() -> Solid:
+    """Comes down from a gate at x = 0."""
+    top, foot = (0.02, FLOOR + 0.52), (0.72, 0.0)
+    pieces = []
+    for z in (-0.26, 0.26):
+        pieces.append(swept([(top[0] + 0.02, top[1], z), (0.12, FLOOR + 0.56, z), (0.26, FLOOR + 0.42, z), (foot[0], foot[1], z)], regular(6, 0.045), BLUE))
+    for k in range(5):
+        y = 0.22 + 0.26 * k
+        x = 0.72 - 0.46 * y / (FLOOR + 0.42)
+        pieces.append(box((0.14, 0.06, 0.52), (x, y, 0.0), WOOD_LIGHT, 0.015))
+    pieces.append(box((0.3, 0.08, 0.5), (0.12, FLOOR - 0.1, 0.0), WOOD))
+    return joined(*pieces)
+
+
+def _pole() -> Solid:
+    """A fireman's pole in front of a gate at x = 0."""
+    pole = bar((0.46, 0.02, 0.0), (0.46, FLOOR + 0.98, 0.0), 0.05, STEEL, 8)
+    arm = swept([(-BITE + 0.04, FLOOR + 0.98, 0.28), (0.3, FLOOR + 0.98, 0.28), (0.46, FLOOR + 0.98, 0.16), (0.46, FLOOR + 0.98, -0.16), (0.3, FLOOR + 0.98, -0.28), (-BITE + 0.04, FLOOR + 0.98, -0.28)], regular(6, 0.045), RED)
+    foot = revolved([(0.3, 0.0), (0.3, 0.05), (0.1, 0.1)], 8, RED_DARK).moved(0.46)
+    return pole + arm + foot
+
+
+def _climbing_wall() -> Solid:
+    """A leaning wall with holds, up to a gate at x = 0."""
+    profile = np.array([(-BITE, FLOOR - 0.02), (-BITE, FLOOR - 0.14), (0.6, 0.0), (0.76, 0.0), (0.12, FLOOR - 0.02)])
+    wall = extruded(profile, -0.31, 0.31, GREEN)
+    for k, (t, z) in enumerate(((0.2, -0.14), (0.36, 0.12), (0.52, -0.1), (0.68, 0.14), (0.84, -0.12))):
+        at = (0.76 - 0.64 * t, (FLOOR - 0.02) * t, z)
+        wall = wall.inset(at, regular(6, 0.07), -0.05, (RED, YELLOW, BLUE)[k % 3], shrink=0.025)
+    return wall
+
+
+def _sandbox() -> Solid:
+    frame = stacked(regular(8, SAND), [(0.0, 0.0), (0.0, 0.2), (-0.03, 0.24)], WOOD)
+    frame = frame.inset((0.0, 0.24, 0.0), regular(8, 0.72), 0.12, WOOD_DARK, SANDY)
+    mound = revolved([(0.3, 0.1), (0.2, 0.2), (0.06, 0.24)], 8, SANDY)
+    return frame + mound
+
+
+def _balance_beam() -> Solid:
+    """A log on stumps along x, between two sandboxes."""
+    half = PITCH / 2 - SAND + BITE
+    log = bar((-half, 0.14, 0.0), (half, 0.14, 0.0), 0.09, WOOD_DARK, 8)
+    for x in (-0.7, 0.0, 0.7):
+        log = log + revolved([(0.22, 0.0), (0.22, 0.26), (0.18, 0.3)], 8, [WOOD_DARK, WOOD_LIGHT]).moved(x)
+    return log
+
+
+def _parasol() -> Solid:
+    """Stands in the middle of a sandbox."""
+    pole = revolved([(0.05, 0.0), (0.05, 1.5)], 6, WHITE)
+    shade = revolved([(0.06, 1.36), (0.82, 1.2), (0.84, 1.26), (0.44, 1.52), (0.06, 1.66)], 8, [BLUE_DARK, BLUE, BLUE, BLUE])
+    shade = shade.tinted(WHITE, lambda index, _: 8 <= index < 32 and index % 2 == 1)
+    tip = revolved([(0.05, 1.62), (0.08, 1.7), (0.0, 1.82)], 6, YELLOW)
+    return pole + shade + tip
+
+
+class _Playground(Layout):
+    """Places playground parts; spots are points (x, z), directions count eighths of a turn from +x, towards -z."""
+
+    def __init__(self) -> None:
+        super().__init__(_types())
+
+    def deck(self, spot: Spot, top: str = "", storeys: int = 0) -> None:
+        """A deck, so many storeys on it, and a roof, with `+pennant` behind its name for a pennant."""
+        x, z = spot
+        self.put("deck", x, 0.0, z)
+        self.put("ring", x, POSTS, z)
+        height = POSTS + RING
+        for _ in range(storeys):
+            self.put("storey", x, height, z)
+            self.put("ring", x, height + STOREY, z)
+            height += STOREY + RING
+        roof, _, pennant = top.partition("+")
+        if roof:
+            self.put(f"roof_{roof}", x, height, z)
+        if pennant:
+            self.put("pennant", x, height + {"tent": 1.48, "cap": 1.26}[roof], z)
+
+    def end(self, name: str, spot: Spot, eighth: int) -> None:
+        """A gate of a deck, and a slide, ladder, pole or climbing wall that leads down from it."""
+        self.put("gate", *_from(spot, eighth, APOTHEM), 45.0 * eighth)
+        self.put(name, *_from(spot, eighth, APOTHEM + GATE), 45.0 * eighth)
+
+    def bridge(self, name: str, spot: Spot, eighth: int) -> Spot:
+        """A bridge to the deck one pitch away, with its gates; the spot of that deck."""
+        beyond = _step(spot, eighth)
+        self.put("gate", *_from(spot, eighth, APOTHEM), 45.0 * eighth)
+        self.put("gate", *_from(beyond, eighth + 4, APOTHEM), 45.0 * ((eighth + 4) % 8))
+        self.put(name, *_from(spot, eighth, PITCH / 2), 45.0 * eighth)
+        return beyond
+
+    def sandbox(self, spot: Spot, parasol: bool = False) -> None:
+        """A sandbox on the ground."""
+        self.put("sandbox", spot[0], 0.0, spot[1])
+        if parasol:
+            self.put("parasol", spot[0], 0.24, spot[1])
+
+
+def _step(spot: Spot, eighth: int) -> Spot:
+    x, _, z = _from(spot, eighth, PITCH)
+    return x, z
+
+
+def _from(spot: Spot, eighth: int, distance: float) -> tuple[float, float, float]:
+    angle = np.radians(45.0 * eighth)
+    return float(spot[0] + distance * np.cos(angle)), 0.0, float(spot[1] - distance * np.sin(angle))
+
+
+def _square() -> Layout:
+    """A square of decks with a wing, slides into two sandboxes, a balance beam between them."""
+    ground = _Playground()
+    west, middle, east = (0.0, 0.0), (4.0, 0.0), (8.0, 0.0)
+    south_west, south, far = (0.0, 4.0), (4.0, 4.0), (4.0, 8.0)
+    ground.deck(west, "tent+pennant", 1)
+    ground.deck(middle, "cap")
+    ground.deck(east, "tent")
+    ground.deck(south_west)
+    ground.deck(south, "tent+pennant")
+    ground.deck(far, "cap+pennant")
+    ground.bridge("bridge_planks", west, 0)
+    ground.bridge("bridge_tube", middle, 0)
+    ground.bridge("bridge_bars", west, 6)
+    ground.bridge("bridge_planks", middle, 6)
+    ground.bridge("bridge_tube", south_west, 0)
+    ground.bridge("bridge_bars", south, 6)
+    ground.end("slide", east, 6)
+    ground.end("slide", south, 0)
+    ground.end("slide", far, 0)
+    ground.sandbox((8.0, 4.0))
+    ground.sandbox((8.0, 8.0), parasol=True)
+    ground.put("balance_beam", 8.0, 0.0, 6.0, 90.0)
+    ground.end("ladder", south_west, 5)
+    ground.end("climbing_wall", west, 3)
+    ground.end("pole", far, 4)
+    ground.end("ladder", east, 1)
+    return ground
+
+
+def _octagon() -> Layout:
+    """Eight decks in a ring, with slides inward and outward."""
+    ground = _Playground()
+    spots = [(0.0, 0.0)]
+    for k, name in enumerate(("planks", "bars", "tube", "planks", "tube", "planks", "bars", "tube")):
+        beyond = ground.bridge(f"bridge_{name}", spots[k], k)
+        if k < 7:
+            spots.append(beyond)
+    tops = ("tent+pennant", "cap", "", "tent", "cap+pennant", "tent+pennant", "", "tent")
+    for spot, top, storeys in zip(spots, tops, (0, 1, 0, 0, 2, 0, 0, 0), strict=True):
+        ground.deck(spot, top, storeys)
+    for k in (0, 1, 4, 5):
+        ground.end("slide", spots[k], 2)
+        ground.sandbox(_step(spots[k], 2), parasol=k in (1, 5))
+    for k in (0, 5):
+        ground.put("balance_beam", *_from(_step(spots[k], 2), 0, PITCH / 2))
+    ground.end("ladder", spots[0], 5)
+    ground.end("pole", spots[2], 0)
+    ground.end("climbing_wall", spots[3], 1)
+    ground.end("ladder", spots[7], 4)
+    return ground

@@ -1,0 +1,356 @@
+"""The space base: six-sided hubs on a triangular lattice, joined port to port by tunnels.
+
+Hubs are 6.0 apart. Whatever leaves a hub leaves it through a port, so a tunnel, a greenhouse, an airlock, a tank or a
+landing pad can stand wherever another one can; whatever stands on a hub stands on its collar. Nothing leaves upper
+storeys sideways: what stands on the ground stays on the ground.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.exemplars.kits.layout import Layout
+from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
+from stages.exemplars.kits.solid import Color, Solid, bar, box, loft, revolved, stacked
+from stages.shape.arrays import FloatArray
+
+__all__ = ["shapes"]
+
+PITCH = 6.0
+APOTHEM = 1.3
+"""Of a hub, from its middle to a port."""
+PORT = 0.34
+"""Length of a port."""
+AXIS = 1.3
+"""Height of the middle of tunnels and ports above the ground."""
+DECK = 2.3
+"""Height of the top of a hub, where its collar stands."""
+COLLAR, RISER = 0.3, 1.5
+PAD = 2.3
+"""From the outer end of a port to the middle of a pad."""
+BITE = 0.03
+"""How deep a part reaches into the part that it is joined to."""
+
+WHITE, PALE, GREY, DARK = (236, 238, 240), (206, 212, 218), (140, 150, 162), (74, 82, 96)
+ORANGE, ORANGE_DARK, GLASS, GLASS_DARK = (238, 136, 58), (206, 108, 44), (126, 196, 218), (74, 132, 168)
+LEAF, LEAF_DARK, SOIL, CELL = (108, 176, 96), (78, 142, 78), (120, 92, 72), (46, 72, 132)
+GOLD, RED, LAMP = (226, 184, 92), (206, 72, 66), (252, 226, 140)
+
+
+def shapes() -> dict[str, Layout]:
+    """The two example bases by name."""
+    return {"outpost": _outpost(), "colony": _colony()}
+
+
+def _types() -> dict[str, Solid]:
+    return {
+        "hub": _hub(),
+        "port": _port(),
+        "tunnel": _tunnel(),
+        "greenhouse": _greenhouse(),
+        "airlock": _airlock(),
+        "tank": _tank(),
+        "pad": _pad(),
+        "rocket": _rocket(),
+        "collar": _collar(),
+        "riser": _riser(),
+        "dome": _dome(),
+        "antenna": _antenna(),
+        "mast": _mast(),
+        "solar_wing": _solar_wing(),
+    }
+
+
+def _along_x(section: FloatArray, stations: list[tuple[float, float]], colors: Color | list[Color]) -> Solid:
+    """A lying body: the section (k, 2) in (z, y) around the origin, scaled at each station along x."""
+    rings = []
+    for scale, x in stations:
+        rings.append(np.column_stack([np.full(len(section), x), section[:, 1] * scale, -section[:, 0] * scale]))
+    return loft(rings, colors)
+
+
+def _hub() -> Solid:
+    outline = regular(6, APOTHEM)
+    levels = [(-0.4, 0.3), (-0.08, 0.52), (-0.08, 0.6), (0.0, 0.66), (0.0, 1.94), (-0.06, 2.0), (-0.42, DECK)]
+    hub = stacked(outline, levels, [GREY, DARK, PALE, WHITE, ORANGE, WHITE])
+    hub = hub.inset((APOTHEM, AXIS, 0.0), chamfered(1.16, 1.04, 0.24), 0.06, GREY, PALE, copies=6)
+    leg = bar((1.02, 0.62, 0.0), (1.34, 0.1, 0.0), 0.07, GREY) + revolved([(0.2, 0.0), (0.2, 0.08), (0.1, 0.14)], 8, DARK).moved(1.38)
+    lamp = box((0.1, 0.7, 0.24), (1.46, 0.86, 0.0), ORANGE)
+    for k in range(6):
+        hub = hub + leg.turned(30.0 + 60.0 * k) + lamp.turned(30.0 + 60.0 * k)
+    return hub
+
+
+def _port() -> Solid:
+    """Leads from a hub at x = 0 outward along x; its own middle is on the ground below its axis."""
+    ring = chamfered(1.1, 1.1, 0.3)
+    stations = [(0.86, -0.09), (0.86, 0.06), (1.0, 0.08), (1.0, 0.26), (0.9, 0.28), (0.9, PORT)]
+    port = _along_x(ring, stations, [DARK, GREY, ORANGE, GREY, DARK]).moved(0.0, AXIS)
+    light = box((0.14, 0.1, 0.2), (0.17, AXIS + 0.54, 0.0), LAMP, 0.02)
+    strut = box((0.12, 0.2, 0.5), (0.17, AXIS - 0.73, 0.0), DARK)
+    return port + light + strut
+
+
+def _length() -> float:
+    """Of what lies between the ports of two neighbouring hubs."""
+    return PITCH - 2 * (APOTHEM + PORT)
+
+
+def _tunnel() -> Solid:
+    half = _length() / 2 + BITE
+    ring = chamfered(0.96, 0.96, 0.3)
+    ribs = [(1.0, -half), (1.0, -half + 0.14), (0.9, -half + 0.18)]
+    for x in (-0.5, 0.5):
+        ribs += [(0.9, x - 0.12), (1.0, x - 0.08), (1.0, x + 0.08), (0.9, x + 0.12)]
+    ribs += [(0.9, half - 0.18), (1.0, half - 0.14), (1.0, half)]
+    colors = [GREY, GREY, WHITE, GREY, GREY, GREY, WHITE, GREY, GREY, GREY, WHITE, GREY, GREY]
+    tunnel = _along_x(ring, ribs, colors)
+    for x in (-0.9, 0.0, 0.9):
+        tunnel = tunnel.inset((x, 0.0, 0.432), chamfered(0.34, 0.26, 0.08), 0.05, GREY, GLASS_DARK, copies=2)
+    tunnel = tunnel.moved(0.0, AXIS)
+    pipe = bar((-half + 0.06, AXIS + 0.5, 0.14), (half - 0.06, AXIS + 0.5, 0.14), 0.06, ORANGE)
+    pipe = pipe + bar((half - 0.06, AXIS + 0.5, -0.14), (-half + 0.06, AXIS + 0.5, -0.14), 0.06, ORANGE)
+    foot = box((0.16, 0.84, 0.3), (0.0, 0.08, 0.0), GREY) + stacked(rectangle(0.5, 0.7), [(0.0, 0.0), (0.0, 0.07), (-0.06, 0.12)], DARK)
+    return tunnel + pipe + foot.moved(0.5) + foot.moved(-0.5)
+
+
+def _greenhouse() -> Solid:
+    """As long as a tunnel, with beds under a vault of glass."""
+    half = _length() / 2 + BITE
+    end = chamfered(0.96, 0.96, 0.3)
+    collar = _along_x(end, [(1.0, -half), (1.0, -half + 0.3)], GREY).moved(0.0, AXIS)
+    vault = arch(1.7, 1.5, 0.92, 6, y=-0.62)
+    shell = _along_x(vault, [(1.0, -1.16), (1.0, 1.16)], GLASS)
+    shell = shell.moved(0.0, AXIS)
+    for x in (-0.72, 0.0, 0.72):
+        shell = shell.inset((x, AXIS - 0.32, 0.85), rectangle(0.58, 0.34), 0.06, WHITE, LEAF, copies=2)
+    for x in (-1.16, -0.39, 0.39, 1.16):
+        shell = shell + _along_x(arch(1.8, 1.56, 0.96, 6, y=-0.64), [(1.0, -0.05), (1.0, 0.05)], WHITE).moved(x, AXIS)
+    plinth = stacked(rectangle(2.5, 1.86), [(-0.1, 0.16), (0.0, 0.3), (0.0, 0.78), (-0.04, 0.82)], [DARK, PALE, PALE])
+    ridge = box((2.36, 0.1, 0.16), (0.0, AXIS + 0.86, 0.0), WHITE)
+    feet = box((0.4, 0.2, 0.4), (0.9, 0.0, 0.6), DARK)
+    return collar + collar.turned(180.0) + shell + plinth + ridge + feet + feet.moved(z=-1.2) + (feet + feet.moved(z=-1.2)).moved(-1.8)
+
+
+def _airlock() -> Solid:
+    """Closes a port: its inner face is the plane x = 0, it looks along x."""
+    lock = _along_x(chamfered(0.96, 0.96, 0.3), [(1.0, -BITE), (1.0, 0.12), (1.16, 0.16), (1.16, 0.86), (1.0, 0.94)], [GREY, GREY, WHITE, ORANGE])
+    lock = lock.inset((0.94, 0.0, 0.0), chamfered(0.68, 0.76, 0.2), 0.1, DARK, PALE)
+    lock = lock.inset((0.84, 0.16, 0.0), rectangle(0.3, 0.16), 0.04, DARK, GLASS_DARK)
+    lock = lock.inset((0.5, 0.0, 0.5568), chamfered(0.4, 0.3, 0.08), 0.05, GREY, GLASS_DARK)
+    lock = lock.moved(0.0, AXIS)
+    step = box((0.62, 0.1, 0.9), (1.14, AXIS - 0.56, 0.0), GREY)
+    ramp = loft([np.array([(x, y, z) for x, y in ((1.4, AXIS - 0.58), (2.2, 0.0), (2.4, 0.0), (2.4, 0.06), (1.4, AXIS - 0.42))]) for z in (-0.4, 0.4)], PALE)
+    stilts = bar((0.5, 0.1, 0.3), (0.5, 0.9, 0.3), 0.06, GREY) + bar((0.5, 0.1, -0.3), (0.5, 0.9, -0.3), 0.06, GREY)
+    pads = box((0.3, 0.12, 0.9), (0.5, 0.0, 0.0), DARK)
+    return lock + step + ramp + stilts + pads
+
+
+def _tank() -> Solid:
+    """A round tank on a port: the port's outer face is the plane x = 0."""
+    neck = _along_x(chamfered(0.7, 0.7, 0.22), [(1.0, -BITE), (1.0, 0.36)], GREY).moved(0.0, AXIS)
+    angles = np.radians([-66.0, -40.0, -12.0, 12.0, 40.0, 66.0])
+    ball = [(0.92 * float(np.cos(a)), AXIS + 0.92 * float(np.sin(a))) for a in angles]
+    tank = revolved([*ball, (0.22, AXIS + 0.86), (0.22, AXIS + 1.02)], 12, [WHITE, WHITE, ORANGE, WHITE, WHITE, PALE, GREY]).moved(1.12)
+    legs = bar((0.72, AXIS - 0.3, 0.0), (1.0, 0.08, 0.0), 0.06, GREY) + box((0.26, 0.1, 0.26), (1.0, 0.0, 0.0), DARK)
+    for k in range(4):
+        tank = tank + legs.turned(45.0 + 90.0 * k).moved(1.12)
+    return neck + tank
+
+
+def _pad() -> Solid:
+    """A landing pad at the end of a port: the port's outer face is the plane x = 0."""
+    neck = _along_x(chamfered(0.7, 0.7, 0.22), [(1.0, -BITE), (1.0, 0.5)], GREY).moved(0.0, AXIS)
+    office = box((0.84, 1.16, 0.96), (0.64, AXIS - 0.6, 0.0), WHITE, 0.1)
+    office = office.inset((1.06, AXIS + 0.06, 0.0), rectangle(0.66, 0.34), 0.05, GREY, GLASS_DARK)
+    office = office.inset((0.7, AXIS, 0.48), rectangle(0.34, 0.3), 0.05, GREY, GLASS_DARK)
+    plate = stacked(regular(6, 1.5, 30.0), [(-0.5, 0.36), (0.0, 0.66), (0.0, 0.8), (-0.06, 0.86)], [DARK, GREY, PALE])
+    plate = plate.inset((0.0, 0.86, 0.0), regular(6, 1.26, 30.0), -0.02, DARK, ORANGE)
+    plate = plate.inset((0.0, 0.88, 0.0), regular(6, 1.12, 30.0), -0.02, DARK, DARK)
+    plate = plate.inset((0.0, 0.9, 0.0), regular(8, 0.6), -0.02, DARK, WHITE)
+    leg = box((0.22, 0.5, 0.22), (1.0, 0.0, 0.0), GREY)
+    for k in range(6):
+        plate = plate + leg.turned(60.0 * k)
+    return neck + office + plate.moved(PAD)
+
+
+def _rocket() -> Solid:
+    """Stands on a pad."""
+    hull = [(0.3, 0.42), (0.44, 0.7), (0.52, 1.3), (0.52, 1.9), (0.42, 2.6), (0.26, 3.1), (0.0, 3.6)]
+    rocket = revolved([(0.2, 0.26), (0.26, 0.42), *hull], 8, [DARK, DARK, GREY, WHITE, ORANGE, WHITE, WHITE, RED])
+    rocket = rocket.inset((0.52, 1.6, 0.0), regular(8, 0.13), 0.05, GOLD, GLASS_DARK, copies=4)
+    fin = loft([np.array([(0.4, 1.2, z), (0.86, 0.5, z), (0.96, 0.0, z), (0.8, 0.0, z), (0.38, 0.56, z)])[::-1] for z in (-0.06, 0.06)], RED)
+    for k in range(4):
+        rocket = rocket + fin.turned(45.0 + 90.0 * k)
+    return rocket
+
+
+def _collar() -> Solid:
+    """Stands on a hub or a riser and carries whatever comes above."""
+    collar = revolved([(0.84, 0.0), (0.84, 0.08), (0.74, 0.12), (0.74, 0.24), (0.8, COLLAR)], 12, [GREY, ORANGE, DARK, GREY])
+    return collar.inset((0.0, COLLAR, 0.0), regular(6, 0.46), 0.05, DARK, ORANGE)
+
+
+def _riser() -> Solid:
+    """A round room between two collars."""
+    riser = revolved([(0.7, 0.0), (0.9, 0.16), (0.9, 1.3), (0.78, RISER)], 12, [GREY, WHITE, PALE])
+    for turn in range(3):
+        riser = riser.turned(30.0 * min(turn, 1))
+        if turn < 2:
+            riser = riser.inset((0.9, 0.76, 0.0), chamfered(0.3, 0.56, 0.1), 0.07, GREY, GLASS_DARK, copies=6)
+    return riser.turned(30.0)
+
+
+def _dome() -> Solid:
+    """A glass cupola on a collar."""
+    angles = np.radians([0.0, 24.0, 48.0, 68.0])
+    levels = [(0.96, 0.0), (1.02, 0.06), (1.02, 0.2)] + [(0.94 * float(np.cos(a)), 0.2 + 0.94 * float(np.sin(a))) for a in angles]
+    dome = revolved([*levels, (0.3, 1.12), (0.2, 1.22)], 12, [GREY, WHITE, WHITE, GLASS, GLASS, GLASS, WHITE, WHITE])
+    for k in range(6):
+        dome = dome + _dome_rib().turned(60.0 * k + 15.0)
+    return dome
+
+
+def _dome_rib() -> Solid:
+    angles = np.radians([2.0, 24.0, 48.0, 70.0])
+    rings = []
+    for a in angles:
+        out, up = float(np.cos(a)), float(np.sin(a))
+        rings.append(np.array([(radius * out, 0.2 + radius * up, z) for radius, z in ((0.93, -0.04), (1.02, -0.04), (1.02, 0.04), (0.93, 0.04))])[::-1])
+    return loft(rings, WHITE)
+
+
+def _antenna() -> Solid:
+    """A dish on a collar, looking up along x."""
+    foot = revolved([(0.66, 0.0), (0.66, 0.12), (0.3, 0.2), (0.2, 0.9)], 8, [GREY, WHITE, WHITE])
+    dish = revolved([(0.12, -0.2), (0.3, -0.16), (0.8, 0.1), (1.08, 0.42), (1.02, 0.46), (0.74, 0.18), (0.26, -0.06)], 12, [GREY, WHITE, WHITE, ORANGE, PALE, PALE])
+    feed = bar((0.0, -0.1, 0.0), (0.0, 0.66, 0.0), 0.035, GREY) + revolved([(0.0, 0.6), (0.1, 0.66), (0.1, 0.76), (0.0, 0.82)], 6, RED)
+    return foot + (dish + feed).turned(-40.0, "z").moved(0.0, 1.06)
+
+
+def _mast() -> Solid:
+    """Carries solar wings along x on both sides."""
+    mast = revolved([(0.6, 0.0), (0.6, 0.12), (0.24, 0.22), (0.16, 0.3), (0.16, 1.1)], 8, [GREY, WHITE, WHITE, PALE])
+    head = box((0.5, 0.4, 0.5), (0.0, 1.0, 0.0), WHITE, 0.08).inset((0.25, 1.18, 0.0), rectangle(0.26, 0.2), 0.04, GREY, DARK, copies=2)
+    lamp = revolved([(0.08, 1.36), (0.08, 1.6), (0.0, 1.7)], 6, ORANGE)
+    return mast + head + lamp
+
+
+def _solar_wing() -> Solid:
+    """A panel that leads on along x; the next one docks to its outer end."""
+    arm = bar((-0.06, 0.0, 0.0), (2.0, 0.0, 0.0), 0.07, GREY)
+    panel = loft([np.array([(x, 0.06, -0.66), (x, 0.1, -0.66), (x, 0.1, 0.66), (x, 0.06, 0.66)]) for x in (0.2, 1.8)], PALE)
+    for x in (0.48, 1.0, 1.52):
+        for z in (-0.32, 0.32):
+            panel = panel.inset((x, 0.1, z), rectangle(0.46, 0.56), 0.015, DARK, CELL)
+    clamp = box((0.2, 0.2, 0.3), (1.94, -0.1, 0.0), ORANGE)
+    return arm + panel + clamp
+
+
+class _Base(Layout):
+    """Places base parts on the triangular lattice: hub (i, j) stands at 6 (i + j/2) along x and 5.196 j along -z."""
+
+    def __init__(self) -> None:
+        super().__init__(_types())
+
+    def _spot(self, i: int, j: int) -> FloatArray:
+        return np.array([PITCH * (i + j / 2), -PITCH * j * np.sqrt(0.75)])
+
+    def hub(self, i: int, j: int, top: str, risers: int = 0, turn: float = 0.0) -> None:
+        """A hub, so many risers on it, each on its collar, and what stands at the top."""
+        x, z = self._spot(i, j)
+        self.put("hub", x, 0.0, z)
+        self.put("collar", x, DECK, z)
+        height = DECK + COLLAR
+        for _ in range(risers):
+            self.put("riser", x, height, z)
+            self.put("collar", x, height + RISER, z)
+            height += RISER + COLLAR
+        wings = 0
+        if top.startswith("mast"):
+            wings, top = int(top[4:]), "mast"
+        if top:
+            self.put(top, x, height, z, turn)
+        for side in (0.0, 180.0):
+            along = np.radians(turn + side)
+            for k in range(wings):
+                out = 0.25 + 2.04 * k
+                self.put("solar_wing", x + out * np.cos(along), height + 1.16, z - out * np.sin(along), turn + side)
+
+    def _port(self, i: int, j: int, sixth: int, beyond: float = 0.0) -> tuple[float, float, float]:
+        x, z = self._spot(i, j)
+        angle = np.radians(60.0 * sixth)
+        out = APOTHEM + beyond
+        return float(x + out * np.cos(angle)), float(z - out * np.sin(angle)), 60.0 * sixth
+
+    def end(self, name: str, i: int, j: int, sixth: int) -> None:
+        """A port on side `sixth` of a hub (counter-clockwise from +x), and what it leads to."""
+        x, z, turn = self._port(i, j, sixth)
+        self.put("port", x, 0.0, z, turn)
+        x, z, turn = self._port(i, j, sixth, PORT)
+        self.put(name, x, 0.0, z, turn)
+
+    def join(self, name: str, i: int, j: int, sixth: int) -> None:
+        """A tunnel or greenhouse from a hub to its neighbour on side `sixth`, with a port at both ends."""
+        k, m = i + (1, 0, -1, -1, 0, 1)[sixth], j + (0, 1, 1, 0, -1, -1)[sixth]
+        for a, b, side in ((i, j, sixth), (k, m, (sixth + 3) % 6)):
+            x, z, turn = self._port(a, b, side)
+            self.put("port", x, 0.0, z, turn)
+        x, z = (self._spot(i, j) + self._spot(k, m)) / 2
+        self.put(name, x, 0.0, z, 60.0 * sixth)
+
+    def rocket(self, i: int, j: int, sixth: int) -> None:
+        """A rocket on the pad at that side of a hub."""
+        x, z, turn = self._port(i, j, sixth, PORT + PAD)
+        self.put("rocket", x, 0.9, z, turn)
+
+
+def _outpost() -> Layout:
+    """A ring of four hubs with a cross tunnel, and arms for a pad, a tank and airlocks."""
+    base = _Base()
+    base.hub(0, 0, "dome")
+    base.hub(1, 0, "dome", 1)
+    base.hub(0, 1, "mast1", turn=60.0)
+    base.hub(1, 1, "antenna", turn=120.0)
+    base.hub(2, 0, "")
+    base.join("tunnel", 0, 0, 0)
+    base.join("tunnel", 0, 0, 1)
+    base.join("greenhouse", 1, 0, 1)
+    base.join("tunnel", 0, 1, 0)
+    base.join("tunnel", 1, 0, 2)
+    base.join("tunnel", 1, 0, 0)
+    base.join("tunnel", 1, 1, 5)
+    base.end("airlock", 0, 0, 4)
+    base.end("pad", 2, 0, 0)
+    base.rocket(2, 0, 0)
+    base.end("tank", 0, 1, 2)
+    base.end("airlock", 1, 1, 1)
+    return base
+
+
+def _colony() -> Layout:
+    """A ring of six hubs around an open court, with a tower and two branches."""
+    base = _Base()
+    base.hub(1, 0, "dome", 2)
+    base.hub(0, 1, "mast2", turn=120.0)
+    base.hub(-1, 1, "dome")
+    base.hub(-1, 0, "antenna", 1, turn=240.0)
+    base.hub(0, -1, "mast1", 1, turn=0.0)
+    base.hub(1, -1, "dome")
+    for i, j, side, name in (
+        (1, 0, 2, "tunnel"), (0, 1, 3, "greenhouse"), (-1, 1, 4, "tunnel"),
+        (-1, 0, 5, "tunnel"), (0, -1, 0, "tunnel"), (1, -1, 1, "greenhouse"),
+    ):  # fmt: skip
+        base.join(name, i, j, side)
+    base.hub(2, 0, "dome")
+    base.hub(2, -1, "antenna", turn=60.0)
+    base.join("tunnel", 1, 0, 0)
+    base.join("tunnel", 1, 0, 5)
+    base.join("tunnel", 1, -1, 0)
+    base.join("greenhouse", 2, -1, 1)
+    base.end("airlock", 2, 0, 0)
+    base.end("pad", 0, -1, 4)
+    base.end("tank", -1, 0, 3)
+    base.end("airlock", -1, 1, 2)
+    base.end("tank", 0, 1, 1)
+    return base

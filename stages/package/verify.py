@@ -1,0 +1,102 @@
+"""`make verify`: is a finished dataset what it says it is?
+
+    python -m stages.package.verify OUT/castle
+
+Files: checksums, members, counts, index, foreign and missing files. Then, for samples chosen by a seed, contacts,
+grammar and penetration computed anew from the meshes, without any cache. Exit code 1, with names, for any fault.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.places import Places
+from pipeline.randomness import decision_rng
+from stages.package.layout import MANIFEST
+from stages.package.verify_files import FileFindings, check_files, shard_samples
+from stages.shape.kit import Kit
+from stages.shape.kit_files import load_kit
+
+__all__ = ["main"]
+
+LISTED_FAULTS = 20
+
+
+def main(argv: Sequence[str]) -> int:
+    """Verify the folder that `argv` names; print a table; return the exit code."""
+    arguments = _arguments(argv)
+    folder: Path = arguments.folder
+    if not (folder / MANIFEST).is_file():
+        print(f"{folder}: no dataset: it has no {MANIFEST}. Make one with: make dataset")
+        return 1
+    findings = check_files(folder)
+    if arguments.samples and not findings.faults:
+        _check_geometry(folder, arguments.samples, arguments.seed, findings)
+    _print(folder, findings)
+    return 1 if findings.faults else 0
+
+
+def _arguments(argv: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="verify", description="Is a finished dataset what it says it is?")
+    parser.add_argument("folder", type=Path, help="the dataset's folder, such as datasets/castle")
+    parser.add_argument("--samples", type=int, default=50, help="samples whose geometry is computed anew (default 50)")
+    parser.add_argument("--seed", type=int, default=0, help="which samples those are (default 0)")
+    return parser.parse_args(argv)
+
+
+def _check_geometry(folder: Path, count: int, seed: int, findings: FileFindings) -> None:
+    """Compute contacts anew for `count` random samples of the dataset."""
+    from stages.package.verify_geometry import geometry_faults
+
+    kits = _kits(folder)
+    if not kits:
+        findings.fault("geometry", str(folder), "has no kits beside it in .work: make the dataset here, or --samples 0")
+        return
+    manifest = json.loads((folder / MANIFEST).read_text())
+    total = manifest["samples"]
+    chosen = np.sort(decision_rng(seed, "verify").choice(total, size=min(count, total), replace=False))
+    first = 0
+    for shard in manifest["shards"]:
+        wanted = {int(each) - first for each in chosen if first <= each < first + shard["samples"]}
+        first += shard["samples"]
+        if not wanted:
+            continue
+        for position, (key, _, members) in enumerate(shard_samples(folder / shard["path"])):
+            if position in wanted:
+                findings.look("geometry")
+                kit = kits[json.loads(members["json"])["kit"]]
+                for what in geometry_faults(kit, members):
+                    findings.fault("geometry", f"{shard['path']}: {key}", what)
+
+
+def _kits(folder: Path) -> dict[str, Kit]:
+    """The kits that the dataset was made from, out of the mill's own folder."""
+    made = Places(folder.resolve().parent, folder.resolve().name).stage("exemplars").root
+    return {
+        path.stem: load_kit(path, path.with_suffix(".tar"))
+        for path in sorted(made.glob("*.json"))
+        if path.with_suffix(".tar").is_file()
+    }
+
+
+def _print(folder: Path, findings: FileFindings) -> None:
+    print(f"{folder}")
+    for check in sorted({*findings.checked, *findings.faults}):
+        faults = findings.faults.get(check, [])
+        verdict = f"{len(faults)} faults" if faults else "good"
+        print(f"  {check:<15}{findings.checked.get(check, 0):>9,} looked at   {verdict}")
+    for check, faults in findings.faults.items():
+        for fault in faults[:LISTED_FAULTS]:
+            print(f"{check}: {fault}")
+        if len(faults) > LISTED_FAULTS:
+            print(f"{check}: and {len(faults) - LISTED_FAULTS} more")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

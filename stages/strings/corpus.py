@@ -1,0 +1,126 @@
+"""The text corpus of a dataset: the strings of all shapes, a file for each kit and split, without duplicates."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+from pipeline.errors import ShardFailed
+from pipeline.shards import read_shard
+from pipeline.stage import Outcome, Task
+from stages.shape.collection import collection_kits
+from stages.strings.alphabet import make_alphabet
+from stages.strings.statistics import StringStatistics
+from stages.strings.tokens import number_value
+
+__all__ = ["CORPUS", "compose_corpus"]
+
+CORPUS = "corpus"
+"""Name of the shard, and stem of its files."""
+
+
+def compose_corpus(task: Task) -> Outcome:
+    """Files of the shard: `<kit>-<split>.txt`, one string a line; `vocabulary.json`, for each kit the name of the type
+    behind each token and all tokens of its strings; `statistics.json`, for each kit and split what its file holds.
+
+    Only a digest of each shape's graph is kept in memory, and the strings of graphs that several shapes share: equal
+    strings stand for equal graphs, so duplicates are among these. Raises ShardFailed where shapes of one graph stand
+    in different splits.
+    """
+    splits: dict[str, str] = dict(task.shard.params["splits"])
+    shared = _shared_graphs(task, splits)
+    statistics: dict[str, dict[str, StringStatistics]] = {}
+    files: dict[str, BinaryIO] = {}
+    for place, (shard, split) in enumerate(splits.items()):
+        for row, strings in _rows_and_strings(task, shard):
+            kit, graph = row["kit"], _graph_key(row)
+            name = f"{kit}-{split}.txt"
+            if name not in files:
+                files[name] = task.output(f"{CORPUS}.{name}")
+            counted = statistics.setdefault(kit, {}).setdefault(split, StringStatistics())
+            counted.shapes += 1
+            counted.graphs += not shared.get(graph)
+            kept = strings
+            if graph in shared:
+                kept = [each for each in strings if each not in shared[graph]]
+                shared[graph].update(kept)
+            counted.duplicates += len(strings) - len(kept)
+            for each in kept:
+                counted.add(each)
+            files[name].write("".join(f"{each}\n" for each in kept).encode())
+        task.progress(place + 1, len(splits))
+    described = {
+        kit: {split: counted.describe() for split, counted in sorted(of_splits.items())}
+        for kit, of_splits in sorted(statistics.items())
+    }
+    for name, value in (("vocabulary.json", _vocabulary(task, statistics)), ("statistics.json", described)):
+        files[name] = task.output(f"{CORPUS}.{name}")
+        files[name].write(_readable(value))
+    counts = [counted for of_splits in statistics.values() for counted in of_splits.values()]
+    summary = {
+        "files": sorted(files),
+        "strings": sum(each.strings for each in counts),
+        "duplicates": sum(each.duplicates for each in counts),
+        "graphs": sum(each.graphs for each in counts),
+    }
+    return Outcome(samples=0, summary=summary)
+
+
+def _shared_graphs(task: Task, splits: dict[str, str]) -> dict[bytes, set[str]]:
+    """The graphs of more than one shape, each with room for the strings that are there already."""
+    first: dict[bytes, tuple[str, str]] = {}
+    shared: dict[bytes, set[str]] = {}
+    for shard, split in splits.items():
+        for row in _rows(task, shard):
+            graph = _graph_key(row)
+            if graph not in first:
+                first[graph] = (split, row["key"])
+                continue
+            other, key = first[graph]
+            if other != split:
+                raise ShardFailed(f"{row['key']} of {split} and {key} of {other} have the same graph {row['graph']}")
+            shared[graph] = set()
+    return shared
+
+
+def _graph_key(row: dict[str, Any]) -> bytes:
+    return row["kit"].encode() + b"/" + bytes.fromhex(row["graph"])
+
+
+def _rows(task: Task, shard: str) -> Iterator[dict[str, Any]]:
+    with open(task.input("strings", f"{shard}.jsonl"), "rb") as lines:
+        for line in lines:
+            yield json.loads(line)
+
+
+def _rows_and_strings(task: Task, shard: str) -> Iterator[tuple[dict[str, Any], list[str]]]:
+    samples = read_shard(task.input("strings", f"{shard}.tar"))
+    for row, (key, members) in zip(_rows(task, shard), samples, strict=True):
+        if row["key"] != key:
+            raise ShardFailed(f"shard {shard} lists {row['key']} where its tar has {key}")
+        yield row, members["txt"].decode().splitlines()
+
+
+def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]]) -> dict[str, Any]:
+    """For each kit with strings: `types`, type name by token; `tokens`, types first, then parentheses and numbers."""
+    described = {}
+    for name, kit in sorted(collection_kits(task).items()):
+        if name in statistics:
+            types = make_alphabet(kit.type_names()).vocabulary()
+            seen = {token for counted in statistics[name].values() for token in counted.seen}
+            numbers = sorted(seen - set(types) - {"(", ")"}, key=_number)
+            described[name] = {"types": types, "tokens": [*types, "(", ")", *numbers]}
+    return described
+
+
+def _number(token: str) -> int:
+    number = number_value(token)
+    if number is None:
+        raise ShardFailed(f"the corpus has a token {token!r} that is no cycle number and no type of its kit")
+    return number
+
+
+def _readable(value: Any) -> bytes:
+    """JSON, one entry a line."""
+    return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()

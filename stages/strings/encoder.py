@@ -1,0 +1,121 @@
+"""Shape graphs to strings: random spanning trees, random walks, and the canonical string (strings §5.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.shape.arrays import IntArray, TypeArray
+from stages.shape.canonical import canonical_order
+from stages.strings.alphabet import Alphabet
+from stages.strings.tokens import number_text
+
+__all__ = ["Encoded", "canonical_string", "encode", "random_strings"]
+
+Indices = npt.NDArray[np.int64]
+
+TRIES = 20
+"""Random walks for each string that is asked for, before a graph counts as having no more strings."""
+
+
+@dataclass(frozen=True)
+class Encoded:
+    """string: the graph as text; nodes: int64 (n,), the graph's node at each node of the string, in order."""
+
+    string: str
+    nodes: npt.NDArray[np.int64]
+
+
+def encode(types: TypeArray, edges: IntArray, alphabet: Alphabet, rng: np.random.Generator) -> Encoded:
+    """A random string of a graph: random spanning tree, random root, random order of the children.
+
+    All cycles are broken at random edges; the tree that is left is written depth first, each subtree of a node in
+    parentheses except the last; the broken edges come back as numbers behind both of their nodes.
+
+    types: int16 (n,), at least one node; edges: int32 (m, 2), a simple graph. Raises ValueError if the graph is empty
+    or not connected, or if an edge or a type names what is not there.
+    """
+    from stages.strings.traversal import first_edges_tree
+
+    letters, pairs = _checked(types, edges, alphabet)
+    root = int(rng.integers(len(letters)))
+    tree = first_edges_tree(len(letters), pairs, rng.permutation(len(pairs)))
+    return _write(letters, pairs, tree, rng.permutation(len(pairs)), root, alphabet)
+
+
+def random_strings(
+    types: TypeArray,
+    edges: IntArray,
+    alphabet: Alphabet,
+    count: int,
+    rng: np.random.Generator,
+    besides: Collection[str] = (),
+) -> list[Encoded]:
+    """`count` distinct random strings of a graph, none of them in `besides`.
+
+    Fewer if `TRIES` walks a string do not find as many: small graphs have few strings. Raises ValueError as `encode`.
+    """
+    seen = set(besides)
+    found: list[Encoded] = []
+    for _ in range(TRIES * count):
+        encoded = encode(types, edges, alphabet, rng)
+        if encoded.string not in seen:
+            seen.add(encoded.string)
+            found.append(encoded)
+            if len(found) == count:
+                break
+    return found
+
+
+def canonical_string(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> Encoded:
+    """The canonical string of a graph, the same for all isomorphic graphs: depth first in canonical order.
+
+    Arguments and errors as for `encode`, and ValueError if the graph is not simple.
+    """
+    from stages.strings.traversal import depth_first_tree
+
+    letters, _ = _checked(types, edges, alphabet)
+    order = canonical_order(types, edges)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    pairs = np.sort(rank[np.asarray(edges).reshape(-1, 2)], axis=1)
+    turn = np.argsort(pairs[:, 0] * len(order) + pairs[:, 1])
+    tree = depth_first_tree(len(order), pairs, turn, 0)
+    encoded = _write(letters[order], pairs, tree, turn, 0, alphabet)
+    return Encoded(encoded.string, order[encoded.nodes])
+
+
+def _checked(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> tuple[Indices, Indices]:
+    """Types and edges as the compiled code takes them, which does not look whether an index is in range."""
+    letters = np.ascontiguousarray(types, dtype=np.int64)
+    pairs = np.ascontiguousarray(edges, dtype=np.int64).reshape(-1, 2)
+    if not len(letters):
+        raise ValueError("a graph without nodes has no string")
+    if letters.min() < 0 or letters.max() >= len(alphabet.tokens):
+        raise ValueError(f"type {letters.max()} is not in the alphabet, which has {len(alphabet.tokens)} types")
+    if len(pairs) and (pairs.min() < 0 or pairs.max() >= len(letters)):
+        raise ValueError(f"an edge names a node that is not there; the graph has {len(letters)} nodes")
+    return letters, pairs
+
+
+def _write(
+    types: Indices, pairs: Indices, tree: npt.NDArray[np.bool_], turn: Indices, root: int, alphabet: Alphabet
+) -> Encoded:
+    from stages.strings.traversal import walk
+
+    letters = len(alphabet.tokens)
+    codes, nodes = walk(types, pairs, tree, turn, root, letters)
+    if len(nodes) < len(types):
+        raise ValueError(f"the graph is not connected: {len(nodes)} of {len(types)} nodes are in reach of node {root}")
+    texts = _texts(alphabet, max(int(codes.max()) - letters, 0) // 64)
+    return Encoded("".join([texts[code] for code in codes.tolist()]), nodes)
+
+
+@lru_cache(maxsize=64)
+def _texts(alphabet: Alphabet, blocks: int) -> list[str]:
+    """The text of each code; 64 cycle numbers a block, and one block more."""
+    return [*alphabet.tokens, "(", ")", *(number_text(number) for number in range(64 * (blocks + 1)))]

@@ -1,0 +1,44 @@
+"""The tiling grammar on strings: is this string a shape graph that the kit's exemplars allow? (strings §3, §5.1)"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from stages.shape.kit import Grammar
+from stages.strings.alphabet import Alphabet
+from stages.strings.decoder import Decoded, decode
+from stages.strings.tokens import StringError
+
+__all__ = ["check"]
+
+
+def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
+    """The graph of `string`, if every node has neighbours that were observed around its type.
+
+    Raises StringError where the string cannot be decoded; at the first edge whose two types were never neighbours;
+    else at the first node whose neighbours were never seen together.
+    """
+    decoded = decode(string, alphabet)
+    types = decoded.types.tolist()
+    around = {
+        kind: {other for multiset in multisets for other, _ in multiset}
+        for kind, multisets in grammar.neighbourhoods.items()
+    }
+    neighbours: list[list[int]] = [[] for _ in types]
+    for i, j in decoded.edges.tolist():
+        neighbours[i].append(types[j])
+        neighbours[j].append(types[i])
+    for token in decoded.tokens:
+        if token.edge >= 0:
+            i, j = decoded.edges[token.edge].tolist()
+            if types[j] not in around.get(types[i], ()):
+                pair = f"{alphabet.tokens[types[i]]} ({alphabet.names[types[i]]}) and {alphabet.tokens[types[j]]} "
+                raise StringError(string, token.index, f"{pair}({alphabet.names[types[j]]}) are never neighbours")
+    for token in decoded.tokens:
+        if token.kind == "node":
+            counts = Counter(neighbours[token.node])
+            multiset = tuple(sorted(counts.items()))
+            if multiset not in grammar.neighbourhoods.get(types[token.node], {}):
+                seen = ", ".join(f"{count} {alphabet.tokens[kind]}" for kind, count in multiset) or "no neighbour"
+                raise StringError(string, token.index, f"{token.text} was never seen with {seen} around it")
+    return decoded

@@ -1,0 +1,128 @@
+"""Stage `strings`: each sample of the collection gets its strings; then they become the text corpus."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.errors import ShardFailed
+from pipeline.shards import ShardWriter, json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.shape.canonical import graph_digest
+from stages.shape.collection import collection_kits, collection_shards
+from stages.shape.kit import Assembly
+from stages.shape.sample import Sample, read_samples
+from stages.strings.alphabet import Alphabet, make_alphabet
+from stages.strings.corpus import CORPUS, compose_corpus
+from stages.strings.decoder import decode
+from stages.strings.encoder import Encoded, canonical_string, random_strings
+from stages.strings.settings import StringsConfig
+
+__all__ = ["STAGE"]
+
+BYTES_A_STRING = 1500
+"""About as long as a string is for a shape of a hundred parts with four hundred contacts."""
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """One shard for each shard of the collection; when all are done, the corpus, which reads them all."""
+    shards = collection_shards(plan)
+    if not shards or any(plan.summary("strings", shard.name) is None for shard in shards):
+        return shards
+    kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
+    splits = {shard.name: shard.params["split"] for shard in shards}
+    corpus = Shard(CORPUS, {"splits": splits}, (*kits, *(f"strings/{shard.name}" for shard in shards)))
+    return [*shards, corpus]
+
+
+def run_shard(task: Task) -> Outcome:
+    """Make one shard of the plan."""
+    return compose_corpus(task) if task.shard.name == CORPUS else write_strings(task)
+
+
+def write_strings(task: Task) -> Outcome:
+    """Files of the shard: `.tar` with the member `txt` of each sample, one string a line, the canonical one first;
+    and `.jsonl` with the sample's key, kit and graph for the corpus, in the same order.
+
+    Every string is decoded again before it is written. A sample whose graph is not connected has no string and is
+    refused. Raises ShardFailed where a string does not stand for its graph, or a sample is filed under a wrong graph.
+    """
+    config = task.config.section(StringsConfig)
+    alphabets = {name: make_alphabet(kit.type_names()) for name, kit in collection_kits(task).items()}
+    total, written, rows = int(task.shard.params["samples"]), 0, []
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
+            if not _is_connected(sample.assembly):
+                task.reject(sample.key, "shape graph is not connected")
+                continue
+            strings = _strings(sample, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
+            written += len(strings)
+            writer.write(sample.key, {"txt": ("\n".join(strings) + "\n").encode()})
+            rows.append({"key": sample.key, "kit": sample.kit, "graph": sample.graph})
+            task.progress(writer.samples, total)
+    with task.output(f"{task.shard.name}.jsonl") as listing:
+        listing.writelines(json_bytes(row) for row in rows)
+    return Outcome(writer.samples, {"split": task.shard.params["split"], "strings": written})
+
+
+def publish(plan: Plan) -> Mapping[str, str]:
+    """The corpus, in a folder beside the dataset's: text files, vocabulary, statistics."""
+    summary = plan.summary("strings", CORPUS)
+    if summary is None:
+        return {}
+    return {f"{plan.config.name}-corpus/{file}": f"{CORPUS}.{file}" for file in summary["files"]}
+
+
+def estimate_bytes(plan: Plan) -> int:
+    """Bytes of all strings, in the shards and once more in the corpus."""
+    strings = plan.config.section(StringsConfig).strings_per_shape + 1
+    samples = sum(int(shard.params["samples"]) for shard in collection_shards(plan))
+    return samples * (2 * strings * BYTES_A_STRING + 2048)
+
+
+def _strings(sample: Sample, alphabet: Alphabet, count: int, rng: np.random.Generator) -> list[str]:
+    """The canonical string of a sample and `count` random ones, proved to stand for its graph."""
+    types, edges = sample.assembly.types, sample.assembly.edges
+    if graph_digest(types, edges) != sample.graph:
+        raise ShardFailed(f"sample {sample.key} is filed under graph {sample.graph}, which is not its own")
+    canonical = canonical_string(types, edges, alphabet)
+    encoded = [canonical, *random_strings(types, edges, alphabet, count, rng, {canonical.string})]
+    for each in encoded:
+        if not _stands_for(each, sample.assembly, alphabet):
+            raise ShardFailed(f"a string of sample {sample.key} does not stand for its graph: {each.string}")
+    return [each.string for each in encoded]
+
+
+def _stands_for(encoded: Encoded, assembly: Assembly, alphabet: Alphabet) -> bool:
+    """Whether the string, decoded, is the graph of `assembly` under the encoder's own matching of their nodes."""
+    decoded = decode(encoded.string, alphabet)
+    if sorted(encoded.nodes.tolist()) != list(range(len(assembly))):
+        return False
+    if not np.array_equal(decoded.types, assembly.types[encoded.nodes]):
+        return False
+    found = np.sort(encoded.nodes[decoded.edges], axis=1)
+    keys, expected = found @ (len(assembly), 1), np.sort(assembly.edges, axis=1) @ (len(assembly), 1)
+    return np.array_equal(np.sort(keys), np.sort(expected))
+
+
+def _is_connected(assembly: Assembly) -> bool:
+    neighbours, reached, fresh = assembly.neighbours(), {0}, [0]
+    while fresh:
+        for each in neighbours[fresh.pop()]:
+            if each not in reached:
+                reached.add(each)
+                fresh.append(each)
+    return len(reached) == len(assembly)
+
+
+STAGE = Stage(
+    name="strings",
+    version=1,
+    config=StringsConfig,
+    inputs=("exemplars", "variations"),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=estimate_bytes,
+    publish=publish,
+)

@@ -1,0 +1,158 @@
+"""Compiled walks over a shape graph: spanning trees, and the token codes of a tree with its cycle edges.
+
+Numba compiles this module when it is imported: import it inside functions.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+__all__ = ["depth_first_tree", "first_edges_tree", "walk"]
+
+
+@numba.njit(cache=True)
+def _arcs(n, edges, turn):  # type: ignore[no-untyped-def]
+    """The arcs out of each node, those of edges that come first in `turn` first: `(first, target, edge)`."""
+    first = np.zeros(n + 1, dtype=np.int64)
+    for k in range(len(edges)):
+        first[edges[k, 0] + 1] += 1
+        first[edges[k, 1] + 1] += 1
+    for v in range(n):
+        first[v + 1] += first[v]
+    fill = first[:n].copy()
+    target = np.empty(2 * len(edges), dtype=np.int64)
+    edge = np.empty(2 * len(edges), dtype=np.int64)
+    for k in turn:
+        for side in range(2):
+            v = edges[k, side]
+            target[fill[v]], edge[fill[v]] = edges[k, 1 - side], k
+            fill[v] += 1
+    return first, target, edge
+
+
+@numba.njit(cache=True)
+def first_edges_tree(n, edges, turn):  # type: ignore[no-untyped-def]
+    """The spanning forest of the edges that close no cycle when taken in the order `turn`, bool (m,)."""
+    leader = np.arange(n)
+    tree = np.zeros(len(edges), dtype=np.bool_)
+    for k in turn:
+        i, j = edges[k, 0], edges[k, 1]
+        while leader[i] != i:
+            leader[i] = leader[leader[i]]
+            i = leader[i]
+        while leader[j] != j:
+            leader[j] = leader[leader[j]]
+            j = leader[j]
+        if i != j:
+            leader[i] = j
+            tree[k] = True
+    return tree
+
+
+@numba.njit(cache=True)
+def depth_first_tree(n, edges, turn, root):  # type: ignore[no-untyped-def]
+    """The spanning tree of a depth-first search from `root` that tries edges in the order `turn`, bool (m,)."""
+    first, target, edge = _arcs(n, edges, turn)
+    following = first[:n].copy()
+    seen = np.zeros(n, dtype=np.bool_)
+    tree = np.zeros(len(edges), dtype=np.bool_)
+    stack = np.empty(n, dtype=np.int64)
+    stack[0], depth = root, 1
+    seen[root] = True
+    while depth > 0:
+        v = stack[depth - 1]
+        if following[v] == first[v + 1]:
+            depth -= 1
+            continue
+        arc = following[v]
+        following[v] += 1
+        if not seen[target[arc]]:
+            seen[target[arc]] = True
+            tree[edge[arc]] = True
+            stack[depth] = target[arc]
+            depth += 1
+    return tree
+
+
+@numba.njit(cache=True)
+def walk(types, edges, tree, turn, root, letters):  # type: ignore[no-untyped-def]
+    """The tokens of a graph, walked along `tree` from `root`: `(codes, nodes)`, both int64.
+
+    codes: a type below `letters`, `letters` for `(`, `letters` + 1 for `)`, `letters` + 2 + k for cycle number k.
+    nodes: the nodes in the order of their codes; fewer than there are if the graph is not connected.
+
+    Children come in the order of their edges in `turn`. Behind a node stand the numbers that end there, ascending,
+    then those that begin there, the one that ends soonest first. A number that begins is the lowest that is free,
+    counting as free what ended at an earlier node.
+    """
+    n, m = len(types), len(edges)
+    first, target, edge = _arcs(n, edges, turn)
+
+    # the walk: nodes, and -1 and -2 for the parentheses around every subtree but a node's last
+    events = np.empty(3 * n, dtype=np.int64)
+    nodes = np.empty(n, dtype=np.int64)
+    rank = np.full(n, -1, dtype=np.int64)
+    stack = np.empty(3 * n, dtype=np.int64)
+    stack[0], size, written, reached = root, 1, 0, 0
+    while size > 0:
+        size -= 1
+        event = stack[size]
+        events[written] = event
+        written += 1
+        if event < 0:
+            continue
+        nodes[reached], rank[event] = event, reached
+        reached += 1
+        is_last = True
+        for arc in range(first[event + 1] - 1, first[event] - 1, -1):
+            if not tree[edge[arc]] or rank[target[arc]] >= 0:
+                continue
+            if is_last:
+                stack[size] = target[arc]
+                size += 1
+                is_last = False
+            else:
+                stack[size], stack[size + 1], stack[size + 2] = -2, target[arc], -1
+                size += 3
+
+    codes = np.empty(written + 2 * m, dtype=np.int64)
+    number = np.full(m, -1, dtype=np.int64)
+    taken = np.zeros(m + 1, dtype=np.bool_)
+    ending = np.empty(m, dtype=np.int64)
+    partner = np.empty(m, dtype=np.int64)
+    length = 0
+    for event in events[:written]:
+        if event < 0:
+            codes[length] = letters - 1 - event
+            length += 1
+            continue
+        codes[length] = types[event]
+        length += 1
+        ends, begins = 0, 0
+        for arc in range(first[event], first[event + 1]):
+            k = edge[arc]
+            if tree[k]:
+                continue
+            if number[k] >= 0:
+                ending[ends] = number[k]
+                ends += 1
+            else:
+                partner[begins] = rank[target[arc]] * m + k
+                begins += 1
+        ending[:ends].sort()
+        for each in ending[:ends]:
+            codes[length] = letters + 2 + each
+            length += 1
+        partner[:begins].sort()
+        lowest = 0
+        for each in partner[:begins]:
+            while taken[lowest]:
+                lowest += 1
+            taken[lowest] = True
+            number[each % m] = lowest
+            codes[length] = letters + 2 + lowest
+            length += 1
+        for each in ending[:ends]:
+            taken[each] = False
+    return codes[:length], nodes[:reached]

@@ -1,0 +1,146 @@
+"""A mistake in a config is told before any work: file, line, key, what is wrong, what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import pytest
+from pydantic import Field, model_validator
+
+from pipeline.config import Config, ExistingFile, StrictModel, load_config
+from pipeline.errors import ConfigError
+
+
+class Oven(StrictModel):
+    heat: float = Field(220.0, ge=50, le=300, description="heat of the oven; unit: degrees Celsius")
+    shelves: tuple[int, ...] = Field((1,), description="shelves in use")
+    mode: Literal["fan", "grill"] = "fan"
+
+
+class Loaf(StrictModel):
+    flour: str = Field(description="kind of flour")
+    grams: int = Field(500, gt=0, lt=5000, description="weight; unit: grams")
+
+
+class Bakery(StrictModel):
+    loaves: list[Loaf] = Field(default_factory=list, description="what is baked")
+    recipe: ExistingFile | None = None
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Bakery:
+        if len(self.loaves) > 3:
+            raise ValueError(f"{len(self.loaves)} loaves do not fit into the oven: at most 3")
+        return self
+
+
+def load(folder: Path, text: str, **overrides: int) -> Config:
+    path = folder / "bread.yaml"
+    path.write_text(text)
+    return load_config(path, {"oven": Oven, "bakery": Bakery}, overrides)
+
+
+def mistakes(folder: Path, text: str) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        load(folder, text)
+    return str(caught.value).replace(f"{folder}/", "").splitlines()
+
+
+def test_sections_left_out_take_their_defaults(tmp_path: Path) -> None:
+    config = load(tmp_path, "name: bread\nseed: 3\noven:\n")
+    assert (config.name, config.version, config.seed, config.title) == ("bread", "1.0.0", 3, "bread")
+    assert config.section(Oven) == Oven()
+    assert config.section(Bakery).loaves == []
+
+
+def test_override_stands_in_place_of_the_file(tmp_path: Path) -> None:
+    assert load(tmp_path, "name: bread\nseed: 3\n", seed=8).seed == 8
+
+
+def test_values_keep_their_types(tmp_path: Path) -> None:
+    oven = load(tmp_path, "name: bread\noven: {heat: 1.2e2, shelves: [2, 3], mode: grill}\n").section(Oven)
+    assert oven == Oven(heat=120.0, shelves=(2, 3), mode="grill")
+
+
+def test_exponent_without_a_point_is_a_number(tmp_path: Path) -> None:
+    assert load(tmp_path, "name: bread\noven: {heat: 1e2}\n").section(Oven).heat == 100.0
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("nam: bread\n", ["bread.yaml:1: nam: unknown key; did you mean name?", "bread.yaml: name: is missing (name"]),
+        ("name: bread\noven:\n  haet: 7\n", ["bread.yaml:3: oven.haet: unknown key; did you mean heat?"]),
+        ("name: bread\nzzz: 1\n", ["bread.yaml:2: zzz: unknown key; known keys are name, version, seed"]),
+        (
+            "name: bread\noven:\n  heat: 900\n",
+            ["bread.yaml:3: oven.heat: must lie in [50, 300], and is 900 (heat of the oven; unit: degrees"],
+        ),
+        ("name: bread\noven:\n  heat: .nan\n", ["bread.yaml:3: oven.heat: input should be a finite number, and is NaN"]),
+        ("name: bread\noven:\n  heat: warm\n", ['bread.yaml:3: oven.heat: input should be a valid number, and is "war']),
+        ("name: bread\noven:\n  heat: '120'\n", ["bread.yaml:3: oven.heat: input should be a valid number"]),
+        ("name: bread\noven: {mode: gril}\n", ["bread.yaml:2: oven.mode: input should be 'fan' or 'grill', and is"]),
+        ("name: bread\noven: 7\n", ["bread.yaml:2: oven: input should be an object, and is 7"]),
+        (
+            "name: bread\nbakery:\n  loaves:\n    - flour: rye\n    - grams: 6000\n",
+            [
+                "bread.yaml:5: bakery.loaves.1.flour: is missing (kind of flour)",
+                "bread.yaml:5: bakery.loaves.1.grams: must lie in (0, 5000), and is 6000 (weight; unit: grams)",
+            ],
+        ),
+        (
+            "name: bread\nbakery:\n  loaves: [{flour: a}, {flour: b}, {flour: c}, {flour: d}]\n",
+            ["bread.yaml:2: bakery: 4 loaves do not fit into the oven: at most 3"],
+        ),
+        ("name: White Bread\n", ["bread.yaml:1: name: string should match pattern"]),
+        ("name: bread\nversion: '1.0'\n", ["bread.yaml:2: version: string should match pattern"]),
+        ("name: bread\nseed: -1\n", ["bread.yaml:2: seed: must lie in [0, "]),
+        ("name: bread\nname: toast\n", ["bread.yaml:2: key name stands twice; first in line 1"]),
+        ("name: bread\noven:\n  heat: 60\n  heat: 70\n", ["bread.yaml:4: key oven.heat stands twice; first in line 3"]),
+        ("name: bread\n7: x\n", ["bread.yaml:2: key '7' must be text: put it in quotes"]),
+        ("name: [bread\n", ["bread.yaml:2: is no YAML: "]),
+        ("name: bread\n\toven: 7\n", ["bread.yaml:2: is no YAML: found character '\\t' that cannot start any token"]),
+        ("- bread\n", ["bread.yaml: must hold keys and values, one `key: value` a line"]),
+        ("", ["bread.yaml: must hold keys and values, one `key: value` a line"]),
+    ],
+)
+def test_mistake_names_file_line_key_and_the_right_thing(tmp_path: Path, text: str, expected: list[str]) -> None:
+    told = mistakes(tmp_path, text)
+    assert len(told) == len(expected), told
+    for line, start in zip(told, expected, strict=True):
+        assert line.startswith(start), line
+
+
+def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
+    assert len(mistakes(tmp_path, "name: B\nseed: x\noven: {heat: 1, mode: 2}\nbakery: {loafs: 1}\n")) == 5
+
+
+def test_missing_file_names_the_nearest_that_is_there(tmp_path: Path) -> None:
+    (tmp_path / "sourdough.txt").write_text("wait")
+    told = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/sourdoughs.txt\n")
+    assert told == [
+        "bread.yaml:3: bakery.recipe: there is no file sourdoughs.txt; the nearest file there is sourdough.txt"
+    ]
+
+
+def test_missing_folder_names_the_last_that_is_there(tmp_path: Path) -> None:
+    (told,) = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}/a/b/c.txt\n")
+    assert told.endswith(f"there is no file a/b/c.txt; of its folders {tmp_path} is the last that is there")
+
+
+def test_folder_in_place_of_a_file_is_told(tmp_path: Path) -> None:
+    (told,) = mistakes(tmp_path, f"name: bread\nbakery:\n  recipe: {tmp_path}\n")
+    assert told.endswith("is a folder, not a file")
+
+
+def test_unreadable_config_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"none\.yaml: cannot be read: No such file"):
+        load_config(tmp_path / "none.yaml", {})
+    (tmp_path / "latin.yaml").write_bytes("name: brötchen".encode("latin-1"))
+    with pytest.raises(ConfigError, match=r"latin\.yaml: is no UTF-8 text"):
+        load_config(tmp_path / "latin.yaml", {})
+
+
+def test_python_objects_in_yaml_are_refused(tmp_path: Path) -> None:
+    (told,) = mistakes(tmp_path, "name: !!python/object/apply:os.getcwd []\n")
+    assert told.startswith("bread.yaml:1: is no YAML: could not determine a constructor")

@@ -1,0 +1,202 @@
+"""The dataset folder: what it holds, that its bytes depend on the config alone, what happens to old files."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+import yaml
+
+from pipeline.places import Places, file_digest
+from pipeline.run import run_stage
+from pipeline.shards import bytes_array, read_shard
+from stages.package.verify_files import empty_values
+from stages.shape.pose import invert, transform_points
+from tests.stages.package.toy import SPLITS, TOY_STAGES, make_toy, toy_config, toy_kit, toy_samples
+
+MEMBERS = ["glb", "points.npy", "normals.npy", "labels.npy", "instances.npy", "sketch0.png", "sketch1.png"]
+MEMBERS += ["txt", "json"]
+
+
+def digests(folder: Path) -> dict[str, str]:
+    return {
+        path.relative_to(folder).as_posix(): file_digest(path) for path in sorted(folder.rglob("*")) if path.is_file()
+    }
+
+
+def all_samples(folder: Path) -> dict[str, dict[str, bytes]]:
+    return {key: members for path in sorted(folder.rglob("*.tar")) for key, members in read_shard(path)}
+
+
+def test_every_sample_of_the_collection_is_there_with_the_same_members(toy_folder: Path) -> None:
+    samples = all_samples(toy_folder)
+    made = {each.key for split in SPLITS for index in range(8) for each in toy_samples(split, index, 2)}
+    assert set(samples) == made
+    assert all(list(members) == MEMBERS for members in samples.values())
+
+
+def test_tar_entries_carry_neither_time_nor_user(toy_folder: Path) -> None:
+    for path in toy_folder.rglob("*.tar"):
+        with tarfile.open(path) as tar:
+            for entry in tar:
+                assert (entry.mtime, entry.uid, entry.gid, entry.uname, entry.gname, entry.mode) == (
+                    *(0, 0, 0, "", ""),
+                    0o644,
+                )
+
+
+def test_the_json_has_the_same_fields_in_each_sample_and_nothing_empty(toy_folder: Path) -> None:
+    def shape(value: object) -> object:
+        if isinstance(value, dict):
+            return {name: shape(each) for name, each in value.items()}
+        return [shape(value[0])] if isinstance(value, list) else type(value).__name__
+
+    records = [json.loads(members["json"]) for members in all_samples(toy_folder).values()]
+    assert all(shape(record) == shape(records[0]) for record in records)
+    assert not [place for record in records for place in empty_values(record)]
+
+
+def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
+    samples = all_samples(toy_folder)
+    sample = toy_samples("val", 3, 2)[1]
+    record = json.loads(samples[sample.key]["json"])
+    assert (record["key"], record["split"], record["kit"], record["graph"]) == (
+        *(sample.key, "val", sample.kit),
+        sample.graph,
+    )
+    assert record["contacts"] == sample.assembly.edges.tolist()
+    assert [part["type"] for part in record["parts"]] == sample.assembly.types.tolist()
+    assert [part["label"] for part in record["parts"]] == [("tower", "long.wall")[k] for k in sample.assembly.types]
+    assert record["counts"] == {
+        "parts": len(sample.assembly),
+        "contacts": len(sample.assembly) - 1,
+        "cycles": 0,
+        "types": 2,
+    }
+    assert record["parents"] == ["row"]
+    assert json.loads(record["lineage"]) == {"parents": ["row"]}
+    assert record["points"] == {"farthest": 16, "uniform": 64, "centre": [0, 0, 0], "scale": 1.0}
+
+
+def test_mesh_points_poses_and_bounds_share_upright_coordinates(toy_folder: Path) -> None:
+    """Of a kit whose z points up the boxes' height lies along y, in the mesh, the points and the JSON alike."""
+    import trimesh
+
+    checked = set()
+    for members in all_samples(toy_folder).values():
+        record = json.loads(members["json"])
+        scene = trimesh.load(io.BytesIO(members["glb"]), file_type="glb", process=False)
+        points, instances = bytes_array(members["points.npy"]), bytes_array(members["instances.npy"])
+        assert np.allclose(scene.bounds, record["bounds"], atol=1e-6)
+        assert np.allclose(np.asarray(record["bounds"])[1, 1], {"blocks": 1.0, "planks": 3.0}[record["kit"]])
+        boxes = [part_type.bounds for part_type in toy_kit(record["kit"]).types]
+        for part in record["parts"]:
+            pose = np.array(part["pose"])
+            assert np.array_equal(scene.graph.get(part["name"])[0], pose)
+            own = transform_points(invert(pose), points[instances == part["instance"]].astype(float))
+            low, high = boxes[part["type"]]
+            outside = np.maximum(low - own, own - high).max(axis=1)
+            assert np.abs(outside).max(initial=0.0) < 1e-6
+        checked.add(record["kit"])
+    assert checked == {"blocks", "planks"}
+
+
+def test_a_row_of_the_index_leads_to_its_sample(toy_folder: Path) -> None:
+    rows = pyarrow.parquet.read_table(toy_folder.parent / "toy-index" / "toy.parquet").to_pylist()
+    samples = all_samples(toy_folder)
+    assert [row["key"] for row in rows] != []
+    assert {row["key"] for row in rows} == set(samples)
+    for row in rows:
+        with open(toy_folder / row["shard"], "rb") as shard:
+            shard.seek(row["offset"])
+            piece = io.BytesIO(shard.read(row["bytes"]))
+        with tarfile.open(fileobj=piece) as tar:
+            found = {name: tar.extractfile(name).read() for name in tar.getnames()}
+        assert found == {f"{row['key']}.{member}": content for member, content in samples[row["key"]].items()}
+        record = json.loads(samples[row["key"]]["json"])
+        assert {name: row[name] for name in record["counts"]} == record["counts"]
+        assert row["string"] == record["strings"]["canonical"]
+
+
+def test_the_card_has_what_hugging_face_asks_for(toy_folder: Path) -> None:
+    _, front, text = (toy_folder / "README.md").read_text().split("---\n", 2)
+    header = yaml.safe_load(front)
+    assert header["license"] == "mit"
+    assert header["pretty_name"] == "Toy boxes"
+    assert header["size_categories"] == ["n<1K"]
+    assert {"task_categories", "tags"} <= set(header)
+    (only,) = header["configs"]
+    assert only["config_name"] == "default"
+    assert {each["split"]: each["path"] for each in only["data_files"]} == {
+        split: f"data/{split}/*.tar" for split in SPLITS
+    }
+    assert "](preview.png)" in text
+    assert "| all | 48 | 24 |" in text
+
+
+def test_checksums_cover_every_file_and_the_manifest_the_index(toy_folder: Path) -> None:
+    listed = dict(line.split("  ")[::-1] for line in (toy_folder / "checksums.txt").read_text().splitlines())
+    there = digests(toy_folder)
+    del there["checksums.txt"]
+    assert listed == there
+    index = json.loads((toy_folder / "manifest.json").read_text())["index"]
+    assert hashlib.sha256((toy_folder / index["path"]).read_bytes()).hexdigest() == index["sha256"]
+
+
+def test_nothing_in_the_folder_depends_on_where_or_with_how_many_workers_it_was_made(
+    toy_folder: Path, tmp_path: Path
+) -> None:
+    again = make_toy(tmp_path / "elsewhere", toy_config(), workers=2)
+    assert digests(again) == digests(toy_folder)
+    assert digests(again.parent / "toy-index") == digests(toy_folder.parent / "toy-index")
+
+
+def test_a_smaller_config_takes_its_old_shards_away_and_nothing_of_others(tmp_path: Path) -> None:
+    folder = make_toy(tmp_path, toy_config(shards=3, samples=1))
+    (folder / "notes.txt").write_text("mine")
+    make_toy(tmp_path, toy_config(shards=2, samples=1))
+    assert len(list(folder.rglob("*.tar"))) == 6
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_a_sample_that_one_stage_has_refused_is_left_out_and_counted(tmp_path: Path) -> None:
+    refused = toy_samples("train", 1, 2)[0].key
+    folder = make_toy(tmp_path, toy_config(shards=2, refused=refused))
+    assert refused not in all_samples(folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["samples"] == 11
+    assert manifest["splits"]["train"] == 3
+    (line,) = (tmp_path / ".work/toy/package/rejects/toy-train-000001.jsonl").read_text().splitlines()
+    assert json.loads(line)["reason"] == "refused by sketches"
+
+
+def test_a_new_title_makes_the_card_again_and_no_shard(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    config = toy_config(shards=1, samples=1)
+    folder = make_toy(tmp_path, config)
+    before = digests(folder)
+    result = run_stage("package", TOY_STAGES, replace(config, title="Other"), Places(tmp_path, "toy"), 1)
+    assert result.made == 1
+    changed = {file for file, digest in digests(folder).items() if digest != before[file]}
+    assert changed == {"README.md", "croissant.json", "checksums.txt"}
+
+
+@pytest.mark.parametrize(
+    ("value", "places"),
+    [
+        ({"a": 0, "b": False, "c": 0.0}, []),
+        ({"a": None}, ["a"]),
+        ({"a": [{"b": ""}, {"b": "x"}]}, ["a[0].b"]),
+        ({"a": [], "b": {}}, ["a", "b"]),
+        ({"a": [[1.0], []]}, ["a[1]"]),
+    ],
+)
+def test_empty_values_are_found_where_they_stand(value: object, places: list[str]) -> None:
+    assert list(empty_values(value)) == places

@@ -1,0 +1,118 @@
+"""`verify` finds what is wrong with a dataset's files, and names it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stages.package.verify import main
+from stages.package.verify_files import check_files
+
+SHARD = "data/val/toy-1_2_0-val-000002.tar"
+
+
+@pytest.fixture
+def folder(toy_folder: Path, tmp_path: Path) -> Path:
+    """A copy of the toy dataset and its index, to be damaged."""
+    for name in ("toy", "toy-index"):
+        shutil.copytree(toy_folder.parent / name, tmp_path / name)
+    return tmp_path / "toy"
+
+
+def flip(path: Path, place: int) -> None:
+    content = bytearray(path.read_bytes())
+    content[place] ^= 1
+    path.write_bytes(bytes(content))
+
+
+def rewrite(folder: Path, file: str, change: Callable[[str], str]) -> None:
+    """Change a text file and its checksum, as who makes a dataset wrongly would."""
+    from pipeline.places import file_digest
+
+    before = file_digest(folder / file)
+    (folder / file).write_text(change((folder / file).read_text()))
+    listing = folder / "checksums.txt"
+    listing.write_text(listing.read_text().replace(before, file_digest(folder / file)))
+
+
+def test_a_finished_dataset_is_good(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(folder), "--samples", "0"]) == 0
+    printed = capsys.readouterr().out
+    assert "48 looked at   good" in printed
+    assert "faults" not in printed
+
+
+@pytest.mark.parametrize("place", [0, 700, -1])
+@pytest.mark.parametrize("file", [SHARD, "README.md", "manifest.json", "../toy-index/toy.parquet"])
+def test_a_corrupted_byte_is_found_and_its_file_named(
+    folder: Path, capsys: pytest.CaptureFixture[str], file: str, place: int
+) -> None:
+    flip(folder / file, place)
+    assert main([str(folder), "--samples", "0"]) == 1
+    assert f"checksums: {file}: is corrupted" in capsys.readouterr().out
+
+
+def test_a_missing_shard_is_found_and_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / SHARD).unlink()
+    assert main([str(folder), "--samples", "0"]) == 1
+    assert f"missing files: {SHARD}: is missing" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("file", ["data/val/extra.tar", "notes.txt", "../toy-index/old.parquet"])
+def test_a_foreign_file_is_found_and_named(folder: Path, capsys: pytest.CaptureFixture[str], file: str) -> None:
+    (folder / file).write_bytes(b"mine")
+    assert main([str(folder), "--samples", "0"]) == 1
+    assert f"foreign files: {file}: does not belong" in capsys.readouterr().out
+
+
+def test_a_missing_index_is_found_and_named(folder: Path) -> None:
+    shutil.rmtree(folder.parent / "toy-index")
+    assert check_files(folder).faults == {"missing files": ["../toy-index/toy.parquet: is missing"]}
+
+
+def test_a_truncated_checksums_file_makes_the_files_it_leaves_out_foreign(folder: Path) -> None:
+    listing = folder / "checksums.txt"
+    listing.write_text("".join(line for line in listing.read_text().splitlines(True) if SHARD not in line))
+    faults = check_files(folder).faults
+    assert faults["foreign files"] == [f"{SHARD}: does not belong to the dataset"]
+    assert any(SHARD in fault for fault in faults["manifest"])
+
+
+def test_counts_that_disagree_are_found(folder: Path) -> None:
+    rewrite(folder, "manifest.json", lambda text: text.replace('"samples": 2,', '"samples": 3,', 1))
+    faults = check_files(folder).faults
+    assert any("has 2 samples, the manifest counts 3" in fault for fault in faults["samples"])
+    assert any("do not add up to 16 samples" in fault for fault in faults["manifest"])
+
+
+def test_croissant_and_manifest_must_name_the_same_shards(folder: Path) -> None:
+    rewrite(folder, "croissant.json", lambda text: text.replace("val-000002", "val-000009"))
+    assert any("manifest.json and croissant.json" in fault for fault in check_files(folder).faults["manifest"])
+
+
+def test_samples_that_break_the_rules_are_found(folder: Path) -> None:
+    """A shard with whole bytes and wrong contents: a null in a JSON, a label that is not its part's type."""
+    from pipeline.places import file_digest
+    from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
+
+    samples = list(read_shard(folder / SHARD))
+    before = file_digest(folder / SHARD)
+    with open(folder / SHARD, "wb") as stream, ShardWriter(stream) as writer:
+        (first, one), (second, two) = samples
+        writer.write(first, {**one, "json": one["json"].replace(b'"kit":"blocks"', b'"kit":null')})
+        writer.write(second, {**two, "labels.npy": array_bytes(1 - bytes_array(two["labels.npy"]))})
+    for listing in ("checksums.txt", "manifest.json", "croissant.json"):
+        rewrite(folder, listing, lambda text: text.replace(before, file_digest(folder / SHARD)))
+    faults = "\n".join(check_files(folder).faults["samples"])
+    assert f"{SHARD}: {first}: its json has nothing at kit" in faults
+    assert f"{SHARD}: {second}: its point labels are not the types of their parts" in faults
+
+
+def test_a_folder_without_a_dataset_is_refused_with_the_mend(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(tmp_path)]) == 1
+    assert "make dataset" in capsys.readouterr().out
