@@ -73,6 +73,9 @@ class Plan(Protocol):
     def summary(self, stage: str, shard: str) -> Mapping[str, Any] | None:
         """The summary in a shard's record, or None while that shard has no matching record."""
 
+    def rejects(self, stage: str, shard: str) -> Mapping[str, int]:
+        """How many items a shard has refused, by reason; empty while that shard has no matching record."""
+
 
 class Task(Protocol):
     """What `run_shard` gets: its shard, the config, its inputs, its outputs, its randomness."""

@@ -136,3 +136,7 @@ class _View:
     def summary(self, stage: str, shard: str) -> Mapping[str, Any] | None:
         record = self._stage(stage).records.get(shard)
         return None if record is None else record.summary
+
+    def rejects(self, stage: str, shard: str) -> Mapping[str, int]:
+        record = self._stage(stage).records.get(shard)
+        return {} if record is None else record.rejects

@@ -89,6 +89,7 @@ def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, KitRepor
         grammar=grammar,
         contact_tolerance=contact.tolerance,
         pose_tolerance=config.pose_tolerance * median,
+        contact_kinds=config.contact.kinds,
         up=config.up,
     )
     report = KitReport(

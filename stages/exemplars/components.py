@@ -14,8 +14,8 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
 
     Vertices at equal positions count as one, whatever the file's indices. Two faces of one kind (`kinds` int (f,))
     that are alone at an edge are joined along it. Where more than two meet in an edge, solids stand side by side:
-    going around the edge, the two faces with the inside between them belong together. A face that repeats another
-    goes with it.
+    two faces that are connected elsewhere and agree belong together, and of the others, going around the edge, two with the
+    inside between them. A face that repeats another goes with it.
     """
     positions, place = np.unique(vertices, axis=0, return_inverse=True)
     places = place.reshape(-1)[faces]
@@ -45,12 +45,15 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
     sides, forward = sides[order], forward[order]
     first = np.flatnonzero(np.r_[True, (sides[1:, :3] != sides[:-1, :3]).any(axis=1)][: len(sides)])
     size = np.diff(np.r_[first, len(sides)])
-    matched = [np.column_stack([first[size == 2], first[size == 2] + 1])]
+    simple = np.column_stack([first[size == 2], first[size == 2] + 1])
+    owner = sides[:, 3] // 3
+    region = _numbered(np.concatenate([owner[simple], pairs[0] // 3]), len(faces))
+    matched = [simple]
     for begin, count in zip(first[size > 2].tolist(), size[size > 2].tolist(), strict=True):
-        around = slice(begin, begin + count)
-        triangles = positions[places[sides[around, 3] // 3]]
-        wedges = _wedges(positions[sides[begin, 1:3]], triangles, forward[around])
-        matched += [np.array([wedge]) + begin for wedge in wedges]
+        there = np.arange(begin, begin + count)
+        couples, rest = _couples(region[owner[there]], forward[there])
+        wedges = _wedges(positions[sides[begin, 1:3]], positions[places[owner[there[rest]]]], forward[there[rest]])
+        matched += [there[np.array([each])] for each in [*couples, *(tuple(rest[[i, j]]) for i, j in wedges)]]
     one, other = np.concatenate(matched).T
     pairs += [np.column_stack([sides[one, column], sides[other, column]]) for column in (3, 4)]
     return np.concatenate(pairs)
@@ -79,6 +82,17 @@ def _numbered(pairs: np.ndarray, count: int) -> IntArray:
     return rank[inverse.reshape(-1)]
 
 
+def _couples(region: IntArray, forward: np.ndarray) -> tuple[list[tuple[int, int]], np.ndarray]:
+    """Pairs among the faces around an edge that are alone there in their region and run against each other, and the
+    places of the other faces."""
+    couples = []
+    for each in np.unique(region):
+        members = np.flatnonzero(region == each)
+        if len(members) == 2 and forward[members[0]] != forward[members[1]]:
+            couples.append((int(members[0]), int(members[1])))
+    return couples, np.setdiff1d(np.arange(len(region)), np.array(couples, dtype=np.int64))
+
+
 def _wedges(ends: FloatArray, triangles: FloatArray, forward: np.ndarray) -> list[tuple[int, int]]:
     """Pairs of faces around an edge with the inside of a solid between them, as indices into `triangles`.
 
@@ -89,7 +103,7 @@ def _wedges(ends: FloatArray, triangles: FloatArray, forward: np.ndarray) -> lis
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     across = triangles.sum(axis=1) - ends.sum(axis=0) - ends[0]  # from the edge to the corner off it
     across = across - np.outer(across @ axis, axis)
-    if not np.linalg.norm(across, axis=1).all():
+    if len(across) < 2 or not np.linalg.norm(across, axis=1).all():
         return []
     counterclockwise = np.arctan2(across @ np.cross(axis, across[0]), across @ across[0])
     # wedges thinner than 1e-4 radians are rounding: there, the solid that ends comes before the one that begins

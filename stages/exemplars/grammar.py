@@ -110,7 +110,15 @@ def _measure_dockings(
         replace(
             each,
             kind=contact.kind(each.a, each.b, each.pose) or "point",
-            depth=round(penetration.depth(each.a, each.b, each.pose), 6),
+            depth=round(_deepest(types, each, penetration), 6),
         )
         for each in dockings
     )
+
+
+def _deepest(types: Sequence[PartType], docking: Docking, penetration: PenetrationTest) -> float:
+    """The penetration depth of a docking: the greatest over its symmetric images, whose probes fall differently."""
+    images = symmetric_images(types[docking.a], types[docking.b], docking.pose)
+    rounded = np.round(pose_vectors(images, types[docking.b].diagonal / 2) / (1e-3 * types[docking.b].diagonal))
+    _, first = np.unique(rounded, axis=0, return_index=True)
+    return max(penetration.depth(docking.a, docking.b, images[index]) for index in first.tolist())

@@ -40,7 +40,6 @@ def repair_mesh(
     left, three empty arrays, of a mesh whose faces have no area at all.
     """
     used = np.unique(faces)
-    places = np.unique(vertices[used], axis=0)
     whole = _distinct_corners(vertices, faces)
     solid = connected_faces(vertices, faces[whole], np.zeros(len(whole), np.int32))
     alone = _without_reversed_solids(vertices, faces[whole], solid)
@@ -52,11 +51,11 @@ def repair_mesh(
     high = _heights(points, oriented) > FLAT * np.linalg.norm(np.ptp(vertices[used], axis=0))
     kept, renumbered = np.unique(oriented[high], return_inverse=True)
     changes = {
-        "merged_vertices": len(used) - len(places),
+        "merged_vertices": _count_rows(np.column_stack([manifold.ravel(), faces[unique].ravel()])) - len(points),
         "unreferenced_vertices": len(vertices) - len(used),
         "duplicate_faces": len(whole) - len(unique),
         "zero_area_faces": len(faces) - len(whole) + int(np.count_nonzero(~high)),
-        "nonmanifold_edges": _crowded_edges(vertices, faces[unique]),
+        "nonmanifold_edges": _crowded_edges(faces[unique]),
         "flipped_faces": int(np.count_nonzero(turned_faces(oriented, manifold)[high])),
     }
     return (
@@ -122,7 +121,10 @@ def _cut_apart(vertices: FloatArray, faces: IntArray, solid: IntArray) -> tuple[
     if crowded.any():  # a surface that touches itself in both ends of an edge: those faces stand alone
         corners[crowded] = corners.max() + 1 + np.arange(3 * np.count_nonzero(crowded)).reshape(-1, 3)
     _, first, inverse = np.unique(corners, return_index=True, return_inverse=True)
-    return vertices[faces.ravel()[first]], inverse.reshape(-1, 3).astype(np.int32)
+    order = np.argsort(faces.ravel()[first], kind="stable")  # vertices keep the order of the file
+    rank = np.empty(len(order), dtype=np.int32)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    return vertices[faces.ravel()[first[order]]], rank[inverse].reshape(-1, 3)
 
 
 def _without_reversed_solids(vertices: FloatArray, faces: IntArray, solid: IntArray) -> np.ndarray:
@@ -137,13 +139,15 @@ def _without_reversed_solids(vertices: FloatArray, faces: IntArray, solid: IntAr
     return np.flatnonzero(~repeats[solid])
 
 
-def _crowded_edges(vertices: FloatArray, faces: IntArray) -> int:
-    """At how many edges, by the places of their ends, more than two faces meet."""
-    _, place = np.unique(vertices, axis=0, return_inverse=True)
-    corners = place.reshape(-1)[faces]
-    edges = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+def _crowded_edges(faces: IntArray) -> int:
+    """At how many edges of a mesh more than two faces meet."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, counts = np.unique(edges, axis=0, return_counts=True)
     return int(np.count_nonzero(counts > 2))
+
+
+def _count_rows(rows: np.ndarray) -> int:
+    return len(np.unique(rows, axis=0))
 
 
 def _heights(vertices: FloatArray, faces: IntArray) -> FloatArray:

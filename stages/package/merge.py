@@ -17,11 +17,12 @@ from stages.package.record import describe_sample
 from stages.points.frame import upright
 from stages.shape.collection import collection_kits
 from stages.shape.sample import Sample, read_samples
+from stages.sketches.settings import SketchesConfig
 
 __all__ = ["MERGED", "merge_shard"]
 
 MERGED = ("points", "sketches", "strings")
-"""The stages whose members a sample gets, in this order; their `json` member goes into the sample's."""
+"""The stages whose members a sample gets, in this order; the `json` of the points goes into the sample's own."""
 
 
 def merge_shard(task: Task) -> Outcome:
@@ -32,6 +33,7 @@ def merge_shard(task: Task) -> Outcome:
     """
     config, split = task.config, str(task.shard.params["split"])
     path = shard_path(config, split, int(task.shard.name.rpartition("-")[2]))
+    views = [view.name for view in config.section(SketchesConfig).views]
     kits = collection_kits(task)
     writers = {name: GlbWriter(kit.types) for name, kit in kits.items()}
     total, rows = int(task.shard.params["samples"]), []
@@ -46,8 +48,9 @@ def merge_shard(task: Task) -> Outcome:
                 if len(assembly.edges) == 0:
                     task.reject(sample.key, "no contact between parts")
                     continue
-                described = {stage: json.loads(made[stage].pop("json")) for stage in MERGED if "json" in made[stage]}
-                record = describe_sample(sample, kit, assembly, described)
+                strings = made["strings"]["txt"].decode().split()
+                points = json.loads(made["points"].pop("json"))
+                record = describe_sample(sample, kit, assembly, strings, points, views)
                 members = {"glb": writers[kit.name].write(assembly)}
                 for stage in MERGED:
                     members.update(made[stage])
@@ -131,5 +134,5 @@ def _row(record: Mapping[str, Any], path: str, offset: int, members: Mapping[str
         "offset": offset,
         "bytes": sum(sizes),
         **record["counts"],
-        "string": members["txt"].decode().split("\n")[0],
+        "string": record["strings"][0],
     }

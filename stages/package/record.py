@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stages.package.glb import node_names
@@ -15,10 +15,15 @@ __all__ = ["cycle_count", "describe_sample"]
 
 
 def describe_sample(
-    sample: Sample, kit: Kit, assembly: Assembly, described: Mapping[str, Mapping[str, Any]]
+    sample: Sample,
+    kit: Kit,
+    assembly: Assembly,
+    strings: Sequence[str],
+    points: Mapping[str, Any],
+    views: Sequence[str],
 ) -> dict[str, Any]:
-    """What the JSON says. `assembly` is the sample's, upright; `described` is what the stages after the search say
-    of the sample, by stage, and stands in it under the stage's name.
+    """What the JSON says. `assembly` is the sample's, upright; `strings` are its strings, the canonical one first;
+    `points` is how its cloud was made; `views` names the views of its sketches.
 
     Nothing is null or empty: loaders guess a field's type from the first samples they see. The lineage differs from
     sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it.
@@ -47,7 +52,9 @@ def describe_sample(
             "types": len(set(assembly.types.tolist())),
         },
         "bounds": assembly_bounds(kit.types, assembly).tolist(),
-        **described,
+        "strings": list(strings),
+        "points": dict(points),
+        "sketches": list(views),
     }
 
 

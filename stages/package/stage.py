@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -34,13 +35,18 @@ def plan(plan: Plan) -> list[Shard]:
     kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
     shown = [shard["name"] for shard in filled[:PICTURE_SHARDS]]
     stages = ("variations", "points", "sketches")
-    picture = Shard(PICTURE, {"shards": shown}, (*kits, *(f"{stage}/{name}" for name in shown for stage in stages)))
+    pictured = {
+        "title": plan.config.title or plan.config.name,
+        "samples": sum(shard["samples"] for shard in filled),
+        "shards": shown,
+    }
+    picture = Shard(PICTURE, pictured, (*kits, *(f"{stage}/{name}" for name in shown for stage in stages)))
     params = {
         "facts": _facts(plan),
         "sections": config_sections(plan.config),
         "shards": filled,
-        "search": [],
-        "rejects": {},
+        "search": _search_endings(plan),
+        "rejects": _search_rejects(plan),
         "preview": PICTURE,
         "package": VERSION,
     }
@@ -74,6 +80,24 @@ def estimate_bytes(plan: Plan) -> int:
     """Bytes of all shards: what the stages before have made of each sample, and a mesh of a usual size."""
     samples = sum(int(shard.params["samples"]) for shard in collection_shards(plan))
     return samples * 300_000
+
+
+def _search_endings(plan: Plan) -> list[str]:
+    """How the search of each kit ended, in words, from the summaries of its last pool."""
+    summaries = [plan.summary("variations", shard) or {} for shard in plan.shards("variations")]
+    return [
+        f"{each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
+        for each in summaries
+        if each.get("why")
+    ]
+
+
+def _search_rejects(plan: Plan) -> dict[str, int]:
+    """Refused tries of all searches by reason."""
+    counts: Counter[str] = Counter()
+    for shard in plan.shards("variations"):
+        counts.update(plan.rejects("variations", shard))
+    return dict(sorted(counts.items()))
 
 
 def _facts(plan: Plan) -> dict[str, Any]:

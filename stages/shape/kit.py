@@ -128,6 +128,7 @@ class Kit:
 
     contact_tolerance: largest distance of two parts in contact, in the kit's units.
     pose_tolerance: largest displacement of relative poses that are one docking, in the kit's units.
+    contact_kinds: the kinds of contact that make neighbours.
     up: the axis that points up in the exemplars' coordinates, `"y"` or `"z"`.
     """
 
@@ -137,6 +138,7 @@ class Kit:
     grammar: Grammar
     contact_tolerance: float
     pose_tolerance: float
+    contact_kinds: tuple[ContactKind, ...]
     up: Literal["y", "z"]
 
     def type_names(self) -> tuple[str, ...]:

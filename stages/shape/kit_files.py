@@ -22,6 +22,7 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         "up": kit.up,
         "contact_tolerance": kit.contact_tolerance,
         "pose_tolerance": kit.pose_tolerance,
+        "contact_kinds": list(kit.contact_kinds),
         "types": [
             {
                 "name": each.name,
@@ -138,5 +139,6 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         grammar=Grammar(neighbourhoods, dockings, nested),
         contact_tolerance=described["contact_tolerance"],
         pose_tolerance=described["pose_tolerance"],
+        contact_kinds=tuple(described["contact_kinds"]),
         up=described["up"],
     )

@@ -85,7 +85,7 @@ def _shared_graphs(task: Task, splits: dict[str, str]) -> dict[bytes, set[str]]:
 
 
 def _graph_key(row: dict[str, Any]) -> bytes:
-    return row["kit"].encode() + b"/" + bytes.fromhex(row["graph"])
+    return f"{row['kit']}/".encode() + bytes.fromhex(row["graph"])
 
 
 def _rows(task: Task, shard: str) -> Iterator[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -74,6 +74,15 @@ def publish(plan: Plan) -> Mapping[str, str]:
     return {f"{plan.config.name}-corpus/{file}": f"{CORPUS}.{file}" for file in summary["files"]}
 
 
+def report(plan: Plan) -> Sequence[str]:
+    """One line about the corpus, once it is there."""
+    summary = plan.summary("strings", CORPUS)
+    if summary is None:
+        return ()
+    counts = f"{summary['strings']} strings of {summary['graphs']} graphs"
+    return (f"corpus: {counts}, {summary['duplicates']} duplicates dropped",)
+
+
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all strings, in the shards and once more in the corpus."""
     strings = plan.config.section(StringsConfig).strings_per_shape + 1
@@ -124,5 +133,6 @@ STAGE = Stage(
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
+    report=report,
     publish=publish,
 )

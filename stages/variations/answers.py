@@ -7,8 +7,8 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.contact import ContactTest
 from stages.shape.docking import DockingTable, symmetric_images
-from stages.shape.kit import ContactKind, Kit
-from stages.shape.penetration import PenetrationTest
+from stages.shape.kit import Kit
+from stages.shape.penetration import PenetrationTest, depth_bound
 from stages.variations.kernels import FORBIDDEN, LABELS, NONE, Answers, Workspace, hash_key, quantise
 from stages.variations.tables import QUANTUM
 
@@ -27,9 +27,8 @@ class ContactAnswers:
     of the chosen pose. So it depends on what is asked and never on what was asked before.
     """
 
-    def __init__(self, kit: Kit, kinds: tuple[ContactKind, ...]) -> None:
+    def __init__(self, kit: Kit) -> None:
         self.kit = kit
-        self.kinds = kinds
         self.contact = ContactTest(kit.types, kit.contact_tolerance)
         self.dockings = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
         self.table = Answers(np.zeros(1 << 16, dtype=np.uint64), np.zeros(1 << 16, dtype=np.int64))
@@ -74,23 +73,21 @@ class ContactAnswers:
                 back[:3, :3] = pose[:3, :3].T
                 back[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
                 return label * LABELS + int(self.dockings.label(b, a, back[None])[0])
-            return FORBIDDEN if self.contact.kind(a, b, pose) in self.kinds else NONE
-        if self.contact.touches(a, b, pose, BORDERLINE * self.contact.tolerance):
-            return FORBIDDEN
-        if self._may_be_nested(a, b, pose):
-            depth = self._penetration.depth(a, b, pose)
-            if depth > self.kit.grammar.nested.get((min(a, b), max(a, b)), 0.0) + self.contact.tolerance:
+            if self.contact.kind(a, b, pose) in self.kit.contact_kinds:
                 return FORBIDDEN
-        return NONE
+        elif self.contact.touches(a, b, pose, BORDERLINE * self.contact.tolerance):
+            return FORBIDDEN
+        return FORBIDDEN if self._nested(a, b, pose) else NONE
 
-    def _may_be_nested(self, a: int, b: int, pose: FloatArray) -> bool:
-        """Whether one part's box lies within the other's."""
+    def _nested(self, a: int, b: int, pose: FloatArray) -> bool:
+        """Whether a part lies in the other without contact that counts, deeper than any of their types did before."""
+        allowed = self.kit.grammar.nested.get((min(a, b), max(a, b)), 0.0) + self.contact.tolerance
         first, second = self.kit.types[a].bounds, self.kit.types[b].bounds
         centre = pose[:3, :3] @ second.mean(axis=0) + pose[:3, 3]
         half = np.abs(pose[:3, :3]) @ (second[1] - second[0]) / 2
-        inner = bool(np.all(centre - half >= first[0]) and np.all(centre + half <= first[1]))
-        outer = bool(np.all(centre - half <= first[0]) and np.all(centre + half >= first[1]))
-        return inner or outer
+        if depth_bound(first, np.stack([centre - half, centre + half])) <= allowed:
+            return False
+        return self._penetration.depth(a, b, pose) > allowed
 
     def _pose(self, b: int, quanta: np.ndarray) -> FloatArray:
         pose = np.eye(4)

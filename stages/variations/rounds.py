@@ -14,7 +14,6 @@ import numpy as np
 
 from pipeline.shards import array_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
-from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection import input_kit
 from stages.shape.kit import Kit
 from stages.variations.answers import ContactAnswers
@@ -182,8 +181,7 @@ _known_answers: dict[str, ContactAnswers] = {}
 
 def _answers(kit: Kit, task: Task) -> ContactAnswers:
     """The contact answers of a kit, kept from shard to shard of one worker: what they hold never changes a result."""
-    fingerprint = f"{task.input('exemplars', f'{kit.name}.tar')}"
-    if fingerprint not in _known_answers:
-        settings = next(each for each in task.config.section(ExemplarsConfig).kits if each.name == kit.name)
-        _known_answers[fingerprint] = ContactAnswers(kit, settings.contact.kinds)
-    return _known_answers[fingerprint]
+    made_from = str(task.input("exemplars", f"{kit.name}.tar"))
+    if made_from not in _known_answers:
+        _known_answers[made_from] = ContactAnswers(kit)
+    return _known_answers[made_from]

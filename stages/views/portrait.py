@@ -104,15 +104,21 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, shape: tuple[int, i
     left = np.ones(shape[0] * shape[1])
     down = slope < -1e-9
     points = near[down] + (far - near)[down] * ((low - near[down, axis]) / slope[down])[:, None]
-    reach = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
-    close = np.linalg.norm(points - reach, axis=1) < 4.0 * view.radius
+    middle = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
+    close = np.linalg.norm(points - middle, axis=1) < 4.0 * view.radius
     found = np.ones(len(points))
     soft = light.reaches(points[close], 0.05 * view.radius)
     wide = light.reaches(points[close], 0.22 * view.radius)
     found[close] = 0.6 * soft + 0.4 * wide
     left[down] = found
-    left = left.reshape(shape)[..., None]
-    return left + (1.0 - left) * SHADOW
+    # Where a shadow would leave the picture it fades out, so that pictures stand side by side without a seam.
+    rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
+    edge = np.minimum(
+        np.minimum(rows, shape[0] - rows)[:, None], np.minimum(columns, shape[1] - columns)[None, :]
+    ) / (0.10 * min(shape))
+    fade = np.clip(edge, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(edge, 0.0, 1.0))
+    shadow = ((1.0 - left.reshape(shape)) * fade)[..., None]
+    return 1.0 - shadow * (1.0 - SHADOW)
 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:

@@ -76,8 +76,14 @@ def test_exponent_without_a_point_is_a_number(tmp_path: Path) -> None:
             "name: bread\noven:\n  heat: 900\n",
             ["bread.yaml:3: oven.heat: must lie in [50, 300], and is 900 (heat of the oven; unit: degrees"],
         ),
-        ("name: bread\noven:\n  heat: .nan\n", ["bread.yaml:3: oven.heat: input should be a finite number, and is NaN"]),
-        ("name: bread\noven:\n  heat: warm\n", ['bread.yaml:3: oven.heat: input should be a valid number, and is "war']),
+        (
+            "name: bread\noven:\n  heat: .nan\n",
+            ["bread.yaml:3: oven.heat: input should be a finite number, and is NaN"],
+        ),
+        (
+            "name: bread\noven:\n  heat: warm\n",
+            ['bread.yaml:3: oven.heat: input should be a valid number, and is "war'],
+        ),
         ("name: bread\noven:\n  heat: '120'\n", ["bread.yaml:3: oven.heat: input should be a valid number"]),
         ("name: bread\noven: {mode: gril}\n", ["bread.yaml:2: oven.mode: input should be 'fan' or 'grill', and is"]),
         ("name: bread\noven: 7\n", ["bread.yaml:2: oven: input should be an object, and is 7"]),

@@ -125,7 +125,7 @@ def test_shard_refused_as_a_whole_is_not_tried_again(tmp_path: Path, write_confi
 
 def test_no_space_stops_everything_and_leaves_whole_files(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest0-1": "no space"}})
-    with pytest.raises(Fatal, match="shard harvest0-1 of flour: .*No space left on device"):
+    with pytest.raises(Fatal, match=r"shard harvest0-1 of flour: .*No space left on device"):
         turn(config, tmp_path / "out", "salt", "grain", "flour")
     flour = tmp_path / "out" / WORK / "flour"
     assert [path.name for path in flour.glob("*.tar")] == ["harvest0-0.tar"]
@@ -182,7 +182,7 @@ def test_folder_that_cannot_be_written_stops_everything(tmp_path: Path, write_co
 
 def test_out_that_is_a_file_is_told(tmp_path: Path, write_config: WriteConfig) -> None:
     (tmp_path / "out").write_text("not a folder")
-    with pytest.raises(Fatal, match="cannot make folders under .*out"):
+    with pytest.raises(Fatal, match=r"cannot make folders under .*out"):
         turn(write_config(), tmp_path / "out", "salt")
 
 

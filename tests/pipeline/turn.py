@@ -24,9 +24,7 @@ def load(config: Path) -> Config:
 def turn(config: Path, out: Path, *stages: str, workers: int = 1, part: Slice = WHOLE) -> dict[str, RunResult]:
     """Run `stages` (all of them, if none is named) in order, in this process and its workers."""
     loaded = load(config)
-    return {
-        name: run_stage(name, STAGES, loaded, Places(out, loaded.name), workers, part) for name in stages or STAGES
-    }
+    return {name: run_stage(name, STAGES, loaded, Places(out, loaded.name), workers, part) for name in stages or STAGES}
 
 
 if __name__ == "__main__":

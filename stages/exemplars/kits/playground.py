@@ -7,6 +7,8 @@ to a sandbox exactly one pitch away, and balance beams join sandboxes. Towers gr
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from stages.exemplars.kits.layout import Layout
@@ -141,10 +143,10 @@ def _bridge_planks() -> Solid:
     sag = [float(0.14 * (x / half) ** 2 - 0.14) for x in xs]
     path = [(float(x), FLOOR - 0.1 + s, 0.0) for x, s in zip(xs, sag, strict=True)]
     bridge = swept([(x, y, 0.2) for x, y, _ in path], rectangle(0.06, 0.06), ROPE) + swept([(x, y, -0.2) for x, y, _ in path], rectangle(0.06, 0.06), ROPE)
-    for x, y, _ in path[:-1]:
-        bridge = bridge + box((0.15, 0.05, 0.56), (x + half / 8, y + 0.03, 0.0), WOOD_LIGHT, 0.01)
+    for (x0, y0, _), (x1, y1, _) in pairwise(path):
+        bridge = bridge + box((0.15, 0.05, 0.56), ((x0 + x1) / 2, (y0 + y1) / 2 + 0.03, 0.0), WOOD_LIGHT, 0.01)
     for z in (-0.29, 0.29):
-        bridge = bridge + swept([(x, y + 0.62, z) for x, y, _ in path], regular(5, 0.035), ROPE)
+        bridge = bridge + swept([(x, y + 0.62, z) for x, y, _ in path], regular(4, 0.03), ROPE)
         for x, y, _ in path[1:-1:2]:
             bridge = bridge + bar((x, y + 0.02, 0.9 * z), (x, y + 0.62, z), 0.02, ROPE, 4)
     return bridge
@@ -170,9 +172,9 @@ def _bridge_bars() -> Solid:
         pieces.append(box((2 * half, 0.08, 0.1), (0.0, FLOOR - 0.12, z), RED, 0.02))
         pieces.append(bar((-half, FLOOR + 0.9, z), (half, FLOOR + 0.9, z), 0.045, BLUE))
         for x in (-0.44, 0.44):
-            pieces.append(bar((x, FLOOR - 0.06, z), (x, FLOOR + 0.9, z), 0.03, BLUE, 5))
+            pieces.append(bar((x, FLOOR - 0.06, z), (x, FLOOR + 0.9, z), 0.03, BLUE))
     for x in np.linspace(-0.66, 0.66, 5):
-        pieces.append(bar((float(x), FLOOR + 0.9, -0.24), (float(x), FLOOR + 0.9, 0.24), 0.028, STEEL, 5))
+        pieces.append(bar((float(x), FLOOR + 0.9, -0.24), (float(x), FLOOR + 0.9, 0.24), 0.028, STEEL))
     for x in np.linspace(-0.7, 0.7, 6):
         pieces.append(box((0.14, 0.05, 0.56), (float(x), FLOOR - 0.06, 0.0), WOOD_LIGHT, 0.01))
     return joined(*pieces)
@@ -206,7 +208,7 @@ def _ladder() -> Solid:
 def _pole() -> Solid:
     """A fireman's pole in front of a gate at x = 0."""
     pole = bar((0.46, 0.02, 0.0), (0.46, FLOOR + 0.98, 0.0), 0.05, STEEL, 8)
-    arm = swept([(-BITE + 0.04, FLOOR + 0.98, 0.28), (0.3, FLOOR + 0.98, 0.28), (0.46, FLOOR + 0.98, 0.16), (0.46, FLOOR + 0.98, -0.16), (0.3, FLOOR + 0.98, -0.28), (-BITE + 0.04, FLOOR + 0.98, -0.28)], regular(6, 0.045), RED)
+    arm = swept([(-BITE, FLOOR + 0.98, 0.28), (0.3, FLOOR + 0.98, 0.28), (0.46, FLOOR + 0.98, 0.16), (0.46, FLOOR + 0.98, -0.16), (0.3, FLOOR + 0.98, -0.28), (-BITE, FLOOR + 0.98, -0.28)], regular(6, 0.045), RED)
     foot = revolved([(0.3, 0.0), (0.3, 0.05), (0.1, 0.1)], 8, RED_DARK).moved(0.46)
     return pole + arm + foot
 
@@ -239,10 +241,10 @@ def _balance_beam() -> Solid:
 
 def _parasol() -> Solid:
     """Stands in the middle of a sandbox."""
-    pole = revolved([(0.05, 0.0), (0.05, 1.5)], 6, WHITE)
+    pole = revolved([(0.05, 0.0), (0.05, 1.5)], 8, WHITE)
     shade = revolved([(0.06, 1.36), (0.82, 1.2), (0.84, 1.26), (0.44, 1.52), (0.06, 1.66)], 8, [BLUE_DARK, BLUE, BLUE, BLUE])
     shade = shade.tinted(WHITE, lambda index, _: 8 <= index < 32 and index % 2 == 1)
-    tip = revolved([(0.05, 1.62), (0.08, 1.7), (0.0, 1.82)], 6, YELLOW)
+    tip = revolved([(0.05, 1.62), (0.08, 1.7), (0.0, 1.82)], 8, YELLOW)
     return pole + shade + tip
 
 

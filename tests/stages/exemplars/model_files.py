@@ -12,10 +12,9 @@ import numpy as np
 __all__ = ["BOX_FACES", "Glb", "box", "png", "signed_volume", "world_triangles", "write_obj"]
 
 BOX_FACES = np.array(
-    [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7], [0, 1, 5], [0, 5, 4]]
-    + [[1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]],
+    [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7],
     dtype=np.int32,
-)
+).reshape(-1, 3)
 
 
 def box(size: tuple[float, float, float] = (1, 1, 1), at: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
@@ -30,7 +29,7 @@ def signed_volume(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 
 def world_triangles(vertices: np.ndarray, faces: np.ndarray, pose: np.ndarray | None = None) -> np.ndarray:
-    """Triangles in the world, (f, 9), each begun at its lowest corner, all sorted: equal for equal oriented surfaces."""
+    """Triangles in the world, (f, 9), each from its lowest corner on, sorted: equal for equal oriented surfaces."""
     pose = np.eye(4) if pose is None else pose
     corners = (vertices @ pose[:3, :3].T + pose[:3, 3])[faces]
     rows = []

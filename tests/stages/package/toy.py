@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.config import Config, StrictModel
 from pipeline.places import Places
 from pipeline.run import run_stage
-from pipeline.shards import ShardWriter, json_bytes
+from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
@@ -22,6 +22,7 @@ from stages.shape.collection import collection_shards
 from stages.shape.kit import Assembly, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
+from stages.sketches.settings import SketchesConfig, SketchView
 
 BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 BOX_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -57,6 +58,7 @@ def toy_kit(name: str) -> Kit:
         grammar=Grammar(rules, (), {}),
         contact_tolerance=0.001,
         pose_tolerance=0.01,
+        contact_kinds=("point", "line", "face"),
         up="z" if KITS[name] == "z" else "y",
     )
 
@@ -89,12 +91,6 @@ class OtherNoConfig(StrictModel):
     """Nothing to set."""
 
 
-class SketchConfig(StrictModel):
-    """How many views."""
-
-    views: int = 2
-
-
 def _make_kit(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.json") as text, task.output(f"{task.shard.name}.tar") as arrays:
         write_kit(toy_kit(task.shard.name), text, arrays)
@@ -122,22 +118,21 @@ def _make_strings(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
             text = "".join("AB"[kind] for kind in sample.assembly.types)
-            members = {"txt": f"{text}\n{text[::-1]}\n".encode(), "json": json_bytes({"canonical": text, "count": 2})}
-            writer.write(sample.key, members)
+            writer.write(sample.key, {"txt": f"{text}\n{text[::-1]}\n".encode()})
     return Outcome(writer.samples)
 
 
 def _make_sketches(task: Task) -> Outcome:
     import PIL.Image
 
-    views, refused = task.config.section(SketchConfig).views, task.config.section(ToyConfig).refused
+    views, refused = task.config.section(SketchesConfig).views, task.config.section(ToyConfig).refused
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
             if sample.key == refused:
                 task.reject(sample.key, "blank drawing")
                 continue
             members = {}
-            for view in range(views):
+            for view in range(len(views)):
                 pixels = np.full((24, 24), 255, dtype=np.uint8)
                 pixels[4 + view : 8 + view, 2 : 2 + len(sample.assembly)] = 0
                 png = io.BytesIO()
@@ -159,7 +154,7 @@ TOY_STAGES: Mapping[str, Stage] = {
     ),
     "points": POINTS,
     "sketches": Stage(
-        "sketches", 1, SketchConfig, ("exemplars", "variations"), collection_shards, _make_sketches, _no_bytes
+        "sketches", 1, SketchesConfig, ("exemplars", "variations"), collection_shards, _make_sketches, _no_bytes
     ),
     "package": PACKAGE,
 }
@@ -172,7 +167,7 @@ def toy_config(**toy: Any) -> Config:
         "variations": ToyConfig(**toy),
         "strings": OtherNoConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
-        "sketches": SketchConfig(),
+        "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right"))),
         "package": PackageConfig(previewed=6),
     }
     return Config(

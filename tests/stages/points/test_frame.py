@@ -22,6 +22,7 @@ def slab_kit(up: str) -> Kit:
         grammar=Grammar({}, (), {}),
         contact_tolerance=0.001,
         pose_tolerance=0.01,
+        contact_kinds=("point", "line", "face"),
         up="z" if up == "z" else "y",
     )
 

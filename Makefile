@@ -1,0 +1,102 @@
+# Shapemill: exemplar meshes in, verified shape datasets out.
+#
+#   make dataset        sets everything up, then makes the default dataset
+#   make test           sets everything up, then runs the tests
+#   make help           shows every target and what the variables are set to
+#
+# Stages are never up to date for make: it always asks the mill, which compares fingerprints (of config, seed, code
+# version and inputs) with its records, and answers in a second when there is nothing to do. Times of files would
+# miss an edited config and would not survive a copy.
+
+SHELL       := bash
+.SHELLFLAGS := -eu -o pipefail -c
+MAKEFLAGS   += --warn-undefined-variables --no-builtin-rules
+.DELETE_ON_ERROR:
+.NOTPARALLEL:  # each stage uses all WORKERS by itself
+.SUFFIXES:
+.DEFAULT_GOAL := help
+
+# What a user may set, on the command line or in the environment.
+CONFIG  ?= configs/default.yaml
+OUT     ?= datasets
+WORKERS ?= $(shell nproc 2>/dev/null || echo 1)
+SEED    ?=
+MESH    ?=
+
+PYTHON  := .venv/bin/python
+READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))
+ASKED   := --config $(CONFIG) --out $(OUT) $(if $(SEED),--seed $(SEED))
+RUN      = $(PYTHON) -m pipeline run $@ $(ASKED) --workers $(WORKERS)
+
+# The way of the data ------------------------------------------------------------------------------------------------
+
+.PHONY: dataset exemplars variations strings points sketches package
+dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
+
+exemplars: setup  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
+	$(RUN)
+variations: exemplars  ## Make new shapes from the exemplars' parts
+	$(RUN)
+strings: variations  ## Write each shape as strings, and the text corpus
+	$(RUN)
+points: variations  ## Turn each shape into a labelled point cloud
+	$(RUN)
+sketches: variations  ## Draw each shape as lines
+	$(RUN)
+package: strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
+	$(RUN)
+
+# Looking at it ------------------------------------------------------------------------------------------------------
+
+.PHONY: status verify inspect doctor
+status: setup  ## Show what is done, failed, rejected and left
+	$(PYTHON) -m pipeline status $(ASKED) --workers $(WORKERS)
+verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes
+	$(PYTHON) -m pipeline verify $(ASKED)
+inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent
+	@test -n '$(MESH)' || { echo 'make inspect needs a model: make inspect MESH=my.glb' >&2; exit 2; }
+	$(PYTHON) -m pipeline inspect '$(MESH)'
+doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
+	$(PYTHON) -m pipeline doctor --out $(OUT)
+
+# Working on it ------------------------------------------------------------------------------------------------------
+
+.PHONY: test lint bench kits lock
+test: setup  ## Run the tests
+	$(PYTHON) -m pytest
+lint: setup  ## Check style and types
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m mypy
+bench: setup  ## Measure every piece beside a public peer
+	$(PYTHON) -m tests.bench
+kits: setup  ## Write the shipped exemplars anew from their source
+	$(PYTHON) -m stages.exemplars.kits
+lock: setup  ## Choose the newest versions of everything and pin them in requirements.lock
+	$(PYTHON) -m venv --clear .venv/lock
+	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+	    print(*p["dependencies"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
+	.venv/lock/bin/python -m pip install -r .venv/lock/asked.txt
+	{ grep '^#' requirements.lock; .venv/lock/bin/python -m pip freeze --all --exclude pip | sed 's/+.*//'; } > lock.tmp
+	mv lock.tmp requirements.lock
+
+# The machine --------------------------------------------------------------------------------------------------------
+
+.PHONY: setup clean help
+setup: $(READY)  ## Install what is missing: system libraries, .venv, the exact versions of requirements.lock
+
+$(READY):
+	pipeline/setup.sh
+	rm -f .venv/ready-*
+	touch $@
+
+clean: setup  ## Remove the work folder of CONFIG (records, shards); the finished dataset stays
+	$(PYTHON) -m pipeline clean --config $(CONFIG) --out $(OUT)
+
+help:  ## Show this
+	@echo 'make <target> [VARIABLE=value]'
+	@echo
+	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | while IFS='|' read -r target text; do \
+	    printf '  %-12s %s\n' $$target "$$text"; done
+	@echo
+	@printf '  %-12s %s\n' CONFIG '$(CONFIG)' OUT '$(OUT)' WORKERS '$(WORKERS)' SEED '$(or $(SEED),as in CONFIG)'

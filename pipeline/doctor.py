@@ -1,0 +1,178 @@
+"""The doctor: tries everything that Shapemill needs on this machine, and says how to mend what fails.
+
+Each library is imported, and each rendering backend draws a triangle, in a process of its own: a library that
+crashes is a row of the table and takes nothing with it.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Literal
+
+from pipeline.space import byte_size
+
+__all__ = ["Finding", "examine", "findings"]
+
+_HERE = Path(__file__).parent
+_LOCK = _HERE.parent / "requirements.lock"
+_LIBRARIES = _HERE / "libraries.txt"
+_SECONDS = 180.0
+_LITTLE_SPACE = 5_000_000_000
+
+_NATIVE = {
+    "numpy": "numpy",
+    "scipy.spatial": "scipy",
+    "numba": "numba",
+    "trimesh": "trimesh",
+    "pymeshlab": "pymeshlab",
+    "open3d": "open3d",
+    "pyrender": "pyrender",
+    "OpenImageIO": "OpenImageIO",
+    "fcl": "python-fcl",
+    "pynauty": "pynauty",
+    "fpsample": "fpsample",
+    "pyarrow.parquet": "pyarrow",
+    "torch": "torch",
+}
+"""Module to import, and the name under which its version is known."""
+
+_BACKENDS = ("egl", "osmesa", "raycast")
+_LAST_BACKEND = "raycast"
+"""The backend that needs no graphics library: it must work, the others are faster or finer."""
+
+# pyrender looks for NumPy names that are gone; the stages give them back before they import it.
+_PRELUDE = {"pyrender": "import numpy; numpy.infty = numpy.inf; "}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One row: what was tried, how it went, and the mend if it went wrong."""
+
+    name: str
+    state: Literal["ok", "warning", "FAILED"]
+    note: str
+    mend: str = ""
+
+
+def examine(out: Path) -> int:
+    """Print the table of all findings; 1 if something that is needed fails, else 0."""
+    failed = 0
+    for finding in findings(out):
+        print(f"{finding.name:<14} {finding.state:<8} {finding.note}", flush=True)
+        if finding.mend:
+            print(f"{'':<14} {'mend:':<8} {finding.mend}", flush=True)
+        failed += finding.state == "FAILED"
+    print(f"{failed} of these must be mended" if failed else "everything that is needed works")
+    return int(failed > 0)
+
+
+def findings(out: Path) -> Iterator[Finding]:
+    """All findings, as they come."""
+    yield _python()
+    yield _locked_versions()
+    yield _disk(out)
+    yield _shared_memory()
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        yield from pool.map(_import, _NATIVE)
+        yield from pool.map(_draw, _BACKENDS)
+
+
+def _python() -> Finding:
+    found = platform.python_version()
+    if found.startswith("3.11."):
+        return Finding("python", "ok", found)
+    return Finding("python", "FAILED", found, "install Python 3.11, remove .venv, run `make setup`")
+
+
+def _locked_versions() -> Finding:
+    pinned = [line.split("==") for line in _LOCK.read_text().splitlines() if "==" in line and not line.startswith("#")]
+    wrong = []
+    for name, wanted in pinned:
+        try:
+            found = version(name).partition("+")[0]
+        except PackageNotFoundError:
+            found = "missing"
+        if found != wanted:
+            wrong.append(f"{name} is {found}, not {wanted}")
+    if not wrong:
+        return Finding("versions", "ok", f"{len(pinned)} packages as in requirements.lock")
+    more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+    mend = f"{sys.executable} -m pip install -r requirements.lock"
+    return Finding("versions", "FAILED", "; ".join(wrong[:3]) + more, mend)
+
+
+def _disk(out: Path) -> Finding:
+    folder = out.absolute()
+    while not folder.exists():
+        folder = folder.parent
+    free = shutil.disk_usage(folder).free
+    if not os.access(folder, os.W_OK):
+        return Finding("disk", "FAILED", f"{folder} cannot be written", "choose another OUT")
+    if free < _LITTLE_SPACE:
+        mend = "free some space, or choose another OUT; each stage says what it needs before it starts"
+        return Finding("disk", "warning", f"{byte_size(free)} free at {folder}", mend)
+    return Finding("disk", "ok", f"{byte_size(free)} free at {folder}")
+
+
+def _shared_memory() -> Finding:
+    # Workers talk through semaphores, which live there.
+    if os.access("/dev/shm", os.W_OK):
+        return Finding("workers", "ok", f"{os.cpu_count()} cores, /dev/shm can be written")
+    return Finding("workers", "FAILED", "/dev/shm cannot be written", "mount it: mount -t tmpfs tmpfs /dev/shm")
+
+
+def _import(module: str) -> Finding:
+    name = _NATIVE[module]
+    start = time.perf_counter()
+    code, said = _try([sys.executable, "-c", f"{_PRELUDE.get(module, '')}import {module}"])
+    seconds = time.perf_counter() - start
+    if code == 0:
+        return Finding(name, "ok", f"{version(name)}, imported in {seconds:.1f} s")
+    return Finding(name, "FAILED", said, _mend(said, name))
+
+
+def _draw(backend: str) -> Finding:
+    start = time.perf_counter()
+    code, said = _try([sys.executable, "-m", "stages.views.probe", backend])
+    if code == 0:
+        return Finding(f"draw: {backend}", "ok", f"a triangle in {time.perf_counter() - start:.1f} s")
+    if backend == _LAST_BACKEND:
+        return Finding(f"draw: {backend}", "FAILED", said, _mend(said, "open3d"))
+    package = "libosmesa6" if backend == "osmesa" else "libegl1 libegl-mesa0 libgl1-mesa-dri"
+    mend = f"apt-get install {package}; without it another backend draws"
+    return Finding(f"draw: {backend}", "warning", said, mend)
+
+
+def _try(command: list[str]) -> tuple[int, str]:
+    """The exit code of a command, and its last line or what ended it."""
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False, cwd=_HERE.parent
+        )
+    except subprocess.TimeoutExpired:
+        return 1, f"no answer in {_SECONDS:.0f} s"
+    lines = (done.stdout + done.stderr).strip().splitlines()
+    if done.returncode < 0:
+        return done.returncode, f"killed by signal {-done.returncode}"
+    return done.returncode, lines[-1] if lines else f"ended with code {done.returncode}"
+
+
+def _mend(said: str, name: str) -> str:
+    missing = re.search(r"(lib[\w.+-]+\.so[.\d]*)", said)
+    if missing:
+        for line in _LIBRARIES.read_text().splitlines():
+            if not line.startswith("#") and line.split()[0] == missing[1]:
+                return f"apt-get install {line.split()[1]}"
+        return f"install the Debian package that holds {missing[1]}: apt-file search {missing[1]}"
+    return f"{sys.executable} -m pip install --force-reinstall --no-deps -r requirements.lock  (or only {name} of it)"

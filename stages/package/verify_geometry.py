@@ -1,0 +1,134 @@
+"""Is a sample's geometry what its record says? Contacts, grammar and penetration, computed anew from its GLB.
+
+Nothing here uses the search's contact test or its tables: meshes and poses are read back from the sample's GLB with
+trimesh, and FCL answers for every pair of parts whose boxes overlap.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.contact import ContactTest, overlapping_boxes
+from stages.shape.kit import Assembly, Kit
+from stages.shape.penetration import PenetrationTest, depth_bound
+from stages.shape.pose import invert
+
+__all__ = ["geometry_faults"]
+
+BORDERLINE = 0.03
+"""A distance that differs from the contact tolerance by less than this share of it is no evidence either way: poses
+in a GLB are 32-bit numbers."""
+
+
+def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
+    """What is wrong with the sample whose `members` these are; an empty list where nothing is.
+
+    Contacts equal the record's, every neighbourhood is in the grammar, every pair in contact was observed, and no
+    pair of parts reaches deeper into each other than any pair of its types does in the exemplars.
+    """
+    record = json.loads(members["json"])
+    names = [part["name"] for part in record["parts"]]
+    types = np.array([part["type"] for part in record["parts"]], dtype=np.int16)
+    meshes, poses = _parts_of(members["glb"], names)
+    boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
+    pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
+    stored = {tuple(sorted(pair)) for pair in record["contacts"]}
+    found, doubtful = _contacts(meshes, poses, pairs, kit.contact_tolerance)
+    contact = ContactTest(kit.types, kit.contact_tolerance)
+    faults: list[str] = []
+    for i, j in sorted(stored - found - doubtful):
+        faults.append(f"{names[i]} and {names[j]} are recorded as neighbours and do not touch")
+    for i, j in sorted(found - stored):
+        if contact.kind(int(types[i]), int(types[j]), invert(poses[i]) @ poses[j]) in kit.contact_kinds:
+            faults.append(f"{names[i]} and {names[j]} touch and are not recorded as neighbours")
+    edges = np.array(sorted(stored), dtype=np.int32).reshape(-1, 2)
+    faults.extend(_grammar_faults(kit, Assembly(types, poses, edges), names))
+    faults.extend(_penetration_faults(kit, types, poses, boxes, pairs, names))
+    return faults
+
+
+def _parts_of(content: bytes, names: Sequence[str]) -> tuple[list[Any], FloatArray]:
+    """Mesh and pose (n, 4, 4) of each named node of a GLB."""
+    import trimesh
+
+    scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
+    placed = [scene.graph.get(name) for name in names]
+    return [scene.geometry[geometry] for _, geometry in placed], np.array([pose for pose, _ in placed], dtype=float)
+
+
+def _world_box(mesh: Any, pose: FloatArray) -> FloatArray:
+    corners = mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+
+def _contacts(
+    meshes: Sequence[Any], poses: FloatArray, pairs: IntArray, tolerance: float
+) -> tuple[set[tuple[int, ...]], set[tuple[int, ...]]]:
+    """The pairs in contact by FCL, and the pairs whose distance is too near the tolerance to say."""
+    import fcl
+
+    models: dict[int, Any] = {}
+    for mesh in meshes:
+        if id(mesh) not in models:
+            model = fcl.BVHModel()
+            model.beginModel(len(mesh.vertices), len(mesh.faces))
+            model.addSubModel(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+            model.endModel()
+            models[id(mesh)] = model
+    bodies = [
+        fcl.CollisionObject(models[id(mesh)], fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        for mesh, pose in zip(meshes, poses, strict=True)
+    ]
+    found: set[tuple[int, ...]] = set()
+    doubtful: set[tuple[int, ...]] = set()
+    for i, j in pairs.tolist():
+        if fcl.collide(bodies[i], bodies[j], fcl.CollisionRequest(), fcl.CollisionResult()):
+            found.add((i, j))
+            continue
+        distance = fcl.distance(bodies[i], bodies[j], fcl.DistanceRequest(), fcl.DistanceResult())
+        if abs(distance - tolerance) <= BORDERLINE * tolerance:
+            doubtful.add((i, j))
+        elif distance < tolerance:
+            found.add((i, j))
+    return found, doubtful
+
+
+def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[str]:
+    known = kit.type_names()
+    faults = []
+    for part, neighbours in enumerate(assembly.neighbours()):
+        around = assembly.multiset(neighbours)
+        if around not in kit.grammar.neighbourhoods.get(int(assembly.types[part]), {}):
+            listed = ", ".join(f"{count} {known[other]}" for other, count in around) or "nothing"
+            faults.append(f"{names[part]} has a neighbourhood that no exemplar shows: {listed}")
+    return faults
+
+
+def _penetration_faults(
+    kit: Kit, types: np.ndarray, poses: FloatArray, boxes: FloatArray, pairs: IntArray, names: Sequence[str]
+) -> list[str]:
+    deepest: dict[tuple[int, int], float] = dict(kit.grammar.nested)
+    for docking in kit.grammar.dockings:
+        deepest[docking.a, docking.b] = max(deepest.get((docking.a, docking.b), 0.0), docking.depth)
+    test = PenetrationTest(kit.types)
+    slack = kit.contact_tolerance + kit.pose_tolerance
+    faults = []
+    for i, j in pairs.tolist():
+        if types[i] > types[j]:
+            i, j = j, i
+        a, b = int(types[i]), int(types[j])
+        allowed = deepest.get((a, b), 0.0) + slack
+        if depth_bound(boxes[i], boxes[j]) <= allowed:
+            continue
+        depth = test.depth(a, b, invert(poses[i]) @ poses[j])
+        if depth > allowed:
+            faults.append(
+                f"{names[i]} and {names[j]} reach {depth:.4g} into each other, {allowed - slack:.4g} in the exemplars"
+            )
+    return faults

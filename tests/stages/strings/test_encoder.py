@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stages.strings.alphabet import make_alphabet
+from stages.strings.decoder import decode
+from stages.strings.encoder import Encoded, canonical_string, encode, random_strings
+from stages.strings.tokens import split_tokens
+from tests.stages.strings.graphs import ALPHABET, Graph, arrays, connected_graphs, isomorphic, renamed
+
+
+def assert_stands_for(encoded: Encoded, graph: Graph) -> None:
+    """The decoded string is the graph itself, once the string's nodes are given the graph's names."""
+    types, edges = graph
+    decoded = decode(encoded.string, ALPHABET)
+    assert sorted(encoded.nodes.tolist()) == list(range(len(types)))
+    assert decoded.types.tolist() == types[encoded.nodes].tolist()
+    found = {frozenset(each) for each in encoded.nodes[decoded.edges].tolist()}
+    assert found == {frozenset(each) for each in edges.tolist()}
+    assert len(decoded.edges) == len(edges)
+
+
+@settings(max_examples=150, deadline=None)
+@given(connected_graphs(), st.integers(0, 2**32 - 1))
+def test_random_strings_decode_to_their_graph(graph: Graph, seed: int) -> None:
+    assert_stands_for(encode(*graph, ALPHABET, np.random.default_rng(seed)), graph)
+
+
+@settings(max_examples=100, deadline=None)
+@given(connected_graphs(), st.integers(0, 2**32 - 1))
+def test_the_canonical_string_decodes_to_its_graph_and_knows_no_names(graph: Graph, seed: int) -> None:
+    encoded = canonical_string(*graph, ALPHABET)
+    assert_stands_for(encoded, graph)
+    assert canonical_string(*renamed(graph, np.random.default_rng(seed)), ALPHABET).string == encoded.string
+
+
+@settings(max_examples=60, deadline=None)
+@given(connected_graphs(6), connected_graphs(6))
+def test_canonical_strings_are_equal_exactly_for_isomorphic_graphs(first: Graph, second: Graph) -> None:
+    same = canonical_string(*first, ALPHABET).string == canonical_string(*second, ALPHABET).string
+    assert same == isomorphic(first, second)
+
+
+def test_all_strings_of_a_small_graph_are_found() -> None:
+    """The star with centre A and leaves B, C: from A two orders, from each leaf one walk."""
+    graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2]], dtype=np.int32))
+    found = random_strings(*graph, ALPHABET, 50, np.random.default_rng(0))
+    assert {each.string for each in found} == {"A(B)C", "A(C)B", "BAC", "CAB"}
+
+
+def test_all_strings_of_a_triangle_are_found() -> None:
+    """Each broken edge leaves a chain of three, walked from an end or from the middle in two orders."""
+    graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32))
+    found = {each.string for each in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0))}
+    chains = {"A0BC0", "A0CB0", "B0AC0", "B0CA0", "C0AB0", "C0BA0"}
+    forks = {"A(B0)C0", "A(C0)B0", "B(A0)C0", "B(C0)A0", "C(A0)B0", "C(B0)A0"}
+    assert found == chains | forks
+
+
+def test_the_strings_of_figure_1_are_walks_that_the_encoder_makes() -> None:
+    decoded = decode("CDA0(DC)DCDBDCDCD0", ALPHABET)
+    found = random_strings(decoded.types, decoded.edges, ALPHABET, 4000, np.random.default_rng(0))
+    strings = {each.string for each in found}
+    assert {"CDA0(DC)DCDBDCDCD0", "A0(DC)(DC)DCDBDCDCD0", "A0(DC)(DCDBDCDCD0)DC"} <= strings
+
+
+def test_random_strings_are_distinct_and_none_of_those_there() -> None:
+    graph = arrays(nx.grid_2d_graph(5, 5))
+    rng = np.random.default_rng(1)
+    first = {each.string for each in random_strings(*graph, ALPHABET, 40, rng)}
+    assert len(first) == 40
+    chain = arrays(nx.path_graph(3), np.array([0, 1, 2]))
+    assert {each.string for each in random_strings(*chain, ALPHABET, 9, rng, {"ABC", "CBA"})} == {"B(A)C", "B(C)A"}
+
+
+def test_a_graph_with_one_string_ends_the_search() -> None:
+    found = random_strings(*arrays(nx.path_graph(2)), ALPHABET, 8, np.random.default_rng(0))
+    assert [each.string for each in found] == ["AA"]
+
+
+def test_random_strings_are_all_over_the_graph() -> None:
+    """Every node is a root and every edge is broken sometimes."""
+    types, edges = arrays(nx.cycle_graph(5), np.arange(5))
+    found = random_strings(types, edges, ALPHABET, 200, np.random.default_rng(2))
+    assert {each.string[0] for each in found} == set("ABCDE")
+    broken = set()
+    for each in found:
+        decoded = decode(each.string, ALPHABET)
+        cycle = next(token.edge for token in decoded.tokens if token.kind == "cycle")
+        broken.add(tuple(sorted(each.nodes[decoded.edges[cycle]].tolist())))
+    assert len(broken) == 5
+
+
+def test_equal_generators_make_equal_strings() -> None:
+    graph = arrays(nx.grid_2d_graph(6, 7))
+    one, other = (
+        [each.string for each in random_strings(*graph, ALPHABET, 10, np.random.default_rng(5))] for _ in range(2)
+    )
+    assert one == other
+    assert one != [each.string for each in random_strings(*graph, ALPHABET, 10, np.random.default_rng(6))]
+
+
+def test_numbers_begin_at_0_and_are_used_again() -> None:
+    """A chain of triangles needs two numbers, however long it is: one ends where the next begins."""
+    graph = nx.Graph()
+    for index in range(30):
+        nx.add_cycle(graph, [2 * index, 2 * index + 1, 2 * index + 2])
+    types, edges = arrays(graph)
+    encoded = canonical_string(types, edges, ALPHABET)
+    assert_stands_for(encoded, (types, edges))
+    assert set(encoded.string) <= set("A()01")
+
+
+def test_numbers_above_9_and_above_99_are_written_as_smiles_does() -> None:
+    types, edges = arrays(nx.complete_graph(24))
+    encoded = canonical_string(types, edges, ALPHABET)
+    assert_stands_for(encoded, (types, edges))
+    texts = split_tokens(encoded.string)
+    assert {"9", "%10", "%99", "%(100)"} <= set(texts)
+    assert "%(99)" not in texts
+    assert "%09" not in texts
+
+
+def test_a_node_never_begins_a_number_that_ends_there() -> None:
+    """`A00` would read like an edge from A to itself to anybody who does not count."""
+    types, edges = arrays(nx.complete_graph(9))
+    for each in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
+        numbers = [(token.node, token.text) for token in decode(each.string, ALPHABET).tokens if token.kind == "cycle"]
+        assert len(set(numbers)) == len(numbers)
+
+
+def test_the_last_subtree_of_a_node_has_no_parentheses() -> None:
+    rng = np.random.default_rng(0)
+    graph = arrays(nx.balanced_tree(3, 3), rng.integers(0, 6, 40))
+    found = [each.string for each in random_strings(*graph, ALPHABET, 50, rng)]
+    assert len(found) == 50
+    assert not any("))" in each or each.endswith(")") for each in found)
+
+
+def test_chains_and_rings_of_5000_nodes_have_strings() -> None:
+    for graph in (nx.path_graph(5000), nx.cycle_graph(5000)):
+        types, edges = arrays(graph)
+        assert_stands_for(encode(types, edges, ALPHABET, np.random.default_rng(0)), (types, edges))
+        assert_stands_for(canonical_string(types, edges, ALPHABET), (types, edges))
+
+
+def test_bracketed_names_are_written() -> None:
+    alphabet = make_alphabet([f"part {index}" for index in range(60)])
+    graph = (np.array([59, 3, 59], dtype=np.int16), np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32))
+    encoded = canonical_string(*graph, alphabet)
+    decoded = decode(encoded.string, alphabet)
+    assert encoded.string == "[part_3]0[part_59][part_59]0"
+    assert isomorphic((decoded.types, decoded.edges), graph)
+
+
+@pytest.mark.parametrize(
+    ("types", "edges", "reason"),
+    [
+        ([], [], "without nodes"),
+        ([0, 0, 0], [[0, 1]], "not connected"),
+        ([0, 6], [[0, 1]], "not in the alphabet"),
+        ([0, -1], [[0, 1]], "not in the alphabet"),
+        ([0, 0], [[0, 2]], "not there"),
+        ([0, 0], [[-1, 0]], "not there"),
+    ],
+)
+def test_what_is_no_connected_graph_of_the_kit_is_refused(
+    types: list[int], edges: list[list[int]], reason: str
+) -> None:
+    graph = np.array(types, dtype=np.int16), np.array(edges, dtype=np.int32).reshape(-1, 2)
+    with pytest.raises(ValueError, match=reason):
+        encode(*graph, ALPHABET, np.random.default_rng(0))
+    with pytest.raises(ValueError, match=reason):
+        canonical_string(*graph, ALPHABET)

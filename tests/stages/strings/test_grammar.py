@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import pytest
+
+from stages.shape.kit import Grammar
+from stages.strings.alphabet import make_alphabet
+from stages.strings.grammar import check
+from stages.strings.tokens import StringError
+
+ALPHABET = make_alphabet(["tower", "gate", "flag", "wall"])
+TOWER, GATE, FLAG, WALL = range(4)
+
+CASTLE = Grammar(
+    neighbourhoods={
+        TOWER: {((WALL, 2),): 3, ((FLAG, 1), (WALL, 2)): 1},
+        FLAG: {((TOWER, 1),): 1},
+        WALL: {((TOWER, 2),): 4, ((TOWER, 1), (GATE, 1)): 2},
+        GATE: {((WALL, 2),): 1},
+    },
+    dockings=(),
+    nested={},
+)
+"""Rings of walls between towers, at most one flag on a tower."""
+
+
+@pytest.mark.parametrize("string", ["A0DADAD0", "A0(C)DADAD0", "CA0DADBDAD0"])
+def test_rings_that_the_grammar_allows_pass(string: str) -> None:
+    assert len(check(string, ALPHABET, CASTLE).types) == sum(each.isalpha() for each in string)
+
+
+@pytest.mark.parametrize(
+    ("string", "index", "reason"),
+    [
+        ("A0DADCD0", 5, r"D \(wall\) and C \(flag\) are never neighbours"),
+        ("A0DAADAD0", 4, r"A \(tower\) and A \(tower\) are never neighbours"),
+        ("D0ADAB0", 5, r"A \(tower\) and B \(gate\) are never neighbours"),
+        ("A0(C)(C)DADAD0", 0, "A was never seen with 2 C, 2 D around it"),
+        ("ADADA", 0, "A was never seen with 1 D around it"),
+        ("A", 0, "A was never seen with no neighbour around it"),
+        ("A0DADBDBD0", 6, "D was never seen with 2 B around it"),
+    ],
+)
+def test_the_first_place_that_breaks_the_grammar_is_named(string: str, index: int, reason: str) -> None:
+    with pytest.raises(StringError, match=reason) as caught:
+        check(string, ALPHABET, CASTLE)
+    assert caught.value.index == index
+
+
+def test_a_forbidden_cycle_edge_is_named_at_its_number() -> None:
+    with pytest.raises(StringError, match="never neighbours") as caught:
+        check("A0DAD(A0)D", ALPHABET, CASTLE)
+    assert caught.value.index == 1
+
+
+def test_a_string_that_cannot_be_read_is_refused_as_such() -> None:
+    with pytest.raises(StringError, match="not closed"):
+        check("A(D", ALPHABET, CASTLE)

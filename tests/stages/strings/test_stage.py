@@ -1,0 +1,257 @@
+"""The stage on the real mill, behind two small stages that make a kit and a collection."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from pipeline.config import Config, StrictModel
+from pipeline.places import Places
+from pipeline.run import RunResult, run_stage
+from pipeline.shards import ShardWriter, read_shard
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from pipeline.survey import Survey
+from pipeline.task import Job, make_shard
+from stages.shape.canonical import graph_digest
+from stages.shape.kit import Assembly, Grammar, Kit, PartType
+from stages.shape.kit_files import write_kit
+from stages.shape.sample import Sample, read_samples, write_sample
+from stages.strings.alphabet import make_alphabet
+from stages.strings.decoder import decode
+from stages.strings.settings import StringsConfig
+from stages.strings.stage import STAGE
+from stages.strings.statistics import measure_string
+from tests.stages.strings.graphs import arrays
+
+KITS = {"castle": ("tower", "gate", "wall"), "chain": tuple(f"link {index}" for index in range(53))}
+SPLITS = {"toys-train-000000": "train", "toys-train-000001": "train", "toys-val-000000": "val"}
+
+
+class KitsConfig(StrictModel):
+    """No keys."""
+
+
+class ShapesConfig(StrictModel):
+    """flaw: what is wrong with the collection."""
+
+    flaw: str = ""
+
+
+def box(name: str) -> PartType:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype=np.int32)
+    return PartType(name, vertices, faces, np.zeros((4, 3), dtype=np.uint8), np.eye(4), np.eye(4)[None])
+
+
+def plan_kits(plan: Plan) -> list[Shard]:
+    return [Shard(name) for name in KITS]
+
+
+def make_kit(task: Task) -> Outcome:
+    name = task.shard.name
+    kit = Kit(name, tuple(box(each) for each in KITS[name]), (), Grammar({}, (), {}), 0.001, 0.001, ("face",), "z")
+    with task.output(f"{name}.json") as text, task.output(f"{name}.tar") as tar:
+        write_kit(kit, text, tar)
+    return Outcome(1)
+
+
+def plan_shapes(plan: Plan) -> list[Shard]:
+    return [Shard(name, inputs=tuple(f"exemplars/{kit}" for kit in KITS)) for name in SPLITS]
+
+
+def make_shapes(task: Task) -> Outcome:
+    """Two grids and two chains a shard; in the second shard one grid again, as another embedding would be."""
+    name, flaw = task.shard.name, task.config.section(ShapesConfig).flaw
+    place = list(SPLITS).index(name)
+    rng = np.random.default_rng(place)
+    shapes = [("castle", nx.grid_2d_graph(3, 4 + place)), ("castle", nx.grid_2d_graph(4, 6 + place))]
+    shapes += [("chain", nx.path_graph(3 + place)), ("chain", nx.cycle_graph(5 + place))]
+    if place == 1 or (place == 2 and flaw == "one graph in two splits"):
+        shapes[0] = ("castle", nx.grid_2d_graph(3, 4))
+    with task.output(f"{name}.tar") as stream, ShardWriter(stream) as writer:
+        for index, (kit, graph) in enumerate(shapes):
+            count = 3 if kit == "castle" else 53
+            types, edges = arrays(graph, np.arange(len(graph)) * 7 % count)
+            if flaw == "not connected" and index == 1:
+                edges = edges[edges[:, 0] > 0]
+            digest = "0" * 64 if flaw == "wrong digest" and index == 1 else graph_digest(types, edges)
+            poses = np.tile(np.eye(4), (len(types), 1, 1))
+            poses[:, 0, 3] = rng.random(len(types))
+            key = f"{name}-{index}"
+            sample = Sample(key, SPLITS[name], "variations", kit, digest, Assembly(types, poses, edges), {})
+            write_sample(writer, sample)
+    return Outcome(len(shapes), {"split": SPLITS[name], "samples": len(shapes)})
+
+
+def small(plan: Plan) -> int:
+    return 100_000
+
+
+STAGES: Mapping[str, Stage] = {
+    "exemplars": Stage("exemplars", 1, KitsConfig, (), plan_kits, make_kit, small),
+    "variations": Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
+    "strings": STAGE,
+}
+
+
+def config(flaw: str = "", count: int = 8) -> Config:
+    sections = {
+        "exemplars": KitsConfig(),
+        "variations": ShapesConfig(flaw=flaw),
+        "strings": StringsConfig(strings_per_shape=count),
+    }
+    return Config(name="toys", version="1.0.0", seed=3, sections=sections, path=Path("toys.yaml"))
+
+
+def make_here(wanted: Config, out: Path, stages: Sequence[str] = tuple(STAGES)) -> dict[str, str]:
+    """Make stages in this process; the shards that failed, with what they said."""
+    places, failed = Places(out, wanted.name), {}
+    survey = Survey(wanted, STAGES, places)
+    for name in stages:
+        stage = STAGES[name]
+        places.stage(name).make()
+        surveyed = survey.stage(name)
+        while fresh := [each for each in surveyed.missing if each.name not in failed]:
+            for shard in fresh:
+                mark = surveyed.fingerprints[shard.name]
+                report = make_shard(Job(name, stage.run_shard, shard, surveyed.config, places, mark))
+                if report.status != "done":
+                    failed[shard.name] = report.message
+            survey.refresh(name)
+    return failed
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output folder of a run of the stage with one worker."""
+    out = tmp_path_factory.mktemp("strings")
+    assert make_here(config(), out, ("exemplars", "variations")) == {}
+    assert run_stage("strings", STAGES, config(), Places(out, "toys"), workers=1) == RunResult(made=4)
+    return out
+
+
+def lines(out: Path, file: str) -> list[str]:
+    return (out / "toys-corpus" / file).read_text().splitlines()
+
+
+def test_each_sample_has_its_canonical_string_and_distinct_random_ones(made: Path) -> None:
+    work = Places(made, "toys").work
+    for shard in SPLITS:
+        samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
+        written = dict(read_shard(work / "strings" / f"{shard}.tar"))
+        assert list(written) == list(samples)
+        for key, members in written.items():
+            sample = samples[key]
+            assert list(members) == ["txt"]
+            strings = members["txt"].decode().splitlines()
+            assert len(strings) == len(set(strings))
+            is_chain = len(sample.assembly.edges) == len(sample.assembly) - 1
+            # a chain is walked from either end, or from a node between them in two orders
+            assert len(strings) == (min(9, 2 * len(sample.assembly) - 2) if is_chain else 9)
+            alphabet = make_alphabet(KITS[sample.kit])
+            for each in strings:
+                decoded = decode(each, alphabet)
+                assert graph_digest(decoded.types, decoded.edges) == sample.graph
+
+
+def test_shapes_of_one_graph_have_one_canonical_string(made: Path) -> None:
+    work = Places(made, "toys").work / "strings"
+    first, again = (
+        dict(read_shard(work / f"{shard}.tar"))[f"{shard}-0"]["txt"].decode().splitlines()
+        for shard in ("toys-train-000000", "toys-train-000001")
+    )
+    assert first[0] == again[0]
+    assert first[1:] != again[1:]
+
+
+def test_the_corpus_has_every_string_once_in_the_file_of_its_kit_and_split(made: Path) -> None:
+    files = {each.name for each in (made / "toys-corpus").iterdir()}
+    corpus = {f"{kit}-{split}.txt" for kit in KITS for split in ("train", "val")}
+    assert files == corpus | {"vocabulary.json", "statistics.json"}
+    work = Places(made, "toys").work
+    expected: dict[str, list[str]] = {}
+    for shard, split in SPLITS.items():
+        for sample, (_, members) in zip(
+            read_samples(work / "variations" / f"{shard}.tar"),
+            read_shard(work / "strings" / f"{shard}.tar"),
+            strict=True,
+        ):
+            expected.setdefault(f"{sample.kit}-{split}.txt", []).extend(members["txt"].decode().splitlines())
+    for file in corpus:
+        assert lines(made, file) == list(dict.fromkeys(expected[file]))
+    assert len(lines(made, "castle-train.txt")) < len(expected["castle-train.txt"])
+
+
+def test_the_vocabulary_names_the_types_and_lists_every_token(made: Path) -> None:
+    vocabulary = json.loads((made / "toys-corpus" / "vocabulary.json").read_text())
+    assert vocabulary["castle"]["types"] == {"A": "tower", "B": "gate", "C": "wall"}
+    assert vocabulary["castle"]["tokens"][:7] == ["A", "B", "C", "(", ")", "0", "1"]
+    assert vocabulary["chain"]["types"]["[link_52]"] == "link 52"
+    assert vocabulary["chain"]["tokens"][53:] == ["(", ")", "0"]
+
+
+def test_the_statistics_agree_with_the_files(made: Path) -> None:
+    statistics = json.loads((made / "toys-corpus" / "statistics.json").read_text())
+    for kit, of_splits in statistics.items():
+        for split, described in of_splits.items():
+            strings = lines(made, f"{kit}-{split}.txt")
+            figures = [measure_string(each) for each in strings]
+            assert described["strings"] == len(strings) == sum(described["cycles"]["histogram"].values())
+            assert described["characters"]["most"] == max(map(len, strings))
+            assert described["tokens"]["mean"] == round(sum(each.tokens for each in figures) / len(figures), 3)
+            assert described["cycles"]["most"] == max(each.cycles for each in figures)
+    castle = statistics["castle"]["train"]
+    assert (castle["shapes"], castle["graphs"]) == (4, 3)
+    assert castle["strings"] + castle["duplicates_dropped"] == 4 * 9
+    assert castle["duplicates_dropped"] >= 1
+    assert castle["cycles"]["histogram"].keys() == {"6", "15", "18"}  # grids of 3 x 4, 4 x 6 and 4 x 7
+
+
+def test_the_report_counts_the_corpus(made: Path) -> None:
+    survey = Survey(config(), STAGES, Places(made, "toys"))
+    total = sum(len(lines(made, f"{kit}-{split}.txt")) for kit in KITS for split in ("train", "val"))
+    report = STAGE.report(survey.stage("strings").view)
+    assert len(report) == 1
+    assert report[0].startswith(f"corpus: {total} strings of 11 graphs")
+
+
+def test_one_worker_two_workers_and_this_process_make_the_same_bytes(made: Path, tmp_path: Path) -> None:
+    assert make_here(config(), tmp_path / "here") == {}
+    assert make_here(config(), tmp_path / "two", ("exemplars", "variations")) == {}
+    run_stage("strings", STAGES, config(), Places(tmp_path / "two", "toys"), workers=2)
+    for path in sorted((made / ".work" / "toys" / "strings").glob("*.*")):
+        for other in ("two", "here"):
+            assert (tmp_path / other / ".work" / "toys" / "strings" / path.name).read_bytes() == path.read_bytes()
+
+
+def test_without_random_strings_every_shape_has_its_canonical_one(tmp_path: Path) -> None:
+    assert make_here(config(count=0), tmp_path) == {}
+    for shard in SPLITS:
+        for _, members in read_shard(tmp_path / ".work" / "toys" / "strings" / f"{shard}.tar"):
+            assert members["txt"].count(b"\n") == 1
+
+
+def test_one_graph_in_two_splits_fails_the_corpus_and_names_both_shapes(tmp_path: Path) -> None:
+    failed = make_here(config("one graph in two splits"), tmp_path)
+    assert list(failed) == ["corpus"]
+    assert "toys-val-000000-0 of val and toys-train-000000-0 of train have the same graph" in failed["corpus"]
+
+
+def test_a_sample_filed_under_a_wrong_graph_fails_its_shard(tmp_path: Path) -> None:
+    failed = make_here(config("wrong digest"), tmp_path)
+    assert set(failed) == set(SPLITS)
+    assert "sample toys-val-000000-1 is filed under graph 0000" in failed["toys-val-000000"]
+
+
+def test_a_shape_that_is_not_connected_is_refused_and_counted(tmp_path: Path) -> None:
+    assert make_here(config("not connected"), tmp_path) == {}
+    survey = Survey(config("not connected"), STAGES, Places(tmp_path, "toys"))
+    records = survey.stage("strings").records
+    for shard in SPLITS:
+        assert records[shard].rejects == {"shape graph is not connected": 1}
+        assert records[shard].samples == 3

@@ -1,0 +1,149 @@
+"""The rules of the house, read from the source: which way imports run, what nobody uses, how files are called."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+DATA_WAY = ["shape", "views", "exemplars", "variations", "strings", "points", "sketches", "package"]
+"""Folders of `stages/` in the order in which data flows; each may import what stands before it."""
+
+BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}
+
+GLOBAL_RANDOMNESS = {"default_rng", "Generator", "SeedSequence", "PCG64", "BitGenerator"}
+"""What `numpy.random` holds that keeps no global state."""
+
+CLOCKS = {"time.time", "time.time_ns", "datetime.now", "datetime.utcnow", "datetime.today", "date.today"}
+
+CODE = sorted(path for top in ("pipeline", "stages", "eval") for path in (ROOT / top).rglob("*.py"))
+ALL = sorted([*CODE, *(ROOT / "tests").rglob("*.py")])
+
+
+def relative(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def imports(tree: ast.AST) -> Iterator[str]:
+    """Every module that a file imports, `from a import b` as both `a` and `a.b`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            yield node.module or ""
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:
+    """Every call, with the dotted name that is called."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            yield ast.unparse(node.func), node
+
+
+def allowed(path: Path, module: str) -> bool:
+    """Whether the arrows of the house let the file `path` import `module`."""
+    target = module.split(".")
+    if target[0] not in {"pipeline", "stages", "eval", "tests"}:
+        return True
+    if target[0] == "tests":
+        return False
+    place = path.relative_to(ROOT).parts
+    if place[0] == "eval":
+        return True
+    if place[0] == "pipeline":
+        return target[0] == "pipeline"
+    if target[0] == "pipeline" or len(target) == 1:
+        return target[0] in {"pipeline", "stages"}
+    return target[0] == "stages" and DATA_WAY.index(target[1]) <= DATA_WAY.index(place[1])
+
+
+@pytest.mark.parametrize("path", [path for path in CODE if path.parent != ROOT / "stages"], ids=relative)
+def test_imports_run_along_the_way_of_the_data(path: Path) -> None:
+    wrong = [module for module in imports(ast.parse(path.read_text())) if not allowed(path, module)]
+    assert not wrong, f"{relative(path)} may not import {wrong}"
+
+
+def test_every_folder_of_stages_has_its_place_on_the_way() -> None:
+    folders = {path.name for path in (ROOT / "stages").iterdir() if (path / "__init__.py").is_file()}
+    assert folders <= set(DATA_WAY), "a new stage takes its place in DATA_WAY"
+
+
+@pytest.mark.parametrize("path", CODE, ids=relative)
+def test_bytes_depend_on_no_global_randomness_no_clock_no_uuid(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    modules = set(imports(tree))
+    assert not {each for each in modules if each.split(".")[0] in {"random", "uuid", "secrets"}}
+    for name, call in calls(tree):
+        tail = name.split(".")
+        if tail[-2:-1] == ["random"] and tail[0] in {"np", "numpy"}:
+            assert tail[-1] in GLOBAL_RANDOMNESS, f"line {call.lineno}: {name} draws from a global"
+        if tail[-1] == "default_rng":
+            assert call.args or call.keywords, f"line {call.lineno}: an unseeded generator"
+        if path.is_relative_to(ROOT / "stages"):
+            assert ".".join(tail[-2:]) not in CLOCKS, f"line {call.lineno}: {name} is a clock"
+
+
+@pytest.mark.parametrize("path", CODE, ids=relative)
+def test_nothing_executes_what_it_reads(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    assert not {each.split(".")[0] for each in imports(tree)} & {"pickle", "cloudpickle", "dill", "shelve", "marshal"}
+    for name, call in calls(tree):
+        assert name not in {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "eval", "exec"}, f"line {call.lineno}"
+        keywords = {keyword.arg: ast.unparse(keyword.value) for keyword in call.keywords}
+        if name == "torch.load":
+            assert keywords.get("weights_only") == "True", f"line {call.lineno}"
+        if name in {"np.load", "numpy.load", "np.save", "numpy.save"}:
+            assert keywords.get("allow_pickle") == "False", f"line {call.lineno}: say allow_pickle=False"
+
+
+@pytest.mark.parametrize("path", ALL, ids=relative)
+def test_random_streams_are_handed_in_and_never_a_default(path: Path) -> None:
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            named = [*node.args.posonlyargs, *node.args.args]
+            defaulted = named[len(named) - len(node.args.defaults) :]
+            defaulted += [
+                argument
+                for argument, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
+                if default is not None
+            ]
+            assert "rng" not in {argument.arg for argument in defaulted}, f"line {node.lineno}"
+
+
+@pytest.mark.parametrize("path", ALL, ids=relative)
+def test_every_file_says_its_subject_in_its_name_and_its_first_line(path: Path) -> None:
+    assert path.stem not in BANNED_NAMES
+    assert not BANNED_NAMES & set(path.relative_to(ROOT).parts)
+    text = path.read_text()
+    if text and path in CODE:
+        assert ast.get_docstring(ast.parse(text)), "a file begins with what it is for"
+    if "import " in text:
+        assert "from __future__ import annotations" in text
+
+
+def test_every_stage_file_holds_the_stage_of_its_folder() -> None:
+    from pipeline.registry import find_stages
+
+    folders = {path.parent.name for path in (ROOT / "stages").glob("*/stage.py")}
+    stages = find_stages()
+    assert set(stages) == folders
+    for place, stage in enumerate(stages.values()):
+        assert set(stage.inputs) <= set(list(stages)[:place]), "a stage comes after the stages that it reads"
+
+
+def test_every_config_key_says_what_it_is() -> None:
+    from pipeline.config import DatasetFacts, StrictModel
+    from pipeline.registry import find_stages
+
+    models: list[type[StrictModel]] = [DatasetFacts, *(stage.config for stage in find_stages().values())]
+    for model in models:
+        schema = model.model_json_schema()
+        for described in [schema, *schema.get("$defs", {}).values()]:
+            for key, field in described.get("properties", {}).items():
+                assert field.get("description") or "$ref" in field, f"{described['title']}.{key} has no description"
