@@ -102,7 +102,7 @@ class _ShardTask:
         source = f"{stage}/{file.partition('.')[0]}"
         path = self._job.places.stage(stage).root / file
         if source not in self.shard.inputs:
-            raise ShardFailed(f"{stage}/{self.shard.name} reads {file}, but {source} is not among its inputs")
+            raise ShardFailed(f"{self._job.stage}/{self.shard.name} reads {file}, but {source} is not among its inputs")
         if not path.is_file():
             raise ShardFailed(f"{source} has no file {file}")
         return path

@@ -11,6 +11,7 @@ import ctypes
 import faulthandler
 import os
 import signal
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
@@ -36,6 +37,10 @@ _ENVIRONMENT = {
 }
 
 _PR_SET_PDEATHSIG = 1
+
+# loky itself gives a worker that has grown by 300 MB a fresh process before its next job, and warns, as if one
+# were lost.
+warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given to the executor")
 
 
 def _start_worker(parent: int, output: Path) -> None:

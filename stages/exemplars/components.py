@@ -14,8 +14,8 @@ def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> 
 
     Vertices at equal positions count as one, whatever the file's indices. Two faces of one kind (`kinds` int (f,))
     that are alone at an edge are joined along it. Where more than two meet in an edge, solids stand side by side:
-    two faces that are connected elsewhere and agree belong together, and of the others, going around the edge, two with the
-    inside between them. A face that repeats another goes with it.
+    two faces that are connected elsewhere and agree belong together, and of the others, going around the edge, two
+    with the inside between them. A face that repeats another goes with it.
     """
     positions, place = np.unique(vertices, axis=0, return_inverse=True)
     places = place.reshape(-1)[faces]

@@ -95,9 +95,7 @@ def _maps_onto(source: Surface, target: Surface, rotation: FloatArray, slack: fl
     return True
 
 
-def _candidate_rotations(
-    source: FloatArray, target: FloatArray, slack: float, reflections: bool
-) -> list[FloatArray]:
+def _candidate_rotations(source: FloatArray, target: FloatArray, slack: float, reflections: bool) -> list[FloatArray]:
     """Rotations that take two chosen corners of `source`, both relative to the centroid, to corners of `target`."""
     radius, target_radius = np.linalg.norm(source, axis=1), np.linalg.norm(target, axis=1)
     reach = radius.max()

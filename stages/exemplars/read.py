@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import os
 from collections.abc import Callable
@@ -118,8 +119,10 @@ def _read(path: Path) -> Scene:
             f"{path}: {path.suffix or 'a name without an extension'} is no model format; {hint}"
             f"Shapemill reads {', '.join(FORMATS)}"
         )
-    if not path.exists():
-        beside = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
+    if not os.access(path, os.F_OK):  # Path.exists() raises where a folder on the way may not be entered
+        beside: list[str] = []
+        with contextlib.suppress(OSError):
+            beside = [each.name for each in path.parent.iterdir()]
         near = difflib.get_close_matches(path.name, beside, n=1)
         raise ConfigError(f"{path}: no such file" + (f"; did you mean {near[0]}?" if near else ""))
     if not path.is_file():

@@ -19,9 +19,7 @@ BYTES_A_KIT = 8_000_000
 def plan(plan: Plan) -> list[Shard]:
     """One shard a kit; the digests of its model files make it anew when they change."""
     kits = plan.config.section(ExemplarsConfig).kits
-    return [
-        Shard(kit.name, {"kit": kit.name, "digests": [file_digest(shape) for shape in kit.shapes]}) for kit in kits
-    ]
+    return [Shard(kit.name, {"kit": kit.name, "digests": [file_digest(shape) for shape in kit.shapes]}) for kit in kits]
 
 
 def run_shard(task: Task) -> Outcome:

@@ -48,9 +48,9 @@ def merge_shard(task: Task) -> Outcome:
                 if len(assembly.edges) == 0:
                     task.reject(sample.key, "no contact between parts")
                     continue
-                strings = made["strings"]["txt"].decode().split()
+                string = made["strings"]["txt"].decode().split("\n", 1)[0]
                 points = json.loads(made["points"].pop("json"))
-                record = describe_sample(sample, kit, assembly, strings, points, views)
+                record = describe_sample(sample, kit, assembly, string, points, views)
                 members = {"glb": writers[kit.name].write(assembly)}
                 for stage in MERGED:
                     members.update(made[stage])
@@ -134,5 +134,5 @@ def _row(record: Mapping[str, Any], path: str, offset: int, members: Mapping[str
         "offset": offset,
         "bytes": sum(sizes),
         **record["counts"],
-        "string": record["strings"][0],
+        "string": record["string"],
     }

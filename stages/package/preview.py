@@ -27,6 +27,10 @@ COLUMNS = 8
 CELL = 232
 EXEMPLARS = 16
 """At most so many exemplars are shown."""
+MARK = 12
+"""What differs from the background by more than so many levels is something shown."""
+PAD = 0.02
+"""Height of the strip left above and below what a row shows, as a share of the pictures' height."""
 CAMERA = Camera(azimuth=-40.0, elevation=25.0)
 
 
@@ -60,24 +64,28 @@ def draw_preview(task: Task) -> Outcome:
 
 
 def varied(samples: Sequence[Sample], kits: Sequence[str], count: int) -> list[Sample]:
-    """`count` samples, or all if there are fewer: the kits take turns, and of each kit the sizes are spread evenly
-    from small to large and come mixed."""
-    queues = []
-    for kit in kits:
-        own = sorted((each for each in samples if each.kit == kit), key=lambda each: (len(each.assembly), each.key))
-        wanted = min(len(own), -(-count // len(kits)) if len(own) < len(samples) else count)
-        spread = [own[(2 * place + 1) * len(own) // (2 * wanted)] for place in range(wanted)]
-        queues.append([spread[place] for place in _mixed(wanted)])
+    """`count` samples, or all if there are fewer: the kits take turns, each beginning with its largest sample and
+    going on with the one that differs most from those before in how many parts of which type it has."""
+    queues = [_farthest([each for each in samples if each.kit == kit], count) for kit in kits]
     turns = [queue[turn] for turn in range(count) for queue in queues if turn < len(queue)]
     return turns[:count]
 
 
+def _farthest(samples: Sequence[Sample], count: int) -> list[Sample]:
+    if not samples:
+        return []
+    types = 1 + max(int(each.assembly.types.max()) for each in samples)
+    counts = np.array([np.bincount(each.assembly.types, minlength=types) for each in samples], dtype=np.float64)
+    chosen = [int(np.argmax(counts.sum(axis=1)))]
+    apart = np.full(len(samples), np.inf)
+    while len(chosen) < min(count, len(samples)):
+        apart = np.minimum(apart, np.abs(counts - counts[chosen[-1]]).sum(axis=1))
+        apart[chosen] = -1.0
+        chosen.append(int(np.argmax(apart)))
+    return [samples[each] for each in chosen]
+
+
 _CLOUD = ("points.npy", "labels.npy")
-
-
-def _mixed(count: int) -> list[int]:
-    """0 to count - 1 in an order whose every stretch covers the whole range: by golden steps."""
-    return sorted(range(count), key=lambda place: (place * 0.6180339887498949) % 1.0)
 
 
 def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[str, bytes]]:
@@ -126,5 +134,22 @@ def _size(assembly: Assembly) -> str:
     return f"{len(assembly)} parts"
 
 
-def _rows(cells: Sequence[Cell]) -> list[Sequence[Cell]]:
-    return [cells[start : start + COLUMNS] for start in range(0, len(cells), COLUMNS)]
+def _rows(cells: Sequence[Cell]) -> list[list[Cell]]:
+    """The cells in rows, each row without the empty strips above and below its pictures."""
+    return [_trimmed(cells[start : start + COLUMNS]) for start in range(0, len(cells), COLUMNS)]
+
+
+def _trimmed(row: Sequence[Cell]) -> list[Cell]:
+    """The same strip of every picture of a row, a little higher than what is shown in the fullest."""
+    tops, ends = [], []
+    for cell in row:
+        height = len(cell.picture)
+        marked = (np.abs(cell.picture.astype(np.int16) - cell.picture[0, 0]) > MARK).reshape(height, -1).any(axis=1)
+        shown = np.flatnonzero(marked)
+        tops.append(shown[0] / height if len(shown) else 0.5)
+        ends.append((shown[-1] + 1) / height if len(shown) else 0.5)
+    top, end = max(min(tops) - PAD, 0.0), min(max(ends) + PAD, 1.0)
+    return [
+        Cell(cell.picture[round(top * len(cell.picture)) : round(end * len(cell.picture))], cell.caption)
+        for cell in row
+    ]

@@ -18,12 +18,12 @@ def describe_sample(
     sample: Sample,
     kit: Kit,
     assembly: Assembly,
-    strings: Sequence[str],
+    string: str,
     points: Mapping[str, Any],
     views: Sequence[str],
 ) -> dict[str, Any]:
-    """What the JSON says. `assembly` is the sample's, upright; `strings` are its strings, the canonical one first;
-    `points` is how its cloud was made; `views` names the views of its sketches.
+    """What the JSON says. `assembly` is the sample's, upright; `string` is its canonical string; `points`
+    says how its cloud was made; `views` names the views of its sketches.
 
     Nothing is null or empty: loaders guess a field's type from the first samples they see. The lineage differs from
     sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it.
@@ -52,7 +52,7 @@ def describe_sample(
             "types": len(set(assembly.types.tolist())),
         },
         "bounds": assembly_bounds(kit.types, assembly).tolist(),
-        "strings": list(strings),
+        "string": string,
         "points": dict(points),
         "sketches": list(views),
     }

@@ -1,8 +1,9 @@
 """`make verify`: is a finished dataset what it says it is?
 
-    python -m stages.package.verify OUT/castle
+    python -m pipeline verify --config configs/castle.yaml --out datasets
+    python -m stages.package.verify datasets/castle
 
-Files: checksums, members, counts, index, foreign and missing files. Then, for samples chosen by a seed, contacts,
+Files: checksums, members, counts, index, foreign and missing files. Then, for samples chosen at random, contacts,
 grammar and penetration computed anew from the meshes, without any cache. Exit code 1, with names, for any fault.
 """
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from pipeline.places import Places
 from pipeline.randomness import decision_rng
+from pipeline.yaml_text import read_yaml
 from stages.package.layout import MANIFEST
 from stages.package.verify_files import FileFindings, check_files, shard_samples
 from stages.shape.kit import Kit
@@ -29,9 +31,10 @@ LISTED_FAULTS = 20
 
 
 def main(argv: Sequence[str]) -> int:
-    """Verify the folder that `argv` names; print a table; return the exit code."""
+    """Verify the dataset that `argv` names, by its folder or by config and output folder; print a table; return the
+    exit code."""
     arguments = _arguments(argv)
-    folder: Path = arguments.folder
+    folder = arguments.folder or arguments.out / str(read_yaml(arguments.config)[0]["name"])
     if not (folder / MANIFEST).is_file():
         print(f"{folder}: no dataset: it has no {MANIFEST}. Make one with: make dataset")
         return 1
@@ -44,10 +47,15 @@ def main(argv: Sequence[str]) -> int:
 
 def _arguments(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="verify", description="Is a finished dataset what it says it is?")
-    parser.add_argument("folder", type=Path, help="the dataset's folder, such as datasets/castle")
+    parser.add_argument("folder", type=Path, nargs="?", help="the dataset's folder, such as datasets/castle")
+    parser.add_argument("--config", type=Path, help="instead of the folder: the config that the dataset is made from")
+    parser.add_argument("--out", type=Path, default=Path("datasets"), help="with --config: the output folder")
     parser.add_argument("--samples", type=int, default=50, help="samples whose geometry is computed anew (default 50)")
-    parser.add_argument("--seed", type=int, default=0, help="which samples those are (default 0)")
-    return parser.parse_args(argv)
+    parser.add_argument("--seed", type=int, default=0, help="decides which samples those are (default 0)")
+    arguments = parser.parse_args(argv)
+    if (arguments.folder is None) == (arguments.config is None):
+        parser.error("name either the dataset's folder or its config")
+    return arguments
 
 
 def _check_geometry(folder: Path, count: int, seed: int, findings: FileFindings) -> None:

@@ -57,9 +57,10 @@ def png_bytes(drawing: ByteArray) -> bytes:
         path = Path(folder) / "drawing.png"
         output = oiio.ImageOutput.create(str(path))
         written = output is not None and output.open(str(path), spec)
-        written = written and output.write_image(np.ascontiguousarray(drawing)) and output.close()
+        written = written and output.write_image(np.ascontiguousarray(drawing)[:, :, None]) and output.close()
         if not written:
-            raise ShardFailed(f"OpenImageIO cannot write a PNG: {oiio.geterror() if output is None else output.geterror()}")
+            reason = oiio.geterror() if output is None else output.geterror()
+            raise ShardFailed(f"OpenImageIO cannot write a PNG: {reason}")
         return path.read_bytes()
 
 

@@ -107,13 +107,33 @@ def decode(string: str, alphabet: Alphabet) -> Decoded:
     if numbers:
         number, (_, begun) = min(numbers.items(), key=lambda each: each[1][1])
         raise _error(string, texts, begun, f"cycle number {number} stands only once")
-    # both nodes of an edge are there in order, so the lower one is first
+    return _graph(string, types, ends, texts, token_nodes, token_edges)
+
+
+def equivalent(first: str, second: str, alphabet: Alphabet) -> bool:
+    """Whether two strings stand for the same shape graph, up to isomorphism. Raises StringError if one is wrong."""
+    one, other = decode(first, alphabet), decode(second, alphabet)
+    if len(one.edges) != len(other.edges) or sorted(one.types.tolist()) != sorted(other.types.tolist()):
+        return False
+    return graph_digest(one.types, one.edges) == graph_digest(other.types, other.edges)
+
+
+def _graph(
+    string: str,
+    types: list[int],
+    ends: list[tuple[int, int]],
+    texts: list[str],
+    token_nodes: list[int],
+    token_edges: list[int],
+) -> Decoded:
+    """The graph with its edges in order; the tokens name edges as they stand in `ends`, lower node first."""
     pairs = np.array(ends, dtype=np.int64).reshape(-1, 2)
     keys = pairs[:, 0] * len(types) + pairs[:, 1]
     order = np.argsort(keys, kind="stable")
-    if (np.diff(keys[order]) == 0).any():
-        doubled = int(order[1:][np.diff(keys[order]) == 0].min())
-        place = len(token_edges) - 1 - token_edges[::-1].index(doubled)
+    is_double = np.diff(keys[order]) == 0
+    if is_double.any():
+        later = int(order[1:][is_double].min())
+        place = len(token_edges) - 1 - token_edges[::-1].index(later)
         raise _error(string, texts, place, "two edges join the same two nodes")
     row = np.append(np.argsort(order), -1)  # a token without an edge keeps its -1
     return Decoded(
@@ -123,14 +143,6 @@ def decode(string: str, alphabet: Alphabet) -> Decoded:
         token_nodes=tuple(token_nodes),
         token_edges=tuple(row[token_edges].tolist()),
     )
-
-
-def equivalent(first: str, second: str, alphabet: Alphabet) -> bool:
-    """Whether two strings stand for the same shape graph, up to isomorphism. Raises StringError if one is wrong."""
-    one, other = decode(first, alphabet), decode(second, alphabet)
-    if len(one.edges) != len(other.edges) or sorted(one.types.tolist()) != sorted(other.types.tolist()):
-        return False
-    return graph_digest(one.types, one.edges) == graph_digest(other.types, other.edges)
 
 
 def _branch_fault(text: str, previous: str, is_inside: bool) -> str:

@@ -14,12 +14,17 @@ from stages.shape.canonical import canonical_order
 from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import number_text
 
-__all__ = ["Encoded", "canonical_string", "encode", "random_strings"]
+__all__ = ["Encoded", "NotConnectedError", "canonical_string", "encode", "random_strings"]
 
 Indices = npt.NDArray[np.int64]
 
-TRIES = 20
-"""Random walks for each string that is asked for, before a graph counts as having no more strings."""
+PATIENCE = 5
+"""A graph counts as having no more strings after so many random walks in a row, for each string it is known to have
+and four besides, that brought nothing new."""
+
+
+class NotConnectedError(ValueError):
+    """The graph falls into pieces, so no string can walk it."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +41,8 @@ def encode(types: TypeArray, edges: IntArray, alphabet: Alphabet, rng: np.random
     All cycles are broken at random edges; the tree that is left is written depth first, each subtree of a node in
     parentheses except the last; the broken edges come back as numbers behind both of their nodes.
 
-    types: int16 (n,), at least one node; edges: int32 (m, 2), a simple graph. Raises ValueError if the graph is empty
-    or not connected, or if an edge or a type names what is not there.
+    types: int16 (n,), at least one node; edges: int32 (m, 2), a simple graph. Raises NotConnectedError, and ValueError
+    if the graph is empty or an edge or a type names what is not there.
     """
     from stages.strings.traversal import first_edges_tree
 
@@ -57,17 +62,19 @@ def random_strings(
 ) -> list[Encoded]:
     """`count` distinct random strings of a graph, none of them in `besides`.
 
-    Fewer if `TRIES` walks a string do not find as many: small graphs have few strings. Raises ValueError as `encode`.
+    Fewer if `PATIENCE` ends before: small graphs have few strings. Arguments and errors as for `encode`.
     """
     seen = set(besides)
     found: list[Encoded] = []
-    for _ in range(TRIES * count):
+    in_vain = 0
+    while len(found) < count and in_vain < PATIENCE * (4 + len(seen)):
         encoded = encode(types, edges, alphabet, rng)
-        if encoded.string not in seen:
+        if encoded.string in seen:
+            in_vain += 1
+        else:
+            in_vain = 0
             seen.add(encoded.string)
             found.append(encoded)
-            if len(found) == count:
-                break
     return found
 
 
@@ -110,7 +117,7 @@ def _write(
     letters = len(alphabet.tokens)
     codes, nodes = walk(types, pairs, tree, turn, root, letters)
     if len(nodes) < len(types):
-        raise ValueError(f"the graph is not connected: {len(nodes)} of {len(types)} nodes are in reach of node {root}")
+        raise NotConnectedError(f"{len(nodes)} of {len(types)} nodes are in reach of node {root}")
     texts = _texts(alphabet, max(int(codes.max()) - letters, 0) // 64)
     return Encoded("".join([texts[code] for code in codes.tolist()]), nodes)
 

@@ -16,7 +16,7 @@ from stages.shape.sample import Sample, read_samples
 from stages.strings.alphabet import Alphabet, make_alphabet
 from stages.strings.corpus import CORPUS, compose_corpus
 from stages.strings.decoder import decode
-from stages.strings.encoder import Encoded, canonical_string, random_strings
+from stages.strings.encoder import Encoded, NotConnectedError, canonical_string, random_strings
 from stages.strings.settings import StringsConfig
 
 __all__ = ["STAGE"]
@@ -53,10 +53,11 @@ def write_strings(task: Task) -> Outcome:
     total, written, rows = int(task.shard.params["samples"]), 0, []
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
-            if not _is_connected(sample.assembly):
-                task.reject(sample.key, "shape graph is not connected")
+            try:
+                strings = _strings(sample, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
+            except NotConnectedError as error:
+                task.reject(sample.key, "shape graph is not connected", str(error))
                 continue
-            strings = _strings(sample, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
             written += len(strings)
             writer.write(sample.key, {"txt": ("\n".join(strings) + "\n").encode()})
             rows.append({"key": sample.key, "kit": sample.kit, "graph": sample.graph})
@@ -113,16 +114,6 @@ def _stands_for(encoded: Encoded, assembly: Assembly, alphabet: Alphabet) -> boo
     found = np.sort(encoded.nodes[decoded.edges], axis=1)
     keys, expected = found @ (len(assembly), 1), np.sort(assembly.edges, axis=1) @ (len(assembly), 1)
     return np.array_equal(np.sort(keys), np.sort(expected))
-
-
-def _is_connected(assembly: Assembly) -> bool:
-    neighbours, reached, fresh = assembly.neighbours(), {0}, [0]
-    while fresh:
-        for each in neighbours[fresh.pop()]:
-            if each not in reached:
-                reached.add(each)
-                fresh.append(each)
-    return len(reached) == len(assembly)
 
 
 STAGE = Stage(

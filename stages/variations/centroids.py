@@ -13,9 +13,7 @@ STEPS = 2000
 """Partial matches looked at before a boundary counts as not matched."""
 
 
-def match_centroids(
-    rng: np.random.Generator, kit: KitTables, a: ShapeTables, b: ShapeTables, ws: Workspace
-) -> int:
+def match_centroids(rng: np.random.Generator, kit: KitTables, a: ShapeTables, b: ShapeTables, ws: Workspace) -> int:
     """Find parts of B with the types and the pairwise centroid distances of the boundary in `ws`.
 
     The first match in random order counts; its images go to `ws.images` and the docking motion, fitted to the

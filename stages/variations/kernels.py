@@ -310,9 +310,7 @@ def _part_at(places, by_type, first, last, place, tolerance):
 @numba.njit(cache=True)
 def _move(motion, place, out):
     for i in range(3):
-        out[i] = (
-            motion[i, 0] * place[0] + motion[i, 1] * place[1] + motion[i, 2] * place[2] + motion[3, i]
-        )
+        out[i] = motion[i, 0] * place[0] + motion[i, 1] * place[1] + motion[i, 2] * place[2] + motion[3, i]
 
 
 @numba.njit(cache=True)

@@ -85,7 +85,9 @@ class FoundVariants:
         """One variant and the docking labels of its edges."""
         (part, edge), (last_part, last_edge) = self.offsets[index].tolist(), self.offsets[index + 1].tolist()
         assembly = Assembly(
-            np.array(self.types[part:last_part]), np.array(self.poses[part:last_part]), np.array(self.edges[edge:last_edge])
+            np.array(self.types[part:last_part]),
+            np.array(self.poses[part:last_part]),
+            np.array(self.edges[edge:last_edge]),
         )
         return assembly, np.array(self.labels[edge:last_edge])
 

@@ -100,9 +100,7 @@ def run_lane(task: Task) -> Outcome:
         assembly, labels = found.assembly(index)
         search.parents.append(search.parent(f"{found.name}-{index}", assembly, labels))
     wanted = task.shard.params["wanted"]
-    variants, tries = search.run(
-        rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted)
-    )
+    variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
     write_variants(task, variants)
     for reason, count in sorted(search.rejects.items()):
         task.reject(task.shard.name, reason, count=count)

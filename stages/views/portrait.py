@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numba
 import numpy as np
 
@@ -67,27 +69,26 @@ def portrait(
 
 
 def points_portrait(
-    points: FloatArray, labels: IntArray, camera: Camera, size: tuple[int, int], up: str, radius: float = 0.0
+    points: FloatArray, labels: IntArray, camera: Camera, size: tuple[int, int], up: Literal["y", "z"]
 ) -> ByteArray:
     """Points (n, 3) as small shaded balls coloured by `labels` (n,), uint8 (height, width, 3) for (width, height).
 
-    `radius` of a ball in world units; 0 picks one by the number of points. `up` is `"y"` or `"z"`.
+    The more points, the smaller the balls. Raises ValueError where there are no points.
     """
     width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
-    axis = "z" if up == "z" else "y"
-    view = camera.look(points, axis, width / height)
-    radius = radius or 0.9 * view.radius / np.sqrt(max(len(points), 1))
+    view = camera.look(points, up, width / height)
+    radius = 0.9 * view.radius / np.sqrt(len(points))
     local = points @ view.eye[:3, :3].T + view.eye[:3, 3]
     depth, normal, owner = _balls(local, radius, view.projection, width, height)
     shown = owner >= 0
     picture = np.broadcast_to(srgb_to_linear(np.array(PAPER, dtype=np.uint8)), (height, width, 3)).copy()
     upright = normal[shown] @ view.eye[:3, :3]
-    above = upright[:, 1 if axis == "y" else 2]
-    lit = np.clip(normal[shown] @ (np.array([-0.5, 0.68, 0.54])), 0.0, None)
+    above = upright[:, 1 if up == "y" else 2]
+    lit = np.clip(normal[shown] @ np.array([-0.5, 0.68, 0.54]), 0.0, None)
     sky = (0.5 + 0.5 * above)[:, None] * SKY + (0.5 - 0.5 * above)[:, None] * GROUND
     open_sky = openness(depth, normal, view, 0.10 * view.radius)[shown][:, None]
     used, which = np.unique(labels, return_inverse=True)
-    colors = label_colors(int(used.max()) + 1 if len(used) else 0)[used]
+    colors = label_colors(int(used.max()) + 1)[used]
     albedo = srgb_to_linear(colors)[which[owner[shown]]]
     picture[shown] = albedo * (lit[:, None] * KEY * 0.9 + 1.15 * sky) * (0.25 + 0.75 * open_sky)
     return linear_to_srgb(_reduced(picture))

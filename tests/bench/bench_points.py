@@ -25,6 +25,7 @@ def bumpy_sheet(cells: int = 71) -> tuple[np.ndarray, np.ndarray]:
 
 def bench() -> Iterator[Measure]:
     """Clouds a second and core. Each peer does what its users call; trimesh keeps the areas from call to call."""
+    import fpsample
     import open3d
     import trimesh
 
@@ -58,5 +59,11 @@ def bench() -> Iterator[Measure]:
     def farthest_open3d() -> int:
         return len(open3d_pool.farthest_point_down_sample(PICKED).points) // PICKED
 
+    def farthest_fpsample() -> int:
+        return len(fpsample.bucket_fps_kdline_sampling(pool, PICKED, h=7, start_idx=0)) // PICKED
+
+    ours = rate(farthest, seconds=0.5)
     name = f"points, {PICKED} farthest of {POOL}"
-    yield Measure(name, "clouds", rate(farthest, 0.5), "Open3D", rate(farthest_open3d, 0.5), "one core each")
+    yield Measure(name, "clouds", ours, "Open3D", rate(farthest_open3d, seconds=0.5))
+    fpsample_rate = rate(farthest_fpsample, seconds=0.5)
+    yield Measure(name, "clouds", ours, "fpsample", fpsample_rate, "fpsample ignores the start it is given")

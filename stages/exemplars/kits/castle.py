@@ -210,7 +210,7 @@ def _bridge_pier() -> Solid:
 
 
 def _bridge_ramp() -> Solid:
-    """Comes down from a gate or a pier: their face is the plane z = 0, the ramp runs towards positive z."""
+    """Comes down from a gate or a pier: its face is the plane z = 0, the ramp runs towards positive z."""
     outline = np.array([(BITE, -0.1), (BITE, 0.38), (-0.3, 0.38), (-1.6, -0.04), (-1.6, -0.1)])
     ramp = extruded(outline, -0.42, 0.42, STONE).turned(90.0)
     for t in (0.2, 0.4, 0.6, 0.8):
@@ -281,7 +281,7 @@ def _river_wards() -> Layout:
 
 
 def _high_keep() -> Layout:
-    """Three wards around a high keep, a gate with a ramp, and a bridge that turns on its piers towards the far bank."""
+    """Three wards around a high keep, a gate with a ramp, and a bridge on a pier to a gatehouse on the far bank."""
     castle = _Castle()
     castle.tower(1, 1, 3, "spire+flag")
     castle.tower(0, 0, 2, "cone", (2,))
@@ -305,9 +305,11 @@ def _high_keep() -> Layout:
     castle.put("cottage", 2.5, 0.0, 5.0, 0.0)
     castle.put("bridge_span", 2.5, 0.0, 12.5)
     castle.put("bridge_pier", 2.5, 0.0, 15.0)
-    castle.put("bridge_span", 5.0, 0.0, 15.0, 90.0)
-    castle.put("bridge_pier", 7.5, 0.0, 15.0)
-    castle.put("bridge_ramp", 7.5, 0.0, 14.5, 180.0)
+    castle.put("bridge_ramp", 3.0, 0.0, 15.0, 90.0)
+    castle.put("bridge_span", 2.5, 0.0, 17.5)
+    castle.join("wall_gate", 0, 4, 1, 4)
+    castle.tower(0, 4, 1)
+    castle.tower(1, 4, 1, "cone")
     castle.join("wall", 2, 1, 3, 1)
     castle.tower(3, 1, 2, "cone+flag")
     castle.join("wall_gate", 3, 1, 3, 2)

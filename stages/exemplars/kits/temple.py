@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.exemplars.kits.layout import Layout
 from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
-from stages.exemplars.kits.solid import Color, Solid, box, extruded, loft, revolved, stacked
+from stages.exemplars.kits.solid import Color, Solid, box, extruded, joined, loft, revolved, stacked
 from stages.shape.arrays import FloatArray
 
 __all__ = ["shapes"]
@@ -56,7 +56,7 @@ def _types() -> dict[str, Solid]:
         "statue": _statue(),
         "stairs": _stairs(),
         "path": _path(),
-        "brazier": _brazier(),
+        "altar": _altar(),
     }
 
 
@@ -248,11 +248,14 @@ def _path() -> Solid:
     return slab.inset((0.0, 0.1, 0.0), chamfered(0.7, 0.7, 0.2), -0.02, MARBLE_WARM, MARBLE_WARM)
 
 
-def _brazier() -> Solid:
-    """A fire bowl on a paving slab."""
-    bowl = revolved([(0.2, 0.0), (0.2, 0.06), (0.06, 0.14), (0.06, 0.5), (0.24, 0.68), (0.26, 0.78), (0.2, 0.78), (0.16, 0.7)], 8, [BRONZE] * 5 + [GOLD, SHADOW])
-    flame = revolved([(0.14, 0.66), (0.17, 0.86), (0.08, 1.1), (0.0, 1.34)], 8, [RED, FLAME, GOLD])
-    return bowl + flame
+def _altar() -> Solid:
+    """A fire bowl on a round step, at the end of a way: its slab docks like a paving slab."""
+    slab = stacked(chamfered(1.0, 1.0, 0.18), [(0.0, 0.0), (0.0, 0.06), (-0.04, 0.1)], MARBLE_SHADE)
+    step = revolved([(0.4, 0.08), (0.4, 0.2), (0.3, 0.2), (0.3, 0.32)], 12, MARBLE)
+    profile = [(0.2, 0.3), (0.2, 0.38), (0.07, 0.46), (0.07, 0.82), (0.26, 1.0), (0.28, 1.1), (0.22, 1.1), (0.18, 1.02)]
+    bowl = revolved(profile, 8, [BRONZE] * 5 + [GOLD, SHADOW])
+    flame = revolved([(0.15, 0.98), (0.19, 1.18), (0.09, 1.42), (0.0, 1.68)], 8, [RED, FLAME, GOLD])
+    return joined(slab, step, bowl, flame)
 
 
 class _Precinct(Layout):
@@ -324,25 +327,25 @@ def _hall_and_court() -> Layout:
     precinct.put("finial", 7.5, REST + 2.08, 4.5)
     precinct.put("stairs", 1.5, 0.0, 9.4)
     precinct.put("path", 1.5, 0.0, 10.5)
-    precinct.put("path", 1.5, 0.0, 11.5)
-    precinct.put("brazier", 1.5, 0.1, 11.5)
+    precinct.put("altar", 1.5, 0.0, 11.5)
     precinct.put("stairs", 9.4, 0.0, 4.5, 90.0)
     return precinct
 
 
 def _belvedere() -> Layout:
-    """A two-storeyed tower and a small temple, joined by colonnades around an open court."""
+    """A tower of three storeys and a small temple, joined by colonnades around an open court."""
     precinct = _Precinct()
     for i, j in ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (4, 0), (3, 1), (4, 1), (3, 2), (4, 2), (2, 2), (1, 2)):
         precinct.column(i, j)
     precinct.bay(0, 0, 1, 0)
-    precinct.bay(0, 0, 0, 1, "portal")
+    precinct.bay(0, 0, 0, 1)
     precinct.bay(1, 0, 1, 1)
     precinct.bay(0, 1, 1, 1)
     precinct.storey(0, 0, 1)
+    precinct.storey(0, 0, 2)
     precinct.cell("floor", 0, 0)
-    precinct.cell("dome", 0, 0, REST + UPPER)
-    precinct.put("finial", 1.5, REST + UPPER + 2.08, 1.5)
+    precinct.cell("dome", 0, 0, REST + 2 * UPPER)
+    precinct.put("finial", 1.5, REST + 2 * UPPER + 2.08, 1.5)
     precinct.bay(1, 0, 2, 0)
     precinct.bay(2, 0, 3, 0)
     precinct.bay(1, 1, 1, 2)
@@ -360,9 +363,7 @@ def _belvedere() -> Layout:
     precinct.gable(10.5, 6.0, 0.0)
     precinct.put("statue", 10.5, 0.3, 4.5)
     precinct.put("stairs", 10.5, 0.0, 6.4)
-    precinct.put("stairs", 4.5, 0.0, 6.4)
-    precinct.put("path", 4.5, 0.0, 7.5)
-    precinct.put("path", 4.5, 0.0, 8.5)
-    precinct.put("path", 5.5, 0.0, 8.5)
-    precinct.put("brazier", 5.5, 0.1, 8.5)
+    precinct.put("stairs", 7.5, 0.0, 6.4)
+    for x in (7.5, 8.5, 9.5, 10.5):
+        precinct.put("path", x, 0.0, 7.5)
     return precinct

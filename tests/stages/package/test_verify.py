@@ -116,3 +116,38 @@ def test_a_folder_without_a_dataset_is_refused_with_the_mend(
 ) -> None:
     assert main([str(tmp_path)]) == 1
     assert "make dataset" in capsys.readouterr().out
+
+
+def test_geometry_of_random_samples_is_computed_anew_from_their_meshes(
+    toy_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(toy_folder), "--samples", "10"]) == 0
+    assert "geometry              10 looked at   good" in capsys.readouterr().out
+
+
+def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_path: Path) -> None:
+    """A record that says that the two ends of a row touch, in a dataset whose checksums all agree."""
+    import json
+
+    from pipeline.shards import read_shard
+    from stages.package.verify_geometry import geometry_faults
+    from tests.stages.package.toy import toy_kit
+
+    samples = [members for path in toy_folder.rglob("*.tar") for _, members in read_shard(path)]
+    members = next(each for each in samples if json.loads(each["json"])["counts"]["parts"] == 3)
+    record = json.loads(members["json"])
+    kit = toy_kit(record["kit"])
+    assert geometry_faults(kit, members) == []
+    record["contacts"].append([0, 2])
+    faults = geometry_faults(kit, {**members, "json": json.dumps(record).encode()})
+    ends = (record["parts"][0]["name"], record["parts"][2]["name"])
+    assert f"{ends[0]} and {ends[1]} are recorded as neighbours and do not touch" in faults
+
+
+def test_the_dataset_can_be_named_by_its_config(
+    toy_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "toy.yaml"
+    config.write_text("name: toy\n")
+    assert main(["--config", str(config), "--out", str(toy_folder.parent), "--samples", "0"]) == 0
+    assert "faults" not in capsys.readouterr().out

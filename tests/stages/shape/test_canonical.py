@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -32,19 +33,17 @@ def arrays(graph: nx.Graph, types: np.ndarray | None = None) -> tuple[np.ndarray
     return np.zeros(len(graph), dtype=np.int16) if types is None else types, edges
 
 
-def renamed(
-    types: np.ndarray, edges: np.ndarray, rng: np.random.Generator, labels: np.ndarray | None = None
-) -> tuple[np.ndarray, ...]:
-    """The same graph with its nodes renamed, its edges in another order, some of them turned round."""
+def renamed(types: np.ndarray, edges: np.ndarray, rng: np.random.Generator, *labels: np.ndarray) -> Any:
+    """The same graph with its nodes renamed, its edges in another order, some of them turned round; labels if given."""
     old = rng.permutation(len(types))
     new = np.argsort(old)
     turned = rng.random(len(edges)) < 0.5
     rows = rng.permutation(len(edges))
     ends = new[edges].astype(np.int32)
     ends[turned] = ends[turned][:, ::-1]
-    if labels is None:
+    if not labels:
         return types[old], ends[rows]
-    seen = labels.copy()
+    seen = labels[0].copy()
     seen[turned] = seen[turned][:, ::-1]
     return types[old], ends[rows], seen[rows]
 

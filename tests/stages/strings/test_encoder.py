@@ -161,7 +161,7 @@ def test_bracketed_names_are_written() -> None:
     ("types", "edges", "reason"),
     [
         ([], [], "without nodes"),
-        ([0, 0, 0], [[0, 1]], "not connected"),
+        ([0, 0, 0], [[0, 1]], "of 3 nodes are in reach"),
         ([0, 6], [[0, 1]], "not in the alphabet"),
         ([0, -1], [[0, 1]], "not in the alphabet"),
         ([0, 0], [[0, 2]], "not there"),

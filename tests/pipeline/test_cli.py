@@ -1,0 +1,122 @@
+"""The command line: exit codes, status, verify, and the stages found by their folders."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.registry import find_stages
+from tests.pipeline.conftest import WriteConfig, made
+from tests.pipeline.turn import PACKAGE, turn
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = Path(".work/mill")
+
+
+def mill(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tests.pipeline.turn", *(str(each) for each in arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_stages_are_found_by_folder_and_stand_after_what_they_read() -> None:
+    stages = find_stages(PACKAGE)
+    assert set(stages) == {"grain", "flour", "salt", "bread"}
+    assert [name for name in stages if name != "salt"] == ["grain", "flour", "bread"]
+
+
+def test_run_and_status_go_through_the_whole_mill(tmp_path: Path, write_config: WriteConfig) -> None:
+    asked = ("--config", write_config(), "--out", tmp_path / "out")
+    assert mill("run", "grain", *asked, "--workers", 2).returncode == 0
+    status = mill("status", *asked)
+    assert status.returncode == 0
+    rows = [line.split() for line in status.stdout.splitlines()]
+    assert rows[0] == ["stage", "done", "failed", "samples", "rejects", "time", "left", "memory", "disk"]
+    by_name = {row[0]: row for row in rows}
+    assert by_name["grain"][1:5] == ["6/6", "0", "24", "12"]
+    assert by_name["flour"][1:7] == ["0/6", "0", "0", "0", "0s", "?"]
+    assert by_name["bread"][1:] == ["waits", "for", "flour"]
+    assert "grain: 12 rejected: hollow" in status.stdout
+
+
+def test_status_names_the_shards_that_are_set_aside(tmp_path: Path, write_config: WriteConfig) -> None:
+    config = write_config(flour={"trouble": {"harvest1-1": "fails"}})
+    turn(config, tmp_path / "out", "salt", "grain", "flour")
+    status = mill("status", "--config", config, "--out", tmp_path / "out")
+    assert "flour: harvest1-1 is set aside: the stones are blunt" in status.stdout
+    assert [line.split()[1:3] for line in status.stdout.splitlines() if line.startswith("flour ")] == [["5/6", "1"]]
+
+
+def test_seed_of_the_command_line_stands_in_place_of_the_configs(tmp_path: Path, write_config: WriteConfig) -> None:
+    mill("run", "grain", "--config", write_config(), "--out", tmp_path / "asked", "--seed", 11)
+    turn(write_config(seed=11), tmp_path / "written", "grain")
+    assert made(tmp_path / "asked") == made(tmp_path / "written")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("run", "flower"), "there is no stage flower; did you mean flour?"),
+        (("run", "flour", "--shards", "3/2"), "--shards 3/2: must be i/n with 1 <= i <= n, such as 2/8"),
+        (("run", "flour", "--workers", "0"), "--workers"),
+        (("run", "flour", "--config", "none.yaml"), "none.yaml: cannot be read: No such file or directory"),
+        (("run", "flour"), "flour reads grain, and 2 of its 2 shards are not made"),
+    ],
+)
+def test_wrong_call_exits_with_2_and_says_what_is_right(
+    tmp_path: Path, write_config: WriteConfig, arguments: tuple[str, ...], message: str
+) -> None:
+    given = arguments if "--config" in arguments else (*arguments, "--config", str(write_config()))
+    done = mill(*given, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_wrong_config_exits_with_2_before_any_work(tmp_path: Path, write_config: WriteConfig) -> None:
+    done = mill("run", "salt", "--config", write_config(flour={"finenes": 1.0}), "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert "flour.finenes: unknown key; did you mean fineness?" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_verify_finds_a_flipped_byte_and_the_next_run_mends_it(tmp_path: Path, write_config: WriteConfig) -> None:
+    config, out = write_config(), tmp_path / "out"
+    turn(config, out)
+    whole = made(out)
+    asked = ("verify", "--config", config, "--out", out)
+    good = mill(*asked, "--samples", 3)
+    assert (good.returncode, good.stdout) == (0, f"verify --config {config} --out {out} --samples 3\n")
+    assert mill(*asked, "--spoiled").returncode == 1
+    loaf = out / "mill/loaves/1.bin"
+    content = bytearray(loaf.read_bytes())
+    content[100] ^= 1
+    with open(loaf, "r+b") as stream:
+        stream.write(content)
+    bad = mill(*asked)
+    assert bad.returncode == 1
+    assert "loaf-harvest0-1.bin is damaged; the next run makes loaf-harvest0-1 again" in bad.stdout
+    assert turn(config, out)["bread"].made == 1
+    assert made(out) == whole
+
+
+def test_verify_of_an_unfinished_dataset_fails(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "out", "salt", "grain")
+    done = mill("verify", "--config", write_config(), "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert "flour: 6 of 6 shards are not made, first harvest0-0" in done.stdout
+
+
+def test_inspect_passes_its_arguments_on() -> None:
+    done = mill("inspect", "my.glb", "--json")
+    assert (done.returncode, done.stdout) == (0, "inspect my.glb --json\n")
+
+
+def test_clean_removes_the_work_and_leaves_the_dataset(tmp_path: Path, write_config: WriteConfig) -> None:
+    turn(write_config(), tmp_path / "out")
+    assert mill("clean", "--config", write_config(), "--out", tmp_path / "out").returncode == 0
+    assert sorted(path.name for path in (tmp_path / "out").rglob("*") if path.is_file()) == [
+        f"{index}.bin" for index in range(4)
+    ]

@@ -1,0 +1,118 @@
+"""Plans and fingerprints: what makes a shard new, and plans that break their contract."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pipeline.config import Config, StrictModel
+from pipeline.places import Places
+from pipeline.records import ShardRecord, fingerprint, read_record
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from pipeline.survey import Survey
+
+
+class Empty(StrictModel):
+    """Nothing to say."""
+
+
+class Other(StrictModel):
+    """Nothing to say either."""
+
+
+def nothing(task: Task) -> Outcome:
+    raise AssertionError("no shard is made here")
+
+
+def stage(name: str, *shards: Shard, inputs: tuple[str, ...] = (), config: type[StrictModel] = Empty) -> Stage:
+    return Stage(name, 1, config, inputs, lambda _: list(shards), nothing, lambda _: 0)
+
+
+def survey(out: Path, *stages: Stage) -> Survey:
+    config = Config("toy", "1.0.0", 0, {each.name: each.config() for each in stages}, Path("toy.yaml"))
+    return Survey(config, {each.name: each for each in stages}, Places(out, "toy"))
+
+
+def prints(out: Path, *stages: Stage) -> dict[str, str]:
+    surveyed = survey(out, *stages)
+    return {
+        f"{each.name}/{shard}": value
+        for each in stages
+        for shard, value in surveyed.stage(each.name).fingerprints.items()
+    }
+
+
+FIRST = stage("first", Shard("a", {"size": 1}), Shard("b", {"size": 1}))
+SECOND = stage("second", Shard("c", {}, ("first/a",)), Shard("d", {}, ("second/c",)), inputs=("first",))
+
+
+def test_fingerprint_depends_on_each_thing_that_bytes_depend_on(tmp_path: Path) -> None:
+    shard = Shard("a", {"size": 1})
+    base = fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"})
+    others = {
+        fingerprint(replace(FIRST, version=2), {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"}),
+        fingerprint(replace(FIRST, name="z"), {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"}),
+        fingerprint(FIRST, {"k": 2}, ("n", "1.0.0", 0), shard, {"x/y": "0"}),
+        fingerprint(FIRST, {"k": 1}, ("m", "1.0.0", 0), shard, {"x/y": "0"}),
+        fingerprint(FIRST, {"k": 1}, ("n", "1.0.1", 0), shard, {"x/y": "0"}),
+        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 1), shard, {"x/y": "0"}),
+        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), replace(shard, name="b"), {"x/y": "0"}),
+        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), replace(shard, params={"size": 2}), {"x/y": "0"}),
+        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "1"}),
+        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/z": "0"}),
+    }
+    assert len(others | {base}) == 11
+    assert fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"}) == base
+
+
+def test_changed_shard_changes_what_reads_it_and_nothing_else(tmp_path: Path) -> None:
+    before = prints(tmp_path, FIRST, SECOND)
+    changed = stage("first", Shard("a", {"size": 2}), Shard("b", {"size": 1}))
+    after = prints(tmp_path, changed, SECOND)
+    assert {name for name in before if before[name] != after[name]} == {"first/a", "second/c", "second/d"}
+
+
+def test_unread_record_of_an_own_shard_keeps_its_reader_waiting(tmp_path: Path) -> None:
+    surveyed = survey(tmp_path, FIRST, SECOND).stage("second")
+    assert [surveyed.ready(shard) for shard in surveyed.shards] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("shards", "message"),
+    [
+        ((Shard("a"), Shard("a")), "malformed or stands twice"),
+        ((Shard("a.b"),), "malformed or stands twice"),
+        ((Shard(""),), "malformed or stands twice"),
+        ((Shard("a", {}, ("first/none",)),), "first/none, which is not planned before it"),
+        ((Shard("a", {}, ("second/b",)), Shard("b")), "second/b, which is not planned before it"),
+        ((Shard("a", {}, ("third/x",)),), "third is no input of second"),
+    ],
+)
+def test_plan_that_breaks_its_contract_is_refused(tmp_path: Path, shards: tuple[Shard, ...], message: str) -> None:
+    surveyed = survey(tmp_path, FIRST, stage("third", Shard("x")), stage("second", *shards, inputs=("first",)))
+    with pytest.raises(ValueError, match=message):
+        surveyed.stage("second")
+
+
+def test_plan_sees_only_the_stages_and_sections_that_it_reads(tmp_path: Path) -> None:
+    seen: list[Plan] = []
+
+    def plan(plan: Plan) -> list[Shard]:
+        seen.append(plan)
+        return []
+
+    second = replace(stage("second", inputs=("first",)), plan=plan)
+    survey(tmp_path, FIRST, second, stage("third", config=Other)).stage("second")
+    assert seen[0].shards("first") == ["a", "b"]
+    assert set(seen[0].config.sections) == {"first", "second"}
+    with pytest.raises(ValueError, match="stage third, which is not among its inputs"):
+        seen[0].shards("third")
+
+
+def test_record_survives_its_way_to_disk_and_back(tmp_path: Path) -> None:
+    record = ShardRecord("s", "a", "f" * 64, {"a.tar": {"sha256": "0", "bytes": 3}}, 2, {"odd": 1}, 0.5, 9, {"k": [1]})
+    (tmp_path / "a.json").write_bytes(record.to_bytes())
+    assert read_record(tmp_path / "a.json") == record
+    assert read_record(tmp_path / "none.json") is None

@@ -1,0 +1,122 @@
+"""The stage on the real mill, behind two small stages that make a kit and a collection."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.config import Config, StrictModel
+from pipeline.places import Places
+from pipeline.run import RunResult, run_stage
+from pipeline.shards import ShardWriter, read_shard
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.shape.kit import Assembly
+from stages.shape.kit_files import write_kit
+from stages.shape.sample import Sample, write_sample
+from stages.sketches.image import png_array
+from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
+from stages.sketches.stage import STAGE
+from tests.stages.views.solids import box, cylinder, kit_of, part_type, posed
+
+SHARDS = {"toys-train-000000": ("train", 3), "toys-val-000000": ("val", 2)}
+
+
+class KitsConfig(StrictModel):
+    """No keys."""
+
+
+class ShapesConfig(StrictModel):
+    """flat: whether one shape is a sheet that the first view sees edge-on."""
+
+    flat: bool = False
+
+
+def make_kit(task: Task) -> Outcome:
+    sheet = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1]]), np.array([[0, 1, 2]], dtype=np.int32)
+    kit = kit_of(part_type("box", box()), part_type("drum", cylinder(24, 0.4, 1.0)), part_type("sheet", sheet))
+    with task.output("solids.json") as text, task.output("solids.tar") as arrays:
+        write_kit(kit, text, arrays)
+    return Outcome(1)
+
+
+def plan_shapes(plan: Plan) -> list[Shard]:
+    return [Shard(name, inputs=("exemplars/solids",)) for name in SHARDS]
+
+
+def make_shapes(task: Task) -> Outcome:
+    split, count = SHARDS[task.shard.name]
+    flat = task.config.section(ShapesConfig).flat and split == "val"
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for index in range(count):
+            types = np.array([2] if flat else [0, 1, 0][: index + 1], dtype=np.int16)
+            poses = posed(*[(k, 0.0, 0.0) for k in range(len(types))])
+            edges = np.array([(k, k + 1) for k in range(len(types) - 1)], dtype=np.int32).reshape(-1, 2)
+            assembly = Assembly(types, poses, edges)
+            write_sample(writer, Sample(f"{split}-{index}", split, "variations", "solids", "0" * 64, assembly, {}))
+    return Outcome(count, {"split": split, "samples": count})
+
+
+def small(plan: Plan) -> int:
+    return 100_000
+
+
+STAGES = {
+    "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
+    "variations": Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
+    "sketches": STAGE,
+}
+
+
+def turn(out: Path, flat: bool = False, **keys: object) -> dict[str, RunResult]:
+    """Run all stages in this process."""
+    sketches = SketchesConfig.model_validate({"size": 48, "backend": "raycast", **keys})
+    sections = {"exemplars": KitsConfig(), "variations": ShapesConfig(flat=flat), "sketches": sketches}
+    config = Config(name="toys", version="1.0.0", seed=5, sections=sections, path=Path("toys.yaml"))
+    return {name: run_stage(name, STAGES, config, Places(out, "toys"), workers=1) for name in STAGES}
+
+
+def made(out: Path, **keys: object) -> dict[str, list[tuple[str, dict[str, bytes]]]]:
+    """The samples of each shard of sketches, from a run of all stages."""
+    assert turn(out, **keys)["sketches"] == RunResult(made=2)
+    return {name: list(read_shard(next(out.rglob(f"sketches/**/{name}.tar")))) for name in SHARDS}
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[str, dict[str, bytes]]]]:
+    """The samples of a run without augmentations."""
+    return made(tmp_path_factory.mktemp("plain"))
+
+
+def test_each_sample_gets_one_drawing_a_view(plain):
+    assert [key for key, _ in plain["toys-train-000000"]] == ["train-0", "train-1", "train-2"]
+    for samples in plain.values():
+        for _, members in samples:
+            assert sorted(members) == ["sketch0.png", "sketch1.png", "sketch2.png"]
+            drawings = [png_array(content) for content in members.values()]
+            assert all(drawing.shape == (48, 48) and drawing.min() < 128 for drawing in drawings)
+            assert not (drawings[0] == drawings[2]).all()
+
+
+def test_the_same_config_gives_the_same_bytes(tmp_path):
+    view = SketchView(name="wandering", azimuth_jitter=20.0).model_dump()
+    one, two = (made(tmp_path / name, views=[view]) for name in ("one", "two"))
+    assert one == two
+    first, second = (members["sketch0.png"] for _, members in one["toys-train-000000"][:2])
+    assert first != second
+
+
+def test_augmented_drawings_keep_their_members(tmp_path, plain):
+    thickened = made(tmp_path, augment=Augmentation(flip=0.5, dilate=1.0).model_dump())
+    for name in SHARDS:
+        for (_, thick), (_, thin) in zip(thickened[name], plain[name], strict=True):
+            assert sorted(thick) == sorted(thin)
+            assert png_array(thick["sketch0.png"]).mean() < png_array(thin["sketch0.png"]).mean()
+
+
+def test_a_blank_drawing_fails_the_shard_and_names_the_sample(tmp_path):
+    view = SketchView(name="edge_on", azimuth=0.0, elevation=0.0).model_dump()
+    failed = turn(tmp_path, flat=True, views=[view])["sketches"].failed
+    assert list(failed) == ["toys-val-000000"]
+    assert "val-0, view edge_on: blank picture" in failed["toys-val-000000"]
