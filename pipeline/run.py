@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -118,6 +119,7 @@ class _Run:
         self._result = RunResult()
         self._failures: Counter[str] = Counter()
         self._deaths: Counter[str] = Counter()
+        self._shown = 0.0
 
     def through(self, count: int, lock: BinaryIO) -> RunResult:
         """Make what is missing with `count` workers, then finish the stage if it is complete."""
@@ -202,7 +204,9 @@ class _Run:
                     self._survey.accept(self._name, job.shard.name)
                 else:
                     self._count_failure(job, report, ready)
-            self._show(surveyed, workers)
+            if time.monotonic() - self._shown >= _LOOK_EVERY:
+                self._shown = time.monotonic()
+                self._show(surveyed, workers)
 
     def _count_death(self, job: Job, ready: deque[Job], alone: deque[Job]) -> None:
         self._deaths[job.shard.name] += 1

@@ -152,8 +152,9 @@ class _ShardTask:
         )
         content = record.to_bytes()
         # The old record goes first: killed between two renames, the shard must not look like the old one.
-        record_path.unlink(missing_ok=True)
-        sync_folder(self._places.records)
+        if record_path.exists():
+            record_path.unlink()
+            sync_folder(self._places.records)
         for name in files:
             os.replace(temporary(self._places.root / name), self._places.root / name)
         if self._reject_stream is not None:

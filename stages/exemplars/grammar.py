@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -62,20 +62,20 @@ def observe(
     contact: ContactTest,
     tolerance: float,
     kinds: Sequence[ContactKind],
-) -> tuple[list[Assembly], Grammar, Mapping[ContactKind, int]]:
+) -> tuple[list[Assembly], Grammar, list[tuple[ContactKind, ...]]]:
     """The grammar of `assemblies`, counting only contacts of the given `kinds`.
 
-    Returns the assemblies with the edges that count, the grammar, and the number of contacts of each kind found.
+    Returns the assemblies with the edges that count, the grammar, and for each assembly the kind of every edge that
+    it came with.
     """
     dockings = _measure_dockings(types, observe_dockings(types, assemblies, tolerance), contact)
     table = DockingTable(types, dockings, tolerance)
-    found: dict[ContactKind, int] = {"point": 0, "line": 0, "face": 0}
+    found: list[tuple[ContactKind, ...]] = []
     kept: list[Assembly] = []
     for assembly in assemblies:
         labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
-        for label in labels.tolist():
-            found[dockings[label].kind] += 1
-        counted = np.array([dockings[label].kind in kinds for label in labels], dtype=bool)
+        found.append(tuple(dockings[label].kind for label in labels.tolist()))
+        counted = np.array([kind in kinds for kind in found[-1]], dtype=bool)
         kept.append(replace(assembly, edges=assembly.edges[counted]))
     usable = tuple(each for each in dockings if each.kind in kinds)
     return kept, Grammar(observe_neighbourhoods(kept), usable, _observe_nested(types, assemblies, contact)), found

@@ -112,12 +112,11 @@ def _normal(tri, out):
 
 @numba.njit(cache=True)
 def _plane_sides(n, length, origin, tri, out):
-    """Signed distances of the corners of `tri` to the plane; False where all three lie off one side."""
+    """Signed distances of the corners of `tri` to a plane, into `out`."""
     for k in range(3):
         out[k] = (
             n[0] * (tri[k, 0] - origin[0]) + n[1] * (tri[k, 1] - origin[1]) + n[2] * (tri[k, 2] - origin[2])
         ) / length
-    return None
 
 
 @numba.njit(cache=True)
@@ -125,14 +124,14 @@ def _pierces(tri, sides, other, n):
     """Whether an edge of `tri` passes through the interior of `other` (normal n); `sides` are its plane distances."""
     hit = np.empty(3)
     for k in range(3):
-        l = (k + 1) % 3
-        if (sides[k] <= 0.0 and sides[l] >= 0.0) or (sides[k] >= 0.0 and sides[l] <= 0.0):
-            span = sides[k] - sides[l]
+        after = (k + 1) % 3
+        if (sides[k] <= 0.0 and sides[after] >= 0.0) or (sides[k] >= 0.0 and sides[after] <= 0.0):
+            span = sides[k] - sides[after]
             if span == 0.0:
                 continue
             t = sides[k] / span
             for axis in range(3):
-                hit[axis] = tri[k, axis] + t * (tri[l, axis] - tri[k, axis])
+                hit[axis] = tri[k, axis] + t * (tri[after, axis] - tri[k, axis])
             if _inside_prism(hit, other, n):
                 return True
     return False
@@ -261,16 +260,16 @@ def _clip(polygon, count, n, offset, out):
     """The part of a polygon where n . x <= offset (Sutherland and Hodgman); its corner count."""
     kept = 0
     for k in range(count):
-        l = (k + 1) % count
+        after = (k + 1) % count
         dk = _dot(n, polygon[k]) - offset
-        dl = _dot(n, polygon[l]) - offset
+        dl = _dot(n, polygon[after]) - offset
         if dk <= 0.0:
             out[kept] = polygon[k]
             kept += 1
         if (dk < 0.0 and dl > 0.0) or (dk > 0.0 and dl < 0.0):
             t = dk / (dk - dl)
             for axis in range(3):
-                out[kept, axis] = polygon[k, axis] + t * (polygon[l, axis] - polygon[k, axis])
+                out[kept, axis] = polygon[k, axis] + t * (polygon[after, axis] - polygon[k, axis])
             kept += 1
     return kept
 
@@ -319,8 +318,8 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
         for k in range(3):
             if count == 0:
                 break
-            l = (k + 1) % 3
-            ex, ey, ez = tri[l, 0] - tri[k, 0], tri[l, 1] - tri[k, 1], tri[l, 2] - tri[k, 2]
+            after = (k + 1) % 3
+            ex, ey, ez = tri[after, 0] - tri[k, 0], tri[after, 1] - tri[k, 1], tri[after, 2] - tri[k, 2]
             # nb points backwards here, so edge x nb points out of the triangle with its sign turned
             edge[0] = ez * nb[1] - ey * nb[2]
             edge[1] = ex * nb[2] - ez * nb[0]

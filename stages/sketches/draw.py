@@ -38,9 +38,7 @@ def draw_sketch(
     from stages.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
 
     seen = visible_triangles(scene, camera, (size * supersample, size * supersample), backend)
-    strokes = find_strokes(
-        seen, options.crease_angle, options.step * supersample, options.shortest * supersample
-    )
+    strokes = find_strokes(seen, options.crease_angle, options.step * supersample, options.shortest * supersample)
     widths = {
         OUTLINE: options.outline,
         CONTOUR: options.contour,

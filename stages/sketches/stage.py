@@ -39,9 +39,7 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(samples=writer.samples, summary=summary)
 
 
-def _drawings(
-    task: Task, config: SketchesConfig, sample: Sample, scene: Scene, backend: Backend
-) -> dict[str, bytes]:
+def _drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, backend: Backend) -> dict[str, bytes]:
     members = {}
     for index, view in enumerate(config.views):
         camera = jittered_camera(view, task.rng(sample.key, view.name, "camera"))

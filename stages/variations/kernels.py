@@ -342,14 +342,14 @@ def _fit_motion(kit, a, b, ws):
         for i in range(3):
             for j in range(3):
                 x = 0.0
-                for l in range(3):
-                    x += b.turns[image, i, l] * kit.symmetries[symmetry, l, j]
+                for axis in range(3):
+                    x += b.turns[image, i, axis] * kit.symmetries[symmetry, axis, j]
                 target[i, j] = x
         for i in range(3):
             for j in range(3):
                 x = (a.places[part, i] - centre_a[i]) * (b.places[image, j] - centre_b[j])
-                for l in range(3):
-                    x += weight * a.turns[part, i, l] * target[j, l]
+                for axis in range(3):
+                    x += weight * a.turns[part, i, axis] * target[j, axis]
                 covariance[i, j] += x
     u, _, vt = np.linalg.svd(covariance)
     old = ws.motion[:3]

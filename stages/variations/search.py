@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import IntArray
-from stages.shape.kit import Assembly, Kit
-from stages.shape.pose import pose_vectors
+from stages.shape.kit import Assembly
 from stages.variations import kernels
 from stages.variations.answers import ContactAnswers
 from stages.variations.centroids import match_centroids
@@ -129,8 +128,8 @@ class Search:
                 outcome = match_centroids(rng, kit, a.tables, b.tables, ws)
         if outcome == Outcome.OK:
             outcome = kernels.join(rng, kit, a.tables, b.tables, ws, self.smallest, self.largest)
-        if outcome == Outcome.OK and self.config.matching == "centroid":
-            if not correct_orientations(self.answers.dockings, ws):
+            corrected = self.config.matching == "pose" or outcome != Outcome.OK
+            if not corrected and not correct_orientations(self.answers.dockings, ws):
                 return "orientation cannot be corrected"
         if outcome == Outcome.OK:
             outcome = self._ask_until_known(kernels.connect)

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, Protocol
 
-import numpy as np
-
 from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.views.camera import Camera, View
@@ -86,9 +84,7 @@ def visible_triangles(scene: Scene, camera: Camera, size: tuple[int, int], backe
     return Visible(scene, view, triangles, screen, screen_normals(scene, view, screen))
 
 
-def render_buffers(
-    scene: Scene, camera: Camera, size: tuple[int, int], supersample: int, backend: Backend
-) -> Buffers:
+def render_buffers(scene: Scene, camera: Camera, size: tuple[int, int], supersample: int, backend: Backend) -> Buffers:
     """Buffers of `size` (width, height) times `supersample` pixels. Raises ShardFailed for a blank picture."""
     from stages.views.screen import surface_buffers
 
@@ -101,14 +97,26 @@ _RENDERS: dict[Backend, int] = {}
 
 
 def _draw(scene: Scene, view: View, width: int, height: int, backend: Backend) -> IntArray:
-    """Draw with this process's one renderer of the kind `backend`."""
+    """Draw with this process's one renderer of the kind `backend`; a lost context is made anew once."""
     if _RENDERS.get(backend, 0) >= RENDERS_A_CONTEXT:
         _RENDERERS.pop(backend).close()
         _RENDERS[backend] = 0
+    try:
+        return _renderer(backend).triangles(scene, view, width, height)
+    except RuntimeError:
+        del _RENDERERS[backend]
+    try:
+        return _renderer(backend).triangles(scene, view, width, height)
+    except RuntimeError as error:
+        raise ShardFailed(f"{backend} fails with a fresh context too: {error}") from error
+
+
+def _renderer(backend: Backend) -> _Renderer:
     if backend not in _RENDERERS:
         _RENDERERS[backend] = _new_renderer(backend)
-    _RENDERS[backend] = _RENDERS.get(backend, 0) + 1
-    return np.ascontiguousarray(_RENDERERS[backend].triangles(scene, view, width, height))
+        _RENDERS[backend] = 0
+    _RENDERS[backend] += 1
+    return _RENDERERS[backend]
 
 
 def _new_renderer(backend: Backend) -> _Renderer:

@@ -27,14 +27,17 @@ def ink_strokes(
 
     widths: line width of each kind of stroke, in pixels of the image; a kind without a width is not drawn.
     scale: pixels of the image for each pixel of the view the strokes were found in.
-    crowding: where lines stand closer than this, in pixels of the image, they are drawn thinner in
-    proportion (contours and outlines less so), so that fine detail turns into a light hatch and not into a black patch; 0 keeps all widths.
+    crowding: where lines stand closer than this, in pixels of the image, they are drawn thinner in proportion
+    (contours and outlines less so), so that fine detail turns into a light hatch and not into a black patch; 0 keeps
+    all widths.
     """
     ends = strokes.ends * scale
     table = np.zeros(256)
     for kind, line in widths.items():
         table[kind] = line
-    return _draw(ends, _fade(ends, strokes.kinds, table, FADING, width, height, crowding), width, height)
+    lines = _fade(ends, strokes.kinds, table, FADING, width, height, crowding)
+    ink: FloatArray = _draw(ends, lines, width, height)
+    return ink
 
 
 @numba.njit(cache=True, error_model="numpy")

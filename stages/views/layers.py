@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from stages.shape.arrays import FloatArray
 from stages.views.camera import View
 from stages.views.scene import Scene

@@ -34,7 +34,9 @@ class KeyLight:
         x = (local[:, 0] * self.view.projection[0, 0] + 1) / 2 * size
         y = (1 - local[:, 1] * self.view.projection[1, 1]) / 2 * size
         pixel = 2.0 / (self.view.projection[0, 0] * size)
-        return _filtered(self.depth, x, y, -local[:, 2], softness / pixel, 2.0 * pixel + 0.004 * self.view.radius)
+        bias = 2.0 * pixel + 0.004 * self.view.radius
+        share: FloatArray = _filtered(self.depth, x, y, -local[:, 2], softness / pixel, bias)
+        return share
 
 
 def key_light(scene: Scene, azimuth: float, elevation: float, backend: Backend) -> KeyLight:
@@ -69,7 +71,8 @@ def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float
     positions = eye_positions(depth, view)
     across = 2.0 / (view.projection[0, 0] * depth.shape[1])
     raw = _openness(depth, normal.astype(np.float64), positions, reach, across, view.perspective)
-    return _smoothed(raw, depth, reach)
+    smooth: FloatArray = _smoothed(raw, depth, reach)
+    return smooth
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -86,10 +89,8 @@ def _filtered(depth, x, y, distance, radius, bias):
         for tap in range(taps):
             away = spread[tap]
             column, row = int(np.floor(x[k] + right[tap])), int(np.floor(y[k] + down[tap]))
-            if column < 0 or row < 0 or column >= size or row >= size:
-                free += 1
-            elif depth[row, column] + bias * (1.0 + away * 0.5) >= distance[k]:
-                free += 1
+            outside = column < 0 or row < 0 or column >= size or row >= size
+            free += outside or depth[row, column] + bias * (1.0 + away * 0.5) >= distance[k]
         lit[k] = free / taps
     return lit
 

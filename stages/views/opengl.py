@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import IntArray
 from stages.views.camera import View
 from stages.views.layers import layered_moves
 from stages.views.scene import MeshSet, Scene
@@ -58,8 +58,7 @@ def load_pyrender(platform: Literal["egl", "osmesa"]) -> Any:
     """
     os.environ.setdefault("PYOPENGL_PLATFORM", platform)
     os.environ.setdefault("LP_NUM_THREADS", "0")
-    if not hasattr(np, "infty"):
-        np.infty = np.inf  # type: ignore[attr-defined]
+    vars(np).setdefault("infty", np.inf)
     import pyrender
 
     return pyrender
@@ -89,7 +88,18 @@ class OpenGLRenderer:
         self._frame = 0
 
     def triangles(self, scene: Scene, view: View, width: int, height: int) -> IntArray:
-        """The triangle that each pixel shows, int32 (height, width), -1 for none."""
+        """The triangle that each pixel shows, int32 (height, width), -1 for none.
+
+        Raises RuntimeError where the driver refuses: the context may be lost.
+        """
+        from OpenGL.error import Error
+
+        try:
+            return self._triangles(scene, view, width, height)
+        except (Error, AssertionError) as error:
+            raise RuntimeError(f"OpenGL: {error}") from error
+
+    def _triangles(self, scene: Scene, view: View, width: int, height: int) -> IntArray:
         from OpenGL import GL
 
         self._context._platform.make_current()
@@ -109,7 +119,7 @@ class OpenGLRenderer:
         pixels = np.empty((height, width), dtype=np.int32)
         GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 4)
         GL.glReadPixels(0, 0, width, height, GL.GL_RED_INTEGER, GL.GL_INT, pixels)
-        return pixels[::-1]
+        return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
         """Give the context back."""
@@ -165,10 +175,8 @@ class OpenGLRenderer:
                     GL.glDeleteVertexArrays(1, [mesh.array])
                     GL.glDeleteBuffers(3, list(mesh.buffers))
             vertices, faces = meshes.vertices.astype(np.float32), meshes.faces
-            points, triangles = pairwise(meshes.vertex_first.tolist()), pairwise(meshes.face_first.tolist())
-            self._uploaded[meshes] = [
-                _upload(vertices[a:b], faces[c:d] - np.int32(a)) for (a, b), (c, d) in zip(points, triangles, strict=True)
-            ]
+            ends = zip(pairwise(meshes.vertex_first.tolist()), pairwise(meshes.face_first.tolist()), strict=True)
+            self._uploaded[meshes] = [_upload(vertices[a:b], faces[c:d] - np.int32(a)) for (a, b), (c, d) in ends]
         self._uploaded.move_to_end(meshes)
         return self._uploaded[meshes]
 

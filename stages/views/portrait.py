@@ -114,12 +114,13 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, shape: tuple[int, i
     left[down] = found
     # Where a shadow would leave the picture it fades out, so that pictures stand side by side without a seam.
     rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
-    edge = np.minimum(
-        np.minimum(rows, shape[0] - rows)[:, None], np.minimum(columns, shape[1] - columns)[None, :]
-    ) / (0.10 * min(shape))
+    edge = np.minimum(np.minimum(rows, shape[0] - rows)[:, None], np.minimum(columns, shape[1] - columns)[None, :]) / (
+        0.10 * min(shape)
+    )
     fade = np.clip(edge, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(edge, 0.0, 1.0))
     shadow = ((1.0 - left.reshape(shape)) * fade)[..., None]
-    return 1.0 - shadow * (1.0 - SHADOW)
+    light_left: FloatArray = 1.0 - shadow * (1.0 - SHADOW)
+    return light_left
 
 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:

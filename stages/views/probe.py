@@ -57,7 +57,7 @@ def main() -> int:
     if len(sys.argv) != 2 or sys.argv[1] not in BACKENDS:
         print(f"usage: python -m stages.views.probe {'|'.join(BACKENDS)}", file=sys.stderr)
         return 2
-    backend = BACKENDS[BACKENDS.index(sys.argv[1])]  # type: ignore[arg-type]
+    backend = BACKENDS[BACKENDS.index(sys.argv[1])]
     wrong = probe(backend)
     print(f"{backend}: {'draws' if wrong is None else wrong}")
     return 0 if wrong is None else 1

@@ -32,7 +32,7 @@ class RaycastRenderer:
         )
         casting = o3d.t.geometry.RaycastingScene(nthreads=1)
         numbers = np.arange(len(corners) * 3, dtype=np.uint32).reshape(-1, 3)
-        casting.add_triangles(o3d.core.Tensor(corners.reshape(-1, 3)), o3d.core.Tensor(numbers))
+        casting.add_triangles(o3d.core.Tensor.from_numpy(corners.reshape(-1, 3)), o3d.core.Tensor.from_numpy(numbers))
         rays = _rays(view.projection.tobytes(), width, height)
         hits = casting.cast_rays(rays, nthreads=1)["primitive_ids"].numpy().astype(np.uint32)
         return np.where(hits == casting.INVALID_ID, -1, hits.astype(np.int64)).astype(np.int32)
@@ -66,4 +66,4 @@ def _rays(projection: bytes, width: int, height: int) -> Any:
     start = 3 if matrix[3, 3] == 0.0 else 0
     rays[..., 5] = -1.0
     rays[..., start], rays[..., start + 1] = x[None, :], y[:, None]
-    return o3d.core.Tensor(rays)
+    return o3d.core.Tensor.from_numpy(rays)

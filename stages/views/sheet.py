@@ -53,9 +53,9 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
     width = 2 * margin + columns * cell_width + (columns - 1) * gap
     heights = _row_heights(sections, cell_width, unit)
     head = round(66 * unit)
-    height = 2 * margin + (round(62 * unit) if title else 0) + sum(
-        (head if section.title else 0) + sum(each) + gap * len(each) for section, each in zip(sections, heights, strict=True)
-    )
+    height = 2 * margin + (round(62 * unit) if title else 0)
+    for section, rows in zip(sections, heights, strict=True):
+        height += (head if section.title else 0) + sum(rows) + gap * len(rows)
     sheet = Image.new("RGB", (width, height), PAPER)
     pen = ImageDraw.Draw(sheet)
     y = margin
@@ -130,9 +130,9 @@ def _fitting(pen: Any, text: str, font: Any, width: int) -> str:
 @lru_cache(maxsize=16)
 def _font(size: int, bold: bool) -> Any:
     """DejaVu Sans as it comes with matplotlib: the same letters on every machine."""
-    import matplotlib
+    from matplotlib import get_data_path
     from PIL import ImageFont
 
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    path = f"{matplotlib.get_data_path()}/fonts/ttf/{name}"
+    path = f"{get_data_path()}/fonts/ttf/{name}"
     return ImageFont.truetype(path, size, layout_engine=ImageFont.Layout.BASIC)

@@ -51,7 +51,7 @@ def find_strokes(seen: Visible, crease_angle: float, step: float, shortest: floa
     crease_angle: degrees between the normals of two faces above which their edge is drawn. step: smallest jump in
     depth that is a contour; shortest: connected lines shorter in all than this are left out; both in pixels.
     """
-    height, width = seen.triangles.shape
+    height = len(seen.triangles)
     scene = seen.scene
     across, across_kind, down, down_kind = _crossings(
         seen.triangles,
@@ -247,9 +247,12 @@ def _crossings(
                 if r2 == height or c2 == width:
                     continue
                 q = triangles[r2, c2]
-                if p == q or (p >= 0 and q >= 0 and parts[p] == parts[q] and _runs_on(
-                    p, q, screen, normals, face_of, neighbours, cosine
-                )):
+                if p == q or (
+                    p >= 0
+                    and q >= 0
+                    and parts[p] == parts[q]
+                    and _runs_on(p, q, screen, normals, face_of, neighbours, cosine)
+                ):
                     continue
                 kind, s = _between(
                     p, q, c + 0.5, r + 0.5, c2 + 0.5, r2 + 0.5, screen, normals, parts, face_of, part_first,

@@ -47,9 +47,10 @@ def bench() -> Iterator[Measure]:
                 render_buffers(scene, view, (SIZE, SIZE), SUPERSAMPLE, backend)
             return len(views)
 
+        ours = rate(buffers)
         peer = _pyrender_buffers(views) if backend == "egl" else None
         name = "pyrender, depth and segmentation" if peer else ""
-        yield Measure(f"buffers, {backend}", "views", rate(buffers), name, peer, note)
+        yield Measure(f"buffers, {backend}", "views", ours, name, peer, note)
 
 
 def _pyrender_buffers(views: list[Camera]) -> float:

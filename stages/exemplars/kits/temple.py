@@ -34,7 +34,7 @@ FLAME, SHADOW = (244, 150, 62), (96, 84, 82)
 
 def shapes() -> dict[str, Layout]:
     """The two example precincts by name."""
-    return {"hall_and_court": _hall_and_court(), "belvedere": _belvedere()}
+    return {"hall_and_court": _hall_and_court(), "tower_and_cloister": _tower_and_cloister()}
 
 
 def _types() -> dict[str, Solid]:
@@ -297,7 +297,7 @@ class _Precinct(Layout):
 
 
 def _hall_and_court() -> Layout:
-    """A long hall with a gabled roof; beside it a court with a pool, and a domed pavilion at its far end."""
+    """A long hall with a gabled roof; beside it a court with a pool, and a domed belvedere at its far end."""
     precinct = _Precinct()
     for j in range(4):
         precinct.column(0, j)
@@ -323,8 +323,9 @@ def _hall_and_court() -> Layout:
     precinct.bay(3, 1, 3, 2)
     precinct.cell("pool", 1, 1)
     precinct.cell("floor", 2, 1)
-    precinct.cell("dome", 2, 1, REST)
-    precinct.put("finial", 7.5, REST + 2.08, 4.5)
+    precinct.storey(2, 1, 1)
+    precinct.cell("dome", 2, 1, REST + UPPER)
+    precinct.put("finial", 7.5, REST + UPPER + 2.08, 4.5)
     precinct.put("stairs", 1.5, 0.0, 9.4)
     precinct.put("path", 1.5, 0.0, 10.5)
     precinct.put("altar", 1.5, 0.0, 11.5)
@@ -332,7 +333,7 @@ def _hall_and_court() -> Layout:
     return precinct
 
 
-def _belvedere() -> Layout:
+def _tower_and_cloister() -> Layout:
     """A tower of three storeys and a small temple, joined by colonnades around an open court."""
     precinct = _Precinct()
     for i, j in ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (4, 0), (3, 1), (4, 1), (3, 2), (4, 2), (2, 2), (1, 2)):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import shutil
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,16 @@ from pipeline.run import run_stage
 from pipeline.shards import bytes_array, read_shard
 from stages.package.verify_files import empty_values
 from stages.shape.pose import invert, transform_points
-from tests.stages.package.toy import SPLITS, TOY_STAGES, make_toy, toy_config, toy_kit, toy_samples
+from tests.stages.package.toy import (
+    REFUSED,
+    SPLITS,
+    TOY_STAGES,
+    make_toy,
+    toy_config,
+    toy_keys,
+    toy_kit,
+    toy_samples,
+)
 
 MEMBERS = ["glb", "points.npy", "normals.npy", "labels.npy", "instances.npy", "sketch0.png", "sketch1.png"]
 MEMBERS += ["txt", "json"]
@@ -34,10 +45,9 @@ def all_samples(folder: Path) -> dict[str, dict[str, bytes]]:
     return {key: members for path in sorted(folder.rglob("*.tar")) for key, members in read_shard(path)}
 
 
-def test_every_sample_of_the_collection_is_there_with_the_same_members(toy_folder: Path) -> None:
+def test_every_sample_that_no_stage_refused_is_there_with_the_same_members(toy_folder: Path) -> None:
     samples = all_samples(toy_folder)
-    made = {each.key for split in SPLITS for index in range(8) for each in toy_samples(split, index, 2)}
-    assert set(samples) == made
+    assert list(samples) == [key for split in sorted(SPLITS) for key in toy_keys(split)]
     assert all(list(members) == MEMBERS for members in samples.values())
 
 
@@ -137,7 +147,7 @@ def test_the_card_has_what_hugging_face_asks_for(toy_folder: Path) -> None:
         split: f"data/{split}/*.tar" for split in SPLITS
     }
     assert "](preview.png)" in text
-    assert "| all | 48 | 24 |" in text
+    assert "| all | 47 | 24 |" in text
 
 
 def test_checksums_cover_every_file_and_the_manifest_the_index(toy_folder: Path) -> None:
@@ -157,35 +167,33 @@ def test_nothing_in_the_folder_depends_on_where_or_with_how_many_workers_it_was_
     assert digests(again.parent / "toy-index") == digests(toy_folder.parent / "toy-index")
 
 
-def test_a_smaller_config_takes_its_old_shards_away_and_nothing_of_others(tmp_path: Path) -> None:
-    folder = make_toy(tmp_path, toy_config(shards=3, samples=1))
-    (folder / "notes.txt").write_text("mine")
-    make_toy(tmp_path, toy_config(shards=2, samples=1))
-    assert len(list(folder.rglob("*.tar"))) == 6
+def test_a_smaller_config_takes_its_old_shards_away_and_nothing_of_others(toy_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(toy_folder.parent, tmp_path / "out")
+    (tmp_path / "out/toy/notes.txt").write_text("mine")
+    folder = make_toy(tmp_path / "out", toy_config(shards=1))
+    assert [path.name for path in sorted(folder.rglob("*.tar"))] == [
+        f"toy-1_2_0-{split}-000000.tar" for split in sorted(SPLITS)
+    ]
     assert (folder / "notes.txt").read_text() == "mine"
 
 
-def test_a_sample_that_one_stage_has_refused_is_left_out_and_counted(tmp_path: Path) -> None:
-    refused = toy_samples("train", 1, 2)[0].key
-    folder = make_toy(tmp_path, toy_config(shards=2, refused=refused))
-    assert refused not in all_samples(folder)
-    manifest = json.loads((folder / "manifest.json").read_text())
-    assert manifest["samples"] == 11
-    assert manifest["splits"]["train"] == 3
-    (line,) = (tmp_path / ".work/toy/package/rejects/toy-train-000001.jsonl").read_text().splitlines()
-    assert json.loads(line)["reason"] == "refused by sketches"
+def test_a_sample_that_one_stage_has_refused_is_left_out_and_counted(toy_folder: Path) -> None:
+    assert REFUSED not in all_samples(toy_folder)
+    manifest = json.loads((toy_folder / "manifest.json").read_text())
+    assert manifest["samples"] == 47
+    assert manifest["splits"] == {"train": 15, "val": 16, "test": 16}
+    (line,) = (toy_folder.parent / ".work/toy/package/rejects/toy-train-000001.jsonl").read_text().splitlines()
+    assert json.loads(line) == {"item": REFUSED, "reason": "refused by sketches", "detail": "", "count": 1}
 
 
-def test_a_new_title_makes_the_card_again_and_no_shard(tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    config = toy_config(shards=1, samples=1)
-    folder = make_toy(tmp_path, config)
-    before = digests(folder)
-    result = run_stage("package", TOY_STAGES, replace(config, title="Other"), Places(tmp_path, "toy"), 1)
-    assert result.made == 1
-    changed = {file for file, digest in digests(folder).items() if digest != before[file]}
-    assert changed == {"README.md", "croissant.json", "checksums.txt"}
+def test_a_new_title_makes_card_and_picture_again_and_no_shard(toy_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(toy_folder.parent, tmp_path / "out")
+    config = replace(toy_config(), title="Other")
+    result = run_stage("package", TOY_STAGES, config, Places(tmp_path / "out", "toy"), 1)
+    assert result.made == 2
+    before, after = digests(toy_folder), digests(tmp_path / "out/toy")
+    changed = {file for file in after if after[file] != before[file]}
+    assert changed == {"README.md", "croissant.json", "preview.png", "checksums.txt"}
 
 
 @pytest.mark.parametrize(

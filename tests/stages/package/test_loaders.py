@@ -11,13 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.stages.package.toy import SPLITS, toy_samples
+from tests.stages.package.toy import SPLITS, toy_keys
 
 POINTS = 16 + 64
-
-
-def keys(split: str) -> list[str]:
-    return [sample.key for index in range(8) for sample in toy_samples(split, index, 2)]
 
 
 def outside(script: str, *arguments: str, cache: Path) -> str:
@@ -45,7 +41,7 @@ def test_webdataset_yields_each_sample_once_and_decoded(toy_folder: Path, split:
     import webdataset
 
     samples = list(webdataset.WebDataset(shard_pattern(toy_folder, split), shardshuffle=False).decode())
-    assert [sample["__key__"] for sample in samples] == keys(split)
+    assert [sample["__key__"] for sample in samples] == toy_keys(split)
     for sample in samples:
         assert sample["points.npy"].shape == sample["normals.npy"].shape == (POINTS, 3)
         assert sample["points.npy"].dtype == np.float32
@@ -63,10 +59,10 @@ def test_a_torch_loader_of_four_workers_yields_each_sample_once(toy_folder: Path
     tuples = samples.to_tuple("__key__", "points.npy", "labels.npy").batched(2)
     seen = []
     for names, points, labels in DataLoader(tuples, batch_size=None, num_workers=4):
-        assert tuple(points.shape) == (2, POINTS, 3)
-        assert tuple(labels.shape) == (2, POINTS)
+        assert tuple(points.shape) == (len(names), POINTS, 3)
+        assert tuple(labels.shape) == (len(names), POINTS)
         seen.extend(names)
-    assert sorted(seen) == sorted(keys("train"))
+    assert sorted(seen) == sorted(toy_keys("train"))
 
 
 HUGGING_FACE = """
@@ -90,7 +86,7 @@ print(json.dumps({
 
 def test_hugging_face_datasets_loads_every_split_with_typed_members(toy_folder: Path, tmp_path: Path) -> None:
     found = json.loads(outside(HUGGING_FACE, str(toy_folder), str(tmp_path / "cache"), cache=tmp_path))
-    assert found["keys"] == found["streamed"] == {split: keys(split) for split in SPLITS}
+    assert found["keys"] == found["streamed"] == {split: toy_keys(split) for split in SPLITS}
     features = found["features"]
     assert features["glb"].startswith("Mesh")
     assert features["sketch0.png"].startswith("Image")

@@ -75,12 +75,19 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
     return samples
 
 
+REFUSED = toy_samples("train", 1, 2)[1].key
+"""The sample that the toy sketches refuse."""
+
+
+def toy_keys(split: str, shards: int = 8) -> list[str]:
+    """The keys of a split of the finished dataset, in order."""
+    return [each.key for index in range(shards) for each in toy_samples(split, index, 2) if each.key != REFUSED]
+
+
 class ToyConfig(StrictModel):
-    """Shards a split, samples a shard, and which item the sketches refuse."""
+    """Shards a split."""
 
     shards: int = 8
-    samples: int = 2
-    refused: str = ""
 
 
 class NoConfig(StrictModel):
@@ -98,20 +105,19 @@ def _make_kit(task: Task) -> Outcome:
 
 
 def _plan_collection(plan: Plan) -> list[Shard]:
-    config = plan.config.section(ToyConfig)
     return [
-        Shard(f"{plan.config.name}-{split}-{index:06d}", {"split": split, "index": index, "samples": config.samples})
+        Shard(f"{plan.config.name}-{split}-{index:06d}", {"split": split, "index": index})
         for split in SPLITS
-        for index in range(config.shards)
+        for index in range(plan.config.section(ToyConfig).shards)
     ]
 
 
 def _make_collection(task: Task) -> Outcome:
-    split, index, count = (task.shard.params[name] for name in ("split", "index", "samples"))
+    split, index = task.shard.params["split"], task.shard.params["index"]
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in toy_samples(split, index, count):
+        for sample in toy_samples(split, index, 2):
             write_sample(writer, sample)
-    return Outcome(count, {"split": split, "samples": count})
+    return Outcome(2, {"split": split, "samples": 2})
 
 
 def _make_strings(task: Task) -> Outcome:
@@ -125,10 +131,10 @@ def _make_strings(task: Task) -> Outcome:
 def _make_sketches(task: Task) -> Outcome:
     import PIL.Image
 
-    views, refused = task.config.section(SketchesConfig).views, task.config.section(ToyConfig).refused
+    views = task.config.section(SketchesConfig).views
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
-            if sample.key == refused:
+            if sample.key == REFUSED:
                 task.reject(sample.key, "blank drawing")
                 continue
             members = {}
@@ -160,15 +166,15 @@ TOY_STAGES: Mapping[str, Stage] = {
 }
 
 
-def toy_config(**toy: Any) -> Config:
-    """The config of the toy dataset; `toy` are fields of ToyConfig."""
+def toy_config(shards: int = 8) -> Config:
+    """The config of the toy dataset of so many shards a split."""
     sections = {
         "exemplars": NoConfig(),
-        "variations": ToyConfig(**toy),
+        "variations": ToyConfig(shards=shards),
         "strings": OtherNoConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right"))),
-        "package": PackageConfig(previewed=6),
+        "package": PackageConfig(previewed=2),
     }
     return Config(
         name="toy", version="1.2.0", seed=7, sections=sections, path=Path("toy.yaml"), title="Toy boxes", license="MIT"

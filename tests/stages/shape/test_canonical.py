@@ -62,11 +62,12 @@ def isomorphic(
             graph.add_edge(i, j, label=a)
             graph.add_edge(j, i, label=b)
         graphs.append(graph)
-    return nx.is_isomorphic(
+    same = nx.is_isomorphic(
         *graphs,
         node_match=lambda a, b: a["type"] == b["type"],
         edge_match=lambda a, b: a["label"] == b["label"],
     )
+    return bool(same)
 
 
 @st.composite

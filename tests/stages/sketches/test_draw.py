@@ -58,7 +58,9 @@ def test_both_backends_draw_the_same_picture(shape):
 
 def test_lines_are_about_as_wide_at_any_supersampling():
     scene = boxes_scene([(0, 0, 0)])
-    ink = [(255 - draw_sketch(scene, CORNER, 128, k, StrokeOptions(), "raycast").astype(float)).sum() for k in (1, 2, 4)]
+    ink = [
+        (255 - draw_sketch(scene, CORNER, 128, k, StrokeOptions(), "raycast").astype(float)).sum() for k in (1, 2, 4)
+    ]
     assert max(ink) / min(ink) < 1.03
 
 

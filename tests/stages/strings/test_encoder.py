@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded, canonical_string, encode, random_strings
-from stages.strings.tokens import split_tokens
+from stages.strings.tokens import number_value, split_tokens
 from tests.stages.strings.graphs import ALPHABET, Graph, arrays, connected_graphs, isomorphic, renamed
 
 
@@ -131,6 +131,19 @@ def test_a_node_never_begins_a_number_that_ends_there() -> None:
     for each in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
         numbers = [(token.node, token.text) for token in decode(each.string, ALPHABET).tokens if token.kind == "cycle"]
         assert len(set(numbers)) == len(numbers)
+
+
+def test_numbers_that_end_come_first_and_those_that_begin_stand_in_the_order_of_their_ends() -> None:
+    types, edges = arrays(nx.complete_graph(9))
+    for each in random_strings(types, edges, ALPHABET, 20, np.random.default_rng(0)):
+        decoded = decode(each.string, ALPHABET)
+        for node in range(9):
+            behind = [token for token in decoded.tokens if token.kind == "cycle" and token.node == node]
+            partners = [int(decoded.edges[token.edge].sum()) - node for token in behind]
+            ending = [number_value(token.text) for token, other in zip(behind, partners, strict=True) if other < node]
+            assert ending == sorted(ending)
+            assert all(other < node for other in partners[: len(ending)])
+            assert partners[len(ending) :] == sorted(partners[len(ending) :])
 
 
 def test_the_last_subtree_of_a_node_has_no_parentheses() -> None:

@@ -30,7 +30,8 @@ def cylinder(sides=64, radius=1.0, height=2.0):
     """Vertices and faces of an upright (y) cylinder with capped ends, no vertex shared between side and caps."""
     turn = 2 * np.pi * np.arange(sides) / sides
     ring = np.stack([radius * np.cos(turn), np.zeros(sides), radius * np.sin(turn)], axis=1)
-    low, high = ring - [0, height / 2, 0], ring + [0, height / 2, 0]
+    lift = np.array([0.0, height / 2, 0.0])
+    low, high = ring - lift, ring + lift
     vertices = np.concatenate([low, high, low, high])
     faces = []
     for k in range(sides):

@@ -7,6 +7,7 @@ from pipeline.errors import ShardFailed
 from stages.views import buffers as module
 from stages.views.buffers import backend_for, render_buffers, visible_triangles
 from stages.views.camera import Camera
+from stages.views.opengl import OpenGLRenderer
 from stages.views.probe import probe
 from stages.views.scene import mesh_scene
 from tests.stages.views.solids import box, boxes_scene, cylinder, exemplar_scene
@@ -60,8 +61,12 @@ def test_where_faces_of_two_parts_coincide_the_lower_layer_is_seen(backend, came
 
 
 @needs_egl
-@pytest.mark.parametrize("camera", [Camera(-40.0, 25.0), Camera(35.0, 15.0, fov=60.0), Camera(10.0, 60.0, "orthographic")])
-@pytest.mark.parametrize("shape", ["blocks", "cylinder", "a01_castle_tower", "a12_dungeon_room_large", "a26_crossvault"])
+@pytest.mark.parametrize(
+    "camera", [Camera(-40.0, 25.0), Camera(35.0, 15.0, fov=60.0), Camera(10.0, 60.0, "orthographic")]
+)
+@pytest.mark.parametrize(
+    "shape", ["blocks", "cylinder", "a01_castle_tower", "a12_dungeon_room_large", "a26_crossvault"]
+)
 def test_both_backends_agree_on_99_percent_of_the_pixels(shape, camera):
     if shape == "blocks":
         places = [(x, y, z) for x in range(3) for y in range(3) for z in range(3) if (x + 2 * y + z) % 3]
@@ -91,9 +96,10 @@ def test_a_shape_a_million_units_away_looks_the_same(backend):
     near = mesh_scene(vertices, faces, colors, "y")
     far = mesh_scene(vertices + 1e6, faces, colors, "y")
     camera = Camera(30.0, 20.0)
-    same = visible_triangles(near, camera, (96, 96), backend).triangles == visible_triangles(
-        far, camera, (96, 96), backend
-    ).triangles
+    same = (
+        visible_triangles(near, camera, (96, 96), backend).triangles
+        == visible_triangles(far, camera, (96, 96), backend).triangles
+    )
     assert same.mean() > 0.995
 
 
@@ -107,6 +113,16 @@ def test_the_same_view_gives_the_same_pixels_again_and_with_a_new_context(backen
     again = visible_triangles(scene, camera, (64, 64), backend).triangles
     assert other.shape == (60, 80)
     assert (first == again).all()
+
+
+@needs_egl
+def test_a_lost_context_is_made_anew():
+    scene = boxes_scene([(0, 0, 0)])
+    first = visible_triangles(scene, FRONT, (32, 32), "egl").triangles
+    other = OpenGLRenderer("egl")
+    # Both contexts share one display, and closing one of them ends it for both.
+    other.close()
+    assert (visible_triangles(scene, FRONT, (32, 32), "egl").triangles == first).all()
 
 
 @pytest.mark.parametrize("backend", EACH)

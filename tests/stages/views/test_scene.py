@@ -55,6 +55,6 @@ def test_parts_that_touch_lie_in_different_layers():
 def test_world_points_are_the_posed_vertices():
     vertices, faces = box((1, 2, 3))
     scene = boxes_scene([(10, 0, 0), (0, 20, 0)], [(1, 2, 3), (1, 1, 1)])
-    assert np.allclose(scene.points[:8], vertices + [10, 0, 0])
-    assert np.allclose(scene.points[8:], box()[0] + [0, 20, 0])
+    assert np.allclose(scene.points[:8], vertices + np.array([10, 0, 0]))
+    assert np.allclose(scene.points[8:], box()[0] + np.array([0, 20, 0]))
     assert np.allclose(mesh_scene(vertices + 7, faces, np.zeros((12, 3), dtype=np.uint8), "y").points, vertices + 7)

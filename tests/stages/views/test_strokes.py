@@ -13,6 +13,7 @@ from tests.stages.views.solids import BOX_CORNERS, BOX_EDGES, boxes_scene, cylin
 
 SIZE = 256
 CORNER = Camera(30.0, 25.0)
+UP = np.array([0.0, 1.0, 0.0])
 
 
 def strokes_of(scene, camera, crease_angle=35.0, step=0.5, shortest=6.0):
@@ -73,7 +74,7 @@ def test_a_cylinder_of_64_sides_has_two_circles_and_two_side_lines():
     view = camera.look(scene.points, "y")
     turn = np.linspace(0, 2 * np.pi, 721)
     circle = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
-    top, bottom = on_screen(view, circle + [0, 1, 0]), on_screen(view, circle - [0, 1, 0])
+    top, bottom = on_screen(view, circle + UP), on_screen(view, circle - UP)
     sides = [np.stack([top[k], bottom[k]]) for k in (top[:, 0].argmin(), top[:, 0].argmax())]
     starts = np.concatenate([top[:-1], bottom[:-1], [side[0] for side in sides]])
     ends = np.concatenate([top[1:], bottom[1:], [side[1] for side in sides]])

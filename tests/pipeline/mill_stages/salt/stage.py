@@ -13,8 +13,8 @@ __all__ = ["STAGE", "SaltConfig"]
 class SaltConfig(StrictModel):
     """How much salt."""
 
-    spoons: int = Field(1, ge=1, le=1_000_000, description="bags of salt of 1 GB each, as the disk is told")
-    bags: int = Field(1, ge=1, le=10, description="shards")
+    spoons: int = Field(1, ge=1, le=1_000_000, description="salt in each bag; the disk is told 1 GB a spoon")
+    bags: int = Field(1, ge=1, le=10_000, description="shards")
 
 
 def plan(plan: Plan) -> list[Shard]:

@@ -1,0 +1,106 @@
+"""The keys of a config as a Markdown table, written from the models that check them."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import annotated_types
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from pipeline.config import DatasetFacts, StrictModel
+from pipeline.stage import Stage
+
+__all__ = ["key_tables"]
+
+
+def key_tables(stages: Mapping[str, Stage]) -> str:
+    """One table for the dataset's own facts and one for each stage's section, as a Markdown page."""
+    page = [
+        "# What a config may say",
+        "",
+        "Written by `make keys` from the models that check a config. Paths are relative to the folder in which make "
+        "runs. A key that is not listed here is an error, and so is a value of another type or out of range.",
+        "",
+        *_table("The dataset itself", "", DatasetFacts),
+    ]
+    for name, stage in stages.items():
+        page += _table(f"Section `{name}`", f"{name}.", stage.config)
+    return "\n".join(page).rstrip() + "\n"
+
+
+def _table(title: str, prefix: str, model: type[StrictModel]) -> list[str]:
+    rows = [f"| `{key}` | {kind} | {default} | {text} |" for key, kind, default, text in _rows(prefix, model)]
+    return [f"## {title}", "", "| key | value | default | what it does |", "|---|---|---|---|", *rows, ""]
+
+
+def _rows(prefix: str, model: type[StrictModel]) -> Iterator[tuple[str, str, str, str]]:
+    for name, field in model.model_fields.items():
+        inner, many = _inner_model(field.annotation)
+        key = f"{prefix}{name}{'[]' if many else ''}"
+        text = (field.description or "").strip()
+        yield key, _kind(field), "" if inner else _default(field), text[:1].upper() + text[1:]
+        if inner is not None:
+            yield from _rows(f"{key}.", inner)
+
+
+def _inner_model(annotation: Any) -> tuple[type[StrictModel] | None, bool]:
+    """The section model that a key holds, and whether it holds a list of them."""
+    if isinstance(annotation, type) and issubclass(annotation, StrictModel):
+        return annotation, False
+    for argument in get_args(annotation):
+        if isinstance(argument, type) and issubclass(argument, StrictModel):
+            return argument, get_origin(annotation) in (tuple, list)
+    return None, False
+
+
+def _kind(field: FieldInfo) -> str:
+    """The type of a key and its range, in words."""
+    limits = {type(each): each for each in field.metadata}
+    low, high = "", ""
+    for kind, sign in ((annotated_types.Ge, ">= "), (annotated_types.Gt, "> ")):
+        if kind in limits:
+            low = f"{sign}{getattr(limits[kind], kind.__name__.lower())}"
+    for kind, sign in ((annotated_types.Le, "<= "), (annotated_types.Lt, "< ")):
+        if kind in limits:
+            high = f"{sign}{getattr(limits[kind], kind.__name__.lower())}"
+    bounds = ", ".join(each for each in (low, high) if each)
+    return f"{_words(field.annotation)}{f', {bounds}' if bounds else ''}"
+
+
+def _words(annotation: Any) -> str:
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _words(arguments[0])
+    if origin is Literal:
+        return " or ".join(f"`{each}`" for each in arguments)
+    if origin in (tuple, list):
+        return f"list of {_words(arguments[0])}"
+    if origin in (Union, types.UnionType):
+        return " or ".join(_words(each) for each in arguments)
+    if annotation is type(None):
+        return "nothing"
+    if isinstance(annotation, type) and issubclass(annotation, StrictModel):
+        return "keys below"
+    plain = {int: "whole number", float: "number", str: "text", bool: "true or false", Path: "path"}
+    return plain.get(annotation, str(annotation))
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    value = field.get_default(call_default_factory=True)
+    if value is PydanticUndefined:
+        return ""
+    if isinstance(value, tuple):
+        return ", ".join(f"`{_shown(each)}`" for each in value) or "none"
+    return f"`{_shown(value)}`" if value != "" else "empty"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value.model_dump_json() if isinstance(value, StrictModel) else str(value)

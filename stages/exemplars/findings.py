@@ -1,0 +1,126 @@
+"""What is wrong with a kit, or may disappoint: each finding is one sentence with its mend."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stages.exemplars.read import Model
+from stages.shape.arrays import IntArray
+from stages.shape.kit import Assembly, Exemplar, Kit
+from stages.shape.pose import pose_vectors, relative_poses
+
+__all__ = ["hubs", "kit_warnings", "pieces", "refusals"]
+
+LETTERS = 52
+"""Part types beyond this number have names in brackets for string tokens, not letters."""
+HUB_CONTACTS = 20
+"""A part with more contacts than this is a hub."""
+HUB_SHARE = 1 / 3
+"""So is a part that touches more than this share of all parts, in shapes of some size."""
+SMALL = 12
+"""Shapes of at most so many parts have no hubs: there, to touch a third of all parts is nothing."""
+NAMED = 5
+"""So many parts are named in a sentence."""
+
+
+def pieces(assembly: Assembly) -> IntArray:
+    """The piece that each part belongs to, int32 (n,): parts of one piece are connected; piece 0 is the largest."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    edges = assembly.edges
+    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(assembly), len(assembly)))
+    _, piece = connected_components(graph, directed=False)
+    order = np.argsort(-np.bincount(piece), kind="stable")
+    rank = np.empty(len(order), dtype=np.int32)
+    rank[order] = np.arange(len(order))
+    ranked: IntArray = rank[piece]
+    return ranked
+
+
+def hubs(assembly: Assembly) -> list[int]:
+    """The parts that touch so many others that hardly another shape can repeat their neighbourhood."""
+    degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
+    most = min(HUB_CONTACTS, HUB_SHARE * len(assembly)) if len(assembly) > SMALL else HUB_CONTACTS
+    found: list[int] = np.flatnonzero(degrees > most).tolist()
+    return found
+
+
+def refusals(kit: Kit, models: Sequence[Model], empty: Sequence[tuple[Model, str]]) -> Iterator[str]:
+    """Why a run does not start with `kit`, made of `models`; `empty` are parts without area, by model and name."""
+    for model, part in empty:
+        yield f"{model.path}: part {part!r} has no triangle with area; remove it from the model"
+    for model, exemplar in zip(models, kit.exemplars, strict=True):
+        assembly = exemplar.assembly
+        if len(model.parts) < 2:
+            yield (
+                f"{model.path}: has {len(model.parts)} part by {model.segmentation}, an exemplar needs at least 2; "
+                "set `parts: components` (or materials, colors), or split the model into one scene node a part"
+            )
+        elif pieces(assembly).any():
+            yield f"{model.path}: the exemplar falls into {_falls_apart(exemplar)}"
+        elif len(assembly) < 2:
+            yield f"{model.path}: only one part of it is connected or has area, an exemplar needs at least 2"
+        others = {int(index) for each in kit.exemplars if each is not exemplar for index in each.assembly.types}
+        if others and not others & set(assembly.types.tolist()):
+            yield (
+                f"{model.path}: shares no part type with the other shapes of its kit, so nothing can be exchanged; "
+                "make it a kit of its own, or raise `congruence_tolerance` if the parts are meant to be alike"
+            )
+
+
+def kit_warnings(kit: Kit) -> Iterator[str]:
+    """What may disappoint in `kit`, though a run starts with it."""
+    for exemplar in kit.exemplars:
+        yield from _stand_twice(kit, exemplar)
+        assembly = exemplar.assembly
+        degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
+        for part in hubs(assembly):
+            yield (
+                f"{exemplar.name}: {exemplar.part_names[part]} is a hub, it touches {degrees[part]} of "
+                f"{len(assembly) - 1} other parts: variants keep it and all around it; split it to vary it"
+            )
+    if np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars])).max() < 2:
+        yield (
+            "no part type occurs twice, so nothing can be exchanged; repeat parts, add a second shape of the same "
+            "parts, or raise `congruence_tolerance` if parts are meant to be alike"
+        )
+    if len(kit.types) > LETTERS:
+        yield (
+            f"{len(kit.types)} part types are more than the {LETTERS} letters, so strings write them as names in "
+            "brackets; raise `congruence_tolerance` if parts are meant to be alike"
+        )
+
+
+def _stand_twice(kit: Kit, exemplar: Exemplar) -> Iterator[str]:
+    """A sentence where parts of one type stand in the same place."""
+    assembly = exemplar.assembly
+    edges = assembly.edges[assembly.types[assembly.edges[:, 0]] == assembly.types[assembly.edges[:, 1]]]
+    moved = relative_poses(assembly.poses, edges)
+    twice: list[str] = []
+    for (first, second), pose in zip(edges.tolist(), moved, strict=True):
+        part_type = kit.types[assembly.types[first]]
+        length = part_type.diagonal / 2
+        gaps = pose_vectors(part_type.symmetries, length) - pose_vectors(pose[None], length)
+        if np.linalg.norm(gaps, axis=1).min() <= kit.pose_tolerance:
+            twice.append(f"{exemplar.part_names[second]} in {exemplar.part_names[first]}")
+    if twice:
+        yield f"{exemplar.name}: {_some(twice)} stand twice in one place; remove them, or variants repeat them"
+
+
+def _falls_apart(exemplar: Exemplar) -> str:
+    piece = pieces(exemplar.assembly)
+    sizes = np.bincount(piece).tolist()
+    alone = _some([exemplar.part_names[index] for index in np.flatnonzero(piece).tolist()])
+    return (
+        f"{len(sizes)} pieces of {_some([str(size) for size in sizes], 8)} parts (apart: {alone}); move the parts "
+        "together, raise `contact.tolerance`, or set `disconnected: largest`"
+    )
+
+
+def _some(words: Sequence[str], count: int = NAMED) -> str:
+    """The first words of a list, and how many more there are."""
+    more = f" and {len(words) - count} more" if len(words) > count else ""
+    return ", ".join(words[:count]) + more

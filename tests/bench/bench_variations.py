@@ -1,0 +1,109 @@
+"""Variants a second and core, and the validation of one variant beside FCL on every pair whose boxes overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stages.exemplars.build import build_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ContactConfig, KitConfig
+from stages.shape.contact import overlapping_boxes, world_boxes
+from stages.shape.kit import Assembly, Kit
+from stages.variations import kernels
+from stages.variations.answers import ContactAnswers
+from stages.variations.search import Search
+from stages.variations.settings import SearchConfig
+from tests.bench.measure import Measure, rate
+
+SHIPPED = Path("datasets/exemplars")
+REAL = Path("../shared/exemplars")
+KITS: dict[str, tuple[str, ...]] = {
+    "castle (a01+a02)": ("a01_castle_tower", "a02_castle_ground_floor"),
+    "dungeon (a12+a13)": ("a12_dungeon_room_large", "a13_dungeon_junction"),
+    "ring segments (a22+a23)": ("a22_ring_segment_10", "a23_ring_segment_13"),
+    "race track (a06)": ("a06_racetrack",),
+    "ball track (a08)": ("a08_ball_track",),
+}
+
+
+def bench() -> Iterator[Measure]:
+    """New variants, all tries counted; and validations."""
+    shapes = {f"shipped {folder.name}": tuple(sorted(folder.glob("*.glb"))) for folder in sorted(SHIPPED.glob("*"))}
+    if REAL.is_dir():
+        shapes |= {name: tuple(REAL / each / "model.glb" for each in members) for name, members in KITS.items()}
+    for name, paths in shapes.items():
+        kit = _kit(paths, ("face",) if "race" in name else ("point", "line", "face"))
+        line = Search(ContactAnswers(kit), SearchConfig(upright="ring" not in name))
+        rng = np.random.default_rng(0)
+        line.run(rng, 500, 10**9, "warm", lambda count: None)
+        found, tries = [], [0]
+
+        def some(line: Search = line, rng: np.random.Generator = rng) -> int:
+            new, tried = line.run(rng, 200, 10**9, "bench", lambda count: None)
+            found.extend(each.assembly for each in new)
+            tries[0] += tried
+            return len(new)
+
+        ours = rate(some, seconds=3.0, rounds=2)
+        yield Measure(f"new variants, {name}", "variants", ours, note=f"{len(found) / max(tries[0], 1):.0%} of tries")
+        if "castle" in name or "dungeon" in name:
+            yield _validation(name, kit, line, found[-20:])
+
+
+def _kit(paths: tuple[Path, ...], kinds: tuple[Any, ...]) -> Kit:
+    config = KitConfig(name="bench", shapes=paths, contact=ContactConfig(kinds=kinds))
+    kit, _ = build_kit(config, [read_model(path) for path in paths])
+    return kit
+
+
+def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -> Measure:
+    """The whole shape graph of a variant from its poses, broad phase included; FCL gets the broad phase for nothing."""
+    import fcl
+
+    models = []
+    for part in kit.types:
+        model = fcl.BVHModel()
+        model.beginModel(len(part.vertices), len(part.faces))
+        model.addSubModel(part.vertices, part.faces)
+        model.endModel()
+        models.append(model)
+    cases = []
+    for assembly in assemblies:
+        bodies = [
+            fcl.CollisionObject(models[index], fcl.Transform(pose[:3, :3], pose[:3, 3]))
+            for index, pose in zip(assembly.types, assembly.poses, strict=True)
+        ]
+        boxes = world_boxes(kit.types, assembly.types, assembly.poses)
+        cases.append((bodies, overlapping_boxes(boxes, kit.contact_tolerance).tolist()))
+
+    def with_fcl() -> int:
+        for bodies, pairs in cases:
+            for i, j in pairs:
+                if not fcl.collide(bodies[i], bodies[j], fcl.CollisionRequest(), fcl.CollisionResult()):
+                    fcl.distance(bodies[i], bodies[j], fcl.DistanceRequest(), fcl.DistanceResult())
+        return len(cases)
+
+    parents = [line.parent("bench", each) for each in assemblies]
+    ws, tables = line._ws, line.tables
+
+    def ours() -> int:
+        for parent in parents:
+            n, shape = len(parent.assembly), parent.tables
+            line._load(parent)
+            ws.turns[:n], ws.places[:n] = shape.turns, shape.places
+            kernels._place_boxes(tables.boxes, ws.types, ws.turns, ws.places, n, ws.boxes)
+            ws.counts[kernels.TRY] += 1
+            i, j = parent.assembly.edges.T
+            ws.stamp[i, j] = ws.stamp[j, i] = ws.counts[kernels.TRY]
+            assert kernels.validate(tables, line.answers.table, ws) == kernels.Outcome.OK
+        return len(parents)
+
+    parts = int(np.mean([len(each) for each in assemblies]))
+    return Measure(
+        f"validation of a variant, {name}", "variants", rate(ours, 1.5, 2), "FCL, overlapping boxes",
+        rate(with_fcl, 1.5, 2), f"{parts} parts",
+    )  # fmt: skip
