@@ -61,7 +61,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 # Working on it ------------------------------------------------------------------------------------------------------
 
-.PHONY: test lint bench kits lock
+.PHONY: test lint bench kits keys lock
 test: setup  ## Run the tests
 	$(PYTHON) -m pytest
 lint: setup  ## Check style and types
@@ -72,6 +72,9 @@ bench: setup  ## Measure every piece beside a public peer
 	$(PYTHON) -m tests.bench
 kits: setup  ## Write the shipped exemplars anew from their source
 	$(PYTHON) -m stages.exemplars.kits
+keys: setup  ## Write the table of all config keys, configs/README.md, anew from the code
+	$(PYTHON) -m pipeline keys > configs/README.md.tmp
+	mv configs/README.md.tmp configs/README.md
 lock: setup  ## Choose the newest versions of everything and pin them in requirements.lock
 	$(PYTHON) -m venv --clear .venv/lock
 	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \

@@ -1,4 +1,4 @@
-"""The command line: `python -m pipeline run|status|verify|inspect|doctor`.
+"""The command line: `python -m pipeline run|status|verify|inspect|doctor|keys|clean`.
 
 Exit codes: 0 all is well; 1 shards were set aside, or something that was checked is not as it should be; 2 nothing
 started, because of a mistake in the config or the command; 3 everything had to stop (disk full, no permission);
@@ -122,6 +122,14 @@ def doctor(out: OutOption = DEFAULT_OUT) -> None:
     from pipeline.doctor import examine
 
     raise typer.Exit(examine(out))
+
+
+@app.command()
+def keys(context: typer.Context) -> None:
+    """Print the table of all config keys as Markdown."""
+    from pipeline.keys import key_tables
+
+    print(key_tables(find_stages(context.obj)), end="")
 
 
 @app.command()

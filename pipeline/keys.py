@@ -64,9 +64,9 @@ def _kind(field: FieldInfo) -> str:
     for kind, sign in ((annotated_types.Ge, ">= "), (annotated_types.Gt, "> ")):
         if kind in limits:
             low = f"{sign}{getattr(limits[kind], kind.__name__.lower())}"
-    for kind, sign in ((annotated_types.Le, "<= "), (annotated_types.Lt, "< ")):
-        if kind in limits:
-            high = f"{sign}{getattr(limits[kind], kind.__name__.lower())}"
+    for limit, sign in ((annotated_types.Le, "<= "), (annotated_types.Lt, "< ")):
+        if limit in limits:
+            high = f"{sign}{getattr(limits[limit], limit.__name__.lower())}"
     bounds = ", ".join(each for each in (low, high) if each)
     return f"{_words(field.annotation)}{f', {bounds}' if bounds else ''}"
 

@@ -8,10 +8,10 @@ fail() { printf '%s\n' "$@" >&2; exit 1; }
 # A Python 3.11 that really runs: a version manager's shim on the PATH may not.
 find_python() {
     IFS=:
-    for folder in $PATH /usr/local/bin /usr/bin "$HOME/.local/bin"; do
+    for folder in $PATH /usr/local/bin /usr/bin "${HOME:-/root}/.local/bin"; do
         if "$folder/python3.11" -c 'import ssl, venv' 2>/dev/null; then echo "$folder/python3.11"; return; fi
     done
-    for python in "$HOME"/.pyenv/versions/3.11.*/bin/python3.11; do
+    for python in "${HOME:-/root}"/.pyenv/versions/3.11.*/bin/python3.11; do
         if "$python" -c 'import ssl, venv' 2>/dev/null; then echo "$python"; return; fi
     done
 }

@@ -13,6 +13,7 @@ from stages.exemplars.findings import kit_warnings, pieces, refusals
 from stages.exemplars.grammar import observe
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.read import Model
+from stages.exemplars.scene import unique_name
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.contact import ContactTest
@@ -90,17 +91,16 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
                 out = sorted(set(range(len(names[index]))) - set(keep.tolist()))
                 if out:
                     left = ", ".join(names[index][part] for part in out[:5])
-                    warnings.append(f"{models[index].path.name}: {len(out)} parts apart from the rest are left out: {left}")
+                    warnings.append(
+                        f"{models[index].path.name}: {len(out)} parts apart from the rest are left out: {left}"
+                    )
                 names[index] = tuple(names[index][part] for part in keep.tolist())
             touching = [_subassembly(each, keep) for each, keep in zip(touching, kept, strict=True)]
             assemblies, grammar, kinds = observe(types, touching, contact, pose_tolerance, config.contact.kinds)
     kit = Kit(
         name=config.name,
         types=types,
-        exemplars=tuple(
-            Exemplar(model.path.stem, assembly, parts)
-            for model, assembly, parts in zip(models, assemblies, names, strict=True)
-        ),
+        exemplars=tuple(Exemplar(*each) for each in zip(_exemplar_names(models), assemblies, names, strict=True)),
         grammar=grammar,
         contact_tolerance=contact.tolerance,
         pose_tolerance=pose_tolerance,
@@ -115,6 +115,16 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
         refusals=tuple(refusals(kit, models, identified.empty)),
         warnings=(*warnings, *kit_warnings(kit)),
     )
+
+
+def _exemplar_names(models: Sequence[Model]) -> list[str]:
+    """The names of the files; where those are alike (all are `model.glb`) the names of their folders."""
+    stems = [model.path.stem for model in models]
+    names: list[str] = []
+    for model in models:
+        folder = model.path.resolve().parent.name
+        names.append(unique_name(folder if stems.count(model.path.stem) > 1 else model.path.stem, names))
+    return names
 
 
 def _subassembly(assembly: Assembly, keep: np.ndarray) -> Assembly:

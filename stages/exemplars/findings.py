@@ -75,13 +75,7 @@ def kit_warnings(kit: Kit) -> Iterator[str]:
     """What may disappoint in `kit`, though a run starts with it."""
     for exemplar in kit.exemplars:
         yield from _stand_twice(kit, exemplar)
-        assembly = exemplar.assembly
-        degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
-        for part in hubs(assembly):
-            yield (
-                f"{exemplar.name}: {exemplar.part_names[part]} is a hub, it touches {degrees[part]} of "
-                f"{len(assembly) - 1} other parts: variants keep it and all around it; split it to vary it"
-            )
+        yield from _hub_warning(exemplar)
     if np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars])).max() < 2:
         yield (
             "no part type occurs twice, so nothing can be exchanged; repeat parts, add a second shape of the same "
@@ -107,7 +101,22 @@ def _stand_twice(kit: Kit, exemplar: Exemplar) -> Iterator[str]:
         if np.linalg.norm(gaps, axis=1).min() <= kit.pose_tolerance:
             twice.append(f"{exemplar.part_names[second]} in {exemplar.part_names[first]}")
     if twice:
-        yield f"{exemplar.name}: {_some(twice)} stand twice in one place; remove them, or variants repeat them"
+        yield (
+            f"{exemplar.name}: {_count(len(twice), 'part')} at the very place of another of its type ({_some(twice)}); "
+            "remove what stands twice, or variants repeat it"
+        )
+
+
+def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
+    assembly = exemplar.assembly
+    degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
+    found = sorted(hubs(assembly), key=lambda part: (-degrees[part], part))
+    if found:
+        named = _some([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
+        yield (
+            f"{exemplar.name}: {_count(len(found), 'part')} of {len(assembly)} with very many contacts: {named}; "
+            "hardly another shape has the same around them, so variants keep them as they are, unless they are split"
+        )
 
 
 def _falls_apart(exemplar: Exemplar) -> str:
@@ -118,6 +127,10 @@ def _falls_apart(exemplar: Exemplar) -> str:
         f"{len(sizes)} pieces of {_some([str(size) for size in sizes], 8)} parts (apart: {alone}); move the parts "
         "together, raise `contact.tolerance`, or set `disconnected: largest`"
     )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def _some(words: Sequence[str], count: int = NAMED) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.build import build_kit
+from stages.exemplars.portrait import kit_sheet
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.kit_files import write_kit
@@ -30,6 +31,8 @@ def run_shard(task: Task) -> Outcome:
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
         write_kit(kit, text, arrays)
+    with task.output(f"{kit.name}.png") as picture:
+        picture.write(kit_sheet(kit))
     return Outcome(
         samples=len(kit.exemplars),
         summary={

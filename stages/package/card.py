@@ -92,9 +92,10 @@ def card(
         "## Loading it",
         _loading(facts, splits, shards),
         "## How it was made",
-        f"By [Shapemill](https://github.com/search?q=shapemill): exemplar meshes are cut into parts, a tiling grammar "
-        f"is read off their contacts, and new shapes are made whose every neighbourhood and every docking of two parts "
-        f"was seen in an exemplar. `{MANIFEST}` holds the whole config.",
+        "By Shapemill: exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new "
+        "shapes are made whose every neighbourhood and every docking of two parts was seen in an exemplar. "
+        f"`{MANIFEST}` holds the whole config. A sample's `parents` are exemplars, or variants by the `name` in their "
+        "own `lineage`.",
         *([_list(search)] if search else []),
         *([_reject_table(rejects)] if rejects else []),
         "## Checking it",

@@ -13,8 +13,8 @@ __all__ = ["checksums", "config_sections", "manifest"]
 
 
 def config_sections(config: Config) -> dict[str, Any]:
-    """All sections of the config as JSON; of a file's path only the name, since folders differ from machine to
-    machine."""
+    """All sections of the config as JSON; of a file's path only the name and its folder's, since what lies above
+    differs from machine to machine."""
     return {name: _portable(section.model_dump()) for name, section in config.sections.items()}
 
 
@@ -56,7 +56,7 @@ def checksums(digests: Mapping[str, str]) -> str:
 
 def _portable(value: Any) -> Any:
     if isinstance(value, PurePath):
-        return value.name
+        return "/".join(value.parts[-2:])
     if isinstance(value, Mapping):
         return {name: _portable(each) for name, each in value.items()}
     if isinstance(value, list | tuple):

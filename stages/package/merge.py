@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, BinaryIO, cast
 
 from pipeline.errors import ShardFailed
@@ -13,7 +14,7 @@ from pipeline.shards import ShardWriter, json_bytes, read_shard
 from pipeline.stage import Outcome, Task
 from stages.package.glb import GlbWriter
 from stages.package.layout import shard_path
-from stages.package.record import describe_sample
+from stages.package.record import describe_sample, rounded
 from stages.points.frame import upright
 from stages.shape.collection import collection_kits
 from stages.shape.sample import Sample, read_samples
@@ -45,6 +46,7 @@ def merge_shard(task: Task) -> Outcome:
             for sample, made in _samples(task):
                 kit = kits[sample.kit]
                 assembly = upright(sample.assembly, kit)
+                assembly = replace(assembly, poses=rounded(assembly.poses))
                 if len(assembly.edges) == 0:
                     task.reject(sample.key, "no contact between parts")
                     continue

@@ -6,12 +6,17 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from stages.package.glb import node_names
 from stages.points.frame import assembly_bounds
+from stages.shape.arrays import FloatArray
 from stages.shape.kit import Assembly, Kit
 from stages.shape.sample import Sample
 
-__all__ = ["cycle_count", "describe_sample"]
+__all__ = ["cycle_count", "describe_sample", "rounded"]
+
+DECIMALS = 12
 
 
 def describe_sample(
@@ -32,7 +37,7 @@ def describe_sample(
     parts = [
         {"name": name, "label": names[kind], "type": kind, "instance": instance, "pose": pose}
         for instance, (name, kind, pose) in enumerate(
-            zip(node_names(names, assembly), assembly.types.tolist(), (assembly.poses + 0.0).tolist(), strict=True)
+            zip(node_names(names, assembly), assembly.types.tolist(), assembly.poses.tolist(), strict=True)
         )
     ]
     return {
@@ -51,11 +56,16 @@ def describe_sample(
             "cycles": cycle_count(assembly),
             "types": len(set(assembly.types.tolist())),
         },
-        "bounds": assembly_bounds(kit.types, assembly).tolist(),
+        "bounds": rounded(assembly_bounds(kit.types, assembly)).tolist(),
         "string": string,
         "points": dict(points),
         "sketches": list(views),
     }
+
+
+def rounded(numbers: FloatArray) -> FloatArray:
+    """`numbers` without the noise of their last digits, and without minus zeros: shorter and the same to the eye."""
+    return np.round(numbers, DECIMALS) + 0.0
 
 
 def cycle_count(assembly: Assembly) -> int:

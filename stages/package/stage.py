@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -32,6 +32,8 @@ def plan(plan: Plan) -> list[Shard]:
         return merged
     described = [{"name": shard.name, **(summary or {})} for shard, summary in zip(merged, summaries, strict=True)]
     filled = [shard for shard in described if shard["samples"]]
+    if not filled:
+        return merged
     kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
     shown = [shard["name"] for shard in filled[:PICTURE_SHARDS]]
     stages = ("variations", "points", "sketches")
@@ -64,8 +66,10 @@ def run_shard(task: Task) -> Outcome:
 
 
 def publish(plan: Plan) -> Mapping[str, str]:
-    """The dataset's folder and the index beside it, by the files of the shards."""
+    """The dataset's folder and the index beside it, by the files of the shards; nothing where no sample is left."""
     name = plan.config.name
+    if WHOLE not in plan.shards("package"):
+        return {}
     files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, MANIFEST, CHECKSUMS)}
     files[f"{name}/{PREVIEW}"] = f"{PICTURE}.png"
     files[index_path(plan.config)] = f"{WHOLE}.parquet"
@@ -74,6 +78,16 @@ def publish(plan: Plan) -> Mapping[str, str]:
         if summary is not None and summary.get("path") and summary["samples"]:
             files[f"{name}/{summary['path']}"] = f"{shard}.tar"
     return files
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """What the finished dataset holds."""
+    if plan.summary("package", WHOLE) is None:
+        return []
+    summaries = [plan.summary("package", shard) or {} for shard in plan.shards("package")]
+    shards = [summary for summary in summaries if summary.get("path")]
+    samples, size = sum(shard["samples"] for shard in shards), sum(shard["bytes"] for shard in shards) / 1e6
+    return [f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB"]
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -124,5 +138,6 @@ STAGE = Stage(
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
+    report=report,
     publish=publish,
 )

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
+from stages.shape.docking import DockingTable
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 
 __all__ = ["describe_kit", "load_kit", "write_kit"]
@@ -17,6 +18,7 @@ __all__ = ["describe_kit", "load_kit", "write_kit"]
 def describe_kit(kit: Kit) -> dict[str, Any]:
     """The kit as JSON that a person can read: types, exemplars, neighbourhoods and dockings by type name."""
     names = kit.type_names()
+    table = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
     return {
         "kit": kit.name,
         "up": kit.up,
@@ -33,7 +35,14 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
             for each in kit.types
         ],
         "exemplars": [
-            {"name": each.name, "parts": list(each.part_names), "contacts": each.assembly.edges.tolist()}
+            {
+                "name": each.name,
+                "parts": [
+                    {"name": name, "type": names[index]}
+                    for name, index in zip(each.part_names, each.assembly.types.tolist(), strict=True)
+                ],
+                "contacts": _contacts(kit, table, each.assembly),
+            }
             for each in kit.exemplars
         ],
         "neighbourhoods": {
@@ -56,6 +65,13 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         ],
         "nested": [{"a": names[a], "b": names[b], "depth": depth} for (a, b), depth in kit.grammar.nested.items()],
     }
+
+
+def _contacts(kit: Kit, table: DockingTable, assembly: Assembly) -> list[list[int | str]]:
+    """Contacts as `[part, part, kind]`."""
+    labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
+    kinds = [kit.grammar.dockings[label].kind for label in labels.tolist()]
+    return [[i, j, kind] for (i, j), kind in zip(assembly.edges.tolist(), kinds, strict=True)]
 
 
 def write_kit(kit: Kit, text: Any, arrays: Any) -> None:

@@ -56,11 +56,11 @@ def png_bytes(drawing: ByteArray) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "drawing.png"
         output = oiio.ImageOutput.create(str(path))
-        written = output is not None and output.open(str(path), spec)
-        written = written and output.write_image(np.ascontiguousarray(drawing)[:, :, None]) and output.close()
-        if not written:
-            reason = oiio.geterror() if output is None else output.geterror()
-            raise ShardFailed(f"OpenImageIO cannot write a PNG: {reason}")
+        if output is None:
+            raise ShardFailed(f"OpenImageIO cannot write PNGs: {oiio.geterror()}")
+        written = output.open(str(path), spec) and output.write_image(np.ascontiguousarray(drawing)[:, :, None])
+        if not (output.close() and written):
+            raise ShardFailed(f"OpenImageIO cannot write a PNG: {output.geterror()}")
         return path.read_bytes()
 
 

@@ -24,13 +24,14 @@ def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
         kind: {other for multiset in multisets for other, _ in multiset}
         for kind, multisets in grammar.neighbourhoods.items()
     }
+    edges = decoded.edges.tolist()
     neighbours: list[list[int]] = [[] for _ in types]
-    for i, j in decoded.edges.tolist():
+    for i, j in edges:
         neighbours[i].append(types[j])
         neighbours[j].append(types[i])
     for token in decoded.tokens:
         if token.edge >= 0:
-            i, j = decoded.edges[token.edge].tolist()
+            i, j = edges[token.edge]
             if types[j] not in around.get(types[i], ()):
                 pair = f"{alphabet.tokens[types[i]]} ({alphabet.names[types[i]]}) and {alphabet.tokens[types[j]]} "
                 raise StringError(string, token.index, f"{pair}({alphabet.names[types[j]]}) are never neighbours")

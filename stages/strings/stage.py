@@ -21,8 +21,8 @@ from stages.strings.settings import StringsConfig
 
 __all__ = ["STAGE"]
 
-BYTES_A_STRING = 1500
-"""About as long as a string is for a shape of a hundred parts with four hundred contacts."""
+BYTES_A_STRING = 3000
+"""About as long as the string of a shape of two hundred parts with six hundred contacts is."""
 
 
 def plan(plan: Plan) -> list[Shard]:

@@ -118,13 +118,15 @@ class Scene:
     @cached_property
     def triangle_part(self) -> IntArray:
         """The part of each triangle, int32 (t,)."""
-        return np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.triangle_first))
+        part: IntArray = np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.triangle_first))
+        return part
 
     @cached_property
     def triangle_face(self) -> IntArray:
         """The face of each triangle in the mesh set, int32 (t,)."""
         shift = self.meshes.face_first[self.mesh_of] - self.triangle_first[:-1]
-        return (np.arange(self.triangle_first[-1]) + np.repeat(shift, np.diff(self.triangle_first))).astype(np.int32)
+        face: IntArray = np.arange(self.triangle_first[-1]) + np.repeat(shift, np.diff(self.triangle_first))
+        return face.astype(np.int32)
 
     @cached_property
     def points(self) -> FloatArray:

@@ -9,12 +9,10 @@ coordinate is clip depth, which is linear across the screen on every plane.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numba
 import numpy as np
 
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.views.camera import View
 from stages.views.scene import Scene
 
@@ -23,7 +21,7 @@ __all__ = ["clip_at", "eye_depth", "screen_normals", "screen_triangles", "surfac
 
 def screen_triangles(scene: Scene, view: View, width: int, height: int) -> FloatArray:
     """The corners of all triangles on the screen, float64 (t, 3, 3)."""
-    return _project(
+    screen: FloatArray = _project(
         scene.meshes.vertices,
         scene.meshes.faces,
         scene.triangle_part,
@@ -33,25 +31,30 @@ def screen_triangles(scene: Scene, view: View, width: int, height: int) -> Float
         width,
         height,
     )
+    return screen
 
 
 def screen_normals(scene: Scene, view: View, screen: FloatArray) -> FloatArray:
     """Unit normals of all triangles in eye space, turned towards the viewer, float64 (t, 3)."""
     rotations = (view.eye @ scene.poses)[:, :3, :3]
-    return _facing_normals(scene.meshes.normals, scene.triangle_part, scene.triangle_face, rotations, screen)
+    parts, faces = scene.triangle_part, scene.triangle_face
+    normals: FloatArray = _facing_normals(scene.meshes.normals, parts, faces, rotations, screen)
+    return normals
 
 
 def surface_buffers(
     scene: Scene, view: View, triangles: IntArray, screen: FloatArray, normals: FloatArray
-) -> tuple[Any, Any, Any, Any]:
+) -> tuple[Float32Array, Float32Array, IntArray, ByteArray]:
     """Depth float32 (h, w), normal float32 (h, w, 3), part int32 (h, w) and colour uint8 (h, w, 3) of the pixels.
 
     `triangles` int32 (h, w) is the triangle each pixel shows, -1 for none; there depth is infinite, the normal
     zero, the part -1 and the colour white.
     """
-    return _shade(
-        triangles, screen, normals, scene.triangle_part, scene.triangle_face, scene.meshes.colors, view.projection
+    parts, faces, colors = scene.triangle_part, scene.triangle_face, scene.meshes.colors
+    shaded: tuple[Float32Array, Float32Array, IntArray, ByteArray] = _shade(
+        triangles, screen, normals, parts, faces, colors, view.projection
     )
+    return shaded
 
 
 @numba.njit(cache=True, error_model="numpy")

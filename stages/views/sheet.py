@@ -29,21 +29,23 @@ class Cell:
 
 @dataclass(frozen=True)
 class Section:
-    """Rows of cells under a heading; `note` stands beside it in small print."""
+    """Rows of cells under a heading; `note` stands beside it in small print. A cell is `span` columns wide."""
 
     title: str
     rows: Sequence[Sequence[Cell]]
     note: str = ""
+    span: int = 1
 
 
 def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int = 320) -> ByteArray:
-    """The sheet, uint8 (h, w, 3). Pictures are scaled to `cell_width` pixels; rows of unequal length stay ragged.
+    """The sheet, uint8 (h, w, 3). Pictures are scaled to `cell_width` pixels (times the section's span, and the gaps
+    between); rows of unequal length stay ragged.
 
     Margins and letters grow with `cell_width`. Raises ValueError where there is no picture at all.
     """
     from PIL import Image, ImageDraw
 
-    columns = max((len(row) for section in sections for row in section.rows), default=0)
+    columns = max((section.span * len(row) for section in sections for row in section.rows), default=0)
     if columns == 0:
         raise ValueError("a contact sheet needs at least one picture")
     unit = cell_width / 320
@@ -51,7 +53,8 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
     fonts = {"title": _font(round(30 * unit), True), "head": _font(round(19 * unit), True)}
     fonts |= {"caption": _font(round(13.5 * unit), False), "note": _font(round(14 * unit), False)}
     width = 2 * margin + columns * cell_width + (columns - 1) * gap
-    heights = _row_heights(sections, cell_width, unit)
+    widths = [section.span * (cell_width + gap) - gap for section in sections]
+    heights = _row_heights(sections, widths, unit)
     head = round(66 * unit)
     height = 2 * margin + (round(62 * unit) if title else 0)
     for section, rows in zip(sections, heights, strict=True):
@@ -62,7 +65,7 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
     if title:
         pen.text((margin, y), title, TITLE_INK, fonts["title"])
         y += round(62 * unit)
-    for section, section_heights in zip(sections, heights, strict=True):
+    for section, across, section_heights in zip(sections, widths, heights, strict=True):
         if section.title:
             pen.line([(margin, y + round(8 * unit)), (width - margin, y + round(8 * unit))], RULE, max(1, round(unit)))
             pen.text((margin, y + round(24 * unit)), section.title, TITLE_INK, fonts["head"])
@@ -71,12 +74,12 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
             y += head
         for row, row_height in zip(section.rows, section_heights, strict=True):
             for index, cell in enumerate(row):
-                x = margin + index * (cell_width + gap)
-                picture = _scaled(cell.picture, cell_width)
+                x = margin + index * (across + gap)
+                picture = _scaled(cell.picture, across)
                 sheet.paste(picture, (x, y))
-                line = _fitting(pen, cell.caption, fonts["caption"], cell_width)
-                across = (cell_width - pen.textlength(line, fonts["caption"])) / 2
-                pen.text((x + across, y + picture.height + round(7 * unit)), line, CAPTION_INK, fonts["caption"])
+                line = _fitting(pen, cell.caption, fonts["caption"], across)
+                middle = (across - pen.textlength(line, fonts["caption"])) / 2
+                pen.text((x + middle, y + picture.height + round(7 * unit)), line, CAPTION_INK, fonts["caption"])
             y += row_height + gap
     return np.asarray(sheet)
 
@@ -92,13 +95,13 @@ def picture_png(picture: ByteArray) -> bytes:
     return stream.getvalue()
 
 
-def _row_heights(sections: Sequence[Section], cell_width: int, unit: float) -> list[list[int]]:
+def _row_heights(sections: Sequence[Section], widths: Sequence[int], unit: float) -> list[list[int]]:
     heights = []
-    for section in sections:
+    for section, width in zip(sections, widths, strict=True):
         rows = []
         for row in section.rows:
             caption = round(30 * unit) if any(cell.caption for cell in row) else 0
-            tallest = max(round(cell.picture.shape[0] * cell_width / cell.picture.shape[1]) for cell in row)
+            tallest = max(round(cell.picture.shape[0] * width / cell.picture.shape[1]) for cell in row)
             rows.append(tallest + caption)
         heights.append(rows)
     return heights

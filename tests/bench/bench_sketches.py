@@ -21,7 +21,7 @@ from tests.bench.measure import Measure, rate
 __all__ = ["bench"]
 
 SIZE, SUPERSAMPLE = 224, 2
-COLUMNS, SIDES = 6, 48
+COLUMNS, SIDES = 6, 40
 
 
 def bench() -> Iterator[Measure]:
@@ -91,7 +91,7 @@ def _pyrender_buffers(views: list[Camera]) -> float:
 
 
 def _colonnade() -> Scene:
-    """Two rows of fluted columns on plinths, under beams: a new assembly of one kit each time."""
+    """Two rows of round columns on plinths, under beams: a new assembly of one kit each time."""
     poses, types = [], []
     for row in range(2):
         for column in range(COLUMNS):
@@ -109,12 +109,12 @@ def _colonnade() -> Scene:
     return scene_of(Assembly(np.array(types, dtype=np.int16), placed, near), _KIT)
 
 
-def _prism(sides: int, radius: float, height: float, flutes: float) -> tuple[FloatArray, IntArray]:
-    """An upright prism of several drums; every second corner stands back by `flutes`."""
-    turn = 2 * np.pi * np.arange(sides) / sides
-    reach = radius * (1 - flutes * (np.arange(sides) % 2))
+def _prism(sides: int, radius: float, height: float, stretch: float = 1.0) -> tuple[FloatArray, IntArray]:
+    """An upright prism of several drums, its first corner on the diagonal, `stretch` times as long in x."""
+    turn = 2 * np.pi * np.arange(sides) / sides + np.pi / 4
     levels = np.linspace(-height / 2, height / 2, 6)
-    rings = [np.stack([reach * np.cos(turn), np.full(sides, level), reach * np.sin(turn)], axis=1) for level in levels]
+    flat = [stretch * radius * np.cos(turn), radius * np.sin(turn)]
+    rings = [np.stack([flat[0], np.full(sides, level), flat[1]], axis=1) for level in levels]
     faces = []
     for level in range(len(levels) - 1):
         for k in range(sides):
@@ -134,9 +134,9 @@ def _type(name: str, mesh: tuple[FloatArray, IntArray]) -> PartType:
 _KIT = Kit(
     name="colonnade",
     types=(
-        _type("plinth", _prism(4, 0.6, 0.2, 0.0)),
-        _type("column", _prism(SIDES, 0.4, 2.0, 0.06)),
-        _type("beam", _prism(4, 0.3, 0.3, 0.0)),
+        _type("plinth", _prism(4, 0.6, 0.2)),
+        _type("column", _prism(SIDES, 0.36, 2.0)),
+        _type("beam", _prism(4, 0.3, 0.3, 2.8)),
     ),
     exemplars=(),
     grammar=Grammar(neighbourhoods={}, dockings=(), nested={}),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.exemplars.kits.layout import Layout
-from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
+from stages.exemplars.kits.polygon import arch, chamfered, mirrored, rectangle, regular
 from stages.exemplars.kits.solid import Solid, bar, box, extruded, joined, revolved, stacked
 
 __all__ = ["shapes"]
@@ -123,11 +123,8 @@ def _turret() -> Solid:
 
 def _wall() -> Solid:
     half = PITCH / 2 - 1.0 + BITE
-    section = [
-        (-0.43, 0.0), (0.43, 0.0), (0.43, 0.3), (0.35, 0.38), (0.35, 1.6), (0.43, 1.7), (0.43, 2.06), (0.25, 2.06),
-        (0.25, 1.82), (-0.25, 1.82), (-0.25, 2.06), (-0.43, 2.06), (-0.43, 1.7), (-0.35, 1.6), (-0.35, 0.38), (-0.43, 0.3),
-    ]  # fmt: skip
-    wall = extruded(np.array(section), -half, half, STONE).turned(90.0)
+    plinth, parapet = ((0.43, 0.0), (0.43, 0.3), (0.35, 0.38)), ((0.43, 1.7), (0.43, 2.06), (0.25, 2.06), (0.25, 1.82))
+    wall = extruded(mirrored(*plinth, (0.35, 1.6), *parapet), -half, half, STONE).turned(90.0)
     wall = wall.tinted(STONE_DARK, lambda _, corners: bool(corners[:, 1].max() < 0.39))
     for x in (-1.1, -0.66, -0.22, 0.22, 0.66, 1.1):
         wall = wall.inset((x, 2.06, 0.34), rectangle(0.26, 0.14), -0.26, STONE, STONE_LIGHT, shrink=0.015, copies=2)
@@ -141,8 +138,8 @@ def _wall() -> Solid:
 def _wall_gate() -> Solid:
     half = PITCH / 2 - 1.0 + BITE
     head = arch(1.0, 1.5, 0.55, 8)[2:]
-    outline = np.array([(-0.5, 0.0), (-half, 0.0), (-half, 2.06), (-1.04, 2.06), (-0.94, 2.18), (-0.94, 2.78), (0.94, 2.78), (0.94, 2.18), (1.04, 2.06), (half, 2.06), (half, 0.0), (0.5, 0.0)])
-    gate = extruded(np.concatenate([outline[::-1], head[::-1]]), -0.5, 0.5, STONE)
+    outline = mirrored((0.5, 0.0), (half, 0.0), (half, 2.06), (1.04, 2.06), (0.94, 2.18), (0.94, 2.78))
+    gate = extruded(np.concatenate([outline, head[::-1]]), -0.5, 0.5, STONE)
     for x in (-0.72, -0.24, 0.24, 0.72):
         gate = gate.inset((x, 2.78, 0.4), rectangle(0.28, 0.15), -0.26, STONE, STONE_LIGHT, shrink=0.015, copies=2)
     for x in (-1.28, 1.28):
@@ -167,7 +164,7 @@ def _hall() -> Solid:
         upper = upper.inset((x, 1.02, 0.69), arch(0.22, 0.48, 0.09, 4, y=-0.23), 0.08, TIMBER, GLASS, copies=2)
     for x in (-1.34, -0.66, 0.0, 0.66, 1.34):
         upper = upper.inset((x, 1.0, 0.65), rectangle(0.1, 0.92), -0.03, TIMBER, copies=2)
-    roof = np.array([(-0.82, 1.42), (0.82, 1.42), (0.82, 1.5), (0.42, 1.96), (0.44, 2.02), (0.06, 2.42), (-0.06, 2.42), (-0.44, 2.02), (-0.42, 1.96), (-0.82, 1.5)])
+    roof = mirrored((0.82, 1.42), (0.82, 1.5), (0.42, 1.96), (0.44, 2.02), (0.06, 2.42))
     tiles = extruded(roof, -half + 0.005, half - 0.005, TILE).turned(90.0)
     chimney = [box((0.2, 0.7, 0.2), (x, 1.94, z), STONE_LIGHT, 0.03) for x, z in ((0.8, 0.36), (-0.8, -0.36))]
     return joined(hall, upper, tiles, *chimney)
@@ -182,7 +179,7 @@ def _cottage() -> Solid:
         body = body.inset((x, 0.5, 1.21), rectangle(0.16, 0.2), 0.05, TIMBER, GLASS)
     for side in (-1.0, 1.0):
         body = body.inset((side * 0.55, 0.5, 0.8), rectangle(0.22, 0.28), 0.05, TIMBER, GLASS)
-    ridge = np.array([(-0.65, 0.76), (0.65, 0.76), (0.65, 0.84), (0.3, 1.16), (0.31, 1.21), (0.04, 1.44), (-0.04, 1.44), (-0.31, 1.21), (-0.3, 1.16), (-0.65, 0.84)])
+    ridge = mirrored((0.65, 0.76), (0.65, 0.84), (0.3, 1.16), (0.31, 1.21), (0.04, 1.44))
     roof = extruded(ridge, 0.38, 1.26, TILE)
     chimney = box((0.16, 0.5, 0.16), (0.36, 1.02, 0.62), STONE_LIGHT, 0.02)
     return body + roof + chimney
@@ -191,8 +188,8 @@ def _cottage() -> Solid:
 def _bridge_span() -> Solid:
     """Lies along z; the gate or pier faces are 4.0 apart."""
     half = 2.0 + BITE
-    under = arch(2.8, 0.46, 0.4, 8)[2:] * [1.0, 1.0] - [0.0, 0.12]
-    outline = np.concatenate([[(half, -0.1), (half, 0.38), (-half, 0.38), (-half, -0.1), (-1.4, -0.1)], under[::-1][1:-1], [(1.4, -0.1)]])
+    under = arch(2.8, 0.46, 0.4, 8, y=-0.12)[2:]
+    outline = np.concatenate([mirrored((1.4, -0.1), (half, -0.1), (half, 0.38)), under[-2:0:-1]])
     span = extruded(outline, -0.42, 0.42, STONE).turned(90.0)
     rail = box((0.12, 0.26, 2 * half - 0.02), (0.0, 0.36, 0.0), STONE_LIGHT, 0.03)
     span = span + rail.moved(-0.36) + rail.moved(0.36)
@@ -203,10 +200,12 @@ def _bridge_span() -> Solid:
 
 
 def _bridge_pier() -> Solid:
-    pier = stacked(chamfered(1.0, 1.0, 0.16), [(0.16, -0.1), (0.16, 0.06), (0.0, 0.16), (0.0, 0.42)], [STONE_DARK, STONE_DARK, STONE])
+    levels = [(0.16, -0.1), (0.16, 0.06), (0.0, 0.16), (0.0, 0.42)]
+    pier = stacked(chamfered(1.0, 1.0, 0.16), levels, [STONE_DARK, STONE_DARK, STONE])
     pier = pier.inset((0.0, 0.42, 0.0), regular(8, 0.22), 0.03, STONE_DARK, STONE_LIGHT)
-    lamp = box((0.15, 0.46, 0.15), (0.36, 0.4, 0.36), STONE_LIGHT, 0.02) + revolved([(0.0, 0.84), (0.08, 0.9), (0.09, 0.98), (0.0, 1.1)], 6, GOLD).moved(0.36, 0.0, 0.36)
-    return pier + lamp.around(4)
+    lamp = revolved([(0.0, 0.84), (0.08, 0.9), (0.09, 0.98), (0.0, 1.1)], 6, GOLD).moved(0.36, 0.0, 0.36)
+    post = box((0.15, 0.46, 0.15), (0.36, 0.4, 0.36), STONE_LIGHT, 0.02)
+    return pier + (post + lamp).around(4)
 
 
 def _bridge_ramp() -> Solid:

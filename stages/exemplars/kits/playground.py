@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from stages.exemplars.kits.layout import Layout
-from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
+from stages.exemplars.kits.polygon import arch, mirrored, rectangle, regular
 from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, revolved, stacked, swept
 
 __all__ = ["shapes"]
@@ -84,8 +84,9 @@ def _gate() -> Solid:
     """Stands on the edge of a deck at x = 0 and opens along x; its foot is on the ground below."""
     half = 0.34
     opening = arch(0.52, 0.94, 0.26, 6, y=FLOOR + 0.02)[2:]
-    outline = np.array([(-0.26, FLOOR - 0.14), (-half, FLOOR - 0.14), (-half, FLOOR + 0.98), (-0.2, FLOOR + 1.12), (0.2, FLOOR + 1.12), (half, FLOOR + 0.98), (half, FLOOR - 0.14), (0.26, FLOOR - 0.14)])
-    frame = extruded(np.concatenate([outline[::-1], opening[::-1]]), -BITE, GATE, GREEN).turned(90.0)
+    low, high = FLOOR - 0.14, FLOOR + 0.98
+    outline = mirrored((0.26, low), (half, low), (half, high), (0.2, high + 0.14))
+    frame = extruded(np.concatenate([outline, opening[::-1]]), -BITE, GATE, GREEN).turned(90.0)
     sill = box((GATE + BITE - 0.01, 0.15, 0.56), ((GATE - BITE) / 2, FLOOR - 0.145, 0.0), WOOD_LIGHT)
     star = revolved([(0.06, 0.0), (0.05, 0.03)], 6, YELLOW).turned(-90.0, "z").moved(GATE - 0.01, FLOOR + 1.03)
     return frame + sill + star
@@ -184,7 +185,7 @@ def _slide() -> Solid:
     """Runs along x from a gate at x = 0 down to a sandbox, whose middle is one pitch from that of the deck."""
     end = PITCH - APOTHEM - GATE - SAND + 0.06
     path = [(-BITE, FLOOR + 0.0, 0.0), (0.26, FLOOR - 0.02, 0.0), (0.6, FLOOR - 0.26, 0.0), (1.3, FLOOR - 0.86, 0.0), (1.62, 0.3, 0.0), (end, 0.22, 0.0)]
-    trough = np.array([(-0.3, -0.06), (0.3, -0.06), (0.3, 0.16), (0.23, 0.16), (0.19, 0.0), (-0.19, 0.0), (-0.23, 0.16), (-0.3, 0.16)])
+    trough = mirrored((0.3, -0.06), (0.3, 0.16), (0.23, 0.16), (0.19, 0.0))
     slide = swept(path, trough, YELLOW)
     legs = bar((1.0, 0.04, 0.2), (1.0, FLOOR - 0.64, 0.2), 0.045, STEEL) + bar((1.0, 0.04, -0.2), (1.0, FLOOR - 0.64, -0.2), 0.045, STEEL)
     hoop = swept([(0.12, FLOOR + 0.1, -0.27), (0.12, FLOOR + 0.56, -0.27), (0.12, FLOOR + 0.72, -0.1), (0.12, FLOOR + 0.72, 0.1), (0.12, FLOOR + 0.56, 0.27), (0.12, FLOOR + 0.1, 0.27)], regular(6, 0.035), RED)

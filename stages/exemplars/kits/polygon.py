@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["arch", "chamfered", "grown", "rectangle", "regular", "triangulate"]
+__all__ = ["arch", "chamfered", "grown", "mirrored", "rectangle", "regular", "triangulate"]
 
 FLAT = 1e-9
 """Areas below this are taken for nothing, so that the last bits of a sine never choose a diagonal."""
@@ -40,6 +40,11 @@ def arch(width: float, height: float, rise: float, segments: int = 6, y: float =
     head = np.stack([np.cos(angles) * width / 2, np.sin(angles) * rise + height - rise], axis=1)
     sill = np.array([[-width / 2, 0.0], [width / 2, 0.0]])
     return np.concatenate([sill, head]) + [0.0, y]
+
+
+def mirrored(*right: tuple[float, float]) -> FloatArray:
+    """The outline that is its own mirror image in x, from its right half, listed from the bottom to the top."""
+    return np.array([*right, *[(-x, y) for x, y in right[::-1]]])
 
 
 def grown(outline: FloatArray, distance: float) -> FloatArray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.exemplars.kits.layout import Layout
-from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
+from stages.exemplars.kits.polygon import arch, chamfered, mirrored, rectangle, regular
 from stages.exemplars.kits.solid import Color, Solid, box, extruded, joined, loft, revolved, stacked
 from stages.shape.arrays import FloatArray
 
@@ -93,14 +93,15 @@ def _column_upper() -> Solid:
 def _span() -> Solid:
     """Lies along x between the feet of two columns."""
     half = PITCH / 2 - 0.5 + BITE
-    section = np.array([(-0.4, 0.0), (0.4, 0.0), (0.4, 0.16), (0.36, 0.2), (0.36, 0.32), (0.32, 0.36), (-0.32, 0.36), (-0.36, 0.32), (-0.36, 0.2), (-0.4, 0.16)])
+    section = mirrored((0.4, 0.0), (0.4, 0.16), (0.36, 0.2), (0.36, 0.32), (0.32, 0.36))
     return extruded(section, -half, half, MARBLE_WARM).turned(90.0)
 
 
 def _beam() -> Solid:
     """Lies along x between the heads of two columns; its own foot is at the height of their abacus."""
     half = PITCH / 2 - 0.4 + BITE
-    lintel = np.array([(-0.25, 0.0), (0.25, 0.0), (0.25, 0.2), (0.28, 0.22), (0.28, 0.54), (0.32, 0.58), (0.32, 0.63), (0.29, 0.66), (-0.29, 0.66), (-0.32, 0.63), (-0.32, 0.58), (-0.28, 0.54), (-0.28, 0.22), (-0.25, 0.2)])
+    frieze, cornice = ((0.25, 0.0), (0.25, 0.2), (0.28, 0.22)), ((0.32, 0.58), (0.32, 0.63), (0.29, 0.66))
+    lintel = mirrored(*frieze, (0.28, 0.54), *cornice)
     beam = extruded(lintel, -half, half, MARBLE).turned(90.0)
     for x in (-0.8, -0.4, 0.0, 0.4, 0.8):
         beam = beam.inset((x, 0.38, 0.28), rectangle(0.2, 0.26), -0.03, MARBLE_WARM, BLUE, shrink=0.02, copies=2)
@@ -133,13 +134,14 @@ def _screen() -> Solid:
 
 def _portal() -> Solid:
     """A doorway that closes a bay."""
-    outline = np.array([(-0.46, 0.0), (-0.46, 2.2), (0.46, 2.2), (0.46, 0.0), (0.92, 0.0), (0.92, 3.06), (-0.92, 3.06), (-0.92, 0.0)])
-    frame = extruded(outline, -0.15, 0.15, MARBLE_WARM)
+    outline = [*mirrored((0.46, 0.0), (0.92, 0.0), (0.92, 3.06)), (-0.46, 2.2), (0.46, 2.2)]
+    lintel = mirrored((0.8, -0.28), (0.8, -0.12), (0.0, 0.24))[[0, 1, 2, 4, 5]]
+    frame = extruded(np.array(outline), -0.15, 0.15, MARBLE_WARM)
     for side in (0.0, 180.0):
         frame = frame.turned(side)
         for x in (-0.62, 0.62):
             frame = frame.inset((x, 1.12, 0.15), rectangle(0.24, 2.16), -0.06, MARBLE, shrink=0.02)
-        frame = frame.inset((0.0, 2.62, 0.15), np.array([(-0.8, -0.28), (0.8, -0.28), (0.8, -0.12), (0.0, 0.24), (-0.8, -0.12)]), -0.08, MARBLE, BLUE, shrink=0.05)
+        frame = frame.inset((0.0, 2.62, 0.15), lintel, -0.08, MARBLE, BLUE, shrink=0.05)
     for x in (-0.42, 0.42):
         frame = frame + box((0.08, 2.1, 0.42), (x, 0.04, 0.16), BRONZE)
     return frame
@@ -147,10 +149,8 @@ def _portal() -> Solid:
 
 def _gable(reach: float, eave: float, ridge: float) -> FloatArray:
     """The outline of a roof: it touches at height 0 between 1.2 and 1.46 from its middle and is clear of all else."""
-    half = [(1.46, 0.0), (1.52, 0.12), (reach, 0.12), (reach, eave), (0.1, ridge)]
-    inside = [(1.2, 0.0), (1.14, 0.16), (0.0, 0.7)]
-    mirrored = [(-x, y) for x, y in half[::-1]] + [(-x, y) for x, y in inside[:2]]
-    return np.array(half + mirrored + inside[::-1])
+    outside = mirrored((1.46, 0.0), (1.52, 0.12), (reach, 0.12), (reach, eave), (0.1, ridge))
+    return np.concatenate([outside, [(-1.2, 0.0), (-1.14, 0.16), (0.0, 0.7), (1.14, 0.16), (1.2, 0.0)]])
 
 
 def _roof() -> Solid:
@@ -168,8 +168,7 @@ def _roof() -> Solid:
 
 def _pediment() -> Solid:
     """Closes a roof: its back is the plane z = 0, at the end of the roof; it rests on the beam below."""
-    half = [(1.05, 0.0), (1.1, 0.12), (2.12, 0.12), (2.12, 0.3), (0.0, 1.44)]
-    outline = np.array([*half, *[(-x, y) for x, y in half[3::-1]]])
+    outline = mirrored((1.05, 0.0), (1.1, 0.12), (2.12, 0.12), (2.12, 0.3), (0.04, 1.42))
     front = extruded(outline, 0.0, 0.36, MARBLE)
     triangle = np.array([(-1.5, 0.0), (1.5, 0.0), (0.0, 0.8)])
     front = front.inset((0.0, 0.26, 0.36), triangle, 0.1, MARBLE_SHADE, BLUE_DARK)
@@ -181,8 +180,7 @@ def _pediment() -> Solid:
 
 def _acroterion() -> Solid:
     """A palmette on the tip of a pediment."""
-    leaf = np.array([(0.0, 0.1), (0.14, 0.14), (0.34, 0.3), (0.26, 0.36), (0.3, 0.52), (0.18, 0.52), (0.12, 0.68), (0.0, 0.78)])
-    palm = np.concatenate([leaf, leaf[-2:0:-1] * [-1.0, 1.0]])
+    palm = mirrored((0.06, 0.1), (0.14, 0.14), (0.34, 0.3), (0.26, 0.36), (0.3, 0.52), (0.18, 0.52), (0.12, 0.68), (0.03, 0.78))
     plate = extruded(palm, -0.06, 0.06, GOLD).inset((0.0, 0.4, 0.06), regular(6, 0.1), -0.04, BRONZE, shrink=0.03)
     return box((0.3, 0.24, 0.26), (0.0, -0.08, 0.0), MARBLE, 0.03) + plate
 
@@ -237,9 +235,9 @@ def _statue() -> Solid:
 def _stairs() -> Solid:
     """Leads up to a span: its face is the plane z = 0, the stairs come down towards positive z."""
     steps = np.array([(BITE, 0.0), (BITE, 0.32), (-0.14, 0.32), (-0.14, 0.24), (-0.28, 0.24), (-0.28, 0.16), (-0.42, 0.16), (-0.42, 0.08), (-0.6, 0.08), (-0.6, 0.0)])
-    flight = extruded(steps, -0.7, 0.7, MARBLE).turned(90.0)
-    cheek = box((0.2, 0.42, 0.56), (0.78, 0.0, 0.29), MARBLE_WARM, 0.03)
-    return flight + cheek + cheek.moved(-1.56)
+    flight = extruded(steps, -0.58, 0.58, MARBLE).turned(90.0)
+    cheek = box((0.2, 0.42, 0.52), (0.67, 0.0, 0.25), MARBLE_WARM, 0.03)
+    return flight + cheek + cheek.moved(-1.34)
 
 
 def _path() -> Solid:
@@ -297,12 +295,12 @@ class _Precinct(Layout):
 
 
 def _hall_and_court() -> Layout:
-    """A long hall with a gabled roof; beside it a court with a pool, and a domed belvedere at its far end."""
+    """A long hall with a gabled roof; beside it a court with a pool, and a way to a domed belvedere."""
     precinct = _Precinct()
     for j in range(4):
         precinct.column(0, j)
         precinct.column(1, j)
-    for i, j in ((2, 1), (3, 1), (2, 2), (3, 2)):
+    for i, j in ((2, 1), (2, 2), (3, 1), (4, 1), (3, 2), (4, 2), (2, 3)):
         precinct.column(i, j)
     precinct.bay(0, 0, 1, 0)
     precinct.bay(0, 1, 1, 1)
@@ -316,20 +314,24 @@ def _hall_and_court() -> Layout:
     precinct.gable(1.5, 0.0, 180.0)
     precinct.gable(1.5, 9.0, 0.0)
     precinct.put("statue", 1.5, 0.3, 1.5)
-    for i in (1, 2):
-        precinct.bay(i, 1, i + 1, 1)
-        precinct.bay(i, 2, i + 1, 2)
+    precinct.bay(1, 1, 2, 1)
+    precinct.bay(1, 2, 2, 2)
     precinct.bay(2, 1, 2, 2)
-    precinct.bay(3, 1, 3, 2)
     precinct.cell("pool", 1, 1)
-    precinct.cell("floor", 2, 1)
-    precinct.storey(2, 1, 1)
-    precinct.cell("dome", 2, 1, REST + UPPER)
-    precinct.put("finial", 7.5, REST + UPPER + 2.08, 4.5)
+    precinct.bay(2, 2, 2, 3)
+    precinct.bay(2, 1, 3, 1)
+    precinct.bay(3, 1, 4, 1)
+    precinct.bay(3, 2, 4, 2)
+    precinct.bay(3, 1, 3, 2)
+    precinct.bay(4, 1, 4, 2)
+    precinct.cell("floor", 3, 1)
+    precinct.storey(3, 1, 1)
+    precinct.cell("dome", 3, 1, REST + UPPER)
+    precinct.put("finial", 10.5, REST + UPPER + 2.08, 4.5)
     precinct.put("stairs", 1.5, 0.0, 9.4)
     precinct.put("path", 1.5, 0.0, 10.5)
     precinct.put("altar", 1.5, 0.0, 11.5)
-    precinct.put("stairs", 9.4, 0.0, 4.5, 90.0)
+    precinct.put("stairs", 12.4, 0.0, 4.5, 90.0)
     return precinct
 
 

@@ -159,6 +159,7 @@ def test_checksums_cover_every_file_and_the_manifest_the_index(toy_folder: Path)
     assert hashlib.sha256((toy_folder / index["path"]).read_bytes()).hexdigest() == index["sha256"]
 
 
+@pytest.mark.slow
 def test_nothing_in_the_folder_depends_on_where_or_with_how_many_workers_it_was_made(
     toy_folder: Path, tmp_path: Path
 ) -> None:

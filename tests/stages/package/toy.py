@@ -19,7 +19,7 @@ from stages.package.stage import STAGE as PACKAGE
 from stages.points.stage import STAGE as POINTS
 from stages.points.stage import PointsConfig
 from stages.shape.collection import collection_shards
-from stages.shape.kit import Assembly, Exemplar, Grammar, Kit, PartType
+from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
 from stages.sketches.settings import SketchesConfig, SketchView
@@ -50,12 +50,15 @@ def toy_kit(name: str) -> Kit:
     """Two types of boxes; the kit `planks` has z up."""
     types = (box("tower", (1.0, 1.0, 3.0), (200, 40, 40)), box("long.wall", (1.0, 0.5, 2.0), (40, 40, 200)))
     exemplar = Exemplar("row", chain(6, 0), tuple(f"part{index}" for index in range(6)))
+    beside = [np.eye(4), np.eye(4)]
+    beside[0][0, 3], beside[1][0, 3] = 1.0, -1.0
+    dockings = tuple(Docking(0, 1, pose, "face", count, 0.0) for pose, count in zip(beside, (3, 2), strict=True))
     rules = {kind: {((1 - kind, 1),): 1, ((1 - kind, 2),): 4} for kind in (0, 1)}
     return Kit(
         name=name,
         types=types,
         exemplars=(exemplar,),
-        grammar=Grammar(rules, (), {}),
+        grammar=Grammar(rules, dockings, {}),
         contact_tolerance=0.001,
         pose_tolerance=0.01,
         contact_kinds=("point", "line", "face"),

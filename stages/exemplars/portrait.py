@@ -1,0 +1,74 @@
+"""The picture of a kit: its exemplars, and every part type with how often it stands in them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.shape.arrays import ByteArray
+from stages.shape.kit import Assembly, Exemplar, Kit
+from stages.views.camera import Camera
+from stages.views.portrait import portrait
+from stages.views.scene import scene_of
+from stages.views.sheet import Cell, Section, contact_sheet, picture_png
+
+__all__ = ["kit_sheet"]
+
+CELL = 240
+COLUMNS = 6
+EXEMPLAR = Camera(azimuth=-36.0, elevation=28.0, fov=24.0, margin=0.04)
+PART = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.12)
+
+
+def kit_sheet(kit: Kit) -> bytes:
+    """A PNG of the kit: its exemplars large, and below them one picture for each part type, the commonest first, with
+    its name, how often it stands in the exemplars and how many rigid motions map it onto itself.
+
+    Drawn by ray casting, which gives the same bytes on every machine.
+    """
+    used = np.concatenate([each.assembly.types for each in kit.exemplars])
+    counts = np.bincount(used, minlength=len(kit.types))
+    commonest = np.argsort(-counts, kind="stable").tolist()
+    shown = [_type_cell(kit, index, int(counts[index])) for index in commonest]
+    span = COLUMNS // min(len(kit.exemplars), 3)
+    shapes = [_exemplar_cell(kit, each, span) for each in kit.exemplars]
+    rules = sum(len(each) for each in kit.grammar.neighbourhoods.values())
+    sections = [
+        Section(
+            _count(len(shapes), "exemplar"),
+            _rows(shapes, COLUMNS // span),
+            f"{_count(rules, 'neighbourhood')}, {_count(len(kit.grammar.dockings), 'docking')}",
+            span,
+        ),
+        Section(_count(len(shown), "part type"), _rows(shown, COLUMNS), "how often in the exemplars, and the rigid motions onto themselves"),
+    ]
+    return picture_png(contact_sheet(sections, kit.name, CELL))
+
+
+def _exemplar_cell(kit: Kit, exemplar: Exemplar, span: int) -> Cell:
+    size = (CELL * span, min(CELL * span * 3 // 4, CELL * 3))
+    picture = portrait(scene_of(exemplar.assembly, kit), EXEMPLAR, size, backend="raycast")
+    parts, contacts = len(exemplar.assembly), len(exemplar.assembly.edges)
+    return Cell(picture, f"{exemplar.name}: {_count(parts, 'part')}, {_count(contacts, 'contact')}")
+
+
+def _type_cell(kit: Kit, index: int, count: int) -> Cell:
+    part = kit.types[index]
+    motions = len(part.symmetries)
+    symmetric = "no symmetry" if motions == 1 else f"{motions} symmetries"
+    return Cell(_type_picture(kit, index), f"{part.name} × {count}, {symmetric}")
+
+
+def _type_picture(kit: Kit, index: int) -> ByteArray:
+    """A part as it first stands in an exemplar."""
+    poses = [each.assembly.poses[each.assembly.types == index] for each in kit.exemplars]
+    pose = np.concatenate([*poses, np.eye(4)[None]])[:1]
+    alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
+    return portrait(scene_of(alone, kit), PART, (CELL, CELL), backend="raycast")
+
+
+def _rows(cells: list[Cell], columns: int) -> list[list[Cell]]:
+    return [cells[first : first + columns] for first in range(0, len(cells), columns)]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
