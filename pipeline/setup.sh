@@ -62,5 +62,5 @@ if ! .venv/bin/python -c 'import sys, pip; sys.exit(sys.version_info[:2] != (3, 
     echo "making .venv with $python"
     "$python" -m venv --clear .venv
 fi
-echo "installing the versions of requirements.lock into .venv"
-.venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+echo "installing the versions of requirements.lock into .venv; the first time this takes some minutes"
+.venv/bin/python -m pip install -qq --disable-pip-version-check -r requirements.lock

@@ -2,7 +2,8 @@
 
 One executor with many processes would break as a whole when one of them dies, and could not say which shard it
 was that killed it. Native libraries do kill (a segmentation fault, memory), so even one worker is a process of
-its own.
+its own. On a cluster there is no executor at all: `--shards i/n` is one job of a job array, and brings its own
+workers like any other run.
 """
 
 from __future__ import annotations

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from stages.exemplars.congruence import congruences, surface
 from stages.exemplars.read import Model
 from stages.shape.arrays import IntArray
-from stages.shape.kit import Assembly, Exemplar, Kit
+from stages.shape.contact import ContactTest
+from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 from stages.shape.pose import pose_vectors, relative_poses
 
-__all__ = ["hubs", "kit_warnings", "pieces", "refusals"]
+__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "ways_together"]
 
 LETTERS = 52
 """Part types beyond this number have names in brackets for string tokens, not letters."""
@@ -21,6 +25,8 @@ HUB_SHARE = 1 / 3
 """So is a part that touches more than this share of all parts, in shapes of some size."""
 SMALL = 12
 """Shapes of at most so many parts have no hubs: there, to touch a third of all parts is nothing."""
+LOOSER = (2.0, 5.0, 10.0, 20.0, 50.0)
+"""Multiples of the contact tolerance that are tried for shapes in pieces."""
 NAMED = 5
 """So many parts are named in a sentence."""
 
@@ -86,6 +92,34 @@ def kit_warnings(kit: Kit) -> Iterator[str]:
             f"{len(kit.types)} part types are more than the {LETTERS} letters, so strings write them as names in "
             "brackets; raise `congruence_tolerance` if parts are meant to be alike"
         )
+
+
+def ways_together(kit: Kit) -> Iterator[str]:
+    """What would make one piece of each exemplar of `kit` that is in pieces."""
+    for exemplar in kit.exemplars:
+        assembly = exemplar.assembly
+        if not pieces(assembly).any():
+            continue
+        for factor in (1.0, *LOOSER):
+            looser = ContactTest(kit.types, factor * kit.contact_tolerance)
+            edges = looser.contacts(assembly.types, assembly.poses)
+            if not pieces(replace(assembly, edges=edges)).any():
+                if factor == 1.0:
+                    yield f"{exemplar.name}: in one piece if all contacts count, `contact.kinds: [point, line, face]`"
+                else:
+                    yield f"{exemplar.name}: in one piece with {factor:g} times the contact tolerance"
+                break
+
+
+def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int, int]]:
+    """Pairs i < j of types that are each other's mirror image; `tolerance` is a share of the diagonal."""
+    surfaces = [surface(each.vertices, each.faces) for each in types]
+    twins: list[tuple[int, int]] = []
+    for i, j in itertools.combinations(range(len(types)), 2):
+        motions = congruences(surfaces[i], surfaces[j], tolerance, reflections=True)
+        if (np.linalg.det(motions[:, :3, :3]) < 0).any():
+            twins.append((i, j))
+    return twins
 
 
 def _stand_twice(kit: Kit, exemplar: Exemplar) -> Iterator[str]:

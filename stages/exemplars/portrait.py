@@ -39,7 +39,11 @@ def kit_sheet(kit: Kit) -> bytes:
             f"{_count(rules, 'neighbourhood')}, {_count(len(kit.grammar.dockings), 'docking')}",
             span,
         ),
-        Section(_count(len(shown), "part type"), _rows(shown, COLUMNS), "how often in the exemplars, and the rigid motions onto themselves"),
+        Section(
+            _count(len(shown), "part type"),
+            _rows(shown, COLUMNS),
+            "how often in the exemplars, and the rigid motions onto themselves",
+        ),
     ]
     return picture_png(contact_sheet(sections, kit.name, CELL))
 

@@ -165,25 +165,22 @@ def _between(
         kind, s = _on_one_surface(q, p, sharp, normals, rounded)
         return kind, 1.0 - s
     start_q = 1.0 - end_q
-    # Depth of the surface of p minus that of q at both ends of the stretch where both are.
-    low, high = min(start_q, end_p), max(start_q, end_p)
-    gap_low = _gap(low, last_p, last_q, px, py, qx, qy, screen, projection)
-    gap_high = _gap(high, last_p, last_q, px, py, qx, qy, screen, projection)
+    # How much farther the surface of p is than that of q, where that of q begins and where that of p ends.
+    at_start = _gap(start_q, last_p, last_q, px, py, qx, qy, screen, projection)
+    at_end = _gap(end_p, last_p, last_q, px, py, qx, qy, screen, projection)
     depth = eye_depth(clip_at(screen, p, px, py), projection)
     tolerance = step * pixel * (depth if perspective else 1.0)
-    if start_q < end_p:
-        if abs(gap_low) < 0.01 * tolerance and abs(gap_high) < 0.01 * tolerance:
-            # Two faces in one plane: the part of the lower layer is seen up to its end.
-            s = end_p if layers[parts[p]] <= layers[parts[q]] else start_q
-            gap = 0.0
-        elif gap_low < 0.0 < gap_high:
-            s, gap = low + (high - low) * gap_low / (gap_low - gap_high), 0.0
-        elif gap_low + gap_high < 0.0:
-            s, gap = end_p, gap_high if end_p == high else gap_low
-        else:
-            s, gap = start_q, gap_low if start_q == low else gap_high
+    if start_q >= end_p:
+        s, gap = (start_q + end_p) / 2, min(abs(at_start), abs(at_end))
+    elif max(abs(at_start), abs(at_end)) < 0.01 * tolerance:
+        # Two faces in one plane: the part of the lower layer is seen up to its end.
+        s, gap = end_p if layers[parts[p]] <= layers[parts[q]] else start_q, 0.0
+    elif at_start < 0.0 < at_end:
+        s, gap = start_q + (end_p - start_q) * at_start / (at_start - at_end), 0.0
+    elif at_start + at_end < 0.0:
+        s, gap = end_p, at_end
     else:
-        s, gap = (low + high) / 2, min(abs(gap_low), abs(gap_high))
+        s, gap = start_q, at_start
     if abs(gap) > tolerance:
         return CONTOUR, s
     if parts[p] != parts[q]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.exemplars.kits.layout import Layout
 from stages.exemplars.kits.polygon import arch, chamfered, mirrored, rectangle, regular
-from stages.exemplars.kits.solid import Solid, bar, box, extruded, joined, revolved, stacked
+from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, revolved, stacked
 
 __all__ = ["shapes"]
 
@@ -81,9 +81,9 @@ def _roof_cone() -> Solid:
     outline = chamfered(1.4, 1.4, 0.38)
     drum = [(0.0, 0.0), (0.0, 0.86)]
     eaves = [(0.5, 0.78), (0.52, 0.86), (0.2, 1.34), (0.22, 1.4), (-0.1, 1.94), (-0.08, 2.0)]
-    roof = stacked(outline, [*drum, *eaves, (-0.4, 2.66), (-0.6, 2.9)], [PLASTER, TIMBER, TILE_DARK, *[TILE, TILE_DARK] * 3])
-    roof = roof.inset((0.7, 0.46, 0.0), arch(0.3, 0.44, 0.15, 4, y=-0.2), 0.1, TIMBER, SLIT, copies=4)
-    return roof
+    colors = [PLASTER, TIMBER, TILE_DARK, *[TILE, TILE_DARK] * 3]
+    roof = stacked(outline, [*drum, *eaves, (-0.4, 2.66), (-0.6, 2.9)], colors)
+    return roof.inset((0.7, 0.46, 0.0), arch(0.3, 0.44, 0.15, 4, y=-0.2), 0.1, TIMBER, SLIT, copies=4)
 
 
 def _roof_spire() -> Solid:
@@ -91,16 +91,17 @@ def _roof_spire() -> Solid:
     steps = [(0.74, 1.62), (0.76, 1.67), (0.5, 2.36), (0.52, 2.41), (0.25, 3.2), (0.27, 3.25), (0.1, 3.9)]
     colors = [STONE_LIGHT, TIMBER, SLATE_DARK, *[SLATE, SLATE_DARK] * 3, SLATE]
     spire = revolved([*drum, *steps], 8, colors)
-    for turn in (0.0, 45.0):
-        spire = spire.turned(turn).inset((0.72, 0.5, 0.0), arch(0.22, 0.56, 0.14, 4, y=-0.26), 0.1, STONE_DARK, SLIT, copies=4)
+    window = arch(0.22, 0.56, 0.14, 4, y=-0.26)
+    spire = spire.inset((0.72, 0.5, 0.0), window, 0.1, STONE_DARK, SLIT, copies=8)
     # Four dormers keep the spire from turning by an eighth.
     dormer = box((0.3, 0.26, 0.3), (0.78, 1.2, 0.0), PLASTER) + _gable(0.4, 0.2, 0.4, SLATE_DARK).moved(0.8, 1.46, 0.0)
     return spire + dormer.around(4)
 
 
-def _gable(width: float, height: float, length: float, color: tuple[int, int, int]) -> Solid:
+def _gable(width: float, height: float, length: float, color: Color) -> Solid:
     """A small roof with its ridge along x."""
-    return extruded(np.array([[-width / 2, 0.0], [width / 2, 0.0], [0.0, height]]), -length / 2, length / 2, color).turned(90.0)
+    outline = np.array([[-width / 2, 0.0], [width / 2, 0.0], [0.0, height]])
+    return extruded(outline, -length / 2, length / 2, color).turned(90.0)
 
 
 def _flag() -> Solid:
@@ -114,9 +115,9 @@ def _flag() -> Solid:
 
 def _turret() -> Solid:
     """A bartizan on a slanted corner of a shaft: its axis is 1.27 from the shaft's, outward along x."""
-    profile = [(0.0, 0.12), (0.2, 0.24), (0.26, 0.34), (0.34, 0.44), (0.34, 0.84), (0.44, 0.82), (0.45, 0.88), (0.0, 1.4)]
+    foot = [(0.0, 0.12), (0.2, 0.24), (0.26, 0.34), (0.34, 0.44)]
     colors = [STONE_DARK, STONE_DARK, STONE_LIGHT, PLASTER, TIMBER, SLATE_DARK, SLATE]
-    turret = revolved(profile, 8, colors)
+    turret = revolved([*foot, (0.34, 0.84), (0.44, 0.82), (0.45, 0.88), (0.0, 1.4)], 8, colors)
     turret = turret.inset((0.34, 0.64, 0.0), rectangle(0.12, 0.2), 0.06, TIMBER, SLIT)
     return turret.moved(1.27)
 
@@ -226,7 +227,7 @@ class _Castle(Layout):
         super().__init__(_types())
 
     def tower(self, i: float, j: float, shafts: int, top: str = "", turrets: tuple[int, ...] = ()) -> None:
-        """A tower of so many shafts; `top` is a roof, with `+flag` behind it; turrets sit on the top shaft's corners."""
+        """A tower of so many shafts; `top` is a roof, with `+flag` behind it; turrets are corners of the top shaft."""
         x, z = PITCH * i, PITCH * j
         self.put("tower_base", x, 0.0, z)
         for level in range(shafts):

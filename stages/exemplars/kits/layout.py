@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stages.exemplars.colors import linear_from_srgb
 from stages.exemplars.kits.solid import Solid, rotation
 from stages.shape.arrays import FloatArray
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["Layout", "glb_bytes"]
 
@@ -31,10 +36,10 @@ class Layout:
 
 
 def glb_bytes(layout: Layout) -> bytes:
-    """The shape as GLB, Y up: one node a part, named `<type>.<nnn>`, one mesh a type, face colours as COLOR_0.
+    """The shape as GLB, Y up: one node a part, named `<type>.<nnn>`, one mesh a type.
 
-    Corners are shared only between triangles of one colour, so colours stay crisp; there are no normals, which
-    glTF reads as flat shading.
+    COLOR_0 is linear, as glTF has it. Corners are shared only between triangles of one colour, so colours stay
+    crisp; there are no normals, which glTF reads as flat shading.
     """
     import trimesh
 
@@ -45,20 +50,19 @@ def glb_bytes(layout: Layout) -> bytes:
         if name not in counts:
             scene.add_geometry(_mesh(layout.types[name]), node_name=node, geom_name=name, transform=pose)
         else:
-            scene.graph.update(node, matrix=pose, geometry=name)
+            scene.graph.update(node, matrix=pose, geometry=name)  # type: ignore[no-untyped-call]
         counts[name] = counts.get(name, 0) + 1
-    exported = scene.export(file_type="glb")
+    exported = scene.export(file_type="glb")  # type: ignore[no-untyped-call]
     assert isinstance(exported, bytes)
     return exported
 
 
-def _mesh(solid: Solid):  # type: ignore[no-untyped-def]
+def _mesh(solid: Solid) -> trimesh.Trimesh:
     import trimesh
 
     vertices, faces, colors = solid.mesh()
-    corners = np.column_stack([vertices[faces.ravel()], np.repeat(colors, 3, axis=0)])
+    linear = np.rint(255.0 * linear_from_srgb(colors)).astype(np.uint8)
+    corners = np.column_stack([vertices[faces.ravel()], np.repeat(linear, 3, axis=0)])
     _, first, inverse = np.unique(corners, axis=0, return_index=True, return_inverse=True)
     rgba = np.column_stack([corners[first, 3:], np.full(len(first), 255)]).astype(np.uint8)
-    return trimesh.Trimesh(
-        vertices=corners[first, :3], faces=inverse.reshape(-1, 3), vertex_colors=rgba, process=False
-    )
+    return trimesh.Trimesh(corners[first, :3], inverse.reshape(-1, 3), vertex_colors=rgba, process=False)

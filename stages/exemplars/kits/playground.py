@@ -94,9 +94,9 @@ def _gate() -> Solid:
 
 def _ring() -> Solid:
     """A hoop on the posts of a deck or a storey; carries what comes above."""
-    hoop = stacked(regular(8, APOTHEM), [(0.06, 0.0), (0.08, 0.04), (0.08, RING - 0.04), (0.05, RING)], [BLUE_DARK, BLUE, BLUE])
-    hoop = hoop.inset((0.0, RING, 0.0), regular(8, 0.86), RING - 0.02, BLUE_DARK, WOOD_LIGHT)
-    return hoop
+    levels = [(0.06, 0.0), (0.08, 0.04), (0.08, RING - 0.04), (0.05, RING)]
+    hoop = stacked(regular(8, APOTHEM), levels, [BLUE_DARK, BLUE, BLUE])
+    return hoop.inset((0.0, RING, 0.0), regular(8, 0.86), RING - 0.02, BLUE_DARK, WOOD_LIGHT)
 
 
 def _storey() -> Solid:
@@ -104,8 +104,8 @@ def _storey() -> Solid:
     floor = stacked(regular(8, APOTHEM), [(0.0, 0.0), (0.04, 0.05), (0.04, 0.12)], [WOOD_DARK, WOOD])
     floor = floor.inset((0.0, 0.12, 0.0), regular(8, 0.9), -0.5, WOOD, WOOD_LIGHT)
     floor = floor.inset((0.0, 0.62, 0.0), regular(8, 0.8), 0.44, WOOD_DARK, WOOD_LIGHT)
-    for turn in range(2):
-        floor = floor.turned(45.0 * turn).inset((0.9, 0.37, 0.0), regular(8, 0.13), 0.06, WOOD_DARK, (RED, YELLOW)[turn], copies=4)
+    for color in (RED, YELLOW):
+        floor = floor.inset((0.9, 0.37, 0.0), regular(8, 0.13), 0.06, WOOD_DARK, color, copies=4).turned(45.0)
     return floor + _posts(0.02, STOREY, WOOD_DARK)
 
 
@@ -120,14 +120,15 @@ def _roof_cap() -> Solid:
     """A rounded roof on a ring."""
     angles = np.radians([4.0, 28.0, 52.0, 74.0])
     dome = [(1.08 * float(np.cos(a)), 0.06 + 0.98 * float(np.sin(a))) for a in angles]
-    cap = revolved([(0.98, 0.0), (1.2, 0.0), (1.22, 0.08), *dome, (0.12, 1.06)], 16, [GREEN_DARK, GREEN_DARK, GREEN_DARK, GREEN, GREEN, GREEN, GREEN])
-    cap = cap + revolved([(0.1, 1.02), (0.16, 1.12), (0.12, 1.24), (0.08, 1.26)], 8, YELLOW)
-    return cap
+    brim = [(0.98, 0.0), (1.2, 0.0), (1.22, 0.08)]
+    cap = revolved([*brim, *dome, (0.12, 1.06)], 16, [GREEN_DARK] * 3 + [GREEN] * 4)
+    return cap + revolved([(0.1, 1.02), (0.16, 1.12), (0.12, 1.24), (0.08, 1.26)], 8, YELLOW)
 
 
 def _pennant() -> Solid:
     """A pole with a pennant on the knob of a roof."""
-    pole = revolved([(0.035, -0.03), (0.035, 0.86), (0.06, 0.88), (0.06, 0.96), (0.0, 1.0)], 6, [STEEL, STEEL, YELLOW, YELLOW])
+    profile = [(0.035, -0.03), (0.035, 0.86), (0.06, 0.88), (0.06, 0.96), (0.0, 1.0)]
+    pole = revolved(profile, 6, [STEEL, STEEL, YELLOW, YELLOW])
     cloth = extruded(np.array([(0.0, 0.44), (0.6, 0.62), (0.0, 0.8)]), -0.02, 0.02, BLUE)
     return pole + cloth
 
@@ -142,23 +143,27 @@ def _bridge_planks() -> Solid:
     half = _length() / 2 + BITE
     xs = np.linspace(-half, half, 9)
     sag = [float(0.14 * (x / half) ** 2 - 0.14) for x in xs]
-    path = [(float(x), FLOOR - 0.1 + s, 0.0) for x, s in zip(xs, sag, strict=True)]
-    bridge = swept([(x, y, 0.2) for x, y, _ in path], rectangle(0.06, 0.06), ROPE) + swept([(x, y, -0.2) for x, y, _ in path], rectangle(0.06, 0.06), ROPE)
-    for (x0, y0, _), (x1, y1, _) in pairwise(path):
-        bridge = bridge + box((0.15, 0.05, 0.56), ((x0 + x1) / 2, (y0 + y1) / 2 + 0.03, 0.0), WOOD_LIGHT, 0.01)
-    for z in (-0.29, 0.29):
-        bridge = bridge + swept([(x, y + 0.62, z) for x, y, _ in path], regular(4, 0.03), ROPE)
-        for x, y, _ in path[1:-1:2]:
-            bridge = bridge + bar((x, y + 0.02, 0.9 * z), (x, y + 0.62, z), 0.02, ROPE, 4)
-    return bridge
+    path = [(float(x), FLOOR - 0.1 + s) for x, s in zip(xs, sag, strict=True)]
+    pieces = [
+        box((0.15, 0.05, 0.56), ((x0 + x1) / 2, (y0 + y1) / 2 + 0.03, 0.0), WOOD_LIGHT, 0.01)
+        for (x0, y0), (x1, y1) in pairwise(path)
+    ]
+    for side in (-1.0, 1.0):
+        pieces += [
+            swept([(x, y, 0.2 * side) for x, y in path], rectangle(0.06, 0.06), ROPE),
+            swept([(x, y + 0.62, 0.29 * side) for x, y in path], regular(4, 0.03), ROPE),
+            *(bar((x, y + 0.02, 0.26 * side), (x, y + 0.62, 0.29 * side), 0.02, ROPE, 4) for x, y in path[1:-1:2]),
+        ]
+    return joined(*pieces)
 
 
 def _bridge_tube() -> Solid:
     """A crawling tube along x."""
     half = _length() / 2 + BITE
-    rims = [(0.36, -half), (0.36, 0.1 - half), (0.31, 0.12 - half), (0.31, -0.06), (0.35, -0.04), (0.35, 0.04), (0.31, 0.06), (0.31, half - 0.12), (0.36, half - 0.1), (0.36, half)]
-    hull = revolved(rims, 8, [YELLOW_DARK, YELLOW_DARK, YELLOW, YELLOW_DARK, YELLOW_DARK, YELLOW_DARK, YELLOW, YELLOW_DARK, YELLOW_DARK])
-    tube = hull.turned(-90.0, "z")
+    rims = [(0.35, 0.04), (0.31, 0.06), (0.31, half - 0.12), (0.36, half - 0.1), (0.36, half)]
+    left = [(apothem, -x) for apothem, x in rims[::-1]]
+    ribs = [YELLOW_DARK, YELLOW_DARK, YELLOW, YELLOW_DARK]
+    tube = revolved([*left, *rims], 8, [*ribs, YELLOW_DARK, *ribs[::-1]]).turned(-90.0, "z")
     for x in (-0.46, 0.46):
         tube = tube.inset((x, 0.0, 0.31), regular(8, 0.1), 0.06, BLUE_DARK, BLUE, copies=2)
     handle = box((0.4, 0.08, 0.08), (0.46, 0.29, 0.0), RED, 0.02)
@@ -172,44 +177,42 @@ def _bridge_bars() -> Solid:
     for z in (-0.24, 0.24):
         pieces.append(box((2 * half, 0.08, 0.1), (0.0, FLOOR - 0.12, z), RED, 0.02))
         pieces.append(bar((-half, FLOOR + 0.9, z), (half, FLOOR + 0.9, z), 0.045, BLUE))
-        for x in (-0.44, 0.44):
-            pieces.append(bar((x, FLOOR - 0.06, z), (x, FLOOR + 0.9, z), 0.03, BLUE))
-    for x in np.linspace(-0.66, 0.66, 5):
-        pieces.append(bar((float(x), FLOOR + 0.9, -0.24), (float(x), FLOOR + 0.9, 0.24), 0.028, STEEL))
-    for x in np.linspace(-0.7, 0.7, 6):
-        pieces.append(box((0.14, 0.05, 0.56), (float(x), FLOOR - 0.06, 0.0), WOOD_LIGHT, 0.01))
-    return joined(*pieces)
+        pieces += [bar((x, FLOOR - 0.06, z), (x, FLOOR + 0.9, z), 0.03, BLUE) for x in (-0.44, 0.44)]
+    rungs = np.linspace(-0.66, 0.66, 5).tolist()
+    boards = np.linspace(-0.7, 0.7, 6).tolist()
+    return joined(
+        *pieces,
+        *(bar((x, FLOOR + 0.9, -0.24), (x, FLOOR + 0.9, 0.24), 0.028, STEEL) for x in rungs),
+        *(box((0.14, 0.05, 0.56), (x, FLOOR - 0.06, 0.0), WOOD_LIGHT, 0.01) for x in boards),
+    )
 
 
 def _slide() -> Solid:
     """Runs along x from a gate at x = 0 down to a sandbox, whose middle is one pitch from that of the deck."""
     end = PITCH - APOTHEM - GATE - SAND + 0.06
-    path = [(-BITE, FLOOR + 0.0, 0.0), (0.26, FLOOR - 0.02, 0.0), (0.6, FLOOR - 0.26, 0.0), (1.3, FLOOR - 0.86, 0.0), (1.62, 0.3, 0.0), (end, 0.22, 0.0)]
+    path = [(-BITE, FLOOR), (0.26, FLOOR - 0.02), (0.6, FLOOR - 0.26), (1.3, FLOOR - 0.86), (1.62, 0.3), (end, 0.22)]
     trough = mirrored((0.3, -0.06), (0.3, 0.16), (0.23, 0.16), (0.19, 0.0))
-    slide = swept(path, trough, YELLOW)
-    legs = bar((1.0, 0.04, 0.2), (1.0, FLOOR - 0.64, 0.2), 0.045, STEEL) + bar((1.0, 0.04, -0.2), (1.0, FLOOR - 0.64, -0.2), 0.045, STEEL)
-    hoop = swept([(0.12, FLOOR + 0.1, -0.27), (0.12, FLOOR + 0.56, -0.27), (0.12, FLOOR + 0.72, -0.1), (0.12, FLOOR + 0.72, 0.1), (0.12, FLOOR + 0.56, 0.27), (0.12, FLOOR + 0.1, 0.27)], regular(6, 0.035), RED)
-    return slide + legs + hoop
+    slide = swept([(x, y, 0.0) for x, y in path], trough, YELLOW)
+    leg = bar((1.0, 0.04, 0.2), (1.0, FLOOR - 0.64, 0.2), 0.045, STEEL)
+    bow = mirrored((0.27, 0.1), (0.27, 0.56), (0.1, 0.72))
+    hoop = swept([(0.12, FLOOR + y, -z) for z, y in bow.tolist()], regular(6, 0.035), RED)
+    return slide + leg + leg.moved(z=-0.4) + hoop
 
 
 def _ladder() -> Solid:
     """Comes down from a gate at x = 0."""
-    top, foot = (0.02, FLOOR + 0.52), (0.72, 0.0)
-    pieces = []
-    for z in (-0.26, 0.26):
-        pieces.append(swept([(top[0] + 0.02, top[1], z), (0.12, FLOOR + 0.56, z), (0.26, FLOOR + 0.42, z), (foot[0], foot[1], z)], regular(6, 0.045), BLUE))
-    for k in range(5):
-        y = 0.22 + 0.26 * k
-        x = 0.72 - 0.46 * y / (FLOOR + 0.42)
-        pieces.append(box((0.14, 0.06, 0.52), (x, y, 0.0), WOOD_LIGHT, 0.015))
-    pieces.append(box((0.3, 0.08, 0.5), (0.12, FLOOR - 0.1, 0.0), WOOD))
-    return joined(*pieces)
+    stile = [(0.04, FLOOR + 0.52), (0.12, FLOOR + 0.56), (0.26, FLOOR + 0.42), (0.72, 0.0)]
+    stiles = [swept([(x, y, z) for x, y in stile], regular(6, 0.045), BLUE) for z in (-0.26, 0.26)]
+    heights = [0.22 + 0.26 * k for k in range(5)]
+    rungs = [box((0.14, 0.06, 0.52), (0.72 - 0.46 * y / (FLOOR + 0.42), y, 0.0), WOOD_LIGHT, 0.015) for y in heights]
+    return joined(*stiles, *rungs, box((0.3, 0.08, 0.5), (0.12, FLOOR - 0.1, 0.0), WOOD))
 
 
 def _pole() -> Solid:
     """A fireman's pole in front of a gate at x = 0."""
     pole = bar((0.46, 0.02, 0.0), (0.46, FLOOR + 0.98, 0.0), 0.05, STEEL, 8)
-    arm = swept([(-BITE, FLOOR + 0.98, 0.28), (0.3, FLOOR + 0.98, 0.28), (0.46, FLOOR + 0.98, 0.16), (0.46, FLOOR + 0.98, -0.16), (0.3, FLOOR + 0.98, -0.28), (-BITE, FLOOR + 0.98, -0.28)], regular(6, 0.045), RED)
+    bow = mirrored((0.28, -BITE), (0.28, 0.3), (0.16, 0.46))
+    arm = swept([(x, FLOOR + 0.98, z) for z, x in bow.tolist()], regular(6, 0.045), RED)
     foot = revolved([(0.3, 0.0), (0.3, 0.05), (0.1, 0.1)], 8, RED_DARK).moved(0.46)
     return pole + arm + foot
 
@@ -243,7 +246,8 @@ def _balance_beam() -> Solid:
 def _parasol() -> Solid:
     """Stands in the middle of a sandbox."""
     pole = revolved([(0.05, 0.0), (0.05, 1.5)], 8, WHITE)
-    shade = revolved([(0.06, 1.36), (0.82, 1.2), (0.84, 1.26), (0.44, 1.52), (0.06, 1.66)], 8, [BLUE_DARK, BLUE, BLUE, BLUE])
+    profile = [(0.06, 1.36), (0.82, 1.2), (0.84, 1.26), (0.44, 1.52), (0.06, 1.66)]
+    shade = revolved(profile, 8, [BLUE_DARK, BLUE, BLUE, BLUE])
     shade = shade.tinted(WHITE, lambda index, _: 8 <= index < 32 and index % 2 == 1)
     tip = revolved([(0.05, 1.62), (0.08, 1.7), (0.0, 1.82)], 8, YELLOW)
     return pole + shade + tip

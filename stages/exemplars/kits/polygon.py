@@ -25,13 +25,15 @@ def chamfered(width: float, height: float, cut: float, x: float = 0.0, y: float 
     a, b = width / 2, height / 2
     corners = [(a, cut - b), (a, b - cut), (a - cut, b), (cut - a, b)]
     corners += [(-u, -v) for u, v in corners]
-    return np.array(corners) + [x, y]
+    placed: FloatArray = np.array(corners) + np.array([x, y])
+    return placed
 
 
 def regular(sides: int, apothem: float, turn: float = 0.0) -> FloatArray:
     """Corners (sides, 2) of a regular polygon with the middle of one side at angle `turn` (degrees)."""
     angles = np.radians(turn + (np.arange(sides) - 0.5) * 360.0 / sides)
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1) * (apothem / np.cos(np.pi / sides))
+    corners: FloatArray = np.stack([np.cos(angles), np.sin(angles)], axis=1) * (apothem / np.cos(np.pi / sides))
+    return corners
 
 
 def arch(width: float, height: float, rise: float, segments: int = 6, y: float = 0.0) -> FloatArray:
@@ -39,7 +41,8 @@ def arch(width: float, height: float, rise: float, segments: int = 6, y: float =
     angles = np.linspace(0.0, np.pi, segments + 1)
     head = np.stack([np.cos(angles) * width / 2, np.sin(angles) * rise + height - rise], axis=1)
     sill = np.array([[-width / 2, 0.0], [width / 2, 0.0]])
-    return np.concatenate([sill, head]) + [0.0, y]
+    placed: FloatArray = np.concatenate([sill, head]) + np.array([0.0, y])
+    return placed
 
 
 def mirrored(*right: tuple[float, float]) -> FloatArray:
@@ -102,13 +105,9 @@ def _is_ear(points: FloatArray, ring: list[int], k: int) -> bool:
     if _side(points, a, b, c) <= FLAT:
         return False
     for other in ring:
-        if other not in (a, b, c) and not any(_gap(points, other, each) < 1e-7 for each in (a, b, c)):
-            if (
-                _side(points, a, b, other) >= -FLAT
-                and _side(points, b, c, other) >= -FLAT
-                and _side(points, c, a, other) >= -FLAT
-            ):
-                return False
+        at_corner = other in (a, b, c) or any(_gap(points, other, each) < 1e-7 for each in (a, b, c))
+        if not at_corner and min(_side(points, *side, other) for side in ((a, b), (b, c), (c, a))) >= -FLAT:
+            return False
     return True
 
 

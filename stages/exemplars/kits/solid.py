@@ -14,10 +14,15 @@ import numpy as np
 from stages.exemplars.kits.polygon import grown, rectangle, regular, triangulate
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["Color", "Face", "Solid", "bar", "box", "extruded", "joined", "loft", "revolved", "rotation", "stacked", "swept"]
+__all__ = [
+    "Color", "Face", "Point", "Solid", "bar", "box", "extruded", "joined", "loft", "revolved", "rotation", "stacked",
+    "swept",
+]  # fmt: skip
 
 Color = tuple[int, int, int]
 """sRGB, 0 to 255."""
+
+Point = tuple[float, float, float]
 
 DIGITS = 6
 """Decimal places of coordinates: far finer than any detail, far coarser than the last bits of a sine."""
@@ -47,7 +52,7 @@ class Solid:
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Solid:
         """The solid moved by (x, y, z)."""
-        return Solid(self.points + [x, y, z], self.faces)
+        return Solid(self.points + np.array([x, y, z]), self.faces)
 
     def turned(self, degrees: float, axis: str = "y") -> Solid:
         """The solid turned about a coordinate axis."""
@@ -70,7 +75,7 @@ class Solid:
 
     def inset(
         self,
-        at: tuple[float, float, float],
+        at: Point,
         outline: FloatArray,
         depth: float,
         color: Color,
@@ -156,7 +161,7 @@ def loft(rings: Sequence[FloatArray], colors: Color | Sequence[Color]) -> Solid:
     A first or last ring of one point is a tip. `colors`: one for each band between two rings; the caps have the
     colours of the bands that they close.
     """
-    bands: list[Color] = [colors] * (len(rings) - 1) if _is_color(colors) else list(colors)  # type: ignore[list-item]
+    bands = _bands(colors, len(rings) - 1)
     starts = np.cumsum([0, *(len(ring) for ring in rings)]).tolist()
     faces: list[Face] = []
     for band, color in enumerate(bands):
@@ -179,14 +184,10 @@ def stacked(outline: FloatArray, levels: Sequence[tuple[float, float]], colors: 
     return loft([_at_height(grown(outline, growth), height) for growth, height in levels], colors)
 
 
-def revolved(
-    profile: Sequence[tuple[float, float]], sides: int, colors: Color | Sequence[Color], turn: float = 0.0
-) -> Solid:
+def revolved(profile: Sequence[tuple[float, float]], sides: int, colors: Color | Sequence[Color]) -> Solid:
     """A regular many-sided column: apothem and height of each level; apothem 0 is a tip."""
-    rings = [
-        _at_height(regular(sides, apothem, turn) if apothem else np.zeros((1, 2)), height) for apothem, height in profile
-    ]
-    return loft(rings, colors)
+    plans = [regular(sides, apothem) if apothem else np.zeros((1, 2)) for apothem, _ in profile]
+    return loft([_at_height(plan, height) for plan, (_, height) in zip(plans, profile, strict=True)], colors)
 
 
 def extruded(outline: FloatArray, z0: float, z1: float, color: Color) -> Solid:
@@ -195,7 +196,7 @@ def extruded(outline: FloatArray, z0: float, z1: float, color: Color) -> Solid:
     return loft(rings, color)
 
 
-def box(size: tuple[float, float, float], at: tuple[float, float, float], color: Color, bevel: float = 0.0) -> Solid:
+def box(size: Point, at: Point, color: Color, bevel: float = 0.0) -> Solid:
     """A box with the centre of its bottom at `at`; `bevel` slants the edges of its top."""
     outline = rectangle(size[0], size[2])
     levels = [(0.0, 0.0), (0.0, size[1])]
@@ -204,12 +205,12 @@ def box(size: tuple[float, float, float], at: tuple[float, float, float], color:
     return stacked(outline, levels, color).moved(*at)
 
 
-def bar(start: tuple[float, float, float], end: tuple[float, float, float], radius: float, color: Color, sides: int = 6) -> Solid:
+def bar(start: Point, end: Point, radius: float, color: Color, sides: int = 6) -> Solid:
     """A straight round bar between two points."""
     return swept([start, end], regular(sides, radius), color)
 
 
-def swept(path: Sequence[tuple[float, float, float]], section: FloatArray, color: Color) -> Solid:
+def swept(path: Sequence[Point], section: FloatArray, color: Color) -> Solid:
     """A section (k, 2), counter-clockwise, drawn along a path that never runs straight up next to a slanted piece.
 
     The section's x points to the left of the path, its y upward as far as the path lets it.
@@ -245,8 +246,14 @@ def rotation(degrees: float, axis: str) -> FloatArray:
     return matrix
 
 
-def _is_color(colors: Color | Sequence[Color]) -> bool:
-    return isinstance(colors[0], int)
+def _bands(colors: Color | Sequence[Color], count: int) -> list[Color]:
+    each = [color for color in colors if not isinstance(color, int)]
+    if each:
+        if len(each) != count:
+            raise ValueError(f"{len(each)} colours for {count} bands")
+        return each
+    red, green, blue = (value for value in colors if isinstance(value, int))
+    return [(red, green, blue)] * count
 
 
 def _at_height(outline: FloatArray, height: float) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.exemplars.kits.layout import Layout
 from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
-from stages.exemplars.kits.solid import Color, Solid, bar, box, loft, revolved, stacked
+from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, loft, revolved, stacked
 from stages.shape.arrays import FloatArray
 
 __all__ = ["shapes"]
@@ -74,7 +74,8 @@ def _hub() -> Solid:
     levels = [(-0.4, 0.3), (-0.08, 0.52), (-0.08, 0.6), (0.0, 0.66), (0.0, 1.94), (-0.06, 2.0), (-0.42, DECK)]
     hub = stacked(outline, levels, [GREY, DARK, PALE, WHITE, ORANGE, WHITE])
     hub = hub.inset((APOTHEM, AXIS, 0.0), chamfered(1.16, 1.04, 0.24), 0.06, GREY, PALE, copies=6)
-    leg = bar((1.02, 0.62, 0.0), (1.34, 0.1, 0.0), 0.07, GREY) + revolved([(0.2, 0.0), (0.2, 0.08), (0.1, 0.14)], 8, DARK).moved(1.38)
+    shoe = revolved([(0.2, 0.0), (0.2, 0.08), (0.1, 0.14)], 8, DARK).moved(1.38)
+    leg = bar((1.02, 0.62, 0.0), (1.34, 0.1, 0.0), 0.07, GREY) + shoe
     lamp = box((0.1, 0.7, 0.24), (1.46, 0.86, 0.0), ORANGE)
     for k in range(6):
         hub = hub + leg.turned(30.0 + 60.0 * k) + lamp.turned(30.0 + 60.0 * k)
@@ -110,7 +111,8 @@ def _tunnel() -> Solid:
     tunnel = tunnel.moved(0.0, AXIS)
     pipe = bar((-half + 0.06, AXIS + 0.5, 0.14), (half - 0.06, AXIS + 0.5, 0.14), 0.06, ORANGE)
     pipe = pipe + bar((half - 0.06, AXIS + 0.5, -0.14), (-half + 0.06, AXIS + 0.5, -0.14), 0.06, ORANGE)
-    foot = box((0.16, 0.84, 0.3), (0.0, 0.08, 0.0), GREY) + stacked(rectangle(0.5, 0.7), [(0.0, 0.0), (0.0, 0.07), (-0.06, 0.12)], DARK)
+    shoe = stacked(rectangle(0.5, 0.7), [(0.0, 0.0), (0.0, 0.07), (-0.06, 0.12)], DARK)
+    foot = box((0.16, 0.84, 0.3), (0.0, 0.08, 0.0), GREY) + shoe
     return tunnel + pipe + foot.moved(0.5) + foot.moved(-0.5)
 
 
@@ -129,18 +131,21 @@ def _greenhouse() -> Solid:
     plinth = stacked(rectangle(2.5, 1.86), [(-0.1, 0.16), (0.0, 0.3), (0.0, 0.78), (-0.04, 0.82)], [DARK, PALE, PALE])
     ridge = box((2.36, 0.1, 0.16), (0.0, AXIS + 0.86, 0.0), WHITE)
     feet = box((0.4, 0.2, 0.4), (0.9, 0.0, 0.6), DARK)
-    return collar + collar.turned(180.0) + shell + plinth + ridge + feet + feet.moved(z=-1.2) + (feet + feet.moved(z=-1.2)).moved(-1.8)
+    feet = feet + feet.moved(z=-1.2)
+    return joined(collar, collar.turned(180.0), shell, plinth, ridge, feet, feet.moved(-1.8))
 
 
 def _airlock() -> Solid:
     """Closes a port: its inner face is the plane x = 0, it looks along x."""
-    lock = _along_x(chamfered(0.96, 0.96, 0.3), [(1.0, -BITE), (1.0, 0.12), (1.16, 0.16), (1.16, 0.86), (1.0, 0.94)], [GREY, GREY, WHITE, ORANGE])
+    stations = [(1.0, -BITE), (1.0, 0.12), (1.16, 0.16), (1.16, 0.86), (1.0, 0.94)]
+    lock = _along_x(chamfered(0.96, 0.96, 0.3), stations, [GREY, GREY, WHITE, ORANGE])
     lock = lock.inset((0.94, 0.0, 0.0), chamfered(0.68, 0.76, 0.2), 0.1, DARK, PALE)
     lock = lock.inset((0.84, 0.16, 0.0), rectangle(0.3, 0.16), 0.04, DARK, GLASS_DARK)
     lock = lock.inset((0.5, 0.0, 0.5568), chamfered(0.4, 0.3, 0.08), 0.05, GREY, GLASS_DARK)
     lock = lock.moved(0.0, AXIS)
     step = box((0.62, 0.1, 0.9), (1.14, AXIS - 0.56, 0.0), GREY)
-    ramp = loft([np.array([(x, y, z) for x, y in ((1.4, AXIS - 0.58), (2.2, 0.0), (2.4, 0.0), (2.4, 0.06), (1.4, AXIS - 0.42))]) for z in (-0.4, 0.4)], PALE)
+    slope = np.array([(1.4, AXIS - 0.58), (2.2, 0.0), (2.4, 0.0), (2.4, 0.06), (1.4, AXIS - 0.42)])
+    ramp = extruded(slope, -0.4, 0.4, PALE)
     stilts = bar((0.5, 0.1, 0.3), (0.5, 0.9, 0.3), 0.06, GREY) + bar((0.5, 0.1, -0.3), (0.5, 0.9, -0.3), 0.06, GREY)
     pads = box((0.3, 0.12, 0.9), (0.5, 0.0, 0.0), DARK)
     return lock + step + ramp + stilts + pads
@@ -151,7 +156,8 @@ def _tank() -> Solid:
     neck = _along_x(chamfered(0.7, 0.7, 0.22), [(1.0, -BITE), (1.0, 0.36)], GREY).moved(0.0, AXIS)
     angles = np.radians([-66.0, -40.0, -12.0, 12.0, 40.0, 66.0])
     ball = [(0.92 * float(np.cos(a)), AXIS + 0.92 * float(np.sin(a))) for a in angles]
-    tank = revolved([*ball, (0.22, AXIS + 0.86), (0.22, AXIS + 1.02)], 12, [WHITE, WHITE, ORANGE, WHITE, WHITE, PALE, GREY]).moved(1.12)
+    colors = [WHITE, WHITE, ORANGE, WHITE, WHITE, PALE, GREY]
+    tank = revolved([*ball, (0.22, AXIS + 0.86), (0.22, AXIS + 1.02)], 12, colors).moved(1.12)
     legs = bar((0.72, AXIS - 0.3, 0.0), (1.0, 0.08, 0.0), 0.06, GREY) + box((0.26, 0.1, 0.26), (1.0, 0.0, 0.0), DARK)
     for k in range(4):
         tank = tank + legs.turned(45.0 + 90.0 * k).moved(1.12)
@@ -179,7 +185,7 @@ def _rocket() -> Solid:
     hull = [(0.3, 0.42), (0.44, 0.7), (0.52, 1.3), (0.52, 1.9), (0.42, 2.6), (0.26, 3.1), (0.0, 3.6)]
     rocket = revolved([(0.2, 0.26), (0.26, 0.42), *hull], 8, [DARK, DARK, GREY, WHITE, ORANGE, WHITE, WHITE, RED])
     rocket = rocket.inset((0.52, 1.6, 0.0), regular(8, 0.13), 0.05, GOLD, GLASS_DARK, copies=4)
-    fin = loft([np.array([(0.4, 1.2, z), (0.86, 0.5, z), (0.96, 0.0, z), (0.8, 0.0, z), (0.38, 0.56, z)])[::-1] for z in (-0.06, 0.06)], RED)
+    fin = extruded(np.array([(0.38, 0.56), (0.8, 0.0), (0.96, 0.0), (0.86, 0.5), (0.4, 1.2)]), -0.06, 0.06, RED)
     for k in range(4):
         rocket = rocket + fin.turned(45.0 + 90.0 * k)
     return rocket
@@ -187,25 +193,26 @@ def _rocket() -> Solid:
 
 def _collar() -> Solid:
     """Stands on a hub or a riser and carries whatever comes above."""
-    collar = revolved([(0.84, 0.0), (0.84, 0.08), (0.74, 0.12), (0.74, 0.24), (0.8, COLLAR)], 12, [GREY, ORANGE, DARK, GREY])
+    profile = [(0.84, 0.0), (0.84, 0.08), (0.74, 0.12), (0.74, 0.24), (0.8, COLLAR)]
+    collar = revolved(profile, 12, [GREY, ORANGE, DARK, GREY])
     return collar.inset((0.0, COLLAR, 0.0), regular(6, 0.46), 0.05, DARK, ORANGE)
 
 
 def _riser() -> Solid:
     """A round room between two collars."""
     riser = revolved([(0.7, 0.0), (0.9, 0.16), (0.9, 1.3), (0.78, RISER)], 12, [GREY, WHITE, PALE])
-    for turn in range(3):
-        riser = riser.turned(30.0 * min(turn, 1))
-        if turn < 2:
-            riser = riser.inset((0.9, 0.76, 0.0), chamfered(0.3, 0.56, 0.1), 0.07, GREY, GLASS_DARK, copies=6)
-    return riser.turned(30.0)
+    return riser.inset((0.9, 0.76, 0.0), chamfered(0.3, 0.56, 0.1), 0.07, GREY, GLASS_DARK, copies=12)
 
 
 def _dome() -> Solid:
     """A glass cupola on a collar."""
     angles = np.radians([0.0, 24.0, 48.0, 68.0])
-    levels = [(0.96, 0.0), (1.02, 0.06), (1.02, 0.2)] + [(0.94 * float(np.cos(a)), 0.2 + 0.94 * float(np.sin(a))) for a in angles]
-    dome = revolved([*levels, (0.3, 1.12), (0.2, 1.22)], 12, [GREY, WHITE, WHITE, GLASS, GLASS, GLASS, WHITE, WHITE])
+    shell = [(0.94 * float(np.cos(a)), 0.2 + 0.94 * float(np.sin(a))) for a in angles]
+    dome = revolved(
+        [(0.96, 0.0), (1.02, 0.06), (1.02, 0.2), *shell, (0.3, 1.12), (0.2, 1.22)],
+        12,
+        [GREY, WHITE, WHITE, GLASS, GLASS, GLASS, WHITE, WHITE],
+    )
     for k in range(6):
         dome = dome + _dome_rib().turned(60.0 * k + 15.0)
     return dome
@@ -213,25 +220,27 @@ def _dome() -> Solid:
 
 def _dome_rib() -> Solid:
     angles = np.radians([2.0, 24.0, 48.0, 70.0])
-    rings = []
-    for a in angles:
-        out, up = float(np.cos(a)), float(np.sin(a))
-        rings.append(np.array([(radius * out, 0.2 + radius * up, z) for radius, z in ((0.93, -0.04), (1.02, -0.04), (1.02, 0.04), (0.93, 0.04))])[::-1])
+    section = np.array([(0.93, 0.04), (1.02, 0.04), (1.02, -0.04), (0.93, -0.04)])
+    radius, across = section.T
+    rings = [np.stack([radius * np.cos(a), 0.2 + radius * np.sin(a), across], axis=1) for a in angles]
     return loft(rings, WHITE)
 
 
 def _antenna() -> Solid:
     """A dish on a collar, looking up along x."""
     foot = revolved([(0.66, 0.0), (0.66, 0.12), (0.3, 0.2), (0.2, 0.9)], 8, [GREY, WHITE, WHITE])
-    dish = revolved([(0.12, -0.2), (0.3, -0.16), (0.8, 0.1), (1.08, 0.42), (1.02, 0.46), (0.74, 0.18), (0.26, -0.06)], 12, [GREY, WHITE, WHITE, ORANGE, PALE, PALE])
-    feed = bar((0.0, -0.1, 0.0), (0.0, 0.66, 0.0), 0.035, GREY) + revolved([(0.0, 0.6), (0.1, 0.66), (0.1, 0.76), (0.0, 0.82)], 6, RED)
-    return foot + (dish + feed).turned(-40.0, "z").moved(0.0, 1.06)
+    bowl = [(0.12, -0.2), (0.3, -0.16), (0.8, 0.1), (1.08, 0.42), (1.02, 0.46), (0.74, 0.18), (0.26, -0.06)]
+    dish = revolved(bowl, 12, [GREY, WHITE, WHITE, ORANGE, PALE, PALE])
+    feed = bar((0.0, -0.1, 0.0), (0.0, 0.66, 0.0), 0.035, GREY)
+    tip = revolved([(0.0, 0.6), (0.1, 0.66), (0.1, 0.76), (0.0, 0.82)], 6, RED)
+    return foot + (dish + feed + tip).turned(-40.0, "z").moved(0.0, 1.06)
 
 
 def _mast() -> Solid:
     """Carries solar wings along x on both sides."""
     mast = revolved([(0.6, 0.0), (0.6, 0.12), (0.24, 0.22), (0.16, 0.3), (0.16, 1.1)], 8, [GREY, WHITE, WHITE, PALE])
-    head = box((0.5, 0.4, 0.5), (0.0, 1.0, 0.0), WHITE, 0.08).inset((0.25, 1.18, 0.0), rectangle(0.26, 0.2), 0.04, GREY, DARK, copies=2)
+    head = box((0.5, 0.4, 0.5), (0.0, 1.0, 0.0), WHITE, 0.08)
+    head = head.inset((0.25, 1.18, 0.0), rectangle(0.26, 0.2), 0.04, GREY, DARK, copies=2)
     lamp = revolved([(0.08, 1.36), (0.08, 1.6), (0.0, 1.7)], 6, ORANGE)
     return mast + head + lamp
 
@@ -239,7 +248,7 @@ def _mast() -> Solid:
 def _solar_wing() -> Solid:
     """A panel that leads on along x; the next one docks to its outer end."""
     arm = bar((-0.06, 0.0, 0.0), (2.0, 0.0, 0.0), 0.07, GREY)
-    panel = loft([np.array([(x, 0.06, -0.66), (x, 0.1, -0.66), (x, 0.1, 0.66), (x, 0.06, 0.66)]) for x in (0.2, 1.8)], PALE)
+    panel = box((1.6, 0.04, 1.32), (1.0, 0.06, 0.0), PALE)
     for x in (0.48, 1.0, 1.52):
         for z in (-0.32, 0.32):
             panel = panel.inset((x, 0.1, z), rectangle(0.46, 0.56), 0.015, DARK, CELL)

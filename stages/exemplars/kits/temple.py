@@ -180,7 +180,8 @@ def _pediment() -> Solid:
 
 def _acroterion() -> Solid:
     """A palmette on the tip of a pediment."""
-    palm = mirrored((0.06, 0.1), (0.14, 0.14), (0.34, 0.3), (0.26, 0.36), (0.3, 0.52), (0.18, 0.52), (0.12, 0.68), (0.03, 0.78))
+    low, high = ((0.06, 0.1), (0.14, 0.14), (0.34, 0.3), (0.26, 0.36)), ((0.3, 0.52), (0.18, 0.52), (0.12, 0.68))
+    palm = mirrored(*low, *high, (0.03, 0.78))
     plate = extruded(palm, -0.06, 0.06, GOLD).inset((0.0, 0.4, 0.06), regular(6, 0.1), -0.04, BRONZE, shrink=0.03)
     return box((0.3, 0.24, 0.26), (0.0, -0.08, 0.0), MARBLE, 0.03) + plate
 
@@ -189,8 +190,8 @@ def _dome() -> Solid:
     """Covers one cell and rests on the beams of its four bays."""
     slab = stacked(chamfered(2.84, 2.84, 0.6), [(0.0, 0.0), (0.0, 0.16), (-0.12, 0.22)], [MARBLE, MARBLE_WARM])
     drum = revolved([(1.12, 0.2), (1.12, 0.86), (1.2, 0.92), (1.2, 1.04)], 12, [MARBLE, MARBLE_WARM, MARBLE])
-    for side in range(3):
-        drum = drum.turned(30.0 * min(side, 1)).inset((1.12, 0.54, 0.0), arch(0.26, 0.5, 0.12, 4, y=-0.26), 0.1, MARBLE_SHADE, BLUE_DARK, copies=4)
+    window = arch(0.26, 0.5, 0.12, 4, y=-0.26)
+    drum = drum.inset((1.12, 0.54, 0.0), window, 0.1, MARBLE_SHADE, BLUE_DARK, copies=12)
     angles = np.radians([0.0, 22.0, 44.0, 64.0])
     cap = [(1.12 * float(np.cos(a)), 1.02 + 1.02 * float(np.sin(a))) for a in angles]
     shell = revolved([*cap, (0.16, 2.02), (0.16, 2.1)], 12, [BLUE, BLUE, BLUE, BLUE_DARK, GOLD])
@@ -199,7 +200,8 @@ def _dome() -> Solid:
 
 def _finial() -> Solid:
     """A gilt ornament on the top of a dome."""
-    return revolved([(0.2, 0.0), (0.2, 0.05), (0.07, 0.12), (0.07, 0.2), (0.17, 0.3), (0.17, 0.4), (0.05, 0.5), (0.0, 0.92)], 8, GOLD)
+    foot = [(0.2, 0.0), (0.2, 0.05), (0.07, 0.12), (0.07, 0.2)]
+    return revolved([*foot, (0.17, 0.3), (0.17, 0.4), (0.05, 0.5), (0.0, 0.92)], 8, GOLD)
 
 
 def _floor() -> Solid:
@@ -215,27 +217,32 @@ def _pool() -> Solid:
     tile = stacked(chamfered(2.28, 2.28, 0.42), [(0.0, 0.06), (0.0, 0.3)], MARBLE_WARM)
     tile = tile.inset((0.0, 0.3, 0.0), chamfered(1.7, 1.7, 0.4), -0.12, MARBLE, MARBLE)
     tile = tile.inset((0.0, 0.42, 0.0), chamfered(1.46, 1.46, 0.35), 0.1, BLUE_DARK, WATER)
-    jet = revolved([(0.3, 0.3), (0.24, 0.44), (0.1, 0.5), (0.08, 0.8), (0.34, 0.94), (0.34, 1.0), (0.12, 1.0), (0.06, 1.3), (0.0, 1.34)], 8, [MARBLE, MARBLE, MARBLE_WARM, MARBLE, MARBLE, WATER, WATER, WATER])
-    return tile + jet
+    foot = [(0.3, 0.3), (0.24, 0.44), (0.1, 0.5), (0.08, 0.8), (0.34, 0.94), (0.34, 1.0)]
+    colors = [MARBLE, MARBLE, MARBLE_WARM, MARBLE, MARBLE, WATER, WATER, WATER]
+    return tile + revolved([*foot, (0.12, 1.0), (0.06, 1.3), (0.0, 1.34)], 8, colors)
 
 
 def _statue() -> Solid:
     """A gilt figure with a spear on a pedestal, in the middle of a floor."""
-    pedestal = stacked(rectangle(0.76, 0.76), [(0.06, 0.0), (0.06, 0.1), (0.0, 0.14), (0.0, 0.52), (0.06, 0.58), (0.06, 0.66)], MARBLE)
+    levels = [(0.06, 0.0), (0.06, 0.1), (0.0, 0.14), (0.0, 0.52), (0.06, 0.58), (0.06, 0.66)]
+    pedestal = stacked(rectangle(0.76, 0.76), levels, MARBLE)
     pedestal = pedestal.inset((0.0, 0.33, 0.38), rectangle(0.48, 0.24), 0.03, MARBLE_SHADE, RED)
-    robe = revolved([(0.26, 0.64), (0.2, 1.1), (0.15, 1.4), (0.22, 1.7), (0.2, 1.82), (0.07, 1.9)], 8, [GOLD, GOLD, BRONZE, GOLD, GOLD])
+    profile = [(0.26, 0.64), (0.2, 1.1), (0.15, 1.4), (0.22, 1.7), (0.2, 1.82), (0.07, 1.9)]
+    robe = revolved(profile, 8, [GOLD, GOLD, BRONZE, GOLD, GOLD])
     head = revolved([(0.06, 1.86), (0.13, 1.98), (0.12, 2.12), (0.0, 2.24)], 8, GOLD)
-    crest = extruded(np.array([(-0.16, 2.0), (0.02, 2.2), (0.14, 2.2), (0.12, 2.34), (-0.08, 2.36), (-0.2, 2.2)]), -0.03, 0.03, RED).turned(90.0)
+    plume = np.array([(-0.16, 2.0), (0.02, 2.2), (0.14, 2.2), (0.12, 2.34), (-0.08, 2.36), (-0.2, 2.2)])
+    crest = extruded(plume, -0.03, 0.03, RED).turned(90.0)
     spear = revolved([(0.025, 0.64), (0.025, 2.3), (0.06, 2.34), (0.0, 2.56)], 5, BRONZE).moved(0.27, 0.0, 0.12)
     shield = revolved([(0.22, 0.0), (0.22, 0.05), (0.0, 0.1)], 10, BRONZE).turned(90.0, "x").moved(-0.2, 1.3, 0.18)
     arm = box((0.16, 0.12, 0.2), (0.23, 1.56, 0.1), GOLD)
-    return pedestal + robe + head + crest + spear + shield + arm
+    return joined(pedestal, robe, head, crest, spear, shield, arm)
 
 
 def _stairs() -> Solid:
     """Leads up to a span: its face is the plane z = 0, the stairs come down towards positive z."""
-    steps = np.array([(BITE, 0.0), (BITE, 0.32), (-0.14, 0.32), (-0.14, 0.24), (-0.28, 0.24), (-0.28, 0.16), (-0.42, 0.16), (-0.42, 0.08), (-0.6, 0.08), (-0.6, 0.0)])
-    flight = extruded(steps, -0.58, 0.58, MARBLE).turned(90.0)
+    treads = [(-0.14 * k, 0.32 - 0.08 * (k - side)) for k in (1, 2, 3) for side in (1, 0)]
+    outline = [(BITE, 0.0), (BITE, 0.32), *treads, (-0.6, 0.08), (-0.6, 0.0)]
+    flight = extruded(np.array(outline), -0.58, 0.58, MARBLE).turned(90.0)
     cheek = box((0.2, 0.42, 0.52), (0.67, 0.0, 0.25), MARBLE_WARM, 0.03)
     return flight + cheek + cheek.moved(-1.34)
 
@@ -338,8 +345,10 @@ def _hall_and_court() -> Layout:
 def _tower_and_cloister() -> Layout:
     """A tower of three storeys and a small temple, joined by colonnades around an open court."""
     precinct = _Precinct()
-    for i, j in ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (4, 0), (3, 1), (4, 1), (3, 2), (4, 2), (2, 2), (1, 2)):
-        precinct.column(i, j)
+    for i in range(5):
+        for j in range(3):
+            if (i, j) not in ((0, 2), (2, 1)):
+                precinct.column(i, j)
     precinct.bay(0, 0, 1, 0)
     precinct.bay(0, 0, 0, 1)
     precinct.bay(1, 0, 1, 1)

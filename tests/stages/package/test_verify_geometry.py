@@ -1,0 +1,68 @@
+"""The independent look at a sample: it finds each kind of fault, and none in a sound shape."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from stages.package.glb import GlbWriter, node_names
+from stages.package.verify_geometry import geometry_faults
+from stages.shape.kit import Assembly, Kit
+from tests.stages.variations.toy import ROAD, kit_of, ring
+
+
+@pytest.fixture(scope="module")
+def kit() -> Kit:
+    return kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+
+
+def faults(kit: Kit, assembly: Assembly) -> list[str]:
+    parts = [
+        {"name": name, "type": index}
+        for name, index in zip(node_names(kit.type_names(), assembly), assembly.types.tolist(), strict=True)
+    ]
+    record = json.dumps({"parts": parts, "contacts": assembly.edges.tolist()}).encode()
+    return geometry_faults(kit, {"json": record, "glb": GlbWriter(kit.types).write(assembly)})
+
+
+def test_exemplars_have_no_faults(kit: Kit) -> None:
+    for exemplar in kit.exemplars:
+        assert faults(kit, exemplar.assembly) == []
+
+
+def test_a_contact_that_is_not_recorded_is_named(kit: Kit) -> None:
+    whole = kit.exemplars[0].assembly
+    found = faults(kit, Assembly(whole.types, whole.poses, whole.edges[1:]))
+    first, second = (node_names(kit.type_names(), whole)[each] for each in whole.edges[0])
+    assert any(f"{first} and {second} touch and are not recorded" in each for each in found)
+    assert any("neighbourhood that no exemplar shows" in each for each in found)
+
+
+def test_a_recorded_contact_that_is_none_is_named(kit: Kit) -> None:
+    whole = kit.exemplars[0].assembly
+    poses = whole.poses.copy()
+    poses[2, 1, 3] += 3.0
+    found = faults(kit, Assembly(whole.types, poses, whole.edges))
+    assert sum("are recorded as neighbours and do not touch" in each for each in found) == 2
+
+
+def test_parts_that_reach_into_each_other_deeper_than_in_the_exemplars_are_named(kit: Kit) -> None:
+    whole = kit.exemplars[0].assembly
+    names = node_names(kit.type_names(), whole)
+    i, j = whole.edges[0].tolist()
+    poses = whole.poses.copy()
+    towards = poses[i, :3, 3] - poses[j, :3, 3]
+    poses[j, :3, 3] += 0.3 * towards / np.linalg.norm(towards)
+    found = faults(kit, Assembly(whole.types, poses, whole.edges))
+    pair = {names[i], names[j]}
+    assert any("into each other" in each and all(name in each for name in pair) for each in found)
+
+
+def test_a_part_inside_another_is_named(kit: Kit) -> None:
+    whole = kit.exemplars[0].assembly
+    types = np.append(whole.types, whole.types[3]).astype(np.int16)
+    poses = np.concatenate([whole.poses, whole.poses[3:4]])
+    found = faults(kit, Assembly(types, poses, whole.edges))
+    assert any("touch and are not recorded" in each for each in found)
