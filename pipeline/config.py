@@ -147,7 +147,13 @@ def _validate(
         return model.model_validate_json(json.dumps(values))
     except ValidationError as error:
         schema = model.model_json_schema()
-        for each in error.errors(include_url=False):
+        found = error.errors(include_url=False)
+        for each in found:
+            # pydantic leaves faulty items out of a list and then finds it too short: that is no mistake of its own
+            if each["type"] == "too_short" and any(
+                other["loc"][: len(each["loc"])] == each["loc"] != other["loc"] for other in found
+            ):
+                continue
             key = (*place, *each["loc"])
             dotted = ".".join(str(step) for step in key) or "(the file)"
             mistakes.append(f"{_where(path, lines, key)}: {dotted}: {_explain(schema, each)}")

@@ -47,7 +47,7 @@ WHOLE = Slice()
 
 @dataclass
 class RunResult:
-    """How a run ended: shards made now, shards set aside and why, shards left to the other slices."""
+    """How a run ended: shards made now, shards set aside and why, shards that neither is true of."""
 
     made: int = 0
     failed: dict[str, str] = field(default_factory=dict)
@@ -117,6 +117,7 @@ class _Run:
         self._journal = journal
         self._survey = Survey(config, stages, places)
         self._result = RunResult()
+        self._made: set[str] = set()
         self._failures: Counter[str] = Counter()
         self._deaths: Counter[str] = Counter()
         self._shown = 0.0
@@ -176,6 +177,7 @@ class _Run:
                     break
                 self._make(workers, ready, surveyed)
                 self._survey.refresh(self._name)
+                self._check_plan(surveyed)
             workers.stop(kill=False)
         except BaseException as error:
             workers.stop(kill=True)
@@ -183,6 +185,15 @@ class _Run:
             raise
         finally:
             self._take_away_unfinished(surveyed)
+
+    def _check_plan(self, surveyed: StageSurvey) -> None:
+        # Without this, a plan that draws a number or reads a clock would have its shards made for ever.
+        for shard in surveyed.missing:
+            if shard.name in self._made:
+                raise ValueError(
+                    f"plan of {self._name}: shard {shard.name} was made just now, and is planned otherwise since: "
+                    "a plan is a function of the config and of records alone"
+                )
 
     def _job(self, surveyed: StageSurvey, shard: Shard) -> Job:
         stage = surveyed.stage
@@ -201,6 +212,7 @@ class _Run:
                     self._count_death(job, ready, alone)
                 elif report.status == "done":
                     self._result.made += 1
+                    self._made.add(job.shard.name)
                     self._survey.accept(self._name, job.shard.name)
                 else:
                     self._count_failure(job, report, ready)

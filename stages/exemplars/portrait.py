@@ -29,7 +29,7 @@ def kit_sheet(kit: Kit) -> bytes:
     counts = np.bincount(used, minlength=len(kit.types))
     commonest = np.argsort(-counts, kind="stable").tolist()
     shown = [_type_cell(kit, index, int(counts[index])) for index in commonest]
-    span = COLUMNS // min(len(kit.exemplars), 3)
+    span = COLUMNS // min(max(len(kit.exemplars), 2), 3)
     shapes = [_exemplar_cell(kit, each, span) for each in kit.exemplars]
     rules = sum(len(each) for each in kit.grammar.neighbourhoods.values())
     sections = [

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
 import pytest
 
+from pipeline.config import Config, StrictModel
 from pipeline.errors import ConfigError
-from pipeline.run import Slice
+from pipeline.places import Places
+from pipeline.run import Slice, run_stage
+from pipeline.stage import Outcome, Shard, Stage, Task
 from tests.pipeline.conftest import WriteConfig, made, record_times
 from tests.pipeline.turn import turn
 
@@ -157,6 +161,20 @@ def test_parts_of_a_job_array_together_make_the_whole(tmp_path: Path, write_conf
     second = turn(config, tmp_path / "parts", "salt", part=Slice(2, 2))["salt"]
     assert (second.made, second.left) == (2, 0)
     assert made(tmp_path / "parts") == made(tmp_path / "whole")
+
+
+def write_nothing(task: Task) -> Outcome:
+    return Outcome(0)
+
+
+def test_plan_that_answers_differently_each_time_is_refused(tmp_path: Path) -> None:
+    ticks = itertools.count()
+    restless = Stage(
+        "restless", 1, StrictModel, (), lambda _: [Shard("a", {"tick": next(ticks)})], write_nothing, lambda _: 0
+    )
+    config = Config("mill", "1.0.0", 0, {"restless": StrictModel()}, tmp_path / "mill.yaml")
+    with pytest.raises(ValueError, match="shard a was made just now, and is planned otherwise since"):
+        run_stage("restless", {"restless": restless}, config, Places(tmp_path, "mill"), workers=1)
 
 
 def test_published_files_follow_the_config(tmp_path: Path, write_config: WriteConfig) -> None:

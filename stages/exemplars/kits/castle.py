@@ -26,7 +26,7 @@ GOLD, BANNER, GLASS = (228, 178, 74), (206, 62, 62), (120, 152, 170)
 
 def shapes() -> dict[str, Layout]:
     """The two example castles by name."""
-    return {"river_wards": _river_wards(), "high_keep": _high_keep()}
+    return {"keep": _keep(), "ward": _ward()}
 
 
 def _types() -> dict[str, Solid]:
@@ -247,7 +247,7 @@ class _Castle(Layout):
         self.put(name, PITCH * (i + k) / 2, 0.0, PITCH * (j + m) / 2, 0.0 if j == m else 90.0)
 
 
-def _river_wards() -> Layout:
+def _ward() -> Layout:
     """Two wards on either side of a river, a bridge between their gates, a wall running out to a watchtower."""
     castle = _Castle()
     castle.tower(0, 0, 1, "cone")
@@ -280,7 +280,7 @@ def _river_wards() -> Layout:
     return castle
 
 
-def _high_keep() -> Layout:
+def _keep() -> Layout:
     """Three wards around a high keep, a gate with a ramp, and a bridge on a pier to a gatehouse on the far bank."""
     castle = _Castle()
     castle.tower(1, 1, 3, "spire+flag")

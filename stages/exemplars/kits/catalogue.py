@@ -13,7 +13,7 @@ __all__ = ["KITS", "write_kits"]
 KITS: Mapping[str, Callable[[], dict[str, Layout]]] = {
     "castle": castle.shapes,
     "playground": playground.shapes,
-    "space_base": space_base.shapes,
+    "space-base": space_base.shapes,
     "temple": temple.shapes,
 }
 

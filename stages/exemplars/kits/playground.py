@@ -41,7 +41,7 @@ Spot = tuple[float, float]
 
 def shapes() -> dict[str, Layout]:
     """The two example playgrounds by name."""
-    return {"square": _square(), "octagon": _octagon()}
+    return {"fort": _fort(), "loop": _loop()}
 
 
 def _types() -> dict[str, Solid]:
@@ -230,7 +230,7 @@ def _climbing_wall() -> Solid:
 def _sandbox() -> Solid:
     frame = stacked(regular(8, SAND), [(0.0, 0.0), (0.0, 0.2), (-0.03, 0.24)], WOOD)
     frame = frame.inset((0.0, 0.24, 0.0), regular(8, 0.72), 0.12, WOOD_DARK, SANDY)
-    mound = revolved([(0.3, 0.1), (0.2, 0.2), (0.06, 0.24)], 8, SANDY)
+    mound = revolved([(0.36, 0.1), (0.3, 0.19), (0.22, 0.23)], 8, SANDY)
     return frame + mound
 
 
@@ -245,7 +245,7 @@ def _balance_beam() -> Solid:
 
 def _parasol() -> Solid:
     """Stands in the middle of a sandbox."""
-    pole = revolved([(0.05, 0.0), (0.05, 1.5)], 8, WHITE)
+    pole = revolved([(0.17, -0.03), (0.17, 0.03), (0.05, 0.07), (0.05, 1.5)], 8, [BLUE_DARK, BLUE_DARK, WHITE])
     profile = [(0.06, 1.36), (0.82, 1.2), (0.84, 1.26), (0.44, 1.52), (0.06, 1.66)]
     shade = revolved(profile, 8, [BLUE_DARK, BLUE, BLUE, BLUE])
     shade = shade.tinted(WHITE, lambda index, _: 8 <= index < 32 and index % 2 == 1)
@@ -305,7 +305,7 @@ def _from(spot: Spot, eighth: int, distance: float) -> tuple[float, float, float
     return float(spot[0] + distance * np.cos(angle)), 0.0, float(spot[1] - distance * np.sin(angle))
 
 
-def _square() -> Layout:
+def _fort() -> Layout:
     """A square of decks with a wing, slides into two sandboxes, a balance beam between them."""
     ground = _Playground()
     west, middle, east = (0.0, 0.0), (4.0, 0.0), (8.0, 0.0)
@@ -335,7 +335,7 @@ def _square() -> Layout:
     return ground
 
 
-def _octagon() -> Layout:
+def _loop() -> Layout:
     """Eight decks in a ring, with slides inward and outward."""
     ground = _Playground()
     spots = [(0.0, 0.0)]

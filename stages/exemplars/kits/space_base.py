@@ -39,7 +39,7 @@ GOLD, RED, LAMP = (226, 184, 92), (206, 72, 66), (252, 226, 140)
 
 def shapes() -> dict[str, Layout]:
     """The two example bases by name."""
-    return {"outpost": _outpost(), "colony": _colony()}
+    return {"outpost": _outpost(), "ring": _ring()}
 
 
 def _types() -> dict[str, Solid]:
@@ -337,7 +337,7 @@ def _outpost() -> Layout:
     return base
 
 
-def _colony() -> Layout:
+def _ring() -> Layout:
     """A ring of six hubs around an open court, with a tower and two branches."""
     base = _Base()
     base.hub(1, 0, "dome", 2)

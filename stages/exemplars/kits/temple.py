@@ -34,7 +34,7 @@ FLAME, SHADOW = (244, 150, 62), (96, 84, 82)
 
 def shapes() -> dict[str, Layout]:
     """The two example precincts by name."""
-    return {"hall_and_court": _hall_and_court(), "tower_and_cloister": _tower_and_cloister()}
+    return {"peripteros": _peripteros(), "stoa": _stoa()}
 
 
 def _types() -> dict[str, Solid]:
@@ -301,7 +301,7 @@ class _Precinct(Layout):
         self.put("acroterion", x + 0.18 * float(np.sin(outward)), height + 1.4, z + 0.18 * float(np.cos(outward)), turn)
 
 
-def _hall_and_court() -> Layout:
+def _peripteros() -> Layout:
     """A long hall with a gabled roof; beside it a court with a pool, and a way to a domed belvedere."""
     precinct = _Precinct()
     for j in range(4):
@@ -342,7 +342,7 @@ def _hall_and_court() -> Layout:
     return precinct
 
 
-def _tower_and_cloister() -> Layout:
+def _stoa() -> Layout:
     """A tower of three storeys and a small temple, joined by colonnades around an open court."""
     precinct = _Precinct()
     for i in range(5):

@@ -1,0 +1,107 @@
+"""The contact graphs and part types of public models, against what was measured on them with other tools."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stages.exemplars.build import build_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ContactConfig, KitConfig
+from stages.shape.kit import ContactKind, Kit
+
+EXEMPLARS = Path(__file__).resolve().parents[4] / "shared" / "exemplars"
+FOLDERS = sorted(path.parent for path in EXEMPLARS.glob("[ah]*/exemplar.json"))
+TOLERANCES = {"h01": 5e-3, "h03": 5e-3, "h04": 1e-2, "h06": 1e-2, "h09": 1e-2, "h10": 2e-3}
+"""The shares of the median part diagonal by which the edges of `exemplar.json` were measured, where not 1e-3."""
+ALL_KINDS: tuple[ContactKind, ...] = ("point", "line", "face")
+
+MIRRORED = {"a08": 1, "h06": 3}
+"""`types_by_geometry` takes mirror images for one type; so many pairs of these models' types are mirror images."""
+PRINTED = {"a17": 1}
+"""A tile with a printed pattern is the plain tile with other triangles: one surface, one type."""
+
+pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars lie beside the project; they are not here")
+
+
+def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] = ALL_KINDS) -> Kit:
+    path = folder / "model.glb"
+    contact = ContactConfig(tolerance=TOLERANCES.get(folder.name[:3], 1e-3), kinds=kinds)
+    config = KitConfig(name="real", shapes=(path,), contact=contact, mirror_images_match=mirrored)
+    return build_kit(config, [read_model(path)])[0]
+
+
+def measured(folder: Path) -> dict[str, Any]:
+    described: dict[str, Any] = json.loads((folder / "exemplar.json").read_text())
+    return described
+
+
+def edges(kit: Kit) -> list[list[int]]:
+    found: list[list[int]] = kit.exemplars[0].assembly.edges.tolist()
+    return found
+
+
+def pairs(listed: list[list[Any]]) -> list[list[int]]:
+    return sorted(sorted(each[:2]) for each in listed)
+
+
+def folder_of(prefix: str) -> Path:
+    return next(each for each in FOLDERS if each.name.startswith(prefix))
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_contacts_and_part_types_are_those_measured_with_fcl(folder: Path) -> None:
+    kit, truth = build(folder), measured(folder)
+    assert list(kit.exemplars[0].part_names) == [part["node"] for part in truth["part_list"]]
+    assert edges(kit) == pairs(truth["edge_list"])
+    short = folder.name[:3]
+    assert len(kit.types) == truth["types_by_geometry"] + MIRRORED.get(short, 0) - PRINTED.get(short, 0)
+    if truth["types_by_geometry"] == truth["types"] and short not in PRINTED:
+        by_name = Counter(part["type"] for part in truth["part_list"])
+        by_type = Counter(kit.exemplars[0].assembly.types.tolist())
+        assert sorted(by_name.values()) == sorted(by_type.values())
+        both = {(part["type"], int(index)) for part, index in zip(truth["part_list"], kit.exemplars[0].assembly.types)}
+        assert len(both) == len(kit.types), "parts of one mesh are one type, and of two meshes are two"
+
+
+@pytest.mark.parametrize("short", sorted(MIRRORED))
+def test_mirror_images_are_one_type_only_if_the_config_says_so(short: str) -> None:
+    folder = folder_of(short)
+    assert len(build(folder, mirrored=True).types) == measured(folder)["types_by_geometry"]
+
+
+def test_the_printed_tile_of_the_temple_is_the_plain_one_in_other_triangles() -> None:
+    import numpy as np
+
+    folder = folder_of("a17")
+    kit = build(folder)
+    types = {part["type"]: index for part, index in zip(measured(folder)["part_list"], kit.exemplars[0].assembly.types)}
+    assert types["4162"] == types["4162p0x"]
+    parts = {part.mesh_name: part for part in read_model(folder / "model.glb").parts}
+    plain, printed = parts["4162"], parts["4162p0x"]
+    np.testing.assert_allclose(np.ptp(plain.vertices, axis=0), np.ptp(printed.vertices, axis=0), atol=1e-5)
+    assert len(plain.faces) != len(printed.faces)
+
+
+@pytest.mark.parametrize("short", ["a24", "a25"])
+def test_masonry_has_the_interfaces_of_its_authors(short: str) -> None:
+    folder = folder_of(short)
+    assert edges(build(folder)) == pairs(measured(folder)["author_interface_graph"])
+
+
+def test_the_cross_vault_has_the_interfaces_of_its_authors_where_faces_count() -> None:
+    folder = folder_of("a26")
+    found = edges(build(folder, kinds=("face",)))
+    assert found == pairs(measured(folder)["author_interface_graph"])
+    assert len(found) == 452
+
+
+def test_the_race_track_is_one_loop_where_faces_count() -> None:
+    kit = build(folder_of("a06"), kinds=("face",))
+    degrees = Counter(part for edge in edges(kit) for part in edge)
+    assert len(edges(kit)) == 16
+    assert set(degrees.values()) == {2}
