@@ -12,6 +12,9 @@ from stages.shape.pose import invert, pose_vectors
 
 __all__ = ["DockingTable", "symmetric_images"]
 
+SAME_IMAGE = 0.01
+"""Images of a docking closer than this share of the tolerance are written once."""
+
 
 def symmetric_images(a: PartType, b: PartType, pose: FloatArray) -> FloatArray:
     """All relative poses (k, 4, 4) of `b` against `a` that look the same as `pose`, by symmetries of either part."""
@@ -46,10 +49,15 @@ class DockingTable:
             labels = np.concatenate([np.full(len(images), label, dtype=np.int32) for images, label in found])
             vectors = pose_vectors(poses, self.types[pair[1]].diagonal / 2)
             kept: list[int] = []
-            # Images are written once; of two labels for one pose the lower stays, so self-inverse dockings are even.
+            # Equal images are written once. Where two images of one docking are within tolerance both get the lower
+            # label, so that a docking that is nearly its own inverse is even; both stay, for what lies at their sides.
             for candidate in np.argsort(labels, kind="stable").tolist():
                 gaps = np.linalg.norm(vectors[kept] - vectors[candidate], axis=1)
-                if not len(kept) or gaps.min() > tolerance:
+                nearest = int(gaps.argmin()) if len(kept) else -1
+                if nearest < 0 or gaps[nearest] > SAME_IMAGE * tolerance:
+                    same = nearest >= 0 and labels[kept[nearest]] // 2 == labels[candidate] // 2
+                    if same and gaps[nearest] <= tolerance:
+                        labels[candidate] = labels[kept[nearest]]
                     kept.append(candidate)
             self.images[pair] = poses[kept], labels[kept]
 
@@ -61,7 +69,7 @@ class DockingTable:
         known, labels = self.images[a, b]
         gaps = np.linalg.norm(pose_vectors(known, length)[None] - pose_vectors(poses, length)[:, None], axis=2)
         nearest = gaps.argmin(axis=1)
-        within = gaps[np.arange(len(poses)), nearest] <= self.tolerance
+        within = gaps[np.arange(len(poses)), nearest] <= (1.0 + SAME_IMAGE) * self.tolerance
         return np.where(within, labels[nearest], -1).astype(np.int32)
 
     def label_edges(self, types: np.ndarray, poses: FloatArray, edges: IntArray) -> IntArray:

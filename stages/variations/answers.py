@@ -102,8 +102,8 @@ class ContactAnswers:
                 np.zeros(2 * len(old.keys), dtype=np.uint64), np.zeros(2 * len(old.keys), dtype=np.int64)
             )
             self._size = 0
-            for slot in np.flatnonzero(old.keys):
-                self._insert(int(old.keys[slot]), int(old.values[slot]))
+            for filled in np.flatnonzero(old.keys).tolist():
+                self._insert(int(old.keys[filled]), int(old.values[filled]))
         mask = len(self.table.keys) - 1
         slot = key & mask
         while self.table.keys[slot] not in (0, key):

@@ -22,6 +22,8 @@ APOTHEM = 1.0
 """Of a deck, from its middle to a gate."""
 GATE = 0.16
 """Thickness of a gate."""
+BETWEEN = PITCH - 2 * (APOTHEM + GATE)
+"""Length of what lies between the gates of two neighbouring decks."""
 FLOOR = 1.3
 """Height of a deck above the ground."""
 POSTS, RING, STOREY = 2.5, 0.16, 1.5
@@ -133,14 +135,9 @@ def _pennant() -> Solid:
     return pole + cloth
 
 
-def _length() -> float:
-    """Of what lies between the gates of two neighbouring decks."""
-    return PITCH - 2 * (APOTHEM + GATE)
-
-
 def _bridge_planks() -> Solid:
     """A hanging bridge of planks along x."""
-    half = _length() / 2 + BITE
+    half = BETWEEN / 2 + BITE
     xs = np.linspace(-half, half, 9)
     sag = [float(0.14 * (x / half) ** 2 - 0.14) for x in xs]
     path = [(float(x), FLOOR - 0.1 + s) for x, s in zip(xs, sag, strict=True)]
@@ -159,7 +156,7 @@ def _bridge_planks() -> Solid:
 
 def _bridge_tube() -> Solid:
     """A crawling tube along x."""
-    half = _length() / 2 + BITE
+    half = BETWEEN / 2 + BITE
     rims = [(0.35, 0.04), (0.31, 0.06), (0.31, half - 0.12), (0.36, half - 0.1), (0.36, half)]
     left = [(apothem, -x) for apothem, x in rims[::-1]]
     ribs = [YELLOW_DARK, YELLOW_DARK, YELLOW, YELLOW_DARK]
@@ -172,7 +169,7 @@ def _bridge_tube() -> Solid:
 
 def _bridge_bars() -> Solid:
     """Monkey bars along x over a walk of two beams."""
-    half = _length() / 2 + BITE
+    half = BETWEEN / 2 + BITE
     pieces = []
     for z in (-0.24, 0.24):
         pieces.append(box((2 * half, 0.08, 0.1), (0.0, FLOOR - 0.12, z), RED, 0.02))

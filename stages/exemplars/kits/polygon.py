@@ -74,11 +74,13 @@ def triangulate(points: FloatArray, loops: Sequence[Sequence[int]]) -> list[tupl
     while len(ring) > 3:
         ears = [k for k in range(len(ring)) if _is_ear(points, ring, k)]
         if not ears:
-            raise ValueError("the outline crosses itself")
+            raise ValueError("the outline crosses itself or runs clockwise")
         size = len(ring)
         best = min(ears, key=lambda k: (round(_gap(points, ring[k - 1], ring[(k + 1) % size]), 6), k))
         triangles.append((ring[best - 1], ring[best], ring[(best + 1) % size]))
         del ring[best]
+    if _side(points, *ring) < -FLAT:
+        raise ValueError("the outline crosses itself or runs clockwise")
     triangles.append((ring[0], ring[1], ring[2]))
     return triangles
 

@@ -21,6 +21,8 @@ APOTHEM = 1.3
 """Of a hub, from its middle to a port."""
 PORT = 0.34
 """Length of a port."""
+BETWEEN = PITCH - 2 * (APOTHEM + PORT)
+"""Length of what lies between the ports of two neighbouring hubs."""
 AXIS = 1.3
 """Height of the middle of tunnels and ports above the ground."""
 DECK = 2.3
@@ -32,8 +34,8 @@ BITE = 0.03
 """How deep a part reaches into the part that it is joined to."""
 
 WHITE, PALE, GREY, DARK = (236, 238, 240), (206, 212, 218), (140, 150, 162), (74, 82, 96)
-ORANGE, ORANGE_DARK, GLASS, GLASS_DARK = (238, 136, 58), (206, 108, 44), (126, 196, 218), (74, 132, 168)
-LEAF, LEAF_DARK, SOIL, CELL = (108, 176, 96), (78, 142, 78), (120, 92, 72), (46, 72, 132)
+ORANGE, GLASS, GLASS_DARK = (238, 136, 58), (126, 196, 218), (74, 132, 168)
+LEAF, CELL = (108, 176, 96), (46, 72, 132)
 GOLD, RED, LAMP = (226, 184, 92), (206, 72, 66), (252, 226, 140)
 
 
@@ -77,9 +79,7 @@ def _hub() -> Solid:
     shoe = revolved([(0.2, 0.0), (0.2, 0.08), (0.1, 0.14)], 8, DARK).moved(1.38)
     leg = bar((1.02, 0.62, 0.0), (1.34, 0.1, 0.0), 0.07, GREY) + shoe
     lamp = box((0.1, 0.7, 0.24), (1.46, 0.86, 0.0), ORANGE)
-    for k in range(6):
-        hub = hub + leg.turned(30.0 + 60.0 * k) + lamp.turned(30.0 + 60.0 * k)
-    return hub
+    return hub + (leg + lamp).turned(30.0).around(6)
 
 
 def _port() -> Solid:
@@ -92,13 +92,8 @@ def _port() -> Solid:
     return port + light + strut
 
 
-def _length() -> float:
-    """Of what lies between the ports of two neighbouring hubs."""
-    return PITCH - 2 * (APOTHEM + PORT)
-
-
 def _tunnel() -> Solid:
-    half = _length() / 2 + BITE
+    half = BETWEEN / 2 + BITE
     ring = chamfered(0.96, 0.96, 0.3)
     ribs = [(1.0, -half), (1.0, -half + 0.14), (0.9, -half + 0.18)]
     for x in (-0.5, 0.5):
@@ -118,7 +113,7 @@ def _tunnel() -> Solid:
 
 def _greenhouse() -> Solid:
     """As long as a tunnel, with beds under a vault of glass."""
-    half = _length() / 2 + BITE
+    half = BETWEEN / 2 + BITE
     end = chamfered(0.96, 0.96, 0.3)
     collar = _along_x(end, [(1.0, -half), (1.0, -half + 0.3)], GREY).moved(0.0, AXIS)
     vault = arch(1.7, 1.5, 0.92, 6, y=-0.62)
@@ -159,9 +154,7 @@ def _tank() -> Solid:
     colors = [WHITE, WHITE, ORANGE, WHITE, WHITE, PALE, GREY]
     tank = revolved([*ball, (0.22, AXIS + 0.86), (0.22, AXIS + 1.02)], 12, colors).moved(1.12)
     legs = bar((0.72, AXIS - 0.3, 0.0), (1.0, 0.08, 0.0), 0.06, GREY) + box((0.26, 0.1, 0.26), (1.0, 0.0, 0.0), DARK)
-    for k in range(4):
-        tank = tank + legs.turned(45.0 + 90.0 * k).moved(1.12)
-    return neck + tank
+    return neck + tank + legs.turned(45.0).around(4).moved(1.12)
 
 
 def _pad() -> Solid:
@@ -175,8 +168,7 @@ def _pad() -> Solid:
     plate = plate.inset((0.0, 0.88, 0.0), regular(6, 1.12, 30.0), -0.02, DARK, DARK)
     plate = plate.inset((0.0, 0.9, 0.0), regular(8, 0.6), -0.02, DARK, WHITE)
     leg = box((0.22, 0.5, 0.22), (1.0, 0.0, 0.0), GREY)
-    for k in range(6):
-        plate = plate + leg.turned(60.0 * k)
+    plate = plate + leg.around(6)
     return neck + office + plate.moved(PAD)
 
 
@@ -186,9 +178,7 @@ def _rocket() -> Solid:
     rocket = revolved([(0.2, 0.26), (0.26, 0.42), *hull], 8, [DARK, DARK, GREY, WHITE, ORANGE, WHITE, WHITE, RED])
     rocket = rocket.inset((0.52, 1.6, 0.0), regular(8, 0.13), 0.05, GOLD, GLASS_DARK, copies=4)
     fin = extruded(np.array([(0.38, 0.56), (0.8, 0.0), (0.96, 0.0), (0.86, 0.5), (0.4, 1.2)]), -0.06, 0.06, RED)
-    for k in range(4):
-        rocket = rocket + fin.turned(45.0 + 90.0 * k)
-    return rocket
+    return rocket + fin.turned(45.0).around(4)
 
 
 def _collar() -> Solid:
@@ -213,9 +203,7 @@ def _dome() -> Solid:
         12,
         [GREY, WHITE, WHITE, GLASS, GLASS, GLASS, WHITE, WHITE],
     )
-    for k in range(6):
-        dome = dome + _dome_rib().turned(60.0 * k + 15.0)
-    return dome
+    return dome + _dome_rib().turned(15.0).around(6)
 
 
 def _dome_rib() -> Solid:

@@ -94,7 +94,10 @@ def _span() -> Solid:
     """Lies along x between the feet of two columns."""
     half = PITCH / 2 - 0.5 + BITE
     section = mirrored((0.4, 0.0), (0.4, 0.16), (0.36, 0.2), (0.36, 0.32), (0.32, 0.36))
-    return extruded(section, -half, half, MARBLE_WARM).turned(90.0)
+    span = extruded(section, -half, half, MARBLE_WARM).turned(90.0)
+    for x in (-0.5, 0.5):
+        span = span.inset((x, 0.08, 0.4), rectangle(0.03, 0.15), 0.03, MARBLE_SHADE, copies=2)
+    return span
 
 
 def _beam() -> Solid:

@@ -1,0 +1,169 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stages.exemplars.congruence import congruences, surface
+from stages.shape.arrays import FloatArray
+from stages.shape.pose import transform_points
+from tests.stages.shape.bodies import Body, box, hull, joined, placed, prism, random_rotation, sheet, sphere
+
+TOLERANCE = 1e-3
+TETRAHEDRON: Body = (
+    np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]),
+    np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype=np.int32),
+)
+SCALENE: Body = (np.array([[0, 0, 0], [3, 0, 0], [0.4, 2, 0], [1, 0.5, 1.2]]), TETRAHEDRON[1])
+HELIX = joined(box(), box(at=(1, 0, 0)), box(at=(1, 1, 0)), box(at=(1, 1, 1)))
+"""Four cubes in a screw: no rotation makes its mirror image of it."""
+
+
+def group(body: Body, reflections: bool = False) -> FloatArray:
+    shape = surface(*body)
+    return congruences(shape, shape, TOLERANCE, reflections)
+
+
+def mirrored(body: Body) -> Body:
+    return body[0] * [1, 1, -1], np.ascontiguousarray(body[1][:, ::-1])
+
+
+def moved(body: Body, pose: FloatArray) -> Body:
+    return transform_points(pose, body[0]), body[1]
+
+
+def split(body: Body) -> Body:
+    """The same surface in four times as many triangles."""
+    vertices, faces = body
+    corners = vertices[faces]
+    middles = (corners + np.roll(corners, -1, axis=1)) / 2
+    a, b, c = np.moveaxis(corners, 1, 0)
+    ab, bc, ca = np.moveaxis(middles, 1, 0)
+    soup = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca], axis=1).reshape(-1, 3)
+    return soup, np.arange(len(soup), dtype=np.int32).reshape(-1, 3)
+
+
+ORDERS = {
+    "cube": (box(), 24),
+    "brick": (box(1, 2, 3), 4),
+    "square brick": (box(1, 1, 2), 8),
+    "tetrahedron": (TETRAHEDRON, 12),
+    "scalene tetrahedron": (SCALENE, 1),
+    "triangular prism": (prism(3), 6),
+    "pentagonal prism": (prism(5), 10),
+    "hexagonal prism": (prism(6), 12),
+    "rod of 24 sides": (prism(24, 0.5, 4.0), 48),
+    "ball of 12 meridians": (sphere(12, 6), 24),
+    "ball of 7 meridians and 5 parallels": (sphere(7, 5), 14),
+    "cube without its lid": (box(sides=5), 4),
+    "square sheet": (sheet(), 8),
+    "oblong sheet": (sheet(2, 1), 4),
+    "screw of cubes": (HELIX, 2),
+}
+
+
+@pytest.mark.parametrize("name", ORDERS)
+def test_the_rotations_of_a_solid_are_those_of_its_group(name: str) -> None:
+    body, order = ORDERS[name]
+    motions = group(body)
+    assert len(motions) == order
+    np.testing.assert_array_equal(motions[0], np.eye(4))
+    rotations = motions[:, :3, :3]
+    np.testing.assert_allclose(np.linalg.det(rotations), 1.0)
+    products = np.einsum("aij,bjk->abik", rotations, rotations).reshape(-1, 9)
+    gaps = np.abs(products[:, None] - rotations.reshape(1, -1, 9)).max(axis=2)
+    assert gaps.min(axis=1).max() < 1e-6, "the product of two of them is one of them"
+    assert np.abs(gaps[:, :]).shape == (order * order, order)
+
+
+@pytest.mark.parametrize(("name", "order"), [("cube", 48), ("tetrahedron", 24), ("brick", 8), ("pentagonal prism", 20)])
+def test_reflections_double_the_group_of_a_solid_that_has_any(name: str, order: int) -> None:
+    motions = group(ORDERS[name][0], reflections=True)
+    assert len(motions) == order
+    np.testing.assert_array_equal(motions[0], np.eye(4))
+    assert (np.linalg.det(motions[:, :3, :3]) < 0).sum() == order // 2
+
+
+def test_the_triangulation_makes_no_difference() -> None:
+    for body, order in (ORDERS["cube"], ORDERS["pentagonal prism"], ORDERS["cube without its lid"]):
+        assert len(group(split(body))) == order
+        assert len(congruences(surface(*body), surface(*split(body)), TOLERANCE, False)) == order
+
+
+def test_triangles_without_area_make_no_difference() -> None:
+    vertices, faces = box()
+    flat = np.concatenate([faces, [[0, 1, 1], [0, 0, 0]]]).astype(np.int32)
+    assert len(group((vertices, flat))) == 24
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_random_motion_of_a_random_mesh_is_found_and_no_other(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    body = hull(rng)
+    pose = placed(*rng.uniform(-100, 100, 3), random_rotation(rng))
+    order = rng.permutation(len(body[0]))
+    renamed = body[0][order], np.argsort(order)[body[1]][rng.permutation(len(body[1]))].astype(np.int32)
+    motions = congruences(surface(*body), surface(*moved(renamed, pose)), TOLERANCE, False)
+    assert len(motions) == 1
+    np.testing.assert_allclose(motions[0], pose, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ORDERS)
+def test_every_motion_between_two_placements_of_a_solid_is_found(name: str) -> None:
+    body, order = ORDERS[name]
+    pose = placed(3, -2, 7, random_rotation(np.random.default_rng(4)))
+    source, target = surface(*body), surface(*moved(body, pose))
+    motions = congruences(source, target, TOLERANCE, False)
+    assert len(motions) == order
+    assert min(np.abs(each - pose).max() for each in motions) < 1e-6
+
+
+def test_a_screw_and_its_mirror_image_are_two_types_unless_reflections_count() -> None:
+    left, right = surface(*HELIX), surface(*mirrored(HELIX))
+    assert len(congruences(left, right, TOLERANCE, reflections=False)) == 0
+    motions = congruences(left, right, TOLERANCE, reflections=True)
+    assert len(motions) == 2
+    assert (np.linalg.det(motions[:, :3, :3]) < 0).all()
+
+
+def test_a_random_mesh_is_no_mirror_image_of_itself() -> None:
+    for seed in range(5):
+        body = hull(np.random.default_rng(seed))
+        assert len(congruences(surface(*body), surface(*mirrored(body)), TOLERANCE, False)) == 0
+        assert len(congruences(surface(*body), surface(*mirrored(body)), TOLERANCE, True)) == 1
+
+
+def test_a_lid_tells_a_box_from_an_open_box() -> None:
+    assert len(congruences(surface(*box()), surface(*box(sides=5)), TOLERANCE, False)) == 0
+    assert len(congruences(surface(*box(sides=5)), surface(*box()), TOLERANCE, False)) == 0
+
+
+def test_balls_of_other_tessellations_are_other_surfaces() -> None:
+    assert len(congruences(surface(*sphere(16, 8)), surface(*sphere(18, 8)), TOLERANCE, False)) == 0
+
+
+def test_tolerance_is_a_share_of_the_diagonal() -> None:
+    brick = surface(*box(1, 2, 3))
+    assert len(congruences(brick, surface(*box(1, 2, 3.003)), TOLERANCE, False)) == 4
+    assert len(congruences(brick, surface(*box(1, 2, 3.03)), TOLERANCE, False)) == 0
+    tiny = surface(*box(1e-4, 2e-4, 3e-4))
+    assert len(congruences(tiny, surface(*box(1e-4, 2e-4, 3.0003e-4)), TOLERANCE, False)) == 4
+
+
+def test_noise_below_the_tolerance_changes_nothing() -> None:
+    rng = np.random.default_rng(6)
+    for name in ("cube", "brick", "hexagonal prism"):
+        (vertices, faces), order = ORDERS[name]
+        noisy = vertices + rng.uniform(-1, 1, vertices.shape) * 1e-4
+        assert len(group((noisy, faces))) == order
+        assert len(congruences(surface(vertices, faces), surface(noisy, faces), TOLERANCE, False)) == order
+
+
+def test_a_surface_says_what_it_compares() -> None:
+    shape = surface(*moved(box(1, 2, 3), placed(10, 20, 30)))
+    np.testing.assert_allclose(shape.centroid, [10, 20, 30])
+    assert shape.area == pytest.approx(22.0)
+    assert shape.diagonal == pytest.approx(np.sqrt(14))
+    assert len(surface(*split(box())).vertices) == 8 + 18, "corners and the middles of edges, each once"

@@ -1,0 +1,145 @@
+"""The whole way, from shipped exemplars to the dataset folder: the same bytes however it was made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from stages.shape.canonical import graph_digest
+from stages.shape.kit_files import load_kit
+from stages.shape.sample import read_samples
+from stages.strings.alphabet import make_alphabet
+from stages.strings.grammar import check
+
+STAGES = ("exemplars", "variations", "strings", "points", "sketches", "package")
+
+pytestmark = pytest.mark.slow
+
+
+def write_config(folder: Path) -> Path:
+    kits = [
+        {"name": name, "shapes": [str(shape) for shape in sorted(Path("datasets/exemplars", name).glob("*.glb"))]}
+        for name in ("castle", "playground")
+    ]
+    config = {
+        "name": "small",
+        "seed": 3,
+        "license": "MIT",
+        "exemplars": {"kits": kits},
+        "variations": {"per_kit": 40, "splits": {"shards": 2}},
+        "points": {"uniform": 256},
+        "sketches": {"size": 64, "backend": "raycast", "views": [{"name": "front"}]},
+        "package": {"previewed": 4},
+    }
+    path = folder / "small.yaml"
+    path.write_text(yaml.safe_dump(config))
+    return path
+
+
+def start(stage: str, config: Path, out: Path, workers: int) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "pipeline", "run", stage, "--config", str(config), "--out", str(out)]
+    return subprocess.Popen(
+        [*command, "--workers", str(workers)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def make(config: Path, out: Path, workers: int) -> None:
+    for stage in STAGES:
+        assert start(stage, config, out, workers).wait() == 0, f"{stage} failed; see {out}/.work/small/log.txt"
+
+
+def kill_while_it_works(stage: str, config: Path, out: Path) -> bool:
+    """Start a stage and kill -9 its parent once it has committed something; whether it was still at work."""
+    records = out / ".work" / "small" / stage / "records"
+    running = start(stage, config, out, 2)
+    deadline = time.monotonic() + 120
+    while running.poll() is None and time.monotonic() < deadline and not any(records.glob("*.json")):
+        time.sleep(0.01)
+    alive = running.poll() is None
+    os.kill(running.pid, signal.SIGKILL)
+    running.wait()
+    return alive
+
+
+def digests(out: Path) -> dict[str, str]:
+    """sha256 of every published file."""
+    return {
+        str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(out.rglob("*"))
+        if path.is_file() and ".work" not in path.parts
+    }
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("dataset")
+    config = write_config(folder)
+    make(config, folder / "one", 1)
+    return config, folder / "one"
+
+
+def test_two_workers_make_the_same_folder(made: tuple[Path, Path]) -> None:
+    config, one = made
+    two = one.with_name("two")
+    make(config, two, 2)
+    assert digests(two) == digests(one)
+
+
+def test_a_kill_in_each_stage_and_another_go_make_the_same_folder(made: tuple[Path, Path]) -> None:
+    config, one = made
+    killed = one.with_name("killed")
+    alive = []
+    for stage in STAGES:
+        alive.append(kill_while_it_works(stage, config, killed))
+        assert start(stage, config, killed, 2).wait() == 0
+    assert sum(alive) >= 4, "too many stages were over before the kill"
+    assert digests(killed) == digests(one)
+
+
+def test_verify_finds_nothing_wrong_and_then_a_flipped_byte(made: tuple[Path, Path]) -> None:
+    config, one = made
+    command = [sys.executable, "-m", "pipeline", "verify", "--config", str(config), "--out", str(one)]
+    sound = subprocess.run([*command, "--samples", "10"], capture_output=True, text=True)
+    assert sound.returncode == 0, sound.stdout + sound.stderr
+    shard = next((one / "small" / "data" / "val").glob("*.tar"))
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 2] ^= 1
+    shard.write_bytes(bytes(content))
+    broken = subprocess.run(command, capture_output=True, text=True)
+    content[len(content) // 2] ^= 1
+    shard.write_bytes(bytes(content))
+    assert broken.returncode == 1
+    assert shard.name in broken.stdout
+
+
+def test_every_string_of_the_corpus_decodes_to_its_graph_and_obeys_the_grammar(made: tuple[Path, Path]) -> None:
+    _, one = made
+    work = one / ".work" / "small"
+    graphs: dict[str, set[str]] = {}
+    for shard in sorted((work / "variations").glob("small-t*.tar")) + sorted((work / "variations").glob("small-v*.tar")):
+        for sample in read_samples(shard):
+            graphs.setdefault(f"{sample.kit}-{sample.split}", set()).add(sample.graph)
+    seen = 0
+    for text in sorted((one / "small-corpus").glob("*.txt")):
+        kit_name = text.stem.rpartition("-")[0]
+        exemplars = work / "exemplars"
+        kit = load_kit(exemplars / f"{kit_name}.json", exemplars / f"{kit_name}.tar")
+        alphabet = make_alphabet(kit.type_names())
+        decoded = [check(line, alphabet, kit.grammar) for line in text.read_text().splitlines()]
+        assert {graph_digest(each.types, each.edges) for each in decoded} == graphs[text.stem]
+        seen += len(decoded)
+    statistics = json.loads((one / "small-corpus" / "statistics.json").read_text())
+    assert seen > 500
+    assert statistics
