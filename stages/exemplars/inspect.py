@@ -25,6 +25,8 @@ from stages.shape.kit_files import describe_kit
 
 __all__ = ["inspection", "main"]
 
+MOST_ROWS = 40
+"""So many part types are listed for people."""
 PICTURES = Path("datasets", "inspect")
 """Where the picture goes if nobody says where."""
 
@@ -125,7 +127,9 @@ def _text(found: dict[str, Any], config: KitConfig) -> Iterator[str]:
         ]
         for each in sorted(types, key=lambda each: -each["count"])
     ]
-    yield from _table([header, *rows])
+    yield from _table([header, *rows[:MOST_ROWS]])
+    if len(rows) > MOST_ROWS:
+        yield f"and {len(rows) - MOST_ROWS} more types, of {sum(each['count'] for each in types)} parts in all"
     yield ""
     yield f"tolerance  {found['tolerance']:.4g} units, {config.contact.tolerance:g} of the median part's diagonal"
     repaired = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in found["repairs"].items())
@@ -151,8 +155,6 @@ def _model_lines(model: dict[str, Any], config: KitConfig) -> Iterator[tuple[str
     yield "connected", "yes" if len(sizes) == 1 else f"no, pieces of {', '.join(map(str, sizes))} parts"
     if len(degrees) > 1:
         yield "degree", f"a part touches {degrees.min()} to {degrees.max()} others, {degrees.mean():.1f} on average"
-    for hub in model["hubs"]:
-        yield "hub", f"{hub['name']} touches {hub['contacts']}"
 
 
 def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:

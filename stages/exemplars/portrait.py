@@ -13,7 +13,7 @@ from stages.views.sheet import Cell, Section, contact_sheet, picture_png
 
 __all__ = ["kit_sheet"]
 
-CELL = 240
+CELL = 200
 COLUMNS = 6
 EXEMPLAR = Camera(azimuth=-36.0, elevation=28.0, fov=24.0, margin=0.04)
 PART = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.12)

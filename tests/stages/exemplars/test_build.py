@@ -1,0 +1,239 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.errors import ConfigError
+from stages.exemplars.build import build_kit, observe_models
+from stages.exemplars.findings import hubs, mirror_twins, pieces, ways_together
+from stages.exemplars.read import Model, read_model
+from stages.exemplars.settings import ContactConfig
+from stages.shape.kit import Assembly
+from stages.shape.pose import transform_points
+from tests.stages.exemplars.blocks import CUBE, SLAB, block_config, block_kit, model, raw_part, ring
+from tests.stages.exemplars.model_files import BOX_FACES, Glb
+from tests.stages.exemplars.model_files import box as file_box
+from tests.stages.shape.bodies import box, joined, placed, random_rotation
+
+SCREW = joined(box(), box(at=(1, 0, 0)), box(at=(1, 1, 0)), box(at=(1, 1, 1)))
+MIRROR_SCREW = SCREW[0] * [1, 1, -1], np.ascontiguousarray(SCREW[1][:, ::-1])
+FAR = [0.0, 0.0, 50.0]
+
+
+def refusal(*models: Model, **settings: object) -> str:
+    with pytest.raises(ConfigError) as caught:
+        build_kit(block_config(**settings), models)
+    return str(caught.value)
+
+
+class TestTypes:
+    def test_parts_come_back_where_they_were(self) -> None:
+        rng = np.random.default_rng(1)
+        parts = []
+        for k in range(6):
+            vertices, faces = SCREW if k % 2 else SLAB
+            # Each mesh stands in coordinates of its own.
+            turned = transform_points(placed(*rng.normal(size=3), random_rotation(rng)), vertices)
+            parts.append(raw_part(f"p{k}", (turned, faces), placed(0.8 * k, 0, 0, random_rotation(rng))))
+        made = Model(Path("mixed.glb"), tuple(parts), "nodes", "", ())
+        kit = observe_models(block_config(), [made]).kit
+        assembly = kit.exemplars[0].assembly
+        assert assembly.types.tolist() == [0, 1] * 3
+        assert kit.exemplars[0].part_names == tuple(f"p{k}" for k in range(6))
+        for part, index, pose in zip(parts, assembly.types, assembly.poses, strict=True):
+            world = transform_points(part.pose, part.vertices)
+            again = transform_points(pose, kit.types[index].vertices)
+            gaps = np.linalg.norm(world[:, None] - again[None], axis=2)
+            assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-6
+
+    def test_the_origin_of_a_type_is_its_centroid(self) -> None:
+        kit = block_kit(model({"a": (SCREW, (0, 0, 0)), "b": (SCREW, (2, 0, 0))}))
+        np.testing.assert_allclose(kit.types[0].centroid, 0, atol=1e-12)
+
+    def test_mirror_images_are_one_type_only_if_the_config_says_so(self) -> None:
+        pair = model({"left": (SCREW, (0, 0, 0)), "right": (MIRROR_SCREW, (0, 0, -1))})
+        kit = block_kit(pair)
+        assert kit.type_names() == ("left", "right")
+        assert mirror_twins(kit.types, 1e-3) == [(0, 1)]
+        assert block_kit(pair, mirror_images_match=True).type_names() == ("left",)
+
+    def test_parts_that_are_their_own_mirror_image_have_no_twin(self) -> None:
+        kit = block_kit(model({"slab": (SLAB, (0, 0, 0)), "cube": (CUBE, (1, 0, 0))}))
+        assert mirror_twins(kit.types, 1e-3) == []
+
+    def test_labels_tell_congruent_parts_apart_if_the_config_says_so(self) -> None:
+        parts = [raw_part(f"{label}.{k}", CUBE, placed(float(k)), label) for k, label in enumerate("aabba")]
+        made = Model(Path("labels.glb"), tuple(parts), "nodes", "", ())
+        assert block_kit(made).exemplars[0].assembly.types.tolist() == [0] * 5
+        kit = block_kit(made, types="labels")
+        assert kit.exemplars[0].assembly.types.tolist() == [0, 0, 1, 1, 0]
+        assert kit.type_names() == ("a", "b")
+
+    def test_names_of_types_are_words_and_differ(self) -> None:
+        bodies = [("wall #1", CUBE), ("wall 1", SLAB), ("!", box(1, 1, 3)), ("...", box(1, 1, 4))]
+        kit = block_kit(model({name: (body, (float(k), 0.0, 0.0)) for k, (name, body) in enumerate(bodies)}))
+        assert kit.type_names() == ("wall_1", "wall_1_2", "part", "part_2")
+
+    def test_a_type_is_shared_by_the_shapes_of_a_kit(self) -> None:
+        kit = block_kit(ring(), model({"x": (SLAB, (0, 0, 0)), "y": (CUBE, (1, 0, 0.5))}, "other"))
+        assert [each.assembly.types.tolist() for each in kit.exemplars] == [[0, 0, 0, 0], [1, 0]]
+        assert [each.name for each in kit.exemplars] == ["ring", "other"]
+
+    def test_shapes_in_files_of_one_name_are_called_by_their_folders(self) -> None:
+        models = [Model(Path(folder, "model.glb"), ring().parts, "nodes", "", ()) for folder in ("tower", "wall")]
+        assert [each.name for each in block_kit(*models).exemplars] == ["tower", "wall"]
+
+
+class TestRepairs:
+    def test_doubled_faces_and_split_vertices_do_not_make_another_type(self) -> None:
+        vertices, faces = CUBE
+        soup = vertices[np.concatenate([faces, faces])].reshape(-1, 3)
+        doubled = soup, np.arange(len(soup), dtype=np.int32).reshape(-1, 3)
+        kit, report = build_kit(block_config(), [model({"plain": (CUBE, (0, 0, 0)), "doubled": (doubled, (1, 0, 0))})])
+        assert kit.type_names() == ("plain",)
+        assert report.repairs["duplicate_faces"] == 12
+        assert report.repairs["merged_vertices"] > 0
+
+
+class TestRefusals:
+    def test_one_part_is_no_exemplar(self) -> None:
+        message = refusal(model({"only": (CUBE, (0, 0, 0))}))
+        assert message.startswith("blocks.glb: has 1 part by nodes")
+        assert "parts: components" in message
+
+    def test_an_exemplar_in_pieces_is_refused_with_what_is_apart(self) -> None:
+        apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "c": (CUBE, (2, 0, 0)), "moon": (CUBE, FAR)})
+        message = refusal(apart)
+        assert "2 pieces of 3, 1 parts (apart: moon)" in message
+        assert "disconnected: largest" in message
+
+    def test_the_largest_piece_is_kept_if_the_config_says_so(self) -> None:
+        apart = model({"moon": (CUBE, FAR), "a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "c": (CUBE, (2, 0, 0))})
+        kit, report = build_kit(block_config(disconnected="largest"), [apart])
+        assert kit.exemplars[0].part_names == ("a", "b", "c")
+        assert kit.exemplars[0].assembly.edges.tolist() == [[0, 1], [1, 2]]
+        assert kit.grammar.neighbourhoods == {0: {((0, 1),): 2, ((0, 2),): 1}}
+        assert any("moon" in warning for warning in report.warnings)
+
+    def test_pieces_of_one_part_each_are_no_exemplar_even_so(self) -> None:
+        apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (3, 0, 0))})
+        assert "needs at least 2" in refusal(apart, disconnected="largest")
+
+    def test_shapes_without_a_common_type_are_refused_each_by_name(self) -> None:
+        cubes, slabs = (
+            model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0))}, "cubes"),
+            model({"a": (SLAB, (0, 0, 0)), "b": (SLAB, (1, 0, 0))}, "slabs"),
+        )
+        message = refusal(cubes, slabs)
+        assert "cubes.glb: shares no part type" in message
+        assert "slabs.glb: shares no part type" in message
+        build_kit(block_config(), [cubes, slabs, model({"a": (SLAB, (0, 0, 0)), "b": (CUBE, (1, 0, 0))}, "both")])
+
+    def test_a_part_without_area_is_refused_by_name(self) -> None:
+        flat = CUBE[0], np.array([[0, 1, 1], [2, 2, 2]], dtype=np.int32)
+        message = refusal(model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "ghost": (flat, (2, 0, 0))}))
+        assert "'ghost' has no triangle with area" in message
+
+    def test_a_model_of_nothing_but_triangles_without_area_is_refused(self) -> None:
+        line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]]), np.array([[0, 1, 2]], dtype=np.int32)
+        assert "no part has a triangle with area" in refusal(model({"a": (line, (0, 0, 0)), "b": (line, (1, 0, 0))}))
+
+    def test_what_is_refused_can_be_looked_at(self) -> None:
+        seen = observe_models(block_config(), [model({"only": (CUBE, (0, 0, 0))})])
+        assert len(seen.refusals) == 1
+        assert len(seen.kit.types[0].symmetries) == 24
+
+
+class TestWarnings:
+    def test_a_part_in_the_place_of_another_is_named(self) -> None:
+        quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+        twice = [*ring().parts, raw_part("again", CUBE, placed(1, 0, 0, quarter))]
+        made = Model(Path("twice.glb"), tuple(twice), "nodes", "", ())
+        kit, report = build_kit(block_config(), [made])
+        assert len(kit.exemplars[0].assembly) == 5
+        assert [warning for warning in report.warnings if "again in cube.1" in warning]
+
+    def test_a_kit_in_which_nothing_repeats_says_that_nothing_can_be_exchanged(self) -> None:
+        _, report = build_kit(block_config(), [model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))})])
+        assert any("nothing can be exchanged" in warning for warning in report.warnings)
+        _, report = build_kit(block_config(), [ring()])
+        assert report.warnings == ()
+
+    def test_three_hundred_types_make_a_kit_and_say_how_strings_write_them(self) -> None:
+        sizes = 1.0 + 0.05 * np.arange(300)
+        middles = np.cumsum(sizes) - sizes / 2
+        parts = {
+            f"block.{k}": (box(size, 1, 1), (middle, 0.0, 0.0))
+            for k, (size, middle) in enumerate(zip(sizes.tolist(), middles.tolist(), strict=True))
+        }
+        parts["twin"] = (box(1, 1, 1), (0.5, 1.0, 0.0))
+        kit, report = build_kit(block_config(), [model(parts)])
+        assert len(kit.types) == 300
+        assert len(kit.exemplars[0].assembly.edges) == 301
+        assert any("300 part types" in warning for warning in report.warnings)
+
+    def test_a_part_that_touches_very_many_is_a_hub(self) -> None:
+        floor = {"floor": (box(30, 2, 1), (15, 0, -1))}
+        posts = {f"post.{k}": (CUBE, (1 + 1.3 * k, 0.0, 0.0)) for k in range(20)}
+        kit, report = build_kit(block_config(), [model(floor | posts)])
+        assert hubs(kit.exemplars[0].assembly) == [0]
+        assert any("floor (20)" in warning for warning in report.warnings)
+
+    def test_small_shapes_have_no_hubs(self) -> None:
+        assert hubs(block_kit(ring()).exemplars[0].assembly) == []
+
+    def test_many_contacts_are_a_hub_in_the_largest_shape_too(self) -> None:
+        edges = np.array([[0, k] for k in range(1, 22)] + [[30, k] for k in range(31, 51)], dtype=np.int32)
+        assembly = Assembly(np.zeros(900, np.int16), np.tile(np.eye(4), (900, 1, 1)), edges)
+        assert hubs(assembly) == [0]
+
+
+class TestPieces:
+    def test_they_are_numbered_from_the_largest_on(self) -> None:
+        edges = np.array([[1, 2], [3, 4], [4, 5]], dtype=np.int32)
+        assembly = Assembly(np.zeros(6, np.int16), np.tile(np.eye(4), (6, 1, 1)), edges)
+        assert pieces(assembly).tolist() == [2, 1, 1, 0, 0, 0]
+
+    def test_the_tolerance_that_joins_them_is_found(self) -> None:
+        gap = 0.004 * np.sqrt(3)
+        apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + gap, 0, 0))})
+        (way,) = ways_together(observe_models(block_config(), [apart]).kit)
+        assert "5 times the contact tolerance" in way
+        assert block_kit(apart, contact=ContactConfig(tolerance=5e-3)).exemplars[0].assembly.edges.tolist() == [[0, 1]]
+
+    def test_contacts_that_do_not_count_are_thought_of(self) -> None:
+        corner = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 1, 1))})
+        (way,) = ways_together(observe_models(block_config(contact=ContactConfig(kinds=("face",))), [corner]).kit)
+        assert "contact.kinds" in way
+
+    def test_nothing_is_said_of_what_is_too_far_apart_or_together(self) -> None:
+        far = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, FAR)})
+        assert list(ways_together(observe_models(block_config(), [far]).kit)) == []
+        assert list(ways_together(block_kit(ring()))) == []
+
+
+def test_a_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> None:
+    found = []
+    for shift in (0.0, 1e6):
+        glb = Glb()
+        cube = glb.mesh(glb.primitive(file_box(), BOX_FACES), name="cube")
+        for k in range(5):
+            glb.node(name=f"cube.{k}", mesh=cube, translation=[shift + k, shift, 0.0])
+        glb.node(name="on top", mesh=cube, translation=[shift + 0.5, shift + 1.0, 0.0])
+        made = read_model(glb.write(tmp_path / f"{shift:g}.glb"))
+        found.append((block_kit(made), made.warnings))
+    (near, quiet), (away, warned) = found
+    assert away.exemplars[0].assembly.edges.tolist() == near.exemplars[0].assembly.edges.tolist()
+    assert len(near.exemplars[0].assembly.edges) == 6
+    assert [each.kind for each in away.grammar.dockings] == [each.kind for each in near.grammar.dockings]
+    assert quiet == ()
+    assert "units from the origin" in warned[0]
+
+
+def test_building_twice_gives_the_same_kit() -> None:
+    from stages.shape.kit_files import describe_kit
+
+    models = [ring(), model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))}, "two")]
+    assert describe_kit(block_kit(*models)) == describe_kit(block_kit(*models))

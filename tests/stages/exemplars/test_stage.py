@@ -1,0 +1,146 @@
+"""The stage in the real mill."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pipeline.config import Config, load_config
+from pipeline.errors import ConfigError
+from pipeline.places import Places
+from pipeline.run import run_stage
+from pipeline.status import status_lines
+from stages.exemplars.build import build_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ExemplarsConfig
+from stages.exemplars.stage import STAGE
+from stages.shape.kit_files import describe_kit, load_kit
+from tests.stages.exemplars.model_files import box, write_obj
+
+STAGES = {"exemplars": STAGE}
+
+
+def blocks(count: int, gap: float = 0.0) -> dict[str, np.ndarray]:
+    return {f"block.{k:03d}": box(at=(k * (1 + gap), 0, 0)) for k in range(count)}
+
+
+def write_config(folder: Path, kits: list[dict[str, Any]]) -> Config:
+    import yaml
+
+    path = folder / "toy.yaml"
+    path.write_text(yaml.safe_dump({"name": "toy", "exemplars": {"kits": kits}}))
+    return load_config(path, {"exemplars": ExemplarsConfig})
+
+
+def run(folder: Path, config: Config, out: str = "out") -> tuple[str, ...]:
+    """The shards that were set aside."""
+    return tuple(run_stage("exemplars", STAGES, config, Places(folder / out, config.name), 1).failed)
+
+
+def files(folder: Path, out: str = "out") -> dict[str, bytes]:
+    root = folder / out / ".work" / "toy" / "exemplars"
+    return {path.name: path.read_bytes() for path in sorted(root.iterdir()) if path.is_file()}
+
+
+def record(folder: Path, shard: str) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(
+        (folder / "out" / ".work" / "toy" / "exemplars" / "records" / f"{shard}.json").read_text()
+    )
+    return content
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Config]:
+    folder = tmp_path_factory.mktemp("exemplars")
+    write_obj(folder / "short.obj", blocks(3))
+    write_obj(folder / "long.obj", blocks(5))
+    shapes = [str(folder / "short.obj"), str(folder / "long.obj")]
+    config = write_config(folder, [{"name": "row", "shapes": shapes}, {"name": "short", "shapes": shapes[:1]}])
+    assert run(folder, config) == ()
+    return folder, config
+
+
+def test_each_kit_is_a_shard_of_three_files(made: tuple[Path, Config]) -> None:
+    assert list(files(made[0])) == [f"{kit}.{kind}" for kit in ("row", "short") for kind in ("json", "png", "tar")]
+
+
+def test_the_files_hold_the_kit_of_its_shapes(made: tuple[Path, Config]) -> None:
+    folder, config = made
+    root = folder / "out" / ".work" / "toy" / "exemplars"
+    settings = config.section(ExemplarsConfig).kits[0]
+    kit, _ = build_kit(settings, [read_model(path) for path in settings.shapes])
+    assert describe_kit(load_kit(root / "row.json", root / "row.tar")) == describe_kit(kit)
+    assert kit.grammar.neighbourhoods == {0: {((0, 1),): 4, ((0, 2),): 4}}
+
+
+def test_the_record_says_what_was_found(made: tuple[Path, Config]) -> None:
+    summary = record(made[0], "row")["summary"]
+    assert summary["parts"] == [3, 5]
+    assert (summary["types"], summary["rules"], summary["dockings"]) == (1, 2, 1)
+    assert summary["contacts"] == {"point": 0, "line": 0, "face": 6}
+    assert summary["segmentation"][0] == "short.obj: objects: 3 named objects"
+    assert summary["warnings"] == []
+
+
+def test_people_are_told_a_line_for_each_kit(made: tuple[Path, Config]) -> None:
+    folder, config = made
+    lines = "\n".join(status_lines(config, STAGES, Places(folder / "out", "toy"), 1))
+    assert "row: 3 + 5 parts of 1 types, 2 neighbourhoods, 1 dockings" in lines
+
+
+def test_the_picture_shows_something(made: tuple[Path, Config]) -> None:
+    with Image.open(made[0] / "out" / ".work" / "toy" / "exemplars" / "row.png") as picture:
+        pixels = np.asarray(picture.convert("RGB"))
+    assert pixels.shape[1] > 1000
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 500
+
+
+def test_another_run_gives_the_same_bytes(made: tuple[Path, Config]) -> None:
+    folder, config = made
+    assert run(folder, config, "again") == ()
+    assert files(folder, "again") == files(folder)
+
+
+def test_a_changed_model_makes_its_kit_anew_and_no_other(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        write_obj(tmp_path / f"{name}.obj", blocks(3))
+    config = write_config(
+        tmp_path, [{"name": each, "shapes": [str(tmp_path / f"{each}.obj")]} for each in ("one", "two")]
+    )
+    assert run(tmp_path, config) == ()
+    before = {name: record(tmp_path, name)["fingerprint"] for name in ("one", "two")}
+    write_obj(tmp_path / "one.obj", blocks(4))
+    assert run(tmp_path, config) == ()
+    assert record(tmp_path, "one")["summary"]["parts"] == [4]
+    assert record(tmp_path, "one")["fingerprint"] != before["one"]
+    assert record(tmp_path, "two")["fingerprint"] == before["two"]
+
+
+def test_a_kit_that_cannot_be_made_is_set_aside_with_the_mend_and_the_rest_goes_on(tmp_path: Path) -> None:
+    write_obj(tmp_path / "good.obj", blocks(3))
+    write_obj(tmp_path / "apart.obj", blocks(3, gap=0.5))
+    config = write_config(
+        tmp_path, [{"name": each, "shapes": [str(tmp_path / f"{each}.obj")]} for each in ("apart", "good")]
+    )
+    assert run(tmp_path, config) == ("apart",)
+    assert "good.json" in files(tmp_path)
+    assert "apart.json" not in files(tmp_path)
+    failed = tmp_path / "out" / ".work" / "toy" / "exemplars" / "failed"
+    assert "falls into 3 pieces" in "".join(path.read_text() for path in failed.iterdir())
+
+
+def test_a_config_that_names_no_file_starts_nothing(tmp_path: Path) -> None:
+    write_obj(tmp_path / "here.obj", blocks(2))
+    with pytest.raises(ConfigError, match=r"there is no file .*her\.obj; the nearest file there is .*here\.obj"):
+        write_config(tmp_path, [{"name": "kit", "shapes": [str(tmp_path / "her.obj")]}])
+
+
+def test_two_kits_of_one_name_start_nothing(tmp_path: Path) -> None:
+    path = str(write_obj(tmp_path / "here.obj", blocks(2)))
+    with pytest.raises(ConfigError, match="two kits are named 'kit'"):
+        write_config(tmp_path, [{"name": "kit", "shapes": [path]}] * 2)
