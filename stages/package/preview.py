@@ -15,9 +15,10 @@ from stages.shape.collection import collection_kits
 from stages.shape.kit import Assembly, Kit
 from stages.shape.sample import Sample, read_samples
 from stages.sketches.settings import SketchesConfig
-from stages.views.buffers import Backend, backend_for
+from stages.views.buffers import Backend
 from stages.views.camera import Camera
 from stages.views.portrait import points_portrait, portrait
+from stages.views.probe import backend_for
 from stages.views.scene import scene_of
 from stages.views.sheet import Cell, Section, contact_sheet, picture_png
 

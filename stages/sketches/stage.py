@@ -10,7 +10,8 @@ from stages.shape.sample import Sample, read_samples
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment, png_bytes
 from stages.sketches.settings import SketchesConfig
-from stages.views.buffers import Backend, backend_for
+from stages.views.buffers import Backend
+from stages.views.probe import backend_for
 from stages.views.scene import Scene, scene_of
 
 __all__ = ["STAGE", "SketchesConfig"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal, Protocol
 
 from pipeline.errors import ShardFailed
@@ -11,7 +10,7 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.views.camera import Camera, View
 from stages.views.scene import Scene
 
-__all__ = ["Backend", "Buffers", "Visible", "backend_for", "render_buffers", "visible_triangles"]
+__all__ = ["Backend", "Buffers", "Visible", "render_buffers", "visible_triangles"]
 
 Backend = Literal["egl", "osmesa", "raycast"]
 
@@ -50,19 +49,6 @@ class Buffers:
     normal: Float32Array
     part: IntArray
     color: ByteArray
-
-
-def backend_for(choice: Literal["auto", "egl", "osmesa", "raycast"]) -> Backend:
-    """The backend that `auto` stands for on this machine: OpenGL on EGL where a probe in a process of its own draws
-    its triangle, else ray casting. Any other choice is taken at its word."""
-    return _probed() if choice == "auto" else choice
-
-
-@lru_cache(maxsize=1)
-def _probed() -> Backend:
-    from stages.views.probe import probe_in_subprocess
-
-    return "egl" if probe_in_subprocess("egl") is None else "raycast"
 
 
 def visible_triangles(scene: Scene, camera: Camera, size: tuple[int, int], backend: Backend) -> Visible:

@@ -8,10 +8,11 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
-from stages.views.buffers import Backend, Visible, backend_for, visible_triangles
+from stages.views.buffers import Backend, Visible, visible_triangles
 from stages.views.camera import Camera, View
 from stages.views.light import KeyLight, eye_positions, key_light, openness, to_world
 from stages.views.palette import label_colors, linear_to_srgb, srgb_to_linear
+from stages.views.probe import backend_for
 from stages.views.scene import Scene
 
 __all__ = ["PAPER", "points_portrait", "portrait"]

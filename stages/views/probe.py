@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -13,11 +15,22 @@ from stages.views.buffers import Backend, render_buffers
 from stages.views.camera import Camera
 from stages.views.scene import mesh_scene
 
-__all__ = ["BACKENDS", "probe", "probe_in_subprocess"]
+__all__ = ["BACKENDS", "backend_for", "probe", "probe_in_subprocess"]
 
 BACKENDS: tuple[Backend, ...] = ("egl", "osmesa", "raycast")
 
 SECONDS = 120.0
+
+
+def backend_for(choice: Literal["auto", "egl", "osmesa", "raycast"]) -> Backend:
+    """The backend that `auto` stands for on this machine: OpenGL on EGL where a probe in a process of its own draws
+    its triangle, else ray casting. Any other choice is taken at its word."""
+    return _probed() if choice == "auto" else choice
+
+
+@lru_cache(maxsize=1)
+def _probed() -> Backend:
+    return "egl" if probe_in_subprocess("egl") is None else "raycast"
 
 
 def probe(backend: Backend) -> str | None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from stages.exemplars.build import build_kit
@@ -28,6 +30,7 @@ PRINTED = {"a17": 1}
 pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars lie beside the project; they are not here")
 
 
+@cache
 def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] = ALL_KINDS) -> Kit:
     path = folder / "model.glb"
     contact = ContactConfig(tolerance=TOLERANCES.get(folder.name[:3], 1e-3), kinds=kinds)
@@ -64,7 +67,10 @@ def test_contacts_and_part_types_are_those_measured_with_fcl(folder: Path) -> No
         by_name = Counter(part["type"] for part in truth["part_list"])
         by_type = Counter(kit.exemplars[0].assembly.types.tolist())
         assert sorted(by_name.values()) == sorted(by_type.values())
-        both = {(part["type"], int(index)) for part, index in zip(truth["part_list"], kit.exemplars[0].assembly.types)}
+        both = {
+            (part["type"], int(index))
+            for part, index in zip(truth["part_list"], kit.exemplars[0].assembly.types, strict=True)
+        }
         assert len(both) == len(kit.types), "parts of one mesh are one type, and of two meshes are two"
 
 
@@ -75,11 +81,12 @@ def test_mirror_images_are_one_type_only_if_the_config_says_so(short: str) -> No
 
 
 def test_the_printed_tile_of_the_temple_is_the_plain_one_in_other_triangles() -> None:
-    import numpy as np
-
     folder = folder_of("a17")
     kit = build(folder)
-    types = {part["type"]: index for part, index in zip(measured(folder)["part_list"], kit.exemplars[0].assembly.types)}
+    types = {
+        part["type"]: index
+        for part, index in zip(measured(folder)["part_list"], kit.exemplars[0].assembly.types, strict=True)
+    }
     assert types["4162"] == types["4162p0x"]
     parts = {part.mesh_name: part for part in read_model(folder / "model.glb").parts}
     plain, printed = parts["4162"], parts["4162p0x"]

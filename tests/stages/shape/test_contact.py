@@ -104,7 +104,7 @@ class TestBoxes:
         # A comb whose teeth end in edges: two parallel lines are as wide as a face and are none.
         tooth = np.array([[0, 0, 0], [0, 1, 0], [-0.2, 0, 1], [-0.2, 1, 1], [0.2, 0, 1], [0.2, 1, 1]], dtype=float)
         faces = np.array([[0, 2, 4], [1, 5, 3], [0, 1, 3], [0, 3, 2], [0, 4, 5], [0, 5, 1], [2, 3, 5], [2, 5, 4]])
-        comb = joined((tooth, faces.astype(np.int32)), (tooth + [0.8, 0, 0], faces.astype(np.int32)))
+        comb = joined((tooth, faces.astype(np.int32)), (tooth + np.array([0.8, 0, 0]), faces.astype(np.int32)))
         assert kind_of(box(4, 4, 1), comb, placed(0, 0, 0.5)) == "line"
 
 

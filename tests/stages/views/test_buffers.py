@@ -5,10 +5,10 @@ import pytest
 
 from pipeline.errors import ShardFailed
 from stages.views import buffers as module
-from stages.views.buffers import backend_for, render_buffers, visible_triangles
+from stages.views.buffers import render_buffers, visible_triangles
 from stages.views.camera import Camera
 from stages.views.opengl import OpenGLRenderer
-from stages.views.probe import probe
+from stages.views.probe import backend_for, probe
 from stages.views.scene import mesh_scene
 from tests.stages.views.solids import box, boxes_scene, cylinder, exemplar_scene
 
