@@ -55,7 +55,7 @@ verify: setup  ## Check the finished dataset: checksums, members, and shapes com
 	$(PYTHON) -m pipeline verify $(ASKED)
 inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent
 	@test -n '$(MESH)' || { echo 'make inspect needs a model: make inspect MESH=my.glb' >&2; exit 2; }
-	$(PYTHON) -m pipeline inspect '$(MESH)'
+	$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png'
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	$(PYTHON) -m pipeline doctor --out $(OUT)
 

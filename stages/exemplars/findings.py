@@ -117,7 +117,8 @@ def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int,
     twins: list[tuple[int, int]] = []
     for i, j in itertools.combinations(range(len(types)), 2):
         motions = congruences(surfaces[i], surfaces[j], tolerance, reflections=True)
-        if (np.linalg.det(motions[:, :3, :3]) < 0).any():
+        # Types that rotations alone make equal, told apart by their labels, are no twins.
+        if len(motions) and (np.linalg.det(motions[:, :3, :3]) < 0).all():
             twins.append((i, j))
     return twins
 

@@ -70,6 +70,7 @@ class TestTypes:
         kit = block_kit(made, types="labels")
         assert kit.exemplars[0].assembly.types.tolist() == [0, 0, 1, 1, 0]
         assert kit.type_names() == ("a", "b")
+        assert mirror_twins(kit.types, 1e-3) == []
 
     def test_names_of_types_are_words_and_differ(self) -> None:
         bodies = [("wall #1", CUBE), ("wall 1", SLAB), ("!", box(1, 1, 3)), ("...", box(1, 1, 4))]
