@@ -202,7 +202,12 @@ def test_ctrl_c_stops_with_130_and_leaves_whole_files(tmp_path: Path, write_conf
     out = tmp_path / "out"
     turn(config, out, "salt", "grain")
     with subprocess.Popen(
-        mill(config, out, "flour"), cwd=ROOT, stderr=subprocess.DEVNULL, start_new_session=True
+        mill(config, out, "flour"),
+        cwd=ROOT,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        # whoever runs the tests in the background has them ignore Ctrl-C, and a child inherits that
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as run:
         wait_until(lambda: list((out / WORK / "flour").glob(".*.tmp")))
         os.killpg(run.pid, signal.SIGINT)
