@@ -22,6 +22,7 @@ __all__ = [
     "cut",
     "hash_key",
     "join",
+    "lies_in",
     "match_poses",
     "quantise",
     "refinement_keys",
@@ -97,7 +98,7 @@ class Workspace(NamedTuple):
     fresh: np.ndarray  # uint64 (v,)
     boxes: np.ndarray  # float64 (v, 2, 3)
     near: np.ndarray  # int64 (p, 2): pairs whose boxes overlap
-    counts: np.ndarray  # int64 (8,): edges, unknown, variant parts, boundary parts, try number
+    counts: np.ndarray  # int64 (8,): edges, unknown, variant parts, boundary parts, try number, piece's parts
 
 
 class _Outcomes(NamedTuple):
@@ -116,7 +117,7 @@ class _Outcomes(NamedTuple):
 
 
 Outcome = _Outcomes()
-EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY = 0, 1, 2, 3, 4
+EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY, PIECE = 0, 1, 2, 3, 4, 5
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 LABELS = 1 << 20
 CHOICES = 64
@@ -379,6 +380,7 @@ def cut(rng, a, b, ws, growth_share):
                     count += 1
                     break
     ws.counts[BOUNDARY] = count
+    ws.counts[PIECE] = size
     if count == 0 or size == n:
         return Outcome.WHOLE
     rarest, fewest = 0, 1 << 30
@@ -456,6 +458,53 @@ def match_poses(rng, kit, a, b, same_shape, ws):
             _fit_motion(kit, a, b, ws)
             return Outcome.OK
     return Outcome.NO_MATCH
+
+
+@numba.njit(cache=True)
+def lies_in(kit, ws, b):
+    """Whether the variant is nothing but parts of B: each of its parts stands for one of B under one rigid motion."""
+    n = ws.counts[PARTS]
+    if n > len(b.types):
+        return False
+    anchor, fewest = 0, 1 << 30
+    for v in range(n):
+        present = b.type_starts[ws.types[v] + 1] - b.type_starts[ws.types[v]]
+        if present == 0:
+            return False
+        if present < fewest:
+            anchor, fewest = v, present
+    anchor_type = ws.types[anchor]
+    place = np.empty(3)
+    turn = np.empty((3, 3))
+    between = np.empty((3, 3))
+    motion = np.empty((4, 3))
+    for at in range(b.type_starts[anchor_type], b.type_starts[anchor_type + 1]):
+        for symmetry in range(kit.symmetry_starts[anchor_type], kit.symmetry_starts[anchor_type + 1]):
+            _turn(b.turns[b.by_type[at]], kit.symmetries[symmetry], between)
+            for i in range(3):
+                for j in range(3):
+                    x = 0.0
+                    for k in range(3):
+                        x += between[i, k] * ws.turns[anchor, j, k]
+                    motion[i, j] = x
+            for i in range(3):
+                motion[3, i] = b.places[b.by_type[at], i]
+                for j in range(3):
+                    motion[3, i] -= motion[i, j] * ws.places[anchor, j]
+            inside = True
+            for v in range(n):
+                part_type = ws.types[v]
+                first, last = b.type_starts[part_type], b.type_starts[part_type + 1]
+                _move(motion, ws.places[v], place)
+                found = _part_at(b.places, b.by_type, first, last, place, kit.limits[0])
+                if found >= 0:
+                    _turn(motion, ws.turns[v], turn)
+                if found < 0 or _looks_same(kit, part_type, turn, b.turns[found]) < 0:
+                    inside = False
+                    break
+            if inside:
+                return True
+    return False
 
 
 @numba.njit(cache=True)

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from stages.shape.arrays import IntArray
+from stages.shape.arrays import Float32Array, FloatArray, IntArray
 from stages.shape.kit import Assembly
 from stages.variations import kernels
 from stages.variations.answers import ContactAnswers
+from stages.variations.archive import Archive, Cell, cell_of
 from stages.variations.centroids import match_centroids
 from stages.variations.correction import correct_orientations
-from stages.variations.kernels import BOUNDARY, EDGES, PARTS, UNKNOWNS, Outcome, ShapeTables
+from stages.variations.features import FeatureTest, material_shares
+from stages.variations.kernels import BOUNDARY, EDGES, PARTS, PIECE, UNKNOWNS, Outcome, ShapeTables
 from stages.variations.settings import SearchConfig
 from stages.variations.tables import kit_tables, shape_tables, workspace
 
@@ -33,25 +35,49 @@ REASONS = {
 }
 
 
+DUPLICATE = "duplicate"
+SUBASSEMBLY = "nothing but a piece of an exemplar"
+FULL = "cell of the archive is full"
+
+SMALL, NEARLY_ALL = 0.2, 0.8
+"""A piece with a share of parts between these is a large cut, one that can change a shape as a whole."""
+RECUTS = 4
+"""Cuts made at most until one is large."""
+
+
 @dataclass(frozen=True)
 class Parent:
-    """A shape that pieces are cut from and docked to; `name` is an exemplar's name or a variant's place in the pool."""
+    """A shape that pieces are cut from and docked to; `name` is an exemplar's name or a variant's place in the pool.
+
+    origins: int8 (n,), the exemplar that each part came from; shares: float64 (exemplars,) of them; cell and
+    histogram: its place in the archive.
+    """
 
     name: str
     assembly: Assembly
     labels: IntArray
     tables: ShapeTables
+    origins: np.ndarray
+    shares: FloatArray
+    cell: Cell
+    histogram: int
 
 
 @dataclass(frozen=True)
 class Variant:
     """A valid new shape. labels: int32 (m, 2), directed docking labels of its edges; graph and docked: its two keys
-    by colour refinement; lineage: parents, number of parts from each, boundary and docking motion, as JSON."""
+    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (8,);
+    histogram: a hash of its type histogram; lineage: parents, number of parts from each, boundary and docking
+    motion, as JSON."""
 
     assembly: Assembly
     labels: IntArray
     graph: int
     docked: int
+    origins: np.ndarray
+    features: Float32Array
+    cell: Cell
+    histogram: int
     lineage: dict[str, Any]
 
 
@@ -71,16 +97,27 @@ class Search:
         ]
         self.tables = kit_tables(kit, neighbourhoods, config.upright)
         self._ws = workspace(max(self.largest, *sizes))
-        self.exemplars = [self.parent(each.name, each.assembly) for each in kit.exemplars]
+        self.archive = Archive(config.novelty.quota)
+        self._features = FeatureTest(kit)
+        self.exemplars = [
+            self.parent(each.name, each.assembly, np.full(len(each.assembly), number, dtype=np.int8))
+            for number, each in enumerate(kit.exemplars)
+        ]
         self.parents: list[Parent] = []
         self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.exemplars}
+        for each in self.exemplars:
+            self.archive.add(each.cell, each.histogram)
         self.rejects: Counter[str] = Counter()
+        self.crossings: Counter[str] = Counter()
 
-    def parent(self, name: str, assembly: Assembly, labels: IntArray | None = None) -> Parent:
+    def parent(self, name: str, assembly: Assembly, origins: np.ndarray, labels: IntArray | None = None) -> Parent:
         """A shape made ready for cutting and docking."""
         if labels is None:
             labels = self.answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
-        return Parent(name, assembly, labels, shape_tables(assembly, labels, len(self.kit.types)))
+        shares = material_shares(origins, len(self.kit.exemplars))
+        cell = self._cell(self._features.features(assembly, shares))
+        tables = shape_tables(assembly, labels, len(self.kit.types))
+        return Parent(name, assembly, labels, tables, origins, shares, cell, self.histogram(assembly.types))
 
     def keys_of(self, parent: Parent) -> tuple[int, int]:
         """The two refinement keys of a shape."""
@@ -98,29 +135,71 @@ class Search:
         """
         found: list[Variant] = []
         for number in range(tries):
-            a, b = self._pick(rng), self._pick(rng)
+            a = self._pick(rng)
+            b = self._partner(rng, a)
+            crossing = not (a.shares * b.shares).any()
             variant = self._attempt(rng, a, b)
+            if crossing:
+                self.crossings[variant if isinstance(variant, str) else "new variant"] += 1
             if isinstance(variant, str):
                 self.rejects[variant] += 1
                 continue
             found.append(variant)
             self.seen.add(self.key(variant.assembly.types, variant.graph, variant.docked))
-            self.parents.append(self.parent(f"{name}-{len(found) - 1}", variant.assembly, variant.labels))
+            self.archive.add(variant.cell, variant.histogram)
+            parent = self.parent(f"{name}-{len(found) - 1}", variant.assembly, variant.origins, variant.labels)
+            self._adopt(rng, parent)
             progress(len(found))
             if len(found) >= wanted:
                 return found, number + 1
         return found, tries
 
+    def _adopt(self, rng: np.random.Generator, parent: Parent) -> None:
+        """Add a parent; where there are as many as the config allows, the most crowded of some makes room."""
+        if len(self.parents) < self.config.parents:
+            self.parents.append(parent)
+            return
+        places = self._draw(rng, len(self.parents), self.config.novelty.rivals)
+        self.parents[max(places, key=lambda place: self._crowd(self.parents[place]))] = parent
+
     def _pick(self, rng: np.random.Generator) -> Parent:
-        pool: Sequence[Parent] = self.parents
-        if not pool or rng.random() < self.config.exemplar_share:
-            pool = self.exemplars
-        return pool[int(rng.integers(len(pool)))]
+        """The first parent: an exemplar, or the rarest of some earlier variants."""
+        if not self.parents or rng.random() < self.config.exemplar_share:
+            return self.exemplars[int(rng.random() * len(self.exemplars))]
+        rivals = self.config.novelty.rivals if self.config.novelty.guided else 1
+        return min((self.parents[place] for place in self._draw(rng, len(self.parents), rivals)), key=self._crowd)
+
+    def _partner(self, rng: np.random.Generator, a: Parent) -> Parent:
+        """The second parent: like the first, or that of some whose parts come from other exemplars."""
+        novelty = self.config.novelty
+        if not novelty.guided or len(self.exemplars) == 1 or rng.random() >= novelty.cross_share:
+            return self._pick(rng)
+        rivals = [self._pick(rng) for _ in range(3)]
+        rivals.append(self.exemplars[int(rng.random() * len(self.exemplars))])
+        return min(rivals, key=lambda each: (float(np.minimum(each.shares, a.shares).sum()), self._crowd(each)))
+
+    def _crowd(self, parent: Parent) -> int:
+        return self.archive.crowd(parent.cell, parent.histogram)
+
+    @staticmethod
+    def _draw(rng: np.random.Generator, among: int, count: int) -> list[int]:
+        return [int(each * among) for each in rng.random(count)]
+
+    def _cut(self, rng: np.random.Generator, a: Parent, b: Parent) -> int:
+        """Cut a piece out of A; a share of the pieces is cut anew while they are small or nearly everything."""
+        novelty, parts = self.config.novelty, len(a.assembly)
+        large = novelty.guided and rng.random() < novelty.large_share
+        for _ in range(RECUTS if large else 1):
+            growth = 0.0 if large else self.config.growth_share
+            outcome: int = kernels.cut(rng, a.tables, b.tables, self._ws, growth)
+            if outcome == Outcome.OK and SMALL * parts <= self._ws.counts[PIECE] <= NEARLY_ALL * parts:
+                break
+        return outcome
 
     def _attempt(self, rng: np.random.Generator, a: Parent, b: Parent) -> Variant | str:
         """One try: a new variant, or the reason why there is none."""
         ws, kit = self._ws, self.tables
-        outcome = kernels.cut(rng, a.tables, b.tables, ws, self.config.growth_share)
+        outcome = self._cut(rng, a, b)
         if outcome == Outcome.OK:
             if self.config.matching == "pose":
                 outcome = kernels.match_poses(rng, kit, a.tables, b.tables, a is b, ws)
@@ -137,17 +216,29 @@ class Search:
             return REASONS[outcome]
         graph, docked = kernels.refinement_keys(ws)
         if self.key(ws.types[: ws.counts[PARTS]], int(graph), int(docked)) in self.seen:
-            return "duplicate"
+            return DUPLICATE
+        if any(kernels.lies_in(kit, ws, each.tables) for each in self.exemplars):
+            return SUBASSEMBLY
         outcome = self._ask_until_known(kernels.validate)
         if outcome != Outcome.OK:
             return REASONS[outcome]
-        return self._variant(a, b, int(graph), int(docked))
+        variant = self._variant(a, b, int(graph), int(docked))
+        if self.config.novelty.guided and self.archive.is_full(variant.cell, variant.histogram):
+            return FULL
+        return variant
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""
         if self.config.duplicates == "histogram":
-            return int(self.tables.weights[types].sum(dtype=np.uint64))
+            return self.histogram(types)
         return graph if self.config.duplicates == "graph" else docked
+
+    def histogram(self, types: np.ndarray) -> int:
+        """A hash of a type histogram."""
+        return int(self.tables.weights[types].sum(dtype=np.uint64))
+
+    def _cell(self, features: Float32Array) -> Cell:
+        return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)
 
     def _ask_until_known(self, kernel: Callable[..., int]) -> int:
         """Run a kernel, and again after answering the contacts that it did not know."""
@@ -176,7 +267,22 @@ class Search:
             "motion": np.round(ws.motion, 9).tolist(),
         }
         assembly = Assembly(ws.types[:parts].astype(np.int16), poses, edges)
-        return Variant(assembly, labels.astype(np.int32), graph, docked, lineage)
+        origins = np.empty(parts, dtype=np.int8)
+        for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
+            at = placed[: len(parent.assembly)]
+            origins[at[at >= 0]] = parent.origins[at >= 0]
+        features = self._features.features(assembly, material_shares(origins, len(self.exemplars)))
+        return Variant(
+            assembly,
+            labels.astype(np.int32),
+            graph,
+            docked,
+            origins,
+            features,
+            self._cell(features),
+            self.histogram(assembly.types),
+            lineage,
+        )
 
     def _load(self, parent: Parent) -> None:
         """Put a shape's graph into the workspace as if it were the variant in hand."""

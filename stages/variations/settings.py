@@ -8,7 +8,40 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["SearchConfig", "SplitConfig", "VariationsConfig"]
+from stages.variations.features import Axis
+
+__all__ = ["NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]
+
+
+class NoveltyConfig(StrictModel):
+    """How the search is led to what its pool lacks: an archive of cells, rare ones first."""
+
+    guided: bool = Field(
+        True, description="Whether the archive leads the search; without it parents and cuts are plain random."
+    )
+    axes: tuple[Axis, ...] = Field(
+        ("parts", "footprint", "height", "cycle_rank", "mixture", "distance"),
+        min_length=1,
+        description="Axes of the archive's grid: number of parts, area seen from above, height, longer by shorter "
+        "side, edges beyond a tree, share of parts from other exemplars than the main one, histogram distance to the "
+        "nearest exemplar, commonest part type.",
+    )
+    resolution: int = Field(
+        4, ge=1, le=64, description="Cells along a doubling of a size; a share has four times as many from 0 to 1."
+    )
+    quota: int = Field(
+        8,
+        ge=1,
+        description="Variants of a cell after which one with a known histogram is refused; doubled whenever a round "
+        "brings too little that is new.",
+    )
+    rivals: int = Field(6, ge=1, le=100, description="Shapes drawn for each parent, of which the rarest is taken.")
+    cross_share: float = Field(
+        0.5, ge=0, le=1, description="Share of tries whose second parent is the one of most other ancestry."
+    )
+    large_share: float = Field(
+        0.5, ge=0, le=1, description="Share of tries whose piece is cut anew while it is small or nearly everything."
+    )
 
 
 class SearchConfig(StrictModel):
@@ -47,6 +80,22 @@ class SearchConfig(StrictModel):
         200_000, ge=1, description="Tries of a kit without a new variant after which its search has ended."
     )
     rounds: int = Field(200, ge=1, description="Most rounds of a kit's search.")
+    novelty: NoveltyConfig = Field(
+        default_factory=NoveltyConfig, description="How the search is led to what its pool lacks."
+    )
+
+
+class SelectionConfig(StrictModel):
+    """How the dataset is chosen from the pool of found variants."""
+
+    oversample: float = Field(
+        3.0, ge=1, le=100, description="Variants that the search looks for, as a multiple of those wanted."
+    )
+    spread: int = Field(
+        10_000,
+        ge=1,
+        description="Most variants of a kit that are chosen farthest first; the rest are drawn at random.",
+    )
 
 
 class SplitConfig(StrictModel):
@@ -63,4 +112,7 @@ class VariationsConfig(StrictModel):
 
     per_kit: int = Field(500, ge=1, description="Variants wanted of each kit.")
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
+    selection: SelectionConfig = Field(
+        default_factory=SelectionConfig, description="How the dataset is chosen from what was found."
+    )
     splits: SplitConfig = Field(default_factory=SplitConfig, description="How the samples are shared out.")
