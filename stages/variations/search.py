@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -166,7 +166,8 @@ class Search:
         """The first parent: an exemplar, or the rarest of some earlier variants."""
         if not self.parents or rng.random() < self.config.exemplar_share:
             return self.exemplars[int(rng.random() * len(self.exemplars))]
-        rivals = self.config.novelty.rivals if self.config.novelty.guided else 1
+        novelty = self.config.novelty
+        rivals = novelty.rivals if novelty.guided and rng.random() < novelty.rare_share else 1
         return min((self.parents[place] for place in self._draw(rng, len(self.parents), rivals)), key=self._crowd)
 
     def _partner(self, rng: np.random.Generator, a: Parent) -> Parent:

@@ -7,7 +7,6 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
-
 from stages.variations.features import Axis
 
 __all__ = ["NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]
@@ -35,7 +34,10 @@ class NoveltyConfig(StrictModel):
         description="Variants of a cell after which one with a known histogram is refused; doubled whenever a round "
         "brings too little that is new.",
     )
-    rivals: int = Field(6, ge=1, le=100, description="Shapes drawn for each parent, of which the rarest is taken.")
+    rare_share: float = Field(
+        0.7, ge=0, le=1, description="Share of parents that are the rarest of some rivals; the rest are plain random."
+    )
+    rivals: int = Field(6, ge=1, le=100, description="Variants drawn for a rare parent, of which the rarest is taken.")
     cross_share: float = Field(
         0.5, ge=0, le=1, description="Share of tries whose second parent is the one of most other ancestry."
     )
