@@ -118,6 +118,7 @@ class _Outcomes(NamedTuple):
 
 Outcome = _Outcomes()
 EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY, PIECE = 0, 1, 2, 3, 4, 5
+GROWN, PLANES, JOINTS = 0, 1, 2
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 LABELS = 1 << 20
 CHOICES = 64
@@ -172,14 +173,53 @@ def _random_below(rng, n):
 
 
 @numba.njit(cache=True)
-def _cut(rng, shape, ws, growth_share):
-    """A random connected piece of a shape into `ws.inside`: grown part by part, or cut out by a half-space, a slab or
-    a box along the axes of one of its parts or in any direction. Returns its number of parts."""
+def _cut_at_joints(rng, shape, other, ws, seed):
+    """A piece that ends at parts of one or two types which the other shape has too, each with even odds of being
+    passed by all the same. Returns its number of parts."""
+    n = len(shape.types)
+    inside, stack = ws.inside, ws.stack
+    joints = np.empty(2, dtype=np.int64)
+    for k in range(2):
+        joints[k] = -1
+        for _ in range(8):
+            part_type = shape.types[_random_below(rng, n)]
+            if other.type_starts[part_type + 1] > other.type_starts[part_type]:
+                joints[k] = part_type
+                break
+    if rng.random() < 0.5:
+        joints[1] = -1
+    leaky = 0.4 * rng.random() if rng.random() < 0.5 else 0.0
+    stack[0] = seed
+    inside[seed] = True
+    size, count = 0, 1
+    while count > 0:
+        count -= 1
+        part = stack[count]
+        size += 1
+        part_type = shape.types[part]
+        if part != seed and (part_type == joints[0] or part_type == joints[1]) and rng.random() >= leaky:
+            continue
+        for e in range(shape.starts[part], shape.starts[part + 1]):
+            end = shape.ends[e]
+            if not inside[end]:
+                inside[end] = True
+                stack[count] = end
+                count += 1
+    return size
+
+
+@numba.njit(cache=True)
+def _cut(rng, shape, other, ws, way):
+    """A random connected piece of a shape into `ws.inside`: grown part by part (GROWN), ended at joints (JOINTS), or
+    cut out by a half-space, a slab or a box along the axes of one of its parts or in any direction (PLANES). Returns
+    its number of parts."""
     n = len(shape.types)
     inside, stack = ws.inside, ws.stack
     inside[:n] = False
     seed = _random_below(rng, n)
-    if rng.random() < growth_share:
+    if way == JOINTS:
+        return _cut_at_joints(rng, shape, other, ws, seed)
+    if way == GROWN:
         wanted = 1 + _random_below(rng, n - 1)
         size, count = 0, 1
         stack[0] = seed
@@ -366,11 +406,11 @@ def _fit_motion(kit, a, b, ws):
 
 
 @numba.njit(cache=True)
-def cut(rng, a, b, ws, growth_share):
+def cut(rng, a, b, ws, way):
     """Cut a random connected piece out of A: `ws.inside`, and its boundary, the parts with a neighbour outside, in
     `ws.boundary`, that of the rarest type in B first."""
     n = len(a.types)
-    size = _cut(rng, a, ws, growth_share)
+    size = _cut(rng, a, b, ws, way)
     count = 0
     for part in range(n):
         if ws.inside[part]:
@@ -747,7 +787,8 @@ def _overlaps(boxes, count, origin, between_sides, slack, pairs):
 
 @numba.njit(cache=True)
 def _contact(kit, answers, ws, i, j, quanta):
-    """The answer for a pair: NONE, FORBIDDEN, MISSING or a packed pair of labels."""
+    """The answer for a pair: GROWN, PLANES, JOINTS = 0, 1, 2
+    NONE, FORBIDDEN, MISSING or a packed pair of labels."""
     quantise(ws.turns[i], ws.places[i], ws.turns[j], ws.places[j], kit.reach[ws.types[j]], kit.limits[2], quanta)
     return _ask(answers.keys, answers.values, hash_key(ws.types[i], ws.types[j], quanta))
 

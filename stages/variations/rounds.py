@@ -98,7 +98,7 @@ def run_lane(task: Task) -> Outcome:
     chosen = _parents(rng, crowds, config.parents, config.novelty.guided)
     for found, index in pool.variants(task, chosen):
         assembly, labels = found.assembly(index)
-        search.parents.append(search.parent(f"{found.name}-{index}", assembly, found.origins_of(index), labels))
+        search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, found.origins_of(index), labels))
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
     write_variants(task, variants)

@@ -17,7 +17,18 @@ from stages.variations.archive import Archive, Cell, cell_of
 from stages.variations.centroids import match_centroids
 from stages.variations.correction import correct_orientations
 from stages.variations.features import FeatureTest, material_shares
-from stages.variations.kernels import BOUNDARY, EDGES, PARTS, PIECE, UNKNOWNS, Outcome, ShapeTables
+from stages.variations.kernels import (
+    BOUNDARY,
+    EDGES,
+    GROWN,
+    JOINTS,
+    PARTS,
+    PIECE,
+    PLANES,
+    UNKNOWNS,
+    Outcome,
+    ShapeTables,
+)
 from stages.variations.settings import SearchConfig
 from stages.variations.tables import kit_tables, shape_tables, workspace
 
@@ -37,8 +48,15 @@ REASONS = {
 
 DUPLICATE = "duplicate"
 SUBASSEMBLY = "nothing but a piece of an exemplar"
+NEW = "new variant"
 FULL = "cell of the archive is full"
 
+WAYS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
+"""Ways of cutting, and whether the piece must be large."""
+KNOWN_GAIN = 0.2
+"""What a new variant of a known histogram counts beside one of a new histogram."""
+MIXED = 0.1
+"""A shape with less of its parts from other exemplars than its main one is of that one's family, not of the mixed."""
 SMALL, NEARLY_ALL = 0.2, 0.8
 """A piece with a share of parts between these is a large cut, one that can change a shape as a whole."""
 RECUTS = 4
@@ -103,10 +121,12 @@ class Search:
             self.parent(each.name, each.assembly, np.full(len(each.assembly), number, dtype=np.int8))
             for number, each in enumerate(kit.exemplars)
         ]
-        self.parents: list[Parent] = []
+        self.families: list[list[Parent]] = [[] for _ in range(len(self.exemplars) + 1)]
         self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.exemplars}
         for each in self.exemplars:
             self.archive.add(each.cell, each.histogram)
+        self._cuts = np.zeros(len(WAYS))
+        self._gains = np.zeros(len(WAYS))
         self.rejects: Counter[str] = Counter()
         self.crossings: Counter[str] = Counter()
 
@@ -137,47 +157,79 @@ class Search:
         for number in range(tries):
             a = self._pick(rng)
             b = self._partner(rng, a)
-            crossing = not (a.shares * b.shares).any()
-            variant = self._attempt(rng, a, b)
-            if crossing:
-                self.crossings[variant if isinstance(variant, str) else "new variant"] += 1
+            way = self._way(rng)
+            self._cuts[way] += 1
+            variant = self._attempt(rng, a, b, way)
+            if not (a.shares * b.shares).any():
+                self.crossings[variant if isinstance(variant, str) else NEW] += 1
             if isinstance(variant, str):
                 self.rejects[variant] += 1
                 continue
             found.append(variant)
             self.seen.add(self.key(variant.assembly.types, variant.graph, variant.docked))
+            self._gains[way] += KNOWN_GAIN if variant.histogram in self.archive.histograms else 1.0
             self.archive.add(variant.cell, variant.histogram)
             parent = self.parent(f"{name}-{len(found) - 1}", variant.assembly, variant.origins, variant.labels)
-            self._adopt(rng, parent)
+            self.adopt(rng, parent)
             progress(len(found))
             if len(found) >= wanted:
                 return found, number + 1
         return found, tries
 
-    def _adopt(self, rng: np.random.Generator, parent: Parent) -> None:
-        """Add a parent; where there are as many as the config allows, the most crowded of some makes room."""
-        if len(self.parents) < self.config.parents:
-            self.parents.append(parent)
-            return
-        places = self._draw(rng, len(self.parents), self.config.novelty.rivals)
-        self.parents[max(places, key=lambda place: self._crowd(self.parents[place]))] = parent
+    def adopt(self, rng: np.random.Generator, parent: Parent) -> None:
+        """Add a parent; where there are as many as the config allows, the most crowded of some of the largest family
+        makes room."""
+        if sum(len(family) for family in self.families) >= self.config.parents:
+            largest = max(self.families, key=len)
+            places = self._draw(rng, len(largest), self.config.novelty.rivals)
+            leaves = max(places, key=lambda place: self._crowd(largest[place]))
+            largest[leaves] = largest[-1]
+            largest.pop()
+        mixed = parent.shares.max() <= 1.0 - MIXED
+        self.families[len(self.exemplars) if mixed else int(parent.shares.argmax())].append(parent)
 
     def _pick(self, rng: np.random.Generator) -> Parent:
-        """The first parent: an exemplar, or the rarest of some earlier variants."""
-        if not self.parents or rng.random() < self.config.exemplar_share:
-            return self.exemplars[int(rng.random() * len(self.exemplars))]
+        """A parent: an exemplar; or an earlier variant of any family, or of all together, most often a rare one."""
         novelty = self.config.novelty
+        counts = [len(family) for family in self.families]
+        total = sum(counts)
+        if not total or rng.random() < self.config.exemplar_share:
+            return self.exemplars[int(rng.random() * len(self.exemplars))]
+        if novelty.guided and rng.random() < novelty.family_share:
+            number = int(rng.random() * (len(counts) if counts[-1] else len(counts) - 1))
+            if not counts[number]:
+                return self.exemplars[number]
+            first, total = sum(counts[:number]), counts[number]
+        else:
+            first = 0
         rivals = novelty.rivals if novelty.guided and rng.random() < novelty.rare_share else 1
-        return min((self.parents[place] for place in self._draw(rng, len(self.parents), rivals)), key=self._crowd)
+        return min((self._member(first + place) for place in self._draw(rng, total, rivals)), key=self._crowd)
+
+    def _member(self, place: int) -> Parent:
+        """The earlier variant at a place, counted through all families."""
+        for family in self.families:
+            if place < len(family):
+                return family[place]
+            place -= len(family)
+        raise IndexError(place)
 
     def _partner(self, rng: np.random.Generator, a: Parent) -> Parent:
-        """The second parent: like the first, or that of some whose parts come from other exemplars."""
+        """The second parent: any; or of some the one whose parts come from other exemplars, or from the same."""
         novelty = self.config.novelty
-        if not novelty.guided or len(self.exemplars) == 1 or rng.random() >= novelty.cross_share:
+        if not novelty.guided or len(self.exemplars) == 1:
+            return self._pick(rng)
+        crossing = rng.random() < novelty.cross_share * self._hope()
+        if not crossing and rng.random() < 0.5:
             return self._pick(rng)
         rivals = [self._pick(rng) for _ in range(3)]
         rivals.append(self.exemplars[int(rng.random() * len(self.exemplars))])
-        return min(rivals, key=lambda each: (float(np.minimum(each.shares, a.shares).sum()), self._crowd(each)))
+        common = [float(np.minimum(each.shares, a.shares).sum()) * (1 if crossing else -1) for each in rivals]
+        return min(zip(common, rivals, strict=True), key=lambda each: (each[0], self._crowd(each[1])))[1]
+
+    def _hope(self) -> float:
+        """How much of its share of tries crossing gets: all of it at first, less the longer nothing comes of it."""
+        won = self.crossings[NEW]
+        return max(0.2, (1 + won) / (1 + won + self.crossings.total() / 200))
 
     def _crowd(self, parent: Parent) -> int:
         return self.archive.crowd(parent.cell, parent.histogram)
@@ -186,21 +238,29 @@ class Search:
     def _draw(rng: np.random.Generator, among: int, count: int) -> list[int]:
         return [int(each * among) for each in rng.random(count)]
 
-    def _cut(self, rng: np.random.Generator, a: Parent, b: Parent) -> int:
-        """Cut a piece out of A; a share of the pieces is cut anew while they are small or nearly everything."""
-        novelty, parts = self.config.novelty, len(a.assembly)
-        large = novelty.guided and rng.random() < novelty.large_share
+    def _way(self, rng: np.random.Generator) -> int:
+        """The way of the next cut, an index into WAYS."""
+        if not self.config.novelty.guided:
+            return 0 if rng.random() < self.config.growth_share else 1
+        if rng.random() < self.config.novelty.learnt_share:
+            odds = np.cumsum((self._gains + 1) / (self._cuts + 100))
+            return int(np.searchsorted(odds, rng.random() * odds[-1], side="right").clip(0, len(WAYS) - 1))
+        return 0 if rng.random() < self.config.growth_share else 1 + int(rng.random() * (len(WAYS) - 1))
+
+    def _cut(self, rng: np.random.Generator, a: Parent, b: Parent, way: int) -> int:
+        """Cut a piece out of A; where it must be large it is cut anew while it is small or nearly everything."""
+        how, large = WAYS[way]
+        parts = len(a.assembly)
         for _ in range(RECUTS if large else 1):
-            growth = 0.0 if large else self.config.growth_share
-            outcome: int = kernels.cut(rng, a.tables, b.tables, self._ws, growth)
+            outcome: int = kernels.cut(rng, a.tables, b.tables, self._ws, how)
             if outcome == Outcome.OK and SMALL * parts <= self._ws.counts[PIECE] <= NEARLY_ALL * parts:
                 break
         return outcome
 
-    def _attempt(self, rng: np.random.Generator, a: Parent, b: Parent) -> Variant | str:
+    def _attempt(self, rng: np.random.Generator, a: Parent, b: Parent, way: int) -> Variant | str:
         """One try: a new variant, or the reason why there is none."""
         ws, kit = self._ws, self.tables
-        outcome = self._cut(rng, a, b)
+        outcome = self._cut(rng, a, b, way)
         if outcome == Outcome.OK:
             if self.config.matching == "pose":
                 outcome = kernels.match_poses(rng, kit, a.tables, b.tables, a is b, ws)

@@ -38,11 +38,25 @@ class NoveltyConfig(StrictModel):
         0.7, ge=0, le=1, description="Share of parents that are the rarest of some rivals; the rest are plain random."
     )
     rivals: int = Field(6, ge=1, le=100, description="Variants drawn for a rare parent, of which the rarest is taken.")
-    cross_share: float = Field(
-        0.5, ge=0, le=1, description="Share of tries whose second parent is the one of most other ancestry."
+    family_share: float = Field(
+        0.3,
+        ge=0,
+        le=1,
+        description="Share of parents drawn family by family: the offspring of each exemplar, and those that mix them.",
     )
-    large_share: float = Field(
-        0.5, ge=0, le=1, description="Share of tries whose piece is cut anew while it is small or nearly everything."
+    cross_share: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="Share of tries whose second parent is the one of most other ancestry; it falls to a "
+        "fifth of that while no such try succeeds.",
+    )
+    learnt_share: float = Field(
+        0.6,
+        ge=0,
+        le=0.9,
+        description="Share of tries that cut in the way which has found most so far: growing, planes, planes that cut "
+        "off a large piece, or ending at parts of types which both parents have; the rest try every way.",
     )
 
 

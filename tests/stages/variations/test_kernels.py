@@ -26,8 +26,8 @@ def test_a_cut_is_connected_and_its_boundary_are_the_parts_with_a_neighbour_outs
     shape = line.exemplars[1].tables
     ws, rng = line._ws, np.random.default_rng(0)
     sizes = set()
-    for _ in range(300):
-        outcome = kernels.cut(rng, shape, shape, ws, 0.5)
+    for number in range(300):
+        outcome = kernels.cut(rng, shape, shape, ws, number % 3)
         inside = ws.inside[: len(shape.types)]
         sizes.add(int(inside.sum()))
         boundary = set(ws.boundary[: ws.counts[BOUNDARY]].tolist())
