@@ -17,11 +17,11 @@ __all__ = ["Archive", "Cell", "cell_of"]
 
 Cell = tuple[int, ...]
 
-_SHARES = ("mixture", "distance")
+_SHARES = ("mixture", "blend", "distance")
 
 
 def cell_of(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Cell:
-    """The cell of features float32 (8,): sizes by octaves, shares in equal steps with 0 apart, the dominant type."""
+    """The cell of features float32 (9,): sizes by octaves, shares in equal steps with 0 apart, the dominant type."""
     cell = []
     for axis in axes:
         value = float(features[AXES.index(axis)])

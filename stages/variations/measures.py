@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stages.variations.archive import cell_of
-from stages.variations.features import AXES
+from stages.variations.features import AXES, MIXED
 from stages.variations.settings import NoveltyConfig
 
 __all__ = ["described", "growth", "pool_measures"]
@@ -21,17 +21,20 @@ def pool_measures(
 ) -> dict[str, Any]:
     """What a set of k variants is worth, as JSON.
 
-    counts: int32 (k, types) parts by type; features: float32 (k, 8); digests: uint8 (k, 2, 32).
-    graphs, histograms: distinct ones; mixed: share with parts from several exemplars; distance: mean, and distances:
-    quantiles 0, 0.1, 0.5, 0.9 and 1, of the histogram metric E to the nearest exemplar (strings §5.3); parts: the same
-    quantiles of the number of parts; cells: filled cells of the archive; bins: for each of its axes the filled steps.
+    counts: int32 (k, types) parts by type; features: float32 (k, 9); digests: uint8 (k, 2, 32).
+    graphs, histograms: distinct ones; mixed: share of variants with at least a tenth of their parts from other
+    exemplars than the main one; blended: share with neighbourhoods of several exemplars that only one each shows;
+    distance: mean, and distances: quantiles 0, 0.1, 0.5, 0.9 and 1, of the histogram metric E to the nearest exemplar
+    (strings §5.3); parts: the same quantiles of the number of parts; cells: filled cells of the archive; bins: for
+    each of its axes the filled steps.
     """
     cells = [cell_of(each, novelty.axes, novelty.resolution) for each in features]
     distances, parts = features[:, AXES.index("distance")], features[:, AXES.index("parts")]
     return {
         "graphs": len({bytes(each) for each in digests[:, 0]}),
         "histograms": len({bytes(each) for each in counts}),
-        "mixed": round(float((features[:, AXES.index("mixture")] > 0).mean()), 4) if len(features) else 0.0,
+        "mixed": _share(features[:, AXES.index("mixture")] >= MIXED),
+        "blended": _share(features[:, AXES.index("blend")] > 0),
         "distance": round(float(distances.mean()), 4) if len(features) else 0.0,
         "distances": _quantiles(distances, 4),
         "parts": _quantiles(parts, 0),
@@ -40,13 +43,18 @@ def pool_measures(
     }
 
 
+def _share(holds: np.ndarray) -> float:
+    return round(float(holds.mean()), 4) if len(holds) else 0.0
+
+
 def described(measures: Mapping[str, Any]) -> str:
     """The measures of the variants chosen from a pool, in words."""
     low, _, median, _, high = measures["parts"] or [0] * 5
     return (
         f"chosen {measures['variants']:,} of {measures['pool']:,}: {measures['graphs']:,} distinct graphs, "
         f"{measures['histograms']:,} distinct histograms in {measures['cells']:,} cells; "
-        f"{measures['mixed']:.0%} mix the exemplars; mean distance E to the nearest {measures['distance']:.2f}; "
+        f"{measures['mixed']:.0%} mix material of the exemplars, {measures['blended']:.0%} "
+        f"their neighbourhoods; mean distance E to the nearest {measures['distance']:.2f}; "
         f"{low:.0f} to {high:.0f} parts, median {median:.0f}"
     )
 

@@ -16,7 +16,7 @@ from stages.variations.answers import ContactAnswers
 from stages.variations.archive import Archive, Cell, cell_of
 from stages.variations.centroids import match_centroids
 from stages.variations.correction import correct_orientations
-from stages.variations.features import FeatureTest, material_shares
+from stages.variations.features import MIXED, FeatureTest, material_shares
 from stages.variations.kernels import (
     BOUNDARY,
     EDGES,
@@ -55,8 +55,6 @@ WAYS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
 """Ways of cutting, and whether the piece must be large."""
 KNOWN_GAIN = 0.2
 """What a new variant of a known histogram counts beside one of a new histogram."""
-MIXED = 0.1
-"""A shape with less of its parts from other exemplars than its main one is of that one's family, not of the mixed."""
 SMALL, NEARLY_ALL = 0.2, 0.8
 """A piece with a share of parts between these is a large cut, one that can change a shape as a whole."""
 RECUTS = 4
@@ -84,7 +82,7 @@ class Parent:
 @dataclass(frozen=True)
 class Variant:
     """A valid new shape. labels: int32 (m, 2), directed docking labels of its edges; graph and docked: its two keys
-    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (8,);
+    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (9,);
     histogram: a hash of its type histogram; lineage: parents, number of parts from each, boundary and docking
     motion, as JSON."""
 
@@ -135,7 +133,7 @@ class Search:
         if labels is None:
             labels = self.answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
         shares = material_shares(origins, len(self.kit.exemplars))
-        cell = self._cell(self._features.features(assembly, shares))
+        cell = self._cell(self._features.features(assembly, shares, self._features.marks(assembly)))
         tables = shape_tables(assembly, labels, len(self.kit.types))
         return Parent(name, assembly, labels, tables, origins, shares, cell, self.histogram(assembly.types))
 
@@ -185,7 +183,7 @@ class Search:
             leaves = max(places, key=lambda place: self._crowd(largest[place]))
             largest[leaves] = largest[-1]
             largest.pop()
-        mixed = parent.shares.max() <= 1.0 - MIXED
+        mixed = 1.0 - parent.shares.max() >= MIXED
         self.families[len(self.exemplars) if mixed else int(parent.shares.argmax())].append(parent)
 
     def _pick(self, rng: np.random.Generator) -> Parent:
@@ -202,8 +200,12 @@ class Search:
             first, total = sum(counts[:number]), counts[number]
         else:
             first = 0
-        rivals = novelty.rivals if novelty.guided and rng.random() < novelty.rare_share else 1
-        return min((self._member(first + place) for place in self._draw(rng, total, rivals)), key=self._crowd)
+        if not novelty.guided:
+            return self._member(int(rng.random() * total))
+        rivals = [self._member(first + place) for place in self._draw(rng, total, novelty.rivals)]
+        # The first to come, where the common wait long: of two, one twice as crowded has half the chance.
+        waits = rng.exponential(size=len(rivals)).tolist()
+        return min(zip(waits, rivals, strict=True), key=lambda each: each[0] * self._crowd(each[1]))[1]
 
     def _member(self, place: int) -> Parent:
         """The earlier variant at a place, counted through all families."""
@@ -332,7 +334,10 @@ class Search:
         for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
             at = placed[: len(parent.assembly)]
             origins[at[at >= 0]] = parent.origins[at >= 0]
-        features = self._features.features(assembly, material_shares(origins, len(self.exemplars)))
+        # A part whose neighbourhood tells its exemplar is of that one, whichever copy of it a piece brought along.
+        marks = self._features.marks(assembly)
+        origins = np.where(marks >= 0, marks, origins)
+        features = self._features.features(assembly, material_shares(origins, len(self.exemplars)), marks)
         return Variant(
             assembly,
             labels.astype(np.int32),

@@ -19,10 +19,11 @@ class NoveltyConfig(StrictModel):
         True, description="Whether the archive leads the search; without it parents and cuts are plain random."
     )
     axes: tuple[Axis, ...] = Field(
-        ("parts", "footprint", "height", "cycle_rank", "mixture", "distance"),
+        ("parts", "footprint", "height", "cycle_rank", "mixture", "blend", "distance"),
         min_length=1,
         description="Axes of the archive's grid: number of parts, area seen from above, height, longer by shorter "
-        "side, edges beyond a tree, share of parts from other exemplars than the main one, histogram distance to the "
+        "side, edges beyond a tree, share of parts from other exemplars than the main one, share of "
+        "telling neighbourhoods from other exemplars than the main one, histogram distance to the "
         "nearest exemplar, commonest part type.",
     )
     resolution: int = Field(
@@ -34,10 +35,9 @@ class NoveltyConfig(StrictModel):
         description="Variants of a cell after which one with a known histogram is refused; doubled whenever a round "
         "brings too little that is new.",
     )
-    rare_share: float = Field(
-        0.7, ge=0, le=1, description="Share of parents that are the rarest of some rivals; the rest are plain random."
+    rivals: int = Field(
+        6, ge=1, le=100, description="Variants drawn for each parent, of which a rare one is likeliest to be taken."
     )
-    rivals: int = Field(6, ge=1, le=100, description="Variants drawn for a rare parent, of which the rarest is taken.")
     family_share: float = Field(
         0.3,
         ge=0,
