@@ -153,9 +153,10 @@ class Search:
         """
         found: list[Variant] = []
         for number in range(tries):
-            a = self._pick(rng)
-            b = self._partner(rng, a)
-            way = self._way(rng)
+            guided = self.config.novelty.guided and rng.random() >= self.config.novelty.plain_share
+            a = self._pick(rng, guided)
+            b = self._partner(rng, a, guided)
+            way = self._way(rng, guided)
             self._cuts[way] += 1
             variant = self._attempt(rng, a, b, way)
             if not (a.shares * b.shares).any():
@@ -186,21 +187,21 @@ class Search:
         mixed = 1.0 - parent.shares.max() >= MIXED
         self.families[len(self.exemplars) if mixed else int(parent.shares.argmax())].append(parent)
 
-    def _pick(self, rng: np.random.Generator) -> Parent:
+    def _pick(self, rng: np.random.Generator, guided: bool) -> Parent:
         """A parent: an exemplar; or an earlier variant of any family, or of all together, most often a rare one."""
         novelty = self.config.novelty
         counts = [len(family) for family in self.families]
         total = sum(counts)
         if not total or rng.random() < self.config.exemplar_share:
             return self.exemplars[int(rng.random() * len(self.exemplars))]
-        if novelty.guided and rng.random() < novelty.family_share:
+        if guided and rng.random() < novelty.family_share:
             number = int(rng.random() * (len(counts) if counts[-1] else len(counts) - 1))
             if not counts[number]:
                 return self.exemplars[number]
             first, total = sum(counts[:number]), counts[number]
         else:
             first = 0
-        if not novelty.guided:
+        if not guided:
             return self._member(int(rng.random() * total))
         rivals = [self._member(first + place) for place in self._draw(rng, total, novelty.rivals)]
         # The first to come, where the common wait long: of two, one twice as crowded has half the chance.
@@ -215,15 +216,15 @@ class Search:
             place -= len(family)
         raise IndexError(place)
 
-    def _partner(self, rng: np.random.Generator, a: Parent) -> Parent:
+    def _partner(self, rng: np.random.Generator, a: Parent, guided: bool) -> Parent:
         """The second parent: any; or of some the one whose parts come from other exemplars, or from the same."""
         novelty = self.config.novelty
-        if not novelty.guided or len(self.exemplars) == 1:
-            return self._pick(rng)
+        if not guided or len(self.exemplars) == 1:
+            return self._pick(rng, guided)
         crossing = rng.random() < novelty.cross_share * self._hope()
         if not crossing and rng.random() < 0.5:
-            return self._pick(rng)
-        rivals = [self._pick(rng) for _ in range(3)]
+            return self._pick(rng, guided)
+        rivals = [self._pick(rng, guided) for _ in range(3)]
         rivals.append(self.exemplars[int(rng.random() * len(self.exemplars))])
         common = [float(np.minimum(each.shares, a.shares).sum()) * (1 if crossing else -1) for each in rivals]
         return min(zip(common, rivals, strict=True), key=lambda each: (each[0], self._crowd(each[1])))[1]
@@ -240,9 +241,9 @@ class Search:
     def _draw(rng: np.random.Generator, among: int, count: int) -> list[int]:
         return [int(each * among) for each in rng.random(count)]
 
-    def _way(self, rng: np.random.Generator) -> int:
+    def _way(self, rng: np.random.Generator, guided: bool) -> int:
         """The way of the next cut, an index into WAYS."""
-        if not self.config.novelty.guided:
+        if not guided:
             return 0 if rng.random() < self.config.growth_share else 1
         if rng.random() < self.config.novelty.learnt_share:
             odds = np.cumsum((self._gains + 1) / (self._cuts + 100))

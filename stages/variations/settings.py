@@ -35,6 +35,12 @@ class NoveltyConfig(StrictModel):
         description="Variants of a cell after which one with a known histogram is refused; doubled whenever a round "
         "brings too little that is new.",
     )
+    plain_share: float = Field(
+        0.35,
+        ge=0,
+        le=1,
+        description="Share of tries with plain random parents and cuts all the same, so that nothing is out of reach.",
+    )
     rivals: int = Field(
         6, ge=1, le=100, description="Variants drawn for each parent, of which a rare one is likeliest to be taken."
     )
