@@ -11,9 +11,11 @@ from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, array_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection import input_kit
 from stages.shape.sample import Sample, write_sample
-from stages.variations.pool import FoundVariants
-from stages.variations.rounds import pool_entries
+from stages.variations.measures import pool_measures
+from stages.variations.pool import FoundVariants, PoolIndex
+from stages.variations.selection import select
 from stages.variations.settings import SplitConfig, VariationsConfig
 
 __all__ = ["assignment_shard", "collection_shards_of", "run_assignment", "run_collection"]
@@ -46,7 +48,7 @@ def collection_shards_of(plan: Plan, assignment: Shard) -> list[Shard]:
 
 
 def run_assignment(task: Task) -> Outcome:
-    """Give every variant its split, shard and place.
+    """Choose the variants of each kit from its pool, and give each its split, shard and place.
 
     Variants of one kit with equal canonical graphs stand in one split. Writes rows int64 (k, 6): kit, row of
     `lanes.txt`, index there, place in the kit, split, shard, in the order of the samples.
@@ -55,13 +57,17 @@ def run_assignment(task: Task) -> Outcome:
     rows: list[tuple[int, int, int, int]] = []
     groups: dict[tuple[int, bytes], list[int]] = {}
     lanes: dict[str, int] = {}
-    for number, kit in enumerate(task.shard.params["kits"]):
-        for place, (found, index) in enumerate(pool_entries(task, kit)):
-            if place == config.per_kit:
-                break
-            lane = lanes.setdefault(found.name, len(lanes))
-            groups.setdefault((number, found.digest(index, docked=False)), []).append(len(rows))
-            rows.append((number, lane, index, place))
+    measures: dict[str, Any] = {}
+    for number, name in enumerate(task.shard.params["kits"]):
+        kit = input_kit(task, name)
+        pool = PoolIndex.of(task, name, len(kit.types))
+        chosen = select(kit, pool.counts, pool.features, config.per_kit, config.selection, task.rng("selection", name))
+        taken = pool.counts[chosen], pool.features[chosen], pool.digests[chosen]
+        measures[name] = {"pool": len(pool), "variants": len(chosen), **pool_measures(*taken, config.search.novelty)}
+        for place, variant in enumerate(chosen.tolist()):
+            lane, index = pool.rows[variant].tolist()
+            groups.setdefault((number, bytes(pool.digests[variant, 0])), []).append(len(rows))
+            rows.append((number, lanes.setdefault(pool.lanes[lane], len(lanes)), index, place))
     if not rows:
         raise ShardFailed("the search found no variant of any kit; see `python -m pipeline status` for the reasons")
     split_of = _share_out(list(groups.values()), config.splits, task.rng("splits"))
@@ -80,7 +86,7 @@ def run_assignment(task: Task) -> Outcome:
         stream.write(array_bytes(np.concatenate(placed).astype(np.int64)))
     with task.output(f"{task.shard.name}.lanes.txt") as stream:
         stream.write("".join(f"{name}\n" for name in lanes).encode())
-    return Outcome(0, {"shards": shards, "variants": len(rows), "graphs": len(groups)})
+    return Outcome(0, {"shards": shards, "variants": len(rows), "graphs": len(groups), "kits": measures})
 
 
 def _share_out(groups: list[list[int]], config: SplitConfig, rng: np.random.Generator) -> np.ndarray:
@@ -124,7 +130,7 @@ def _sample(kit: str, place: int, split: str, found: FoundVariants, index: int) 
         split=split,
         producer="variations",
         kit=kit,
-        graph=found.digest(index, docked=False).hex(),
+        graph=found.digest(index),
         assembly=assembly,
         lineage={"name": f"{found.name}-{index}", **found.described(index)},
     )

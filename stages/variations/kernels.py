@@ -22,6 +22,7 @@ __all__ = [
     "cut",
     "hash_key",
     "join",
+    "lies_in",
     "match_poses",
     "quantise",
     "refinement_keys",
@@ -97,7 +98,7 @@ class Workspace(NamedTuple):
     fresh: np.ndarray  # uint64 (v,)
     boxes: np.ndarray  # float64 (v, 2, 3)
     near: np.ndarray  # int64 (p, 2): pairs whose boxes overlap
-    counts: np.ndarray  # int64 (8,): edges, unknown, variant parts, boundary parts, try number
+    counts: np.ndarray  # int64 (8,): edges, unknown, variant parts, boundary parts, try number, piece's parts
 
 
 class _Outcomes(NamedTuple):
@@ -116,7 +117,8 @@ class _Outcomes(NamedTuple):
 
 
 Outcome = _Outcomes()
-EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY = 0, 1, 2, 3, 4
+EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY, PIECE = 0, 1, 2, 3, 4, 5
+GROWN, PLANES, JOINTS = 0, 1, 2
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 LABELS = 1 << 20
 CHOICES = 64
@@ -171,14 +173,53 @@ def _random_below(rng, n):
 
 
 @numba.njit(cache=True)
-def _cut(rng, shape, ws, growth_share):
-    """A random connected piece of a shape into `ws.inside`: grown part by part, or cut out by a half-space, a slab or
-    a box along the axes of one of its parts or in any direction. Returns its number of parts."""
+def _cut_at_joints(rng, shape, other, ws, seed):
+    """A piece that ends at parts of one or two types which the other shape has too, each with even odds of being
+    passed by all the same. Returns its number of parts."""
+    n = len(shape.types)
+    inside, stack = ws.inside, ws.stack
+    joints = np.empty(2, dtype=np.int64)
+    for k in range(2):
+        joints[k] = -1
+        for _ in range(8):
+            part_type = shape.types[_random_below(rng, n)]
+            if other.type_starts[part_type + 1] > other.type_starts[part_type]:
+                joints[k] = part_type
+                break
+    if rng.random() < 0.5:
+        joints[1] = -1
+    leaky = 0.4 * rng.random() if rng.random() < 0.5 else 0.0
+    stack[0] = seed
+    inside[seed] = True
+    size, count = 0, 1
+    while count > 0:
+        count -= 1
+        part = stack[count]
+        size += 1
+        part_type = shape.types[part]
+        if part != seed and (part_type == joints[0] or part_type == joints[1]) and rng.random() >= leaky:
+            continue
+        for e in range(shape.starts[part], shape.starts[part + 1]):
+            end = shape.ends[e]
+            if not inside[end]:
+                inside[end] = True
+                stack[count] = end
+                count += 1
+    return size
+
+
+@numba.njit(cache=True)
+def _cut(rng, shape, other, ws, way):
+    """A random connected piece of a shape into `ws.inside`: grown part by part (GROWN), ended at joints (JOINTS), or
+    cut out by a half-space, a slab or a box along the axes of one of its parts or in any direction (PLANES). Returns
+    its number of parts."""
     n = len(shape.types)
     inside, stack = ws.inside, ws.stack
     inside[:n] = False
     seed = _random_below(rng, n)
-    if rng.random() < growth_share:
+    if way == JOINTS:
+        return _cut_at_joints(rng, shape, other, ws, seed)
+    if way == GROWN:
         wanted = 1 + _random_below(rng, n - 1)
         size, count = 0, 1
         stack[0] = seed
@@ -365,11 +406,11 @@ def _fit_motion(kit, a, b, ws):
 
 
 @numba.njit(cache=True)
-def cut(rng, a, b, ws, growth_share):
+def cut(rng, a, b, ws, way):
     """Cut a random connected piece out of A: `ws.inside`, and its boundary, the parts with a neighbour outside, in
     `ws.boundary`, that of the rarest type in B first."""
     n = len(a.types)
-    size = _cut(rng, a, ws, growth_share)
+    size = _cut(rng, a, b, ws, way)
     count = 0
     for part in range(n):
         if ws.inside[part]:
@@ -379,6 +420,7 @@ def cut(rng, a, b, ws, growth_share):
                     count += 1
                     break
     ws.counts[BOUNDARY] = count
+    ws.counts[PIECE] = size
     if count == 0 or size == n:
         return Outcome.WHOLE
     rarest, fewest = 0, 1 << 30
@@ -456,6 +498,53 @@ def match_poses(rng, kit, a, b, same_shape, ws):
             _fit_motion(kit, a, b, ws)
             return Outcome.OK
     return Outcome.NO_MATCH
+
+
+@numba.njit(cache=True)
+def lies_in(kit, ws, b):
+    """Whether the variant is nothing but parts of B: each of its parts stands for one of B under one rigid motion."""
+    n = ws.counts[PARTS]
+    if n > len(b.types):
+        return False
+    anchor, fewest = 0, 1 << 30
+    for v in range(n):
+        present = b.type_starts[ws.types[v] + 1] - b.type_starts[ws.types[v]]
+        if present == 0:
+            return False
+        if present < fewest:
+            anchor, fewest = v, present
+    anchor_type = ws.types[anchor]
+    place = np.empty(3)
+    turn = np.empty((3, 3))
+    between = np.empty((3, 3))
+    motion = np.empty((4, 3))
+    for at in range(b.type_starts[anchor_type], b.type_starts[anchor_type + 1]):
+        for symmetry in range(kit.symmetry_starts[anchor_type], kit.symmetry_starts[anchor_type + 1]):
+            _turn(b.turns[b.by_type[at]], kit.symmetries[symmetry], between)
+            for i in range(3):
+                for j in range(3):
+                    x = 0.0
+                    for k in range(3):
+                        x += between[i, k] * ws.turns[anchor, j, k]
+                    motion[i, j] = x
+            for i in range(3):
+                motion[3, i] = b.places[b.by_type[at], i]
+                for j in range(3):
+                    motion[3, i] -= motion[i, j] * ws.places[anchor, j]
+            inside = True
+            for v in range(n):
+                part_type = ws.types[v]
+                first, last = b.type_starts[part_type], b.type_starts[part_type + 1]
+                _move(motion, ws.places[v], place)
+                found = _part_at(b.places, b.by_type, first, last, place, kit.limits[0])
+                if found >= 0:
+                    _turn(motion, ws.turns[v], turn)
+                if found < 0 or _looks_same(kit, part_type, turn, b.turns[found]) < 0:
+                    inside = False
+                    break
+            if inside:
+                return True
+    return False
 
 
 @numba.njit(cache=True)
@@ -698,7 +787,8 @@ def _overlaps(boxes, count, origin, between_sides, slack, pairs):
 
 @numba.njit(cache=True)
 def _contact(kit, answers, ws, i, j, quanta):
-    """The answer for a pair: NONE, FORBIDDEN, MISSING or a packed pair of labels."""
+    """The answer for a pair: GROWN, PLANES, JOINTS = 0, 1, 2
+    NONE, FORBIDDEN, MISSING or a packed pair of labels."""
     quantise(ws.turns[i], ws.places[i], ws.turns[j], ws.places[j], kit.reach[ws.types[j]], kit.limits[2], quanta)
     return _ask(answers.keys, answers.values, hash_key(ws.types[i], ws.types[j], quanta))
 

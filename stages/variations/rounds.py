@@ -6,25 +6,29 @@ their parents from the pools of all earlier rounds; what a lane does depends on 
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from pipeline.shards import array_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.shape.collection import input_kit
 from stages.shape.kit import Kit
 from stages.variations.answers import ContactAnswers
-from stages.variations.pool import FoundVariants, write_variants
-from stages.variations.search import Search
+from stages.variations.archive import cell_of
+from stages.variations.measures import pool_measures
+from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
+from stages.variations.search import FULL, Search
 from stages.variations.settings import VariationsConfig
 
-__all__ = ["last_pool", "pool_entries", "run_lane", "run_pool", "search_shards"]
+__all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
 
 ROUND_FIND = 400
 """Most variants that one lane finds in a round before the lanes exchange what they have."""
+ROUND_SHARE = 40
+"""Unless that would make more rounds than about so many: a large pool grows in larger steps."""
 FEWEST = 32
 """A lane looks for at least so many variants, so that the last rounds are not mere starts and stops."""
 
@@ -34,14 +38,17 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     config = plan.config.section(VariationsConfig)
     shards: list[Shard] = []
     found: list[str] = []
-    state: Mapping[str, Any] = {"found": 0, "tries": 0, "idle": 0}
+    quota = config.search.novelty.quota
+    state: Mapping[str, Any] = {"found": 0, "tries": 0, "idle": 0, "quota": quota, "curve": []}
+    target = math.ceil(config.selection.oversample * config.per_kit)
     for number in range(config.search.rounds):
         name = f"{kit}-r{number:03d}"
-        wanted = max(FEWEST, -(-(config.per_kit - state["found"]) * 11 // (10 * config.search.lanes)))
+        wanted = max(FEWEST, -(-(target - state["found"]) * 11 // (10 * config.search.lanes)))
+        wanted = min(wanted, max(ROUND_FIND, target // (ROUND_SHARE * config.search.lanes)))
         lanes = [
             Shard(
                 f"{name}-lane{lane:02d}",
-                {"job": "lane", "kit": kit, "wanted": min(wanted, ROUND_FIND)},
+                {"job": "lane", "kit": kit, "wanted": wanted, "quota": state["quota"]},
                 (f"exemplars/{kit}", *found),
             )
             for lane in range(config.search.lanes)
@@ -49,12 +56,18 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
         shards.extend(lanes)
         found.extend(f"variations/{lane.name}" for lane in lanes)
         ended_lanes = [plan.summary("variations", lane.name) for lane in lanes]
-        tries = [each["tries"] for each in ended_lanes if each is not None]
-        if len(tries) < len(lanes):
+        done = [each for each in ended_lanes if each is not None]
+        if len(done) < len(lanes):
             return shards, False
-        last = number == config.search.rounds - 1
-        params = {"job": "pool", "kit": kit, "tried": sum(tries), "tries": state["tries"], "idle": state["idle"]}
-        pool = Shard(f"{name}-pool", {**params, "last": last}, (f"exemplars/{kit}", *found))
+        params = {
+            "job": "pool",
+            "kit": kit,
+            "tried": sum(each["tries"] for each in done),
+            "full": sum(each["full"] for each in done),
+            "last": number == config.search.rounds - 1,
+            **{key: state[key] for key in ("tries", "idle", "quota", "curve")},
+        }
+        pool = Shard(f"{name}-pool", params, (f"exemplars/{kit}", *found))
         shards.append(pool)
         found.append(f"variations/{pool.name}")
         summary = plan.summary("variations", pool.name)
@@ -73,38 +86,45 @@ def last_pool(plan: Plan, kit: str) -> dict[str, Any]:
     return newest
 
 
-def pool_entries(task: Task, kit: str) -> Iterator[tuple[FoundVariants, int]]:
-    """Every variant in the pools among a shard's inputs, in the order in which they were kept."""
-    names = [each.partition("/")[2] for each in task.shard.inputs]
-    for pool in sorted(name for name in names if re.fullmatch(rf"{kit}-r\d+-pool", name)):
-        kept = np.load(task.input("variations", f"{pool}.kept.npy"), allow_pickle=False)
-        lanes: dict[int, FoundVariants] = {}
-        for lane, index in kept.tolist():
-            if lane not in lanes:
-                lanes[lane] = FoundVariants.of(task, f"{pool.removesuffix('pool')}lane{lane:02d}")
-            yield lanes[lane], index
-
-
 def run_lane(task: Task) -> Outcome:
     """One lane of one round."""
     config = task.config.section(VariationsConfig).search
     kit = input_kit(task, task.shard.params["kit"])
     search = Search(_answers(kit, task), config)
     rng = task.rng("tries")
-    entries = list(pool_entries(task, kit.name))
-    for found, index in entries:
-        search.seen.add(search.key(found.types_of(index), *found.keys[index].tolist()))
-    chosen = rng.permutation(len(entries))[: config.parents]
-    for entry in np.sort(chosen).tolist():
-        found, index = entries[entry]
+    pool = PoolIndex.of(task, kit.name, len(kit.types))
+    search.archive.quota = task.shard.params["quota"]
+    crowds = _archive(pool, search)
+    chosen = _parents(rng, crowds, config.parents, config.novelty.guided)
+    for found, index in pool.variants(task, chosen):
         assembly, labels = found.assembly(index)
-        search.parents.append(search.parent(f"{found.name}-{index}", assembly, labels))
+        search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, found.origins_of(index), labels))
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
     write_variants(task, variants)
     for reason, count in sorted(search.rejects.items()):
         task.reject(task.shard.name, reason, count=count)
-    return Outcome(0, {"found": len(variants), "tries": tries})
+    crossings = dict(sorted(search.crossings.items()))
+    summary = {"found": len(variants), "tries": tries, "full": search.rejects[FULL], "crossings": crossings}
+    return Outcome(0, summary)
+
+
+def _archive(pool: PoolIndex, search: Search) -> np.ndarray:
+    """Tell a search what the pool holds; how crowded the place of each of its variants is, int64 (k,)."""
+    novelty = search.config.novelty
+    places = []
+    for counts, features, keys in zip(pool.counts, pool.features, pool.keys, strict=True):
+        types = np.repeat(np.arange(len(counts)), counts)
+        search.seen.add(search.key(types, *keys.tolist()))
+        places.append((cell_of(features, novelty.axes, novelty.resolution), search.histogram(types)))
+        search.archive.add(*places[-1])
+    return np.array([search.archive.crowd(*place) for place in places], dtype=np.int64)
+
+
+def _parents(rng: np.random.Generator, crowds: np.ndarray, most: int, guided: bool) -> list[int]:
+    """At most `most` variants of the pool as parents, without replacement, the rare ones likelier; ascending."""
+    waits = rng.exponential(size=len(crowds)) * (crowds if guided else 1)
+    return sorted(np.argsort(waits, kind="stable")[:most].tolist())
 
 
 def run_pool(task: Task) -> Outcome:
@@ -113,37 +133,31 @@ def run_pool(task: Task) -> Outcome:
     params = task.shard.params
     kit = input_kit(task, params["kit"])
     duplicates = config.search.duplicates
-    known: set[bytes] = set()
-    histograms: set[bytes] = set()
-    graphs: set[bytes] = set()
-    before = 0
-    for found, index in pool_entries(task, kit.name):
-        known.add(_identity(found, index, duplicates, len(kit.types)))
-        histograms.add(found.histogram(index, len(kit.types)))
-        graphs.add(found.digest(index, docked=False))
-        before += 1
+    before = PoolIndex.of(task, kit.name, len(kit.types))
+    known = {_identity(*each, duplicates) for each in zip(before.counts, before.digests, strict=True)}
     kept: list[tuple[int, int]] = []
     doubles = 0
     stem = task.shard.name.removesuffix("pool")
-    for lane in range(config.search.lanes):
-        found = FoundVariants.of(task, f"{stem}lane{lane:02d}")
+    lanes = [FoundVariants.of(task, f"{stem}lane{lane:02d}") for lane in range(config.search.lanes)]
+    for lane, found in enumerate(lanes):
         for index in range(len(found)):
-            identity = _identity(found, index, duplicates, len(kit.types))
+            identity = _identity(found.counts(index, len(kit.types)), found.digests[index], duplicates)
             if identity in known:
                 doubles += 1
                 continue
             known.add(identity)
-            histograms.add(found.histogram(index, len(kit.types)))
-            graphs.add(found.digest(index, docked=False))
             kept.append((lane, index))
     if doubles:
         task.reject(task.shard.name, "found by another lane too", count=doubles)
-    with task.output(f"{task.shard.name}.kept.npy") as stream:
-        stream.write(array_bytes(np.array(kept, dtype=np.int64).reshape(-1, 2)))
-    total = before + len(kept)
+    new = write_kept(task, lanes, kept, len(kit.types))
+    counts = np.concatenate([before.counts, new["counts"]])
+    features = np.concatenate([before.features, new["features"]])
+    measures = pool_measures(counts, features, np.concatenate([before.digests, new["digests"]]), config.search.novelty)
+    total = len(counts)
     tries = params["tries"] + params["tried"]
-    idle = 0 if kept else params["idle"] + params["tried"]
-    ended = total >= config.per_kit or idle >= config.search.patience or params["last"]
+    idle = 0 if kept or params["full"] else params["idle"] + params["tried"]
+    target = math.ceil(config.selection.oversample * config.per_kit)
+    ended = total >= target or idle >= config.search.patience or params["last"]
     return Outcome(
         0,
         {
@@ -151,8 +165,9 @@ def run_pool(task: Task) -> Outcome:
             "found": total,
             "tries": tries,
             "idle": idle,
-            "graphs": len(graphs),
-            "histograms": len(histograms),
+            "quota": params["quota"] * (2 if len(kept) < params["full"] else 1),
+            **measures,
+            "curve": [*params["curve"], [tries, total, measures["histograms"]]],
             "ended": ended,
             "why": _why(kit, config, total, tries, idle) if ended else "",
         },
@@ -160,18 +175,18 @@ def run_pool(task: Task) -> Outcome:
 
 
 def _why(kit: Kit, config: VariationsConfig, found: int, tries: int, idle: int) -> str:
-    if found >= config.per_kit:
-        return f"{kit.name}: {config.per_kit:,} of {config.per_kit:,} variants after {tries:,} tries"
+    start = f"{kit.name}: {min(found, config.per_kit):,} of {config.per_kit:,}"
+    if found >= config.selection.oversample * config.per_kit:
+        return f"{start} variants, chosen from {found:,} after {tries:,} tries"
+    chosen = f", chosen from {found:,}" if found > config.per_kit else ""
     if idle >= config.search.patience:
-        return f"{kit.name}: {found:,} of {config.per_kit:,}: no new variant in the last {idle:,} tries"
-    return f"{kit.name}: {found:,} of {config.per_kit:,}: the search ended after {config.search.rounds} rounds"
+        return f"{start}{chosen}: no new variant in the last {idle:,} tries"
+    return f"{start}{chosen}: the search ended after {config.search.rounds} rounds"
 
 
-def _identity(found: FoundVariants, index: int, duplicates: str, types: int) -> bytes:
+def _identity(counts: np.ndarray, digests: np.ndarray, duplicates: str) -> bytes:
     """What two variants share when they are the same by the config's rule."""
-    if duplicates == "histogram":
-        return found.histogram(index, types)
-    return found.digest(index, docked=duplicates == "docking")
+    return bytes(counts if duplicates == "histogram" else digests[int(duplicates == "docking")])
 
 
 _known_answers: dict[str, ContactAnswers] = {}

@@ -7,8 +7,63 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.variations.features import Axis
 
-__all__ = ["SearchConfig", "SplitConfig", "VariationsConfig"]
+__all__ = ["NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]
+
+
+class NoveltyConfig(StrictModel):
+    """How the search is led to what its pool lacks: an archive of cells, rare ones first."""
+
+    guided: bool = Field(
+        True, description="Whether the archive leads the search; without it parents and cuts are plain random."
+    )
+    axes: tuple[Axis, ...] = Field(
+        ("parts", "footprint", "height", "cycle_rank", "mixture", "blend", "distance"),
+        min_length=1,
+        description="Axes of the archive's grid: number of parts, area seen from above, height, longer by shorter "
+        "side, edges beyond a tree, share of parts from other exemplars than the main one, share of "
+        "telling neighbourhoods from other exemplars than the main one, histogram distance to the "
+        "nearest exemplar, commonest part type.",
+    )
+    resolution: int = Field(
+        4, ge=1, le=64, description="Cells along a doubling of a size; a share has four times as many from 0 to 1."
+    )
+    quota: int = Field(
+        8,
+        ge=1,
+        description="Variants of a cell after which one with a known histogram is refused; doubled whenever a round "
+        "brings too little that is new.",
+    )
+    plain_share: float = Field(
+        0.35,
+        ge=0,
+        le=1,
+        description="Share of tries with plain random parents and cuts all the same, so that nothing is out of reach.",
+    )
+    rivals: int = Field(
+        6, ge=1, le=100, description="Variants drawn for each parent, of which a rare one is likeliest to be taken."
+    )
+    family_share: float = Field(
+        0.3,
+        ge=0,
+        le=1,
+        description="Share of parents drawn family by family: the offspring of each exemplar, and those that mix them.",
+    )
+    cross_share: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="Share of tries whose second parent is the one of most other ancestry; it falls to a "
+        "fifth of that while no such try succeeds.",
+    )
+    learnt_share: float = Field(
+        0.6,
+        ge=0,
+        le=0.9,
+        description="Share of tries that cut in the way which has found most so far: growing, planes, planes that cut "
+        "off a large piece, or ending at parts of types which both parents have; the rest try every way.",
+    )
 
 
 class SearchConfig(StrictModel):
@@ -47,6 +102,22 @@ class SearchConfig(StrictModel):
         200_000, ge=1, description="Tries of a kit without a new variant after which its search has ended."
     )
     rounds: int = Field(200, ge=1, description="Most rounds of a kit's search.")
+    novelty: NoveltyConfig = Field(
+        default_factory=NoveltyConfig, description="How the search is led to what its pool lacks."
+    )
+
+
+class SelectionConfig(StrictModel):
+    """How the dataset is chosen from the pool of found variants."""
+
+    oversample: float = Field(
+        3.0, ge=1, le=100, description="Variants that the search looks for, as a multiple of those wanted."
+    )
+    spread: int = Field(
+        10_000,
+        ge=1,
+        description="Most variants of a kit that are chosen farthest first; the rest are drawn at random.",
+    )
 
 
 class SplitConfig(StrictModel):
@@ -63,4 +134,7 @@ class VariationsConfig(StrictModel):
 
     per_kit: int = Field(500, ge=1, description="Variants wanted of each kit.")
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
+    selection: SelectionConfig = Field(
+        default_factory=SelectionConfig, description="How the dataset is chosen from what was found."
+    )
     splits: SplitConfig = Field(default_factory=SplitConfig, description="How the samples are shared out.")

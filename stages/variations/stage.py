@@ -5,10 +5,12 @@ Its shards are the lanes and pools of each kit's search, the assignment of varia
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
+from stages.variations.measures import described, growth
 from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
 from stages.variations.settings import VariationsConfig
 
@@ -39,27 +41,33 @@ def run_shard(task: Task) -> Outcome:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How far the search of each kit is, and why it ended."""
+    """How far the search of each kit is, why it ended, and what was chosen from what it found."""
     wanted = plan.config.section(VariationsConfig).per_kit
     lines = []
     for kit in plan.shards("exemplars"):
         state = last_pool(plan, kit)
         if state:
             counts = f"{state['graphs']:,} distinct graphs, {state['histograms']:,} distinct histograms"
-            why = state["why"] or f"{kit}: {state['found']:,} of {wanted:,} variants after {state['tries']:,} tries"
+            why = state["why"] or f"{kit}: {state['found']:,} found for {wanted:,} after {state['tries']:,} tries"
             lines.append(f"{why}; {counts}")
+            lines.append(f"{kit}: growth of histograms: {growth(state['curve'])}")
+    assignment = plan.summary("variations", f"{plan.config.name}-assignment") or {"kits": {}}
+    lines += [f"{kit}: {described(chosen)}" for kit, chosen in assignment["kits"].items()]
     return lines
 
 
 STAGE = Stage(
     name="variations",
-    version=1,
+    version=2,
     config=VariationsConfig,
     inputs=("exemplars",),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=lambda plan: (
-        2 * BYTES_A_VARIANT * plan.config.section(VariationsConfig).per_kit * len(plan.shards("exemplars"))
+        (1 + math.ceil(plan.config.section(VariationsConfig).selection.oversample))
+        * BYTES_A_VARIANT
+        * plan.config.section(VariationsConfig).per_kit
+        * len(plan.shards("exemplars"))
     ),
     report=report,
 )
