@@ -45,6 +45,8 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
             }
             for each in kit.exemplars
         ],
+        "strictness": kit.grammar.strictness,
+        "hubs": [names[index] for index in kit.grammar.hubs],
         "neighbourhoods": {
             names[index]: [
                 {"neighbours": {names[other]: count for other, count in multiset}, "seen": seen}
@@ -152,7 +154,13 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         name=described["kit"],
         types=tuple(types),
         exemplars=tuple(exemplars),
-        grammar=Grammar(neighbourhoods, dockings, nested),
+        grammar=Grammar(
+            neighbourhoods=neighbourhoods,
+            dockings=dockings,
+            nested=nested,
+            strictness=described["strictness"],
+            hubs=tuple(index_of[name] for name in described["hubs"]),
+        ),
         contact_tolerance=described["contact_tolerance"],
         pose_tolerance=described["pose_tolerance"],
         contact_kinds=tuple(described["contact_kinds"]),

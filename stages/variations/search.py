@@ -66,10 +66,7 @@ class Search:
         sizes = [len(each.assembly) for each in kit.exemplars]
         self.smallest = max(2, round(config.smallest * min(sizes)))
         self.largest = max(3, round(config.largest * max(sizes)))
-        neighbourhoods = [
-            (index, dict(multiset)) for index, rules in kit.grammar.neighbourhoods.items() for multiset in rules
-        ]
-        self.tables = kit_tables(kit, neighbourhoods, config.upright)
+        self.tables = kit_tables(kit, config.upright)
         self._ws = workspace(max(self.largest, *sizes))
         self.exemplars = [self.parent(each.name, each.assembly) for each in kit.exemplars]
         self.parents: list[Parent] = []
