@@ -18,7 +18,7 @@ from stages.exemplars.scene import unique_name
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.contact import ContactTest
-from stages.shape.kit import Assembly, ContactKind, Exemplar, Kit
+from stages.shape.kit import ContactKind, Exemplar, Kit
 
 __all__ = ["KitReport", "Observation", "build_kit", "observe_models"]
 

@@ -162,7 +162,8 @@ def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
         named = _some([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
         yield (
             f"{exemplar.name}: {_count(len(found), 'part')} of {len(assembly)} with very many contacts: {named}; "
-            "hardly another shape has the same around them, so variants keep them as they are, unless they are split, or left out with `hubs`"
+            "hardly another shape has the same around them, so variants keep them as they are, "
+            "unless they are split, or left out with `hubs`"
         )
 
 

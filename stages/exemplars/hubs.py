@@ -35,14 +35,14 @@ def chosen_hubs(config: KitConfig, types: Sequence[PartType], assemblies: Sequen
     return tuple(sorted(names.index(name) for name in wanted))
 
 
-def with_touching(assembly: Assembly, parts: IntArray, types: Sequence[int]) -> IntArray:
+def with_touching(assembly: Assembly, parts: np.ndarray, types: Sequence[int]) -> np.ndarray:
     """`parts` of an assembly and those of the given `types` that touch one of them, ascending."""
     chosen = np.zeros(len(assembly), dtype=bool)
     chosen[parts] = True
     beside = np.zeros(len(assembly), dtype=bool)
     for column in (0, 1):
         beside[assembly.edges[chosen[assembly.edges[:, 1 - column]], column]] = True
-    found: IntArray = np.flatnonzero(chosen | (beside & np.isin(assembly.types, types)))
+    found: np.ndarray = np.flatnonzero(chosen | (beside & np.isin(assembly.types, types)))
     return found
 
 
@@ -66,9 +66,9 @@ def set_hubs_aside(
         [replace(each, edges=each.edges[~both]) for each, both in zip(assemblies, between_hubs, strict=True)]
     )
     neighbourhoods = observe_neighbourhoods(bare) | {index: around[index] for index in hub_types}
-    left = [
-        tuple(kind for kind, far in zip(found, hub[edges].any(axis=1).tolist(), strict=True) if not far)
-        for found, edges, hub in zip(kinds, contacts, is_hub, strict=True)
-    ]
+    left = []
+    for found, edges, hub in zip(kinds, contacts, is_hub, strict=True):
+        counted = ~hub[edges].any(axis=1)
+        left.append(tuple(found[index] for index in np.flatnonzero(counted).tolist()))
     aside = replace(grammar, neighbourhoods=dict(sorted(neighbourhoods.items())), hubs=tuple(hub_types))
     return bare, aside, left

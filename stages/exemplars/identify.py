@@ -86,7 +86,9 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
         part_names.append(tuple(names))
     part_types = tuple(each.part for each in types)
     aliases = tuple(tuple(each.words)[1:] for each in types)
-    return Identified(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), tuple(empty), aliases)
+    return Identified(
+        part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), tuple(empty), aliases
+    )
 
 
 def _identify(

@@ -38,8 +38,8 @@ class HubConfig(StrictModel):
     keep: Literal["drop", "backdrop"] = Field(
         "drop",
         description="What becomes of hub parts: they are not in the shapes, or every finished variant gets them back "
-        "where they fit: where at least half as many parts as ever stood around one in the exemplars touch it in "
-        "observed ways and none in another.",
+        "where they fit: where a hub has three quarters of the neighbours that one of its type had in an exemplar, "
+        "and touches nothing in a way that no exemplar shows.",
     )
 
 

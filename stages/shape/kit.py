@@ -80,8 +80,8 @@ class Assembly:
             lists[j].append(i)
         return [sorted(each) for each in lists]
 
-    def select(self, parts: IntArray) -> Assembly:
-        """The assembly of the given parts alone, in that order: int (k,), each part at most once."""
+    def select(self, parts: np.ndarray) -> Assembly:
+        """The assembly of the given parts alone, int (k,), ascending."""
         place = np.full(len(self), -1, dtype=np.int32)
         place[parts] = np.arange(len(parts))
         edges = place[self.edges]

@@ -14,7 +14,7 @@ Hub types stand outside: a hub may have any neighbours, and hubs do not count am
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import combinations
+from itertools import combinations, pairwise
 
 from stages.shape.kit import Grammar, Multiset, Strictness
 
@@ -89,7 +89,7 @@ def _compositions(total: int, terms: int) -> Iterator[tuple[int, ...]]:
         return
     for bars in combinations(range(1, total), terms - 1):
         edges = (0, *bars, total)
-        yield tuple(high - low for low, high in zip(edges, edges[1:], strict=False))
+        yield tuple(high - low for low, high in pairwise(edges))
 
 
 def _together(observed: Mapping[Multiset, int]) -> tuple[set[int], set[tuple[int, int]]]:

@@ -11,7 +11,11 @@ from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, array_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.canonical import graph_digest
+from stages.shape.collection import input_kit
 from stages.shape.sample import Sample, write_sample
+from stages.variations.answers import ContactAnswers
+from stages.variations.backdrop import fit_backdrop
 from stages.variations.pool import FoundVariants
 from stages.variations.rounds import pool_entries
 from stages.variations.settings import SplitConfig, VariationsConfig
@@ -106,25 +110,36 @@ def run_collection(task: Task) -> Outcome:
     split: str = task.shard.params["split"]
     mine = rows[(rows[:, 4] == SPLITS.index(split)) & (rows[:, 5] == task.shard.params["number"])]
     found: dict[int, FoundVariants] = {}
+    answers: dict[int, ContactAnswers] = {}
     counts: Counter[str] = Counter()
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for kit, lane, index, place in mine[:, :4].tolist():
             if lane not in found:
                 found[lane] = FoundVariants.of(task, lanes[lane])
-            write_sample(writer, _sample(kits[kit], place, split, found[lane], index))
+            if kit not in answers:
+                answers[kit] = ContactAnswers(input_kit(task, kits[kit]))
+            write_sample(writer, _sample(answers[kit], place, split, found[lane], index))
             counts[kits[kit]] += 1
     summary: dict[str, Any] = {"split": split, "samples": len(mine), "kits": dict(sorted(counts.items()))}
     return Outcome(len(mine), summary)
 
 
-def _sample(kit: str, place: int, split: str, found: FoundVariants, index: int) -> Sample:
-    assembly, _ = found.assembly(index)
+def _sample(answers: ContactAnswers, place: int, split: str, found: FoundVariants, index: int) -> Sample:
+    """One variant with its backdrop. Variants whose graphs are equal with it are equal without it, so it never
+    takes a graph into another split."""
+    bare, _ = found.assembly(index)
+    assembly = fit_backdrop(answers, bare)
+    kit, added = answers.kit.name, len(assembly) - len(bare)
     return Sample(
         key=f"{kit}-{place:06d}",
         split=split,
         producer="variations",
         kit=kit,
-        graph=found.digest(index, docked=False).hex(),
+        graph=graph_digest(assembly.types, assembly.edges) if added else found.digest(index, docked=False).hex(),
         assembly=assembly,
-        lineage={"name": f"{found.name}-{index}", **found.described(index)},
+        lineage={
+            "name": f"{found.name}-{index}",
+            **found.described(index),
+            "backdrop": added,
+        },
     )
