@@ -18,7 +18,7 @@ from stages.exemplars.scene import unique_name
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.contact import ContactTest
-from stages.shape.kit import ContactKind, Exemplar, Kit
+from stages.shape.kit import NOTHING, ContactKind, Exemplar, Kit
 
 __all__ = ["KitReport", "Observation", "build_kit", "observe_models"]
 
@@ -108,6 +108,7 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
                 left = ", ".join(names[index][part] for part in apart[:5].tolist())
                 warnings.append(f"{model.path.name}: {len(apart)} parts apart from the rest are left out: {left}")
                 kept[index] = np.setdiff1d(kept[index], apart)
+    backdrops = [NOTHING] * len(assemblies)
     if any(len(keep) < len(each) for keep, each in zip(kept, assemblies, strict=True)):
         backdrop = hubs if config.hubs.keep == "backdrop" else ()
         seen = [with_touching(each, keep, backdrop) for each, keep in zip(assemblies, kept, strict=True)]
@@ -119,13 +120,13 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
         assemblies, grammar, kinds = observe(types, everything, contact, pose_tolerance, config.contact.kinds)
         aside = np.flatnonzero(np.isin(used, backdrop)).tolist()
         edges = [each.edges for each in everything]
-        assemblies, grammar, kinds = set_hubs_aside(aside, assemblies, grammar, kinds, edges)
+        assemblies, backdrops, grammar, kinds = set_hubs_aside(aside, assemblies, grammar, kinds, edges)
         names = [tuple(words[part] for part in keep.tolist()) for words, keep in zip(names, kept, strict=True)]
         touching = [each.select(keep) for each, keep in zip(touching, kept, strict=True)]
     kit = Kit(
         name=config.name,
         types=types,
-        exemplars=tuple(Exemplar(*each) for each in zip(_exemplar_names(models), assemblies, names, strict=True)),
+        exemplars=tuple(map(Exemplar, _exemplar_names(models), assemblies, names, backdrops)),
         grammar=replace(grammar, strictness=config.grammar),
         contact_tolerance=contact.tolerance,
         pose_tolerance=pose_tolerance,

@@ -17,6 +17,8 @@ from stages.shape.kit import Assembly, ContactKind, Grammar, PartType
 
 __all__ = ["chosen_hubs", "set_hubs_aside", "with_touching"]
 
+NO_EDGES = np.empty((0, 2), dtype=np.int32)
+
 
 def chosen_hubs(config: KitConfig, types: Sequence[PartType], assemblies: Sequence[Assembly]) -> tuple[int, ...]:
     """The types that the config leaves out of the graphs of `assemblies`, ascending; a type with one hub among its
@@ -52,15 +54,17 @@ def set_hubs_aside(
     grammar: Grammar,
     kinds: Sequence[tuple[ContactKind, ...]],
     contacts: Sequence[IntArray],
-) -> tuple[list[Assembly], Grammar, list[tuple[ContactKind, ...]]]:
+) -> tuple[list[Assembly], list[Assembly], Grammar, list[tuple[ContactKind, ...]]]:
     """What was observed of `assemblies` as it is without the parts of `hub_types`.
 
-    The assemblies without hubs; the grammar, in which no neighbourhood counts hubs, those of hubs themselves being
-    the parts around them that are none; and the `kinds` of those `contacts` that join two parts that are no hubs.
+    The assemblies without hubs; their hubs alone, without contacts; the grammar, in which no neighbourhood counts
+    hubs, those of hubs themselves being the parts around them that are none; and the `kinds` of those `contacts` that
+    join two parts that are no hubs.
     Dockings stay those of all parts.
     """
     is_hub = [np.isin(each.types, hub_types) for each in assemblies]
     bare = [each.select(np.flatnonzero(~hub)) for each, hub in zip(assemblies, is_hub, strict=True)]
+    alone = [each.select(np.flatnonzero(hub)) for each, hub in zip(assemblies, is_hub, strict=True)]
     between_hubs = [hub[each.edges].all(axis=1) for each, hub in zip(assemblies, is_hub, strict=True)]
     around = observe_neighbourhoods(
         [replace(each, edges=each.edges[~both]) for each, both in zip(assemblies, between_hubs, strict=True)]
@@ -70,5 +74,5 @@ def set_hubs_aside(
     for found, edges, hub in zip(kinds, contacts, is_hub, strict=True):
         counted = ~hub[edges].any(axis=1)
         left.append(tuple(found[index] for index in np.flatnonzero(counted).tolist()))
-    aside = replace(grammar, neighbourhoods=dict(sorted(neighbourhoods.items())), hubs=tuple(hub_types))
-    return bare, aside, left
+    rules = replace(grammar, neighbourhoods=dict(sorted(neighbourhoods.items())), hubs=tuple(hub_types))
+    return bare, [replace(each, edges=NO_EDGES) for each in alone], rules, left

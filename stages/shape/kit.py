@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -11,7 +11,18 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray, TypeArray
 
-__all__ = ["Assembly", "ContactKind", "Docking", "Exemplar", "Grammar", "Kit", "Multiset", "PartType", "Strictness"]
+__all__ = [
+    "NOTHING",
+    "Assembly",
+    "ContactKind",
+    "Docking",
+    "Exemplar",
+    "Grammar",
+    "Kit",
+    "Multiset",
+    "PartType",
+    "Strictness",
+]
 
 ContactKind = Literal["point", "line", "face"]
 
@@ -93,6 +104,10 @@ class Assembly:
         return tuple(zip(types.tolist(), counts.tolist(), strict=True))
 
 
+NOTHING = Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), np.int32))
+"""An assembly without parts."""
+
+
 @dataclass(frozen=True)
 class Docking:
     """One observed way in which a part of type `b` touches a part of type `a` (a <= b): an edge category.
@@ -129,11 +144,13 @@ class Grammar:
 
 @dataclass(frozen=True)
 class Exemplar:
-    """An input shape: its assembly, and the name of each part in the file it came from."""
+    """An input shape: its assembly, the name of each part in the file it came from, and, without their contacts, the
+    hub parts that are not in the assembly but stand behind it."""
 
     name: str
     assembly: Assembly
     part_names: tuple[str, ...]
+    backdrop: Assembly = field(default_factory=lambda: NOTHING)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from stages.shape.canonical import graph_digest
 from stages.shape.collection import input_kit
 from stages.shape.sample import Sample, write_sample
 from stages.variations.answers import ContactAnswers
-from stages.variations.backdrop import fit_backdrop
+from stages.variations.backdrop import Backdrop
 from stages.variations.pool import FoundVariants
 from stages.variations.rounds import pool_entries
 from stages.variations.settings import SplitConfig, VariationsConfig
@@ -110,26 +110,35 @@ def run_collection(task: Task) -> Outcome:
     split: str = task.shard.params["split"]
     mine = rows[(rows[:, 4] == SPLITS.index(split)) & (rows[:, 5] == task.shard.params["number"])]
     found: dict[int, FoundVariants] = {}
-    answers: dict[int, ContactAnswers] = {}
     counts: Counter[str] = Counter()
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for kit, lane, index, place in mine[:, :4].tolist():
             if lane not in found:
                 found[lane] = FoundVariants.of(task, lanes[lane])
-            if kit not in answers:
-                answers[kit] = ContactAnswers(input_kit(task, kits[kit]))
-            write_sample(writer, _sample(answers[kit], place, split, found[lane], index))
+            write_sample(writer, _sample(_backdrop(task, kits[kit]), place, split, found[lane], index))
             counts[kits[kit]] += 1
     summary: dict[str, Any] = {"split": split, "samples": len(mine), "kits": dict(sorted(counts.items()))}
     return Outcome(len(mine), summary)
 
 
-def _sample(answers: ContactAnswers, place: int, split: str, found: FoundVariants, index: int) -> Sample:
+_known_backdrops: dict[tuple[str, bool], Backdrop] = {}
+
+
+def _backdrop(task: Task, kit: str) -> Backdrop:
+    """The backdrop of a kit, kept from shard to shard of one worker: what it remembers never changes a result."""
+    upright = task.config.section(VariationsConfig).search.upright
+    made_from = str(task.input("exemplars", f"{kit}.tar")), upright
+    if made_from not in _known_backdrops:
+        _known_backdrops[made_from] = Backdrop(ContactAnswers(input_kit(task, kit)), upright)
+    return _known_backdrops[made_from]
+
+
+def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, index: int) -> Sample:
     """One variant with its backdrop. Variants whose graphs are equal with it are equal without it, so it never
     takes a graph into another split."""
     bare, _ = found.assembly(index)
-    assembly = fit_backdrop(answers, bare)
-    kit, added = answers.kit.name, len(assembly) - len(bare)
+    assembly = backdrop.fit(bare)
+    kit, added = backdrop.kit.name, len(assembly) - len(bare)
     return Sample(
         key=f"{kit}-{place:06d}",
         split=split,

@@ -76,7 +76,7 @@ def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() ->
 
 
 def test_auto_takes_the_types_that_inspect_calls_hubs() -> None:
-    row = [("cap", pose(x, 0, z)) for x in range(0, 20) for z in (0, 1)]
+    row = [("cap", pose(x, 0, z)) for x in range(20) for z in (0, 1)]
     meshes = {"cap": box(1.0, 1.0, 1.0), "floor": box(20.0, 0.1, 2.0)}
     shape = [*row, ("floor", pose(9.5, -0.55, 0.5))]
     seen = observe([shape], meshes, hubs=HubConfig(types="auto"))
