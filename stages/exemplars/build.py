@@ -11,26 +11,29 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.findings import kit_warnings, pieces, refusals
 from stages.exemplars.grammar import observe
+from stages.exemplars.hubs import chosen_hubs, set_hubs_aside, with_touching
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.read import Model
 from stages.exemplars.scene import unique_name
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.contact import ContactTest
-from stages.shape.kit import Assembly, ContactKind, Exemplar, Kit
+from stages.shape.kit import NOTHING, ContactKind, Exemplar, Kit
 
 __all__ = ["KitReport", "Observation", "build_kit", "observe_models"]
 
 
 @dataclass(frozen=True)
 class KitReport:
-    """What building a kit found and did: segmentation of each model, repairs, contacts by kind, warnings."""
+    """What building a kit found and did: segmentation of each model, repairs, contacts by kind, warnings, and for each
+    type that the models call by several names the names beside its own."""
 
     segmentation: tuple[str, ...]
     repairs: Mapping[str, int]
     contacts: Mapping[ContactKind, int]
     contact_tolerance: float
     warnings: tuple[str, ...]
+    aliases: Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ class Observation:
 
     kit: the parts that have area, in the models' order; the edges of its exemplars are the contacts that count.
     contacts: all contacts of each exemplar, int32 (m, 2), i < j in lexicographic order; kinds: their kinds.
+    aliases: for each type that the models call by several names the names beside its own.
     refusals: why a run does not start with these models, each with its mend; empty where it does.
     """
 
@@ -46,6 +50,7 @@ class Observation:
     contacts: tuple[IntArray, ...]
     kinds: tuple[tuple[ContactKind, ...], ...]
     repairs: Mapping[str, int]
+    aliases: Mapping[str, tuple[str, ...]]
     refusals: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -65,6 +70,7 @@ def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, KitRepor
         contacts={kind: found.count(kind) for kind in get_args(ContactKind)},
         contact_tolerance=seen.kit.contact_tolerance,
         warnings=seen.warnings,
+        aliases=seen.aliases,
     )
     return seen.kit, report
 
@@ -72,11 +78,13 @@ def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, KitRepor
 def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
     """What Shapemill sees in `models`, also where it could make no kit of them.
 
-    With `disconnected: largest` only the largest piece of each exemplar is seen. Raises ConfigError for a model in
-    which no part has any area.
+    Hubs that the config leaves out are not in the exemplars; those kept as backdrop are types of the kit, and what
+    was seen around them and between them and others is in its grammar. With `disconnected: largest` only the largest
+    piece of what is left of each exemplar is seen. Raises ConfigError for a model in which no part has any area, or
+    nothing but hubs, and for hubs that are no types.
     """
     identified = identify_parts(models, config)
-    types, names = identified.types, list(identified.part_names)
+    types, aliases, names = identified.types, identified.aliases, list(identified.part_names)
     diagonals = np.concatenate([[types[each].diagonal for each in made.types] for made in identified.assemblies])
     median = float(np.median(diagonals))
     contact = ContactTest(types, config.contact.tolerance * median)
@@ -84,24 +92,42 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
     touching = [replace(each, edges=contact.contacts(each.types, each.poses)) for each in identified.assemblies]
     assemblies, grammar, kinds = observe(types, touching, contact, pose_tolerance, config.contact.kinds)
     warnings = [f"{model.path.name}: {warning}" for model in models for warning in model.warnings]
+    hubs = chosen_hubs(config, types, assemblies)
+    left_out = [types[index].name for index in hubs]
+    kept = [np.flatnonzero(~np.isin(each.types, hubs)) for each in assemblies]
+    for model, each, keep in zip(models, assemblies, kept, strict=True):
+        if not len(keep):
+            raise ConfigError(f"{model.path}: every part of it is of a hub type; name fewer types in `hubs`")
+        if len(keep) < len(each):
+            named = ", ".join(types[index].name for index in np.intersect1d(hubs, each.types))
+            warnings.append(f"{model.path.name}: {len(each) - len(keep)} hubs are left out of the graph: {named}")
     if config.disconnected == "largest":
-        kept = [np.flatnonzero(pieces(each) == 0) for each in assemblies]
-        if any(len(keep) < len(each) for keep, each in zip(kept, assemblies, strict=True)):
-            for index, keep in enumerate(kept):
-                out = sorted(set(range(len(names[index]))) - set(keep.tolist()))
-                if out:
-                    left = ", ".join(names[index][part] for part in out[:5])
-                    warnings.append(
-                        f"{models[index].path.name}: {len(out)} parts apart from the rest are left out: {left}"
-                    )
-                names[index] = tuple(names[index][part] for part in keep.tolist())
-            touching = [_subassembly(each, keep) for each, keep in zip(touching, kept, strict=True)]
-            assemblies, grammar, kinds = observe(types, touching, contact, pose_tolerance, config.contact.kinds)
+        for index, (each, model) in enumerate(zip(assemblies, models, strict=True)):
+            apart = kept[index][pieces(each.select(kept[index])) > 0]
+            if len(apart):
+                left = ", ".join(names[index][part] for part in apart[:5].tolist())
+                warnings.append(f"{model.path.name}: {len(apart)} parts apart from the rest are left out: {left}")
+                kept[index] = np.setdiff1d(kept[index], apart)
+    backdrops = [NOTHING] * len(assemblies)
+    if any(len(keep) < len(each) for keep, each in zip(kept, assemblies, strict=True)):
+        backdrop = hubs if config.hubs.keep == "backdrop" else ()
+        seen = [with_touching(each, keep, backdrop) for each, keep in zip(assemblies, kept, strict=True)]
+        everything = [each.select(parts) for each, parts in zip(touching, seen, strict=True)]
+        used = np.unique(np.concatenate([each.types for each in everything]))
+        types, aliases = tuple(types[index] for index in used), tuple(aliases[index] for index in used)
+        everything = [replace(each, types=np.searchsorted(used, each.types).astype(np.int16)) for each in everything]
+        contact = ContactTest(types, contact.tolerance)
+        assemblies, grammar, kinds = observe(types, everything, contact, pose_tolerance, config.contact.kinds)
+        aside = np.flatnonzero(np.isin(used, backdrop)).tolist()
+        edges = [each.edges for each in everything]
+        assemblies, backdrops, grammar, kinds = set_hubs_aside(aside, assemblies, grammar, kinds, edges)
+        names = [tuple(words[part] for part in keep.tolist()) for words, keep in zip(names, kept, strict=True)]
+        touching = [each.select(keep) for each, keep in zip(touching, kept, strict=True)]
     kit = Kit(
         name=config.name,
         types=types,
-        exemplars=tuple(Exemplar(*each) for each in zip(_exemplar_names(models), assemblies, names, strict=True)),
-        grammar=grammar,
+        exemplars=tuple(map(Exemplar, _exemplar_names(models), assemblies, names, backdrops)),
+        grammar=replace(grammar, strictness=config.grammar),
         contact_tolerance=contact.tolerance,
         pose_tolerance=pose_tolerance,
         contact_kinds=config.contact.kinds,
@@ -112,7 +138,8 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
         contacts=tuple(each.edges for each in touching),
         kinds=tuple(kinds),
         repairs=identified.repairs,
-        refusals=tuple(refusals(kit, models, identified.empty)),
+        aliases={each.name: words for each, words in zip(types, aliases, strict=True) if words},
+        refusals=tuple(refusals(kit, models, identified.empty, left_out)),
         warnings=(*warnings, *kit_warnings(kit)),
     )
 
@@ -125,10 +152,3 @@ def _exemplar_names(models: Sequence[Model]) -> list[str]:
         folder = model.path.resolve().parent.name
         names.append(unique_name(folder if stems.count(model.path.stem) > 1 else model.path.stem, names))
     return names
-
-
-def _subassembly(assembly: Assembly, keep: np.ndarray) -> Assembly:
-    renumbered = np.full(len(assembly), -1, dtype=np.int32)
-    renumbered[keep] = np.arange(len(keep))
-    edges = renumbered[assembly.edges]
-    return Assembly(assembly.types[keep], assembly.poses[keep], edges[(edges >= 0).all(axis=1)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from stages.exemplars.read import Model
 from stages.shape.arrays import IntArray
 from stages.shape.contact import ContactTest
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
+from stages.shape.neighbourhoods import enumerate_admitted
 from stages.shape.pose import pose_vectors, relative_poses
 
 __all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "ways_together"]
@@ -27,6 +29,8 @@ SMALL = 12
 """Shapes of at most so many parts have no hubs: there, to touch a third of all parts is nothing."""
 LOOSER = (2.0, 5.0, 10.0, 20.0, 50.0)
 """Multiples of the contact tolerance that are tried for shapes in pieces."""
+LISTED = 500_000
+"""A grammar that admits more neighbourhoods than this is too loose to be searched with."""
 NAMED = 5
 """So many parts are named in a sentence."""
 
@@ -54,8 +58,11 @@ def hubs(assembly: Assembly) -> list[int]:
     return found
 
 
-def refusals(kit: Kit, models: Sequence[Model], empty: Sequence[tuple[Model, str]]) -> Iterator[str]:
-    """Why a run does not start with `kit`, made of `models`; `empty` are parts without area, by model and name."""
+def refusals(
+    kit: Kit, models: Sequence[Model], empty: Sequence[tuple[Model, str]], left_out: Sequence[str]
+) -> Iterator[str]:
+    """Why a run does not start with `kit`, made of `models`; `empty` are parts without area, by model and name, and
+    `left_out` the names of the hub types that are not in its graphs."""
     for model, part in empty:
         yield f"{model.path}: part {part!r} has no triangle with area; remove it from the model"
     for model, exemplar in zip(models, kit.exemplars, strict=True):
@@ -66,7 +73,8 @@ def refusals(kit: Kit, models: Sequence[Model], empty: Sequence[tuple[Model, str
                 "set `parts: components` (or materials, colors), or split the model into one scene node a part"
             )
         elif pieces(assembly).any():
-            yield f"{model.path}: the exemplar falls into {_falls_apart(exemplar)}"
+            without = f" without its hubs {_some(left_out)}" if left_out else ""
+            yield f"{model.path}: the exemplar{without} falls into {_falls_apart(exemplar)}"
         elif len(assembly) < 2:
             yield f"{model.path}: only one part of it is connected or has area, an exemplar needs at least 2"
         others = {int(index) for each in kit.exemplars if each is not exemplar for index in each.assembly.types}
@@ -75,6 +83,11 @@ def refusals(kit: Kit, models: Sequence[Model], empty: Sequence[tuple[Model, str
                 f"{model.path}: shares no part type with the other shapes of its kit, so nothing can be exchanged; "
                 "make it a kit of its own, or raise `congruence_tolerance` if the parts are meant to be alike"
             )
+    if sum(1 for _ in islice(enumerate_admitted(kit.grammar), LISTED + 1)) > LISTED:
+        yield (
+            f"kit {kit.name}: `grammar: {kit.grammar.strictness}` admits more than {LISTED:,} neighbourhoods, for some "
+            "parts touch very many others; take a stricter `grammar`, or leave such parts out with `hubs`"
+        )
 
 
 def kit_warnings(kit: Kit) -> Iterator[str]:
@@ -150,7 +163,8 @@ def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
         named = _some([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
         yield (
             f"{exemplar.name}: {_count(len(found), 'part')} of {len(assembly)} with very many contacts: {named}; "
-            "hardly another shape has the same around them, so variants keep them as they are, unless they are split"
+            "hardly another shape has the same around them, so variants keep them as they are, "
+            "unless they are split, or left out with `hubs`"
         )
 
 

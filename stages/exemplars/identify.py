@@ -26,7 +26,8 @@ class Identified:
     """The parts of the models by type.
 
     assemblies: one for each model, without edges yet; part_names: the names of their parts; repairs: how often a
-    mesh was changed in what way; empty: model and name of each part that has no triangle with area, left out.
+    mesh was changed in what way; empty: model and name of each part that has no triangle with area, left out;
+    aliases: for each type the models' other words for its parts, in order of appearance.
     """
 
     types: tuple[PartType, ...]
@@ -34,15 +35,18 @@ class Identified:
     part_names: tuple[tuple[str, ...], ...]
     repairs: Mapping[str, int]
     empty: tuple[tuple[Model, str], ...]
+    aliases: tuple[tuple[str, ...], ...]
 
 
 @dataclass
 class _Type:
-    """A part type, its surface ready for comparison, and the label it stands for."""
+    """A part type, its surface ready for comparison, the label it stands for, and the models' words for it,
+    its own first."""
 
     surface: Surface
     part: PartType
     label: str | None
+    words: dict[str, None]
 
 
 def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
@@ -70,6 +74,8 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
             if found is None:
                 empty.append((model, part.name))
                 continue
+            if model.segmentation != "components":  # whose names are only numbers
+                types[found[0]].words[_word(part)] = None
             names.append(part.name)
             indices.append(found[0])
             poses.append(part.pose @ found[1])
@@ -79,7 +85,10 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
         assemblies.append(Assembly(np.array(indices, dtype=np.int16), np.array(poses), no_edges))
         part_names.append(tuple(names))
     part_types = tuple(each.part for each in types)
-    return Identified(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), tuple(empty))
+    aliases = tuple(tuple(each.words)[1:] for each in types)
+    return Identified(
+        part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), tuple(empty), aliases
+    )
 
 
 def _identify(
@@ -111,7 +120,7 @@ def _identify(
         frame=extremal_frame(centred, np.zeros(3)),
         symmetries=symmetries,
     )
-    types.append(_Type(shape, part_type, label))
+    types.append(_Type(shape, part_type, label, {_word(part): None}))
     into_part = np.eye(4)
     into_part[:3, 3] = shape.centroid
     return len(types) - 1, into_part
@@ -119,8 +128,13 @@ def _identify(
 
 def _fresh_name(part: RawPart, taken: Sequence[str]) -> str:
     """A type name from the model's own words, of letters, digits, `-` and `_`, not yet taken."""
-    stem = re.sub(r"[^A-Za-z0-9_-]+", "_", part.label or part.mesh_name or part.name).strip("_") or "part"
+    stem = _word(part)
     name, number = stem, 2
     while name in taken:
         name, number = f"{stem}_{number}", number + 1
     return name
+
+
+def _word(part: RawPart) -> str:
+    """The model's own word for a part's type, of letters, digits, `-` and `_`."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", part.label or part.mesh_name or part.name).strip("_") or "part"

@@ -7,9 +7,9 @@ from typing import Literal
 from pydantic import Field, field_validator
 
 from pipeline.config import ExistingFile, StrictModel
-from stages.shape.kit import ContactKind
+from stages.shape.kit import ContactKind, Strictness
 
-__all__ = ["ContactConfig", "ExemplarsConfig", "KitConfig"]
+__all__ = ["ContactConfig", "ExemplarsConfig", "HubConfig", "KitConfig"]
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components"]
 
@@ -24,6 +24,22 @@ class ContactConfig(StrictModel):
         ("point", "line", "face"),
         min_length=1,
         description="Kinds of contact that make neighbours; leave out `point` and `line` to demand faces.",
+    )
+
+
+class HubConfig(StrictModel):
+    """Part types that touch so much that nothing around them can be exchanged."""
+
+    types: Literal["none", "auto"] | tuple[str, ...] = Field(
+        "none",
+        description="Part types left out of the shape graph of the search: none, those that `make inspect` calls hubs, "
+        "or a list of type names (in quotes where they are numbers).",
+    )
+    keep: Literal["drop", "backdrop"] = Field(
+        "drop",
+        description="What becomes of hub parts: they are not in the shapes, or every finished variant gets them back "
+        "where they fit: where a hub has three quarters of the neighbours that one of its type had in an exemplar, "
+        "and touches nothing in a way that no exemplar shows.",
     )
 
 
@@ -51,6 +67,16 @@ class KitConfig(StrictModel):
         "diagonal.",
     )
     contact: ContactConfig = Field(default_factory=ContactConfig, description="When two parts are neighbours.")
+    grammar: Strictness = Field(
+        "multiset",
+        description="Which neighbours a part may have: the very numbers of neighbours of each type that were observed "
+        "around its type; as many neighbours, of the same set of types, as observed once; or as many neighbours as "
+        "observed, each two of their types observed together around its type. Each admits all that the former admits.",
+    )
+    hubs: HubConfig = Field(
+        default_factory=HubConfig,
+        description="Part types that touch so much that nothing around them can be exchanged.",
+    )
     disconnected: Literal["error", "largest"] = Field(
         "error", description="What to do with an exemplar in several pieces: stop, or keep its largest piece."
     )

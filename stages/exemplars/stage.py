@@ -44,6 +44,8 @@ def run_shard(task: Task) -> Outcome:
             "dockings": len(kit.grammar.dockings),
             "segmentation": list(report.segmentation),
             "repairs": report.repairs,
+            "aliases": {name: list(words) for name, words in report.aliases.items()},
+            "hubs": [kit.types[index].name for index in kit.grammar.hubs],
             "warnings": list(report.warnings),
         },
     )
@@ -60,6 +62,7 @@ def report(plan: Plan) -> Sequence[str]:
                 f"{name}: {parts} parts of {seen['types']} types, {seen['rules']} neighbourhoods, "
                 f"{seen['dockings']} dockings"
             )
+            lines.extend(f"{name}: {kind} is also {', '.join(words)}" for kind, words in seen["aliases"].items())
             lines.extend(f"{name}: warning: {warning}" for warning in seen["warnings"])
     return lines
 

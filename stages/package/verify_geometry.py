@@ -16,6 +16,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.contact import ContactTest, overlapping_boxes
 from stages.shape.kit import Assembly, Kit
+from stages.shape.neighbourhoods import admits
 from stages.shape.penetration import PenetrationTest, depth_bound
 from stages.shape.pose import invert
 
@@ -104,9 +105,9 @@ def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[
     faults = []
     for part, neighbours in enumerate(assembly.neighbours()):
         around = assembly.multiset(neighbours)
-        if around not in kit.grammar.neighbourhoods.get(int(assembly.types[part]), {}):
+        if not admits(kit.grammar, int(assembly.types[part]), around):
             listed = ", ".join(f"{count} {known[other]}" for other, count in around) or "nothing"
-            faults.append(f"{names[part]} has a neighbourhood that no exemplar shows: {listed}")
+            faults.append(f"{names[part]} has a neighbourhood that the grammar does not admit: {listed}")
     return faults
 
 

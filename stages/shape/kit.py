@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -11,9 +11,23 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray, TypeArray
 
-__all__ = ["Assembly", "ContactKind", "Docking", "Exemplar", "Grammar", "Kit", "Multiset", "PartType"]
+__all__ = [
+    "NOTHING",
+    "Assembly",
+    "ContactKind",
+    "Docking",
+    "Exemplar",
+    "Grammar",
+    "Kit",
+    "Multiset",
+    "PartType",
+    "Strictness",
+]
 
 ContactKind = Literal["point", "line", "face"]
+
+Strictness = Literal["multiset", "count_and_set", "count_and_pairs"]
+"""How near to what was observed a neighbourhood must be; `stages.shape.neighbourhoods` says what each admits."""
 
 Multiset = tuple[tuple[int, int], ...]
 """Neighbour counts of a part: `(type index, count)` pairs in ascending order of type index."""
@@ -77,10 +91,21 @@ class Assembly:
             lists[j].append(i)
         return [sorted(each) for each in lists]
 
+    def select(self, parts: np.ndarray) -> Assembly:
+        """The assembly of the given parts alone, int (k,), ascending."""
+        place = np.full(len(self), -1, dtype=np.int32)
+        place[parts] = np.arange(len(parts))
+        edges = place[self.edges]
+        return Assembly(self.types[parts], self.poses[parts], edges[(edges >= 0).all(axis=1)])
+
     def multiset(self, neighbours: list[int]) -> Multiset:
         """The multiset of the types of the parts `neighbours`."""
         types, counts = np.unique(self.types[neighbours], return_counts=True)
         return tuple(zip(types.tolist(), counts.tolist(), strict=True))
+
+
+NOTHING = Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), np.int32))
+"""An assembly without parts."""
 
 
 @dataclass(frozen=True)
@@ -106,20 +131,26 @@ class Grammar:
 
     neighbourhoods: for each type index the observed neighbour multisets with the number of parts that had each.
     nested: for pairs of types (a <= b) the greatest depth at which parts lay within each other without contact.
+    strictness: which neighbourhoods beside the observed ones are allowed.
+    hubs: types, ascending, that stand outside the neighbourhoods of others and may have any themselves.
     """
 
     neighbourhoods: Mapping[int, Mapping[Multiset, int]]
     dockings: tuple[Docking, ...]
     nested: Mapping[tuple[int, int], float]
+    strictness: Strictness = "multiset"
+    hubs: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class Exemplar:
-    """An input shape: its assembly, and the name of each part in the file it came from."""
+    """An input shape: its assembly, the name of each part in the file it came from, and, without their contacts, the
+    hub parts that are not in the assembly but stand behind it."""
 
     name: str
     assembly: Assembly
     part_names: tuple[str, ...]
+    backdrop: Assembly = field(default_factory=lambda: NOTHING)
 
 
 @dataclass(frozen=True)

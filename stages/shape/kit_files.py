@@ -45,6 +45,8 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
             }
             for each in kit.exemplars
         ],
+        "strictness": kit.grammar.strictness,
+        "hubs": [names[index] for index in kit.grammar.hubs],
         "neighbourhoods": {
             names[index]: [
                 {"neighbours": {names[other]: count for other, count in multiset}, "seen": seen}
@@ -93,6 +95,8 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
                 "types.npy": array_bytes(exemplar.assembly.types),
                 "poses.npy": array_bytes(exemplar.assembly.poses),
                 "edges.npy": array_bytes(exemplar.assembly.edges),
+                "hub-types.npy": array_bytes(exemplar.backdrop.types),
+                "hub-poses.npy": array_bytes(exemplar.backdrop.poses),
             }
             writer.write(f"exemplar-{index:04d}", members)
 
@@ -127,6 +131,11 @@ def load_kit(text: Path, arrays: Path) -> Kit:
                         poses=bytes_array(members["poses.npy"]),
                         edges=bytes_array(members["edges.npy"]),
                     ),
+                    backdrop=Assembly(
+                        types=bytes_array(members["hub-types.npy"]),
+                        poses=bytes_array(members["hub-poses.npy"]),
+                        edges=np.empty((0, 2), dtype=np.int32),
+                    ),
                 )
             )
     neighbourhoods = {
@@ -152,7 +161,13 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         name=described["kit"],
         types=tuple(types),
         exemplars=tuple(exemplars),
-        grammar=Grammar(neighbourhoods, dockings, nested),
+        grammar=Grammar(
+            neighbourhoods=neighbourhoods,
+            dockings=dockings,
+            nested=nested,
+            strictness=described["strictness"],
+            hubs=tuple(index_of[name] for name in described["hubs"]),
+        ),
         contact_tolerance=described["contact_tolerance"],
         pose_tolerance=described["pose_tolerance"],
         contact_kinds=tuple(described["contact_kinds"]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from stages.shape.kit import Grammar
+from stages.shape.neighbourhoods import admits
 from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
 from stages.strings.tokens import StringError
@@ -13,10 +14,10 @@ __all__ = ["check"]
 
 
 def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
-    """The graph of `string`, if every node has neighbours that were observed around its type.
+    """The graph of `string`, if the grammar admits the neighbours of every node.
 
     Raises StringError where the string cannot be decoded; at the first edge whose two types were never neighbours;
-    else at the first node whose neighbours were never seen together.
+    else at the first node whose neighbours the grammar does not admit.
     """
     decoded = decode(string, alphabet)
     types = decoded.types.tolist()
@@ -24,6 +25,10 @@ def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
         kind: {other for multiset in multisets for other, _ in multiset}
         for kind, multisets in grammar.neighbourhoods.items()
     }
+    for docking in grammar.dockings:
+        if docking.a in grammar.hubs or docking.b in grammar.hubs:
+            around.setdefault(docking.a, set()).add(docking.b)
+            around.setdefault(docking.b, set()).add(docking.a)
     edges = decoded.edges.tolist()
     neighbours: list[list[int]] = [[] for _ in types]
     for i, j in edges:
@@ -39,7 +44,11 @@ def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
         if token.kind == "node":
             counts = Counter(neighbours[token.node])
             multiset = tuple(sorted(counts.items()))
-            if multiset not in grammar.neighbourhoods.get(types[token.node], {}):
+            if not admits(grammar, types[token.node], multiset):
                 seen = ", ".join(f"{count} {alphabet.tokens[kind]}" for kind, count in multiset) or "no neighbour"
-                raise StringError(string, token.index, f"{token.text} was never seen with {seen} around it")
+                raise StringError(string, token.index, f"{token.text} {_verdict(grammar)} with {seen} around it")
     return decoded
+
+
+def _verdict(grammar: Grammar) -> str:
+    return "was never seen" if grammar.strictness == "multiset" else f"is not allowed by {grammar.strictness}"

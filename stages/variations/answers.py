@@ -51,6 +51,14 @@ class ContactAnswers:
                 return False
         return True
 
+    def answer(self, a: int, b: int, pose: FloatArray) -> int:
+        """The answer for a part of type `b` at `pose` (4, 4) in coordinates of a part of type `a`."""
+        quanta = np.empty(12, dtype=np.int64)
+        turn, place = np.eye(3), np.zeros(3)
+        reach = self.kit.types[b].diagonal / 2
+        quantise(turn, place, np.ascontiguousarray(pose[:3, :3]), pose[:3, 3], reach, self._quantum, quanta)
+        return self._answer(a, b, quanta)
+
     def _answer(self, a: int, b: int, quanta: np.ndarray) -> int:
         pose = self._pose(b, quanta)
         images = symmetric_images(self.kit.types[a], self.kit.types[b], pose)

@@ -11,8 +11,11 @@ from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, array_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.canonical import graph_digest
 from stages.shape.collection import input_kit
 from stages.shape.sample import Sample, write_sample
+from stages.variations.answers import ContactAnswers
+from stages.variations.backdrop import Backdrop
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex
 from stages.variations.selection import select
@@ -117,20 +120,40 @@ def run_collection(task: Task) -> Outcome:
         for kit, lane, index, place in mine[:, :4].tolist():
             if lane not in found:
                 found[lane] = FoundVariants.of(task, lanes[lane])
-            write_sample(writer, _sample(kits[kit], place, split, found[lane], index))
+            write_sample(writer, _sample(_backdrop(task, kits[kit]), place, split, found[lane], index))
             counts[kits[kit]] += 1
     summary: dict[str, Any] = {"split": split, "samples": len(mine), "kits": dict(sorted(counts.items()))}
     return Outcome(len(mine), summary)
 
 
-def _sample(kit: str, place: int, split: str, found: FoundVariants, index: int) -> Sample:
-    assembly, _ = found.assembly(index)
+_known_backdrops: dict[tuple[str, bool], Backdrop] = {}
+
+
+def _backdrop(task: Task, kit: str) -> Backdrop:
+    """The backdrop of a kit, kept from shard to shard of one worker: what it remembers never changes a result."""
+    upright = task.config.section(VariationsConfig).search.upright
+    made_from = str(task.input("exemplars", f"{kit}.tar")), upright
+    if made_from not in _known_backdrops:
+        _known_backdrops[made_from] = Backdrop(ContactAnswers(input_kit(task, kit)), upright)
+    return _known_backdrops[made_from]
+
+
+def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, index: int) -> Sample:
+    """One variant with its backdrop. Variants whose graphs are equal with it are equal without it, so it never
+    takes a graph into another split."""
+    bare, _ = found.assembly(index)
+    assembly = backdrop.fit(bare)
+    kit, added = backdrop.kit.name, len(assembly) - len(bare)
     return Sample(
         key=f"{kit}-{place:06d}",
         split=split,
         producer="variations",
         kit=kit,
-        graph=found.digest(index),
+        graph=graph_digest(assembly.types, assembly.edges) if added else found.digest(index),
         assembly=assembly,
-        lineage={"name": f"{found.name}-{index}", **found.described(index)},
+        lineage={
+            "name": f"{found.name}-{index}",
+            **found.described(index),
+            "backdrop": added,
+        },
     )

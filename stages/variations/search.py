@@ -108,10 +108,7 @@ class Search:
         sizes = [len(each.assembly) for each in kit.exemplars]
         self.smallest = max(2, round(config.smallest * min(sizes)))
         self.largest = max(3, round(config.largest * max(sizes)))
-        neighbourhoods = [
-            (index, dict(multiset)) for index, rules in kit.grammar.neighbourhoods.items() for multiset in rules
-        ]
-        self.tables = kit_tables(kit, neighbourhoods, config.upright)
+        self.tables = kit_tables(kit, config.upright)
         self._ws = workspace(max(self.largest, *sizes))
         self.archive = Archive(config.novelty.quota)
         self._features = FeatureTest(kit)

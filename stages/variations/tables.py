@@ -6,6 +6,7 @@ import numpy as np
 
 from stages.shape.arrays import IntArray
 from stages.shape.kit import Assembly, Kit
+from stages.shape.neighbourhoods import enumerate_admitted
 from stages.variations.kernels import KitTables, ShapeTables, Workspace
 
 __all__ = ["QUANTUM", "kit_tables", "shape_tables", "workspace"]
@@ -14,18 +15,19 @@ QUANTUM = 1 / 64
 """Step of the poses by which contact answers are looked up, as a share of the contact tolerance."""
 
 
-def kit_tables(kit: Kit, neighbourhoods: list[tuple[int, dict[int, int]]], upright: bool) -> KitTables:
-    """The kit for the kernels, with `(type, neighbour counts)` of every allowed neighbourhood.
+def kit_tables(kit: Kit, upright: bool) -> KitTables:
+    """The kit for the kernels, with every neighbourhood that its grammar admits.
 
     With `upright` a docking motion may turn a piece about the vertical only.
     """
     bounds = np.stack([each.bounds for each in kit.types])
     weights = np.random.Generator(np.random.PCG64(len(kit.types))).integers(1, 2**63, len(kit.types), dtype=np.uint64)
     allowed = []
-    for part_type, counts in neighbourhoods:
-        total = _mix(int(weights[part_type]))
-        for other, count in counts.items():
-            total += int(weights[other]) * count
+    weight_of = weights.tolist()
+    for part_type, multiset in enumerate_admitted(kit.grammar):
+        total = _mix(weight_of[part_type])
+        for other, count in multiset:
+            total += weight_of[other] * count
         allowed.append(total % 2**64)
     return KitTables(
         symmetry_starts=np.cumsum([0, *(len(each.symmetries) for each in kit.types)]),

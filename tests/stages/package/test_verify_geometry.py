@@ -37,7 +37,7 @@ def test_a_contact_that_is_not_recorded_is_named(kit: Kit) -> None:
     found = faults(kit, Assembly(whole.types, whole.poses, whole.edges[1:]))
     first, second = (node_names(kit.type_names(), whole)[each] for each in whole.edges[0])
     assert any(f"{first} and {second} touch and are not recorded" in each for each in found)
-    assert any("neighbourhood that no exemplar shows" in each for each in found)
+    assert any("neighbourhood that the grammar does not admit" in each for each in found)
 
 
 def test_a_recorded_contact_that_is_none_is_named(kit: Kit) -> None:

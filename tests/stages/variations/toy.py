@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -34,10 +35,8 @@ def with_arrow(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     return trimesh.util.concatenate([mesh, fin])
 
 
-def kit_of(
-    meshes: dict[str, trimesh.Trimesh], shapes: Sequence[Sequence[Placed]], kinds: Sequence[str] = ("face",)
-) -> Kit:
-    """The kit of shapes made of named meshes, through the real path from models to kits."""
+def models_of(meshes: dict[str, trimesh.Trimesh], shapes: Sequence[Sequence[Placed]]) -> list[Model]:
+    """Shapes made of named meshes, as if they had been read from files."""
     models = []
     for number, shape in enumerate(shapes):
         parts = tuple(
@@ -53,12 +52,26 @@ def kit_of(
             for index, (name, at) in enumerate(shape)
         )
         models.append(Model(Path(f"shape{number}.glb"), parts, "nodes", "one part a node", ()))
-    config = KitConfig(
+    return models
+
+
+def config_of(shapes: Sequence[Sequence[Placed]], kinds: Sequence[str] = ("face",)) -> KitConfig:
+    """The config of a kit of so many shapes."""
+    return KitConfig(
         name="toy",
         shapes=tuple(Path(__file__) for _ in shapes),
         contact=ContactConfig(kinds=tuple(kinds)),  # type: ignore[arg-type]
     )
-    kit, _ = build_kit(config, models)
+
+
+def kit_of(
+    meshes: dict[str, trimesh.Trimesh],
+    shapes: Sequence[Sequence[Placed]],
+    kinds: Sequence[str] = ("face",),
+    **changed: Any,
+) -> Kit:
+    """The kit of shapes made of named meshes, through the real path from models to kits, with `changed` keys."""
+    kit, _ = build_kit(config_of(shapes, kinds).model_copy(update=changed), models_of(meshes, shapes))
     return kit
 
 

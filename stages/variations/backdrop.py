@@ -1,0 +1,157 @@
+"""Backdrop: the hub parts that the search leaves out, put back into a finished shape where they fit."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.contact import world_boxes
+from stages.shape.kit import Assembly, Exemplar, Kit, PartType
+from stages.shape.pose import invert, pose_vectors
+from stages.variations.answers import ContactAnswers
+from stages.variations.kernels import FORBIDDEN, NONE
+
+__all__ = ["Backdrop"]
+
+FIT_SHARE = 0.75
+"""A hub fits where it has at least this share of the neighbours that one of its type had in an exemplar."""
+ASKEW = 1e-2
+"""Directions of up that differ by less are one."""
+
+
+class Backdrop:
+    """The hubs of a kit, ready to be put behind shapes.
+
+    With `upright` a hub stands below a part, above it or beside it as one of its type did in an exemplar; without,
+    symmetries of the part may turn it over.
+    """
+
+    def __init__(self, answers: ContactAnswers, upright: bool) -> None:
+        self.answers = answers
+        self.kit = answers.kit
+        self._up = np.array({"y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}[self.kit.up]) if upright else np.zeros(3)
+        self._beside = {hub: self._observed(hub) for hub in self.kit.grammar.hubs}
+
+    def fit(self, assembly: Assembly) -> Assembly:
+        """`assembly` with hub parts of its kit where they fit, behind its own parts, and with their contacts.
+
+        Places are those that parts of the assembly had a hub at in an exemplar; the places that most parts agree on
+        come first. A hub fits where it has most of the neighbours that one of its type had in an exemplar, and
+        touches all that it touches, hubs before it too, in an observed docking; parts too near each other are refused
+        as in the search.
+        """
+        kit = self.kit
+        types, poses = assembly.types, assembly.poses
+        edges = [assembly.edges]
+        boxes = world_boxes(kit.types, types, poses)
+        for hub in kit.grammar.hubs:
+            for place in self._places(hub, assembly):
+                box = world_boxes(kit.types, np.array([hub]), place[None])
+                near = _near(boxes, box[0], 1.1 * kit.contact_tolerance)
+                touched = self._touched(hub, place, types, poses, near)
+                if touched is None or not _has_most(
+                    kit, hub, types[[part for part in touched if part < len(assembly)]]
+                ):
+                    continue
+                edges.append(np.array([(part, len(types)) for part in touched], dtype=np.int32))
+                types = np.append(types, types.dtype.type(hub))
+                poses = np.concatenate([poses, place[None]])
+                boxes = np.concatenate([boxes, box])
+        joined = np.concatenate(edges)
+        return Assembly(types, poses, joined[np.lexsort((joined[:, 1], joined[:, 0]))])
+
+    def _observed(self, hub: int) -> dict[int, tuple[FloatArray, FloatArray]]:
+        """For each type the poses (k, 4, 4) that a hub has in coordinates of a part of that type, by exemplars and the
+        part's symmetries, and the direction of up (k, 3) in those coordinates; of what looks the same one."""
+        kept: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
+        for exemplar in self.kit.exemplars:
+            for part_type, pose, up in self._docked(exemplar, hub):
+                found = kept.setdefault(part_type, [])
+                for symmetry in self.kit.types[part_type].symmetries:
+                    turned, turned_up = symmetry @ pose, symmetry[:3, :3] @ up
+                    known = np.array([each for each, _ in found]).reshape(-1, 4, 4)
+                    known_up = np.array([each for _, each in found]).reshape(-1, 3)
+                    same = _look_same(self.kit.types[hub], known, turned, self.kit.pose_tolerance)
+                    if not (same & (np.abs(known_up - turned_up).max(axis=1, initial=0.0) < ASKEW)).any():
+                        found.append((turned, turned_up))
+        return {
+            part_type: (np.array([pose for pose, _ in found]), np.array([up for _, up in found]))
+            for part_type, found in sorted(kept.items())
+        }
+
+    def _docked(self, exemplar: Exemplar, hub: int) -> list[tuple[int, FloatArray, FloatArray]]:
+        """Each part of an exemplar that touches a hub: its type, the hub's pose and up, both in its coordinates."""
+        assembly, backdrop = exemplar.assembly, exemplar.backdrop
+        docked: list[tuple[int, FloatArray, FloatArray]] = []
+        for place in backdrop.poses[backdrop.types == hub]:
+            relative = invert(assembly.poses) @ place
+            for part, part_type in enumerate(assembly.types.tolist()):
+                if self.answers.dockings.label(part_type, hub, relative[part : part + 1])[0] >= 0:
+                    docked.append((part_type, relative[part], assembly.poses[part, :3, :3].T @ self._up))
+        return docked
+
+    def _places(self, hub: int, assembly: Assembly) -> FloatArray:
+        """The poses (k, 4, 4) that enough parts of the assembly give a hub, those that most give first; of poses that
+        look the same one."""
+        from scipy.spatial import cKDTree
+
+        found = [
+            assembly.poses[part] @ poses[np.abs(ups - assembly.poses[part, :3, :3].T @ self._up).max(axis=1) < ASKEW]
+            for part_type, (poses, ups) in self._beside[hub].items()
+            for part in np.flatnonzero(assembly.types == part_type).tolist()
+        ]
+        places = np.concatenate([np.empty((0, 4, 4)), *found])
+        if not len(places):
+            return places
+        fewest = min(sum(count for _, count in each) for each in self.kit.grammar.neighbourhoods[hub])
+        tolerance = self.kit.pose_tolerance
+        agreeing = cKDTree(places[:, :3, 3]).query_ball_point(places[:, :3, 3], 2 * tolerance)
+        agreed = np.array([len(each) for each in agreeing])
+        is_open = agreed >= FIT_SHARE * fewest
+        chosen: list[int] = []
+        for index in np.argsort(-agreed, kind="stable").tolist():
+            if is_open[index]:
+                chosen.append(index)
+                beside = np.array(sorted(agreeing[index]))
+                is_open[beside[_look_same(self.kit.types[hub], places[beside], places[index], tolerance)]] = False
+        return places[chosen]
+
+    def _touched(
+        self, hub: int, place: FloatArray, types: np.ndarray, poses: FloatArray, near: list[int]
+    ) -> list[int] | None:
+        """Which of the parts `near` a hub at `place` touches; None where it may not stand there."""
+        touched: list[int] = []
+        for part in near:
+            answer = self.answers.answer(int(types[part]), hub, invert(poses[part]) @ place)
+            if answer == FORBIDDEN:
+                return None
+            if answer != NONE:
+                touched.append(part)
+        return touched
+
+
+def _has_most(kit: Kit, hub: int, around: np.ndarray) -> bool:
+    """Whether parts of the types `around` are most of what once stood around a hub of this type."""
+    counts = Counter(around.tolist())
+    return any(
+        sum(min(count, counts[other]) for other, count in seen) >= FIT_SHARE * sum(count for _, count in seen)
+        for seen in kit.grammar.neighbourhoods[hub]
+    )
+
+
+def _look_same(part_type: PartType, poses: FloatArray, pose: FloatArray, tolerance: float) -> np.ndarray:
+    """Which of the parts at `poses` (k, 4, 4) look as if they stood at `pose`, bool (k,)."""
+    images = pose @ part_type.symmetries
+    length = part_type.diagonal / 2
+    gaps = pose_vectors(images, length)[:, None] - pose_vectors(poses, length)[None]
+    same: np.ndarray = (np.linalg.norm(gaps, axis=2) <= tolerance).any(axis=0)
+    return same
+
+
+def _near(boxes: FloatArray, box: FloatArray, slack: float) -> list[int]:
+    """Which of the `boxes` (n, 2, 3) are at most `slack` from a box (2, 3) in every axis, ascending."""
+    apart = (boxes[:, 0] > box[1] + slack) | (boxes[:, 1] < box[0] - slack)
+    near: list[int] = np.flatnonzero(~apart.any(axis=1)).tolist()
+    return near

@@ -1,0 +1,129 @@
+"""Hubs left out of the graph: a chain on a long plate, by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from pipeline.errors import ConfigError
+from stages.exemplars.build import observe_models
+from stages.exemplars.read import Model
+from stages.exemplars.settings import HubConfig
+from stages.shape.kit_files import load_kit, write_kit
+from tests.stages.variations.toy import CHAIN, Placed, box, chain, config_of, models_of, pose
+
+MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
+
+
+def on_plate(links: int) -> list[Placed]:
+    """cap - link - ... - link - cap on a plate: the caps, which are taller than the links, touch it with their feet."""
+    return [*chain(links), ("plate", pose((links - 1) / 2, -0.55, 0))]
+
+
+def observe(shapes: list[list[Placed]], meshes: dict[str, trimesh.Trimesh] = MESHES, **changed: Any) -> Any:
+    return observe_models(config_of(shapes).model_copy(update=changed), models_of(meshes, shapes))
+
+
+def test_dropped_hubs_are_neither_in_the_exemplars_nor_among_the_types() -> None:
+    with_plate, without = on_plate(3), chain(3)
+    seen = observe([with_plate], hubs=HubConfig(types=("plate",)))
+    plain = observe([without])
+    assert not seen.refusals
+    assert seen.kit.type_names() == plain.kit.type_names() == ("cap", "link")
+    assert seen.kit.exemplars[0].part_names == plain.kit.exemplars[0].part_names
+    np.testing.assert_array_equal(seen.kit.exemplars[0].assembly.edges, plain.kit.exemplars[0].assembly.edges)
+    assert seen.kit.grammar.neighbourhoods == plain.kit.grammar.neighbourhoods
+    assert seen.kit.grammar.hubs == ()
+    assert any("1 hubs are left out of the graph: plate" in each for each in seen.warnings)
+
+
+def test_a_backdrop_hub_is_a_type_whose_dockings_are_known_and_that_no_neighbourhood_counts() -> None:
+    seen = observe([on_plate(3)], hubs=HubConfig(types=("plate",), keep="backdrop"))
+    kit = seen.kit
+    cap, link, plate = (kit.type_names().index(name) for name in ("cap", "link", "plate"))
+    assert kit.grammar.hubs == (plate,)
+    assert plate not in kit.exemplars[0].assembly.types
+    assert kit.grammar.neighbourhoods[cap] == {((link, 1),): 2}
+    assert kit.grammar.neighbourhoods[plate] == {((cap, 2),): 1}
+    assert {(each.a, each.b) for each in kit.grammar.dockings} >= {(cap, plate)}
+    assert len(seen.kinds[0]) == len(seen.contacts[0]) == len(kit.exemplars[0].assembly.edges)
+
+
+def test_a_kit_with_hubs_and_a_loose_grammar_is_the_same_after_a_round_through_files(tmp_path: Any) -> None:
+    kit = observe([on_plate(3)], hubs=HubConfig(types=("plate",), keep="backdrop"), grammar="count_and_pairs").kit
+    with (tmp_path / "k.json").open("wb") as text, (tmp_path / "k.tar").open("wb") as arrays:
+        write_kit(kit, text, arrays)
+    read = load_kit(tmp_path / "k.json", tmp_path / "k.tar").grammar
+    assert (read.strictness, read.hubs) == ("count_and_pairs", kit.grammar.hubs)
+    assert read.neighbourhoods == kit.grammar.neighbourhoods
+
+
+def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() -> None:
+    legs = [("cap", pose(-2, 0, 0)), ("cap", pose(2, 0, 0)), ("link", pose(-1.25, 0, 0))]
+    legs.append(("plate", pose(0, -0.55, 0)))
+    hubs = HubConfig(types=("plate",))
+    (refusal,) = observe([legs], hubs=hubs).refusals
+    assert "the exemplar without its hubs plate falls into 2 pieces of 2, 1 parts" in refusal
+    kept = observe([legs], hubs=hubs, disconnected="largest")
+    assert not kept.refusals
+    assert kept.kit.exemplars[0].part_names == ("cap.000", "link.002")
+    behind = observe([legs], hubs=HubConfig(types=("plate",), keep="backdrop"), disconnected="largest")
+    assert behind.kit.exemplars[0].part_names == ("cap.000", "link.002")
+    assert behind.kit.grammar.neighbourhoods[behind.kit.type_names().index("plate")] == {((0, 1),): 1}
+
+
+def test_auto_takes_the_types_that_inspect_calls_hubs() -> None:
+    row = [("cap", pose(x, 0, z)) for x in range(20) for z in (0, 1)]
+    meshes = {"cap": box(1.0, 1.0, 1.0), "floor": box(20.0, 0.1, 2.0)}
+    shape = [*row, ("floor", pose(9.5, -0.55, 0.5))]
+    seen = observe([shape], meshes, hubs=HubConfig(types="auto"))
+    assert seen.kit.type_names() == ("cap",)
+    assert observe([shape], meshes).kit.type_names() == ("cap", "floor")
+
+
+def test_a_hub_that_is_no_type_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(ConfigError, match="'plat', which is no part type of it; did you mean 'plate'"):
+        observe([on_plate(3)], hubs=HubConfig(types=("plat",)))
+    with pytest.raises(ConfigError, match="every part of it is of a hub type"):
+        observe([on_plate(3)], hubs=HubConfig(types=("plate", "cap", "link")))
+
+
+def test_a_grammar_that_admits_too_much_is_refused_with_the_mend() -> None:
+    sizes = np.linspace(0.4, 0.9, 14)
+    meshes = {"floor": box(40.0, 0.1, 2.0), **{f"t{index}": box(size, size, size) for index, size in enumerate(sizes)}}
+    shape: list[Placed] = [("floor", pose(0, -0.05, 0))]
+    shape += [(f"t{index % 14}", pose(1.2 * index - 16, sizes[index % 14] / 2, 0)) for index in range(28)]
+    (refusal,) = observe([shape], meshes, grammar="count_and_set").refusals
+    assert "`grammar: count_and_set` admits more than 500,000 neighbourhoods" in refusal
+    assert not observe([shape], meshes).refusals
+
+
+def renamed(model: Model, turn: np.ndarray) -> Model:
+    """The model with other names and with a rotation of every mesh undone in its pose."""
+    parts = []
+    for part in model.parts:
+        new = part.pose @ np.linalg.inv(turn)
+        name = part.mesh_name[::-1]
+        vertices = part.vertices @ turn[:3, :3].T
+        changes = {"name": f"other {part.name}", "mesh_name": name, "label": name, "pose": new, "vertices": vertices}
+        parts.append(type(part)(**{**vars(part), **changes}))
+    return Model(model.path.with_name("renamed.glb"), tuple(parts), "nodes", "", ())
+
+
+def test_a_renamed_and_turned_copy_has_the_same_types_and_its_names_are_told() -> None:
+    shapes = [chain(3)]
+    model = models_of(CHAIN, shapes)[0]
+    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])
+    seen = observe_models(config_of([*shapes, *shapes]), [model, renamed(model, turn)])
+    alone = observe_models(config_of(shapes), [model])
+    assert not seen.refusals
+    assert seen.kit.type_names() == ("cap", "link")
+    assert seen.aliases == {"cap": ("pac",), "link": ("knil",)}
+    assert alone.aliases == {}
+    first, second = (each.assembly for each in seen.kit.exemplars)
+    np.testing.assert_array_equal(first.types, second.types)
+    np.testing.assert_array_equal(first.edges, second.edges)
+    assert len(seen.kit.grammar.dockings) == len(alone.kit.grammar.dockings)

@@ -1,0 +1,101 @@
+"""Hub parts put back into finished shapes: only where they fit, and with their true contacts."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from trimesh.transformations import translation_matrix
+
+from stages.exemplars.settings import HubConfig
+from stages.package.glb import GlbWriter, node_names
+from stages.package.verify_geometry import geometry_faults
+from stages.shape.kit import Assembly, Kit
+from stages.strings.alphabet import make_alphabet
+from stages.strings.encoder import canonical_string
+from stages.strings.grammar import check
+from stages.strings.tokens import StringError
+from stages.variations.answers import ContactAnswers
+from stages.variations.backdrop import Backdrop
+from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, models_of, pose
+
+MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
+PLATE: Placed = ("plate", pose(1, -0.55, 0))
+
+
+@pytest.fixture(scope="module")
+def kit() -> Kit:
+    """A chain of three links between two caps on a plate that only the caps touch."""
+    hubs = HubConfig(types=("plate",), keep="backdrop")
+    return kit_of(MESHES, [[*chain(3), PLATE]], hubs=hubs)
+
+
+@pytest.fixture(scope="module")
+def answers(kit: Kit) -> ContactAnswers:
+    return ContactAnswers(kit)
+
+
+@pytest.fixture(scope="module")
+def backdrop(answers: ContactAnswers) -> Backdrop:
+    return Backdrop(answers, upright=True)
+
+
+def placed(kit: Kit, shape: list[Placed], answers: ContactAnswers) -> Assembly:
+    """A shape of the kit's parts with its true contacts."""
+    (model,) = models_of(MESHES, [shape])
+    types = np.array([kit.type_names().index(part.mesh_name) for part in model.parts], dtype=np.int16)
+    poses = np.array([part.pose @ translation_matrix(MESHES[part.mesh_name].centroid) for part in model.parts])
+    return Assembly(types, poses, answers.contact.contacts(types, poses))
+
+
+def test_an_exemplar_gets_its_hubs_back_with_all_their_contacts(
+    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+) -> None:
+    whole = backdrop.fit(kit.exemplars[0].assembly)
+    expected = placed(kit, [*chain(3), PLATE], answers)
+    np.testing.assert_array_equal(whole.types, expected.types)
+    np.testing.assert_array_equal(whole.edges, expected.edges)
+    np.testing.assert_allclose(whole.poses[-1][:3, 3], expected.poses[-1][:3, 3], atol=1e-6)
+
+
+def test_a_shape_far_away_and_turned_gets_the_hub_too(kit: Kit, answers: ContactAnswers, backdrop: Backdrop) -> None:
+    bare = kit.exemplars[0].assembly
+    motion = pose(7, 8, 9, 1)
+    moved = backdrop.fit(Assembly(bare.types, motion @ bare.poses, bare.edges))
+    np.testing.assert_allclose(moved.poses[-1], motion @ backdrop.fit(bare).poses[-1], atol=1e-6)
+
+
+def test_a_hub_is_left_out_where_too_few_of_its_neighbours_stand(
+    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+) -> None:
+    assert backdrop.fit(placed(kit, chain(3)[1:], answers)).types.tolist() == [1, 1, 1, 0], "one cap of two"
+
+
+def test_a_hub_is_left_out_where_something_stands_in_its_way(
+    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+) -> None:
+    blocked = placed(kit, [*chain(3), ("link", pose(1, -0.55, 0))], answers)
+    assert len(backdrop.fit(blocked)) == len(blocked)
+
+
+def test_only_without_upright_may_a_hub_stand_above_what_it_stood_below(kit: Kit, answers: ContactAnswers) -> None:
+    free = Backdrop(answers, upright=False).fit(kit.exemplars[0].assembly)
+    assert sorted(np.round(free.poses[5:, 1, 3], 3).tolist()) == [-0.55, 0.55]
+
+
+def test_verification_and_strings_take_shapes_with_their_backdrop(
+    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+) -> None:
+    alphabet = make_alphabet(kit.type_names())
+    for exemplar in kit.exemplars:
+        whole = backdrop.fit(exemplar.assembly)
+        names = node_names(kit.type_names(), whole)
+        parts = [{"name": name, "type": index} for name, index in zip(names, whole.types.tolist(), strict=True)]
+        record = json.dumps({"parts": parts, "contacts": whole.edges.tolist()}).encode()
+        assert geometry_faults(kit, {"json": record, "glb": GlbWriter(kit.types).write(whole)}) == []
+        string = canonical_string(whole.types, whole.edges, alphabet).string
+        assert len(check(string, alphabet, kit.grammar).types) == len(whole)
+    link, plate = (alphabet.tokens[kit.type_names().index(name)] for name in ("link", "plate"))
+    with pytest.raises(StringError, match="never neighbours"):
+        check(f"{link}{plate}", alphabet, kit.grammar)
