@@ -61,7 +61,8 @@ def described(measures: Mapping[str, Any]) -> str:
 
 def growth(curve: Sequence[Sequence[int]]) -> str:
     """A saturation curve, rows of tries, variants and histograms, at its quarters: how many after how many tries."""
-    points = [curve[len(curve) * quarter // 4 - 1] for quarter in range(1, 5) if len(curve) * quarter // 4]
+    places = dict.fromkeys(-(-len(curve) * quarter // 4) - 1 for quarter in range(1, 5))
+    points = [curve[place] for place in places if place >= 0]
     return ", ".join(f"{histograms:,} after {tries:,} tries" for tries, _, histograms in points)
 
 
