@@ -1,0 +1,77 @@
+"""Hubs and strictness on public models, and the configs that use them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.config import Config, load_config
+from stages.exemplars.build import build_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ExemplarsConfig, KitConfig
+from stages.exemplars.stage import STAGE as EXEMPLARS_STAGE
+from stages.package.stage import STAGE as PACKAGE
+from stages.points.stage import STAGE as POINTS
+from stages.shape.contact import ContactTest
+from stages.shape.kit import Kit
+from stages.shape.neighbourhoods import STRICTNESS, admits, enumerate_admitted
+from stages.sketches.stage import STAGE as SKETCHES
+from stages.strings.stage import STAGE as STRINGS
+from stages.variations.answers import ContactAnswers
+from stages.variations.backdrop import Backdrop
+from stages.variations.stage import STAGE as VARIATIONS
+
+ROOT = Path(__file__).resolve().parents[3]
+EXEMPLARS = ROOT.parent / "shared" / "exemplars"
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+STAGES = (EXEMPLARS_STAGE, VARIATIONS, STRINGS, POINTS, SKETCHES, PACKAGE)
+
+needs_models = pytest.mark.skipif(
+    not EXEMPLARS.is_dir(), reason="the public exemplars lie beside the project; they are not here"
+)
+
+
+def loaded(path: Path, monkeypatch: pytest.MonkeyPatch) -> Config:
+    monkeypatch.chdir(ROOT)
+    return load_config(path, {stage.name: stage.config for stage in STAGES})
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_every_config_that_comes_with_the_project_is_valid(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if "../shared" in path.read_text() and not EXEMPLARS.is_dir():
+        pytest.skip("its models lie beside the project; they are not here")
+    assert loaded(path, monkeypatch).name == (path.stem if path.stem != "default" else "shapemill-default")
+
+
+def kit_of(config: KitConfig) -> Kit:
+    return build_kit(config, [read_model(shape, config.parts) for shape in config.shapes])[0]
+
+
+@needs_models
+@pytest.mark.parametrize(("name", "parts", "contacts"), [("bridge", 65, 201), ("temple", 186, 555)])
+def test_a_real_exemplar_gets_its_hubs_back(
+    name: str, parts: int, contacts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = loaded(ROOT / "configs" / f"{name}.yaml", monkeypatch)
+    kit = kit_of(config.section(ExemplarsConfig).kits[0])
+    whole = Backdrop(ContactAnswers(kit), upright=True).fit(kit.exemplars[0].assembly)
+    assert (len(whole), len(whole.edges)) == (parts, contacts)
+    anew = ContactTest(kit.types, kit.contact_tolerance).contacts(whole.types, whole.poses)
+    np.testing.assert_array_equal(whole.edges, anew)
+
+
+@needs_models
+@pytest.mark.parametrize("model", ["a06_racetrack", "a13_dungeon_junction", "a22_ring_segment_10"])
+def test_levels_of_strictness_nest_on_real_kits(model: str) -> None:
+    kit = kit_of(KitConfig(name="real", shapes=(EXEMPLARS / model / "model.glb",)))
+    inner: set[object] = set()
+    for strictness in STRICTNESS:
+        grammar = replace(kit.grammar, strictness=strictness)
+        listed = list(enumerate_admitted(grammar))
+        assert inner <= set(listed)
+        assert len(set(listed)) == len(listed)
+        assert all(admits(grammar, part_type, multiset) for part_type, multiset in listed)
+        inner = set(listed)
