@@ -794,8 +794,9 @@ def _contact(kit, answers, ws, i, j, quanta):
 
 
 @numba.njit(cache=True)
-def _grammar_holds(kit, ws, skip_unknown):
-    """Whether every part's multiset of neighbour types is allowed; parts in unknown pairs may be skipped."""
+def _grammar_holds(kit, ws, open_pairs):
+    """Whether every part's multiset of neighbour types is allowed, but for the parts in the first `open_pairs` rows of
+    `ws.near`."""
     v = ws.counts[PARTS]
     for i in range(v):
         ws.fresh[i] = _mix(kit.weights[ws.types[i]])
@@ -803,10 +804,9 @@ def _grammar_holds(kit, ws, skip_unknown):
         i, j = ws.edges[e, 0], ws.edges[e, 1]
         ws.fresh[i] += kit.weights[ws.types[j]]
         ws.fresh[j] += kit.weights[ws.types[i]]
-    if skip_unknown:
-        for u in range(ws.counts[UNKNOWNS]):
-            ws.fresh[ws.unknown[u, 0]] = kit.allowed[0]
-            ws.fresh[ws.unknown[u, 1]] = kit.allowed[0]
+    for k in range(open_pairs):
+        ws.fresh[ws.near[k, 0]] = kit.allowed[0]
+        ws.fresh[ws.near[k, 1]] = kit.allowed[0]
     for i in range(v):
         at = np.searchsorted(kit.allowed, ws.fresh[i])
         if at == len(kit.allowed) or kit.allowed[at] != ws.fresh[i]:
@@ -818,7 +818,9 @@ def _grammar_holds(kit, ws, skip_unknown):
 def connect(kit, answers, ws):
     """Add the contacts between parts that came from A alone and from B alone, then check the grammar.
 
-    With UNKNOWN the pairs in `ws.unknown` must be answered first; the grammar already holds for all other parts.
+    With UNKNOWN the pairs in `ws.unknown` must be answered first. What comes out in the end, down to the reason of a
+    refusal, is the same whatever was known: first the grammar of the parts that no such contact can change, then
+    forbidden contacts, then the grammar of all parts.
     """
     v = ws.counts[PARTS]
     ws.counts[UNKNOWNS] = 0
@@ -826,6 +828,8 @@ def connect(kit, answers, ws):
     pairs = _overlaps(ws.boxes, v, ws.origin, True, 1.1 * kit.limits[1], ws.near)
     if pairs < 0:
         return Outcome.TOO_LARGE
+    if not _grammar_holds(kit, ws, pairs):
+        return Outcome.GRAMMAR
     for k in range(pairs):
         i, j = ws.near[k, 0], ws.near[k, 1]
         if ws.stamp[i, j] == ws.counts[TRY]:
@@ -835,7 +839,7 @@ def connect(kit, answers, ws):
             return Outcome.CLASH
         if answer == MISSING:
             if ws.counts[UNKNOWNS] == len(ws.unknown):
-                return Outcome.CLASH
+                return Outcome.UNKNOWN
             ws.unknown[ws.counts[UNKNOWNS], 0] = i
             ws.unknown[ws.counts[UNKNOWNS], 1] = j
             ws.counts[UNKNOWNS] += 1
@@ -843,9 +847,9 @@ def connect(kit, answers, ws):
             if ws.counts[EDGES] == len(ws.edges):
                 return Outcome.TOO_LARGE
             _set_edge(ws.stamp, ws.label, ws.edges, ws.counts, i, j, answer // LABELS, answer % LABELS)
-    if not _grammar_holds(kit, ws, True):
-        return Outcome.GRAMMAR
-    return Outcome.UNKNOWN if ws.counts[UNKNOWNS] > 0 else Outcome.OK
+    if ws.counts[UNKNOWNS] > 0:
+        return Outcome.UNKNOWN
+    return Outcome.OK if _grammar_holds(kit, ws, 0) else Outcome.GRAMMAR
 
 
 @numba.njit(cache=True)
@@ -866,7 +870,7 @@ def validate(kit, answers, ws):
         answer = _contact(kit, answers, ws, i, j, quanta)
         if answer == MISSING:
             if ws.counts[UNKNOWNS] == len(ws.unknown):
-                return Outcome.CLASH
+                return Outcome.UNKNOWN
             ws.unknown[ws.counts[UNKNOWNS], 0] = i
             ws.unknown[ws.counts[UNKNOWNS], 1] = j
             ws.counts[UNKNOWNS] += 1

@@ -115,6 +115,18 @@ def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_cha
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
+def test_neither_variants_nor_reasons_depend_on_which_contacts_are_known(folder: Path) -> None:
+    kit = shipped_kit(folder)
+    cold, first = search(kit, seed=3, tries=700)
+    warm = ContactAnswers(kit)
+    for seed in (99, 3):
+        line = Search(warm, SearchConfig())
+        again, _ = line.run(np.random.default_rng(seed), 700, 10**9, "test", lambda count: None)
+    assert [each.docked for each in again] == [each.docked for each in first]
+    assert line.rejects == cold.rejects
+
+
+@pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
 def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path) -> None:
     kit = shipped_kit(folder)
     line, found = search(kit, tries=1500)
