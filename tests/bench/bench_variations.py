@@ -89,7 +89,7 @@ def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -
                     fcl.distance(bodies[i], bodies[j], fcl.DistanceRequest(), fcl.DistanceResult())
         return len(cases)
 
-    parents = [line.parent("bench", each) for each in assemblies]
+    parents = [line.parent("bench", each, np.zeros(len(each), dtype=np.int8)) for each in assemblies]
     ws, tables = line._ws, line.tables
 
     def ours() -> int:
