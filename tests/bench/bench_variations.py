@@ -17,7 +17,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.variations import kernels
 from stages.variations.answers import ContactAnswers
 from stages.variations.search import Search
-from stages.variations.settings import SearchConfig
+from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.bench.measure import Measure, rate
 
 SHIPPED = Path("datasets/exemplars")
@@ -39,13 +39,16 @@ def bench() -> Iterator[Measure]:
         shapes |= {name: tuple(REAL / each / "model.glb" for each in members) for name, members in KITS.items()}
     for name, paths in shapes.items():
         kit = _kit(paths, ("face",) if "race" in name else ("point", "line", "face"))
-        line = Search(ContactAnswers(kit), SearchConfig(upright="ring" not in name))
-        rng = np.random.default_rng(0)
-        line.run(rng, 500, 10**9, "warm", lambda count: None)
-        found: list[Assembly] = []
-        ours = rate(partial(_some, line, rng, found), seconds=3.0, rounds=2)
-        tries = len(found) + sum(line.rejects.values())
-        yield Measure(f"new variants, {name}", "variants", ours, note=f"{len(found) / tries:.0%} of tries")
+        for guided in (False, True):
+            novelty = NoveltyConfig(guided=guided)
+            line = Search(ContactAnswers(kit), SearchConfig(upright="ring" not in name, novelty=novelty))
+            rng = np.random.default_rng(0)
+            line.run(rng, 500, 10**9, "warm", lambda count: None)
+            found: list[Assembly] = []
+            ours = rate(partial(_some, line, rng, found), seconds=2.0, rounds=2)
+            tries = len(found) + sum(line.rejects.values())
+            led = "led by the archive" if guided else "plain"
+            yield Measure(f"new variants, {name}, {led}", "variants", ours, note=f"{len(found) / tries:.0%} of tries")
         if "castle" in name or "dungeon" in name:
             yield _validation(name, kit, line, found[-20:])
 
