@@ -10,7 +10,19 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-DATA_WAY = ["shape", "views", "exemplars", "variations", "strings", "points", "sketches", "package"]
+DATA_WAY = [
+    "shape",
+    "views",
+    "exemplars",
+    "variations",
+    "strings",
+    "programs",
+    "shapeassembly",
+    "collection",
+    "points",
+    "sketches",
+    "package",
+]
 """Folders of `stages/` in the order in which data flows; each may import what stands before it."""
 
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}

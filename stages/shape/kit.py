@@ -20,6 +20,7 @@ __all__ = [
     "Grammar",
     "Kit",
     "Multiset",
+    "PartMesh",
     "PartType",
     "Strictness",
 ]
@@ -34,20 +35,17 @@ Multiset = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
-class PartType:
-    """One building block. Its coordinates are those of its mesh; poses move them into the world.
+class PartMesh:
+    """The surface of a part. Its coordinates are its own; poses move them into the world.
 
+    name: what the part is called; parts of one name have one label.
     vertices: float64 (v, 3); faces: int32 (f, 3); face_colors: uint8 (f, 3) sRGB.
-    frame: float64 (4, 4), the extremal-point coordinate frame (strings §6), in part coordinates.
-    symmetries: float64 (k, 4, 4), the rigid motions that map the part onto itself, the identity first.
     """
 
     name: str
     vertices: FloatArray
     faces: IntArray
     face_colors: ByteArray
-    frame: FloatArray
-    symmetries: FloatArray
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -69,10 +67,22 @@ class PartType:
 
 
 @dataclass(frozen=True)
-class Assembly:
-    """Parts of a kit put together, with their shape graph.
+class PartType(PartMesh):
+    """One building block of a kit: a surface that recurs.
 
-    types: int16 (n,) indices into the kit's types; poses: float64 (n, 4, 4) rigid;
+    frame: float64 (4, 4), the extremal-point coordinate frame (strings §6), in part coordinates.
+    symmetries: float64 (k, 4, 4), the rigid motions that map the part onto itself, the identity first.
+    """
+
+    frame: FloatArray
+    symmetries: FloatArray
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Parts put together, with their shape graph.
+
+    types: int16 (n,) indices into the types of a kit, or into the meshes of a shape; poses: float64 (n, 4, 4) rigid;
     edges: int32 (m, 2), contacts as pairs i < j in lexicographic order.
     """
 
