@@ -1,0 +1,122 @@
+"""A program: a pure function from parameters to the parts of a shape, with its schema as data (geocode §3)."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.config import nearest
+from pipeline.errors import ConfigError
+from stages.programs.parameters import Parameter
+from stages.programs.rules import Rule
+from stages.programs.schema import Schema, Values
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.shape import Shape
+
+__all__ = ["Constraint", "Program", "find_program", "program_names", "shape_of", "shape_of_text"]
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A rule that every valid shape keeps. It binds only while all parameters it speaks of are visible.
+
+    name: what rejects are counted by; rule: over parameters; sentence: why, for people.
+    """
+
+    name: str
+    rule: Rule
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Program:
+    """One program. `PROGRAM = Program(...)` stands in a file of its own, `stages/programs/<name>.py`.
+
+    name: the file's name; sentence: what it makes.
+    labels: the part labels, in a fixed order; every part that `build` returns has one of them as its name.
+    build: settled values (hidden parameters stand at their base) -> parts in world coordinates, y up, front at +z;
+    pure: no randomness, no state. It is called with valid values only.
+    constraints: which combinations of values are valid.
+    apart: pairs of labels whose parts may not intersect; samples in which they do are refused (geocode §3.1).
+    """
+
+    name: str
+    sentence: str
+    parameters: tuple[Parameter, ...]
+    labels: tuple[str, ...]
+    build: Callable[[Values], Sequence[PartMesh]]
+    constraints: tuple[Constraint, ...] = ()
+    apart: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        for constraint in self.constraints:
+            for name in constraint.rule.names:
+                if name not in self.schema.by_name:
+                    raise ValueError(f"constraint {constraint.name} speaks of {name}, which is not there")
+        for label in (each for pair in self.apart for each in pair):
+            if label not in self.labels:
+                raise ValueError(f"{self.name}: parts {label!r} shall stay apart; labels are {', '.join(self.labels)}")
+
+    @cached_property
+    def schema(self) -> Schema:
+        """The parameters together."""
+        return Schema(self.parameters)
+
+    def broken(self, values: Values) -> Constraint | None:
+        """The first constraint that `values` break, or None."""
+        settled, visible = self.schema.settled(values)
+        for constraint in self.constraints:
+            if visible.issuperset(constraint.rule.names) and not constraint.rule.holds(settled):
+                return constraint
+        return None
+
+    def parts(self, values: Values) -> Sequence[PartMesh]:
+        """The parts at `values`; hidden parameters have no say."""
+        return self.build(self.schema.settled(values)[0])
+
+
+def shape_of(program: Program, values: Values) -> Shape:
+    """The shape at `values`: one mesh a part, y up, at identity poses, without contacts."""
+    meshes = tuple(program.parts(values))
+    poses = np.tile(np.eye(4), (len(meshes), 1, 1))
+    assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, np.empty((0, 2), np.int32))
+    return Shape(meshes=meshes, assembly=assembly, up="y", labels=program.labels)
+
+
+def shape_of_text(program: str, text: str) -> Shape:
+    """The shape that a sample's text says, of the program called `program`. Raises ConfigError for a program that is
+    not there, ParameterError for a text that is none of its own."""
+    found = find_program(program)
+    return shape_of(found, found.schema.values(text))
+
+
+def program_names() -> tuple[str, ...]:
+    """The programs in this folder: every file that says PROGRAM at the start of a line. None is imported."""
+    folder = Path(__file__).parent
+    return tuple(path.stem for path in sorted(folder.glob("*.py")) if re.search(r"(?m)^PROGRAM\b", path.read_text()))
+
+
+def find_program(name: str) -> Program:
+    """The program of a name, or, for a name with a dot, the one in the module of that name.
+
+    Raises ConfigError if there is none.
+    """
+    names = program_names()
+    if name not in names and "." not in name:
+        close = nearest(name, names)
+        hint = f"did you mean {close}?" if close else f"programs are {', '.join(names) or 'none'}"
+        raise ConfigError(f"there is no program {name!r}; {hint}")
+    try:
+        found: Any = getattr(importlib.import_module(name if "." in name else f"{__package__}.{name}"), "PROGRAM", None)
+    except ModuleNotFoundError as error:
+        raise ConfigError(f"program {name!r}: {error}") from error
+    if not isinstance(found, Program):
+        raise ConfigError(f"program {name!r}: the module must hold PROGRAM = Program(...)")
+    return found
