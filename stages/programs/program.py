@@ -69,13 +69,12 @@ class Program:
         """The parameters together."""
         return Schema(self.parameters)
 
-    def broken(self, values: Values) -> Constraint | None:
-        """The first constraint that `values` break, or None."""
+    def broken(self, values: Values) -> tuple[Constraint, ...]:
+        """The constraints that `values` break."""
         settled, visible = self.schema.settled(values)
-        for constraint in self.constraints:
-            if visible.issuperset(constraint.rule.names) and not constraint.rule.holds(settled):
-                return constraint
-        return None
+        return tuple(
+            each for each in self.constraints if visible.issuperset(each.rule.names) and not each.rule.holds(settled)
+        )
 
     def parts(self, values: Values) -> Sequence[PartMesh]:
         """The parts at `values`; hidden parameters have no say."""

@@ -1,7 +1,7 @@
 """Rules over parameters, as text that is data: when a parameter is visible, which combinations are valid.
 
 A rule is made of `and`, `or`, `not`, the comparisons `< <= > >= == !=`, `+ - *`, numbers and names of parameters,
-and means what it means in Python. It is read once and never executed as code.
+and means what it means in Python. It is read once and never executed as code; it may be asked of many shapes at once.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import ast
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 __all__ = ["Rule"]
 
 Term = Callable[[Mapping[str, Any]], Any]
 
-_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
+_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
@@ -49,9 +49,10 @@ class Rule:
         """The parameters it speaks of, each once, in the order of their first mention."""
         return self._parsed[1]
 
-    def holds(self, values: Mapping[str, Any]) -> bool:
-        """Whether it is true of `values`, which has all its `names`."""
-        return bool(self._parsed[0](values))
+    def holds(self, values: Mapping[str, Any]) -> Any:
+        """Whether it is true of `values`, which has all its `names`: a bool where they are numbers, a bool array (n,)
+        where they are arrays (n,)."""
+        return self._parsed[0](values)
 
     @cached_property
     def _parsed(self) -> tuple[Term, tuple[str, ...]]:
@@ -60,21 +61,25 @@ class Rule:
         except SyntaxError as error:
             raise ValueError(f"rule {self.text!r}: {error.msg}") from error
         names: dict[str, None] = {}
-        return self._term(tree, names), tuple(names)
+        return self._truth(tree, names), tuple(names)
 
-    def _term(self, node: ast.expr, names: dict[str, None]) -> Term:
+    def _truth(self, node: ast.expr, names: dict[str, None]) -> Term:
+        """What is true or false. Written with `&`, `|` and `==`, which numbers and arrays both have."""
         match node:
-            case ast.BoolOp(op=ast.And(), values=parts):
-                every = [self._term(part, names) for part in parts]
-                return lambda values: all(part(values) for part in every)
-            case ast.BoolOp(values=parts):
-                some = [self._term(part, names) for part in parts]
-                return lambda values: any(part(values) for part in some)
+            case ast.BoolOp(op=join, values=parts):
+                terms = [self._truth(part, names) for part in parts]
+                joined = operator.and_ if isinstance(join, ast.And) else operator.or_
+                return lambda values: reduce(joined, [term(values) for term in terms])
             case ast.UnaryOp(op=ast.Not(), operand=part):
-                denied = self._term(part, names)
-                return lambda values: not denied(values)
+                denied = self._truth(part, names)
+                return lambda values: denied(values) == False  # noqa: E712  # `not` has no meaning for arrays
             case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
                 return self._join(_COMPARISONS[type(op)], left, right, names)
+        number = self._number(node, names)
+        return lambda values: number(values) != 0
+
+    def _number(self, node: ast.expr, names: dict[str, None]) -> Term:
+        match node:
             case ast.BinOp(left=left, op=sign, right=right) if type(sign) in _ARITHMETIC:
                 return self._join(_ARITHMETIC[type(sign)], left, right, names)
             case ast.Name(id=name):
@@ -82,8 +87,8 @@ class Rule:
                 return operator.itemgetter(name)
             case ast.Constant(value=int() | float() as number):
                 return lambda values: number
-        raise ValueError(f"rule {self.text!r}: {ast.unparse(node)!r} has no place in a rule")
+        raise ValueError(f"rule {self.text!r}: {ast.unparse(node)!r} has no place there")
 
     def _join(self, function: Callable[[Any, Any], Any], a: ast.expr, b: ast.expr, names: dict[str, None]) -> Term:
-        left, right = self._term(a, names), self._term(b, names)
+        left, right = self._number(a, names), self._number(b, names)
         return lambda values: function(left(values), right(values))

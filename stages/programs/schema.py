@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from pipeline.config import nearest
 from stages.programs.parameters import Parameter, ParameterError, Value
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import BoolArray, FloatArray
 
 __all__ = ["Schema", "Values"]
 
@@ -77,6 +77,19 @@ class Schema:
             else:
                 settled[parameter.name] = parameter.base
         return {name: settled[name] for name in self.by_name}, frozenset(visible)
+
+    def settled_columns(self, columns: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """The settled values of many shapes at once, float64 (parameters, n), and what is visible, bool (parameters,
+        n), for `columns` (parameters, n) in the parameters' order."""
+        settled, visible = columns.copy(), np.ones(columns.shape, dtype=np.bool_)
+        rows = dict(zip(self.by_name, settled, strict=True))
+        places = {name: place for place, name in enumerate(self.by_name)}
+        for parameter in self._by_dependence:
+            if parameter.visible_if is not None:
+                shown = visible[places[parameter.name]]
+                shown[:] = parameter.visible_if.holds(rows)
+                rows[parameter.name][~shown] = float(parameter.base)
+        return settled, visible
 
     def complete(self, chosen: Mapping[str, Any]) -> dict[str, Value]:
         """`chosen` with the base of every other parameter. Raises ParameterError for a parameter that is not there

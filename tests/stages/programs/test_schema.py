@@ -73,6 +73,16 @@ def test_what_hides_behind_a_hidden_parameter_is_decided_by_its_base() -> None:
     assert visible == {"inner", "middle", "outer"}
 
 
+@given(st.lists(any_values, min_size=1, max_size=5))
+def test_many_shapes_settle_as_each_does_alone(shapes: list[dict[str, float]]) -> None:
+    columns = np.array([[float(values[name]) for values in shapes] for name in SCHEMA.by_name])
+    settled, visible = SCHEMA.settled_columns(columns)
+    for place, values in enumerate(shapes):
+        alone, shown = SCHEMA.settled(values)
+        assert SCHEMA.from_vector(settled[:, place]) == alone
+        assert {name for name, each in zip(SCHEMA.by_name, visible[:, place], strict=True) if each} == shown
+
+
 def test_a_value_between_two_has_the_class_of_the_nearer() -> None:
     assert SCHEMA.classes({**SCHEMA.base, "height": 0.44})[0] == 1
     assert SCHEMA.classes({**SCHEMA.base, "height": 0.46})[0] == 2
