@@ -14,11 +14,11 @@ from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.collection.shards import collection_shards
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
 from stages.points.stage import STAGE as POINTS
 from stages.points.stage import PointsConfig
-from stages.shape.collection import collection_shards
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
@@ -74,7 +74,7 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
         kit = list(KITS)[number % 2]
         assembly = chain(2 + number % 5, number % 2)
         lineage: dict[str, Any] = {"parents": ["row"]} if item else {}
-        samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, f"{number:032x}", assembly, lineage))
+        samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, f"{number:032x}", lineage, assembly))
     return samples
 
 

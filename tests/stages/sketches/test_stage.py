@@ -54,7 +54,7 @@ def make_shapes(task: Task) -> Outcome:
             poses = posed(*[(k, 0.0, 0.0) for k in range(len(types))])
             edges = np.array([(k, k + 1) for k in range(len(types) - 1)], dtype=np.int32).reshape(-1, 2)
             assembly = Assembly(types, poses, edges)
-            write_sample(writer, Sample(f"{split}-{index}", split, "variations", "solids", "0" * 64, assembly, {}))
+            write_sample(writer, Sample(f"{split}-{index}", split, "variations", "solids", "0" * 64, {}, assembly))
     return Outcome(count, {"split": split, "samples": count})
 
 

@@ -83,7 +83,7 @@ def make_shapes(task: Task) -> Outcome:
             poses = np.tile(np.eye(4), (len(types), 1, 1))
             poses[:, 0, 3] = rng.random(len(types))
             key = f"{name}-{index}"
-            sample = Sample(key, SPLITS[name], "variations", kit, digest, Assembly(types, poses, edges), {})
+            sample = Sample(key, SPLITS[name], "variations", kit, digest, {}, Assembly(types, poses, edges))
             write_sample(writer, sample)
     return Outcome(len(shapes), {"split": SPLITS[name], "samples": len(shapes)})
 
