@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.stage import Task
-from stages.collection.shards import producer_of
+from stages.collection.shards import KIT_PRODUCER, producer_of
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample, read_samples
 from stages.shape.shape import Shape, kit_shape, upright
 
-__all__ = ["Collection"]
+__all__ = ["Collection", "text_shape"]
 
 
 class Collection:
@@ -27,4 +27,16 @@ class Collection:
 
     def shape(self, sample: Sample) -> Shape:
         """The shape of a sample."""
-        return upright(kit_shape(self.kits[sample.kit], sample.assembly))
+        if self.producer == KIT_PRODUCER:
+            return upright(kit_shape(self.kits[sample.kit], sample.assembly))
+        return text_shape(self.producer, sample.kit, sample.text)
+
+
+def text_shape(producer: str, kit: str, text: str) -> Shape:
+    """The shape that a sample's own text makes, upright: of the program `kit` at parameters, or of a ShapeAssembly
+    program. Raises what the producer raises for a text that is none of its own."""
+    if producer == "programs":
+        from stages.programs.program import shape_of_text
+
+        return upright(shape_of_text(kit, text))
+    raise ValueError(f"no producer {producer!r} makes shapes of text")
