@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +21,7 @@ from stages.programs.schema import Schema, Values
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 
-__all__ = ["Constraint", "Program", "find_program", "program_names", "shape_of", "shape_of_text"]
+__all__ = ["Constraint", "Program", "find_program", "program_names", "program_source", "shape_of", "shape_of_text"]
 
 
 @dataclass(frozen=True)
@@ -107,15 +108,28 @@ def find_program(name: str) -> Program:
 
     Raises ConfigError if there is none.
     """
-    names = program_names()
-    if name not in names and "." not in name:
-        close = nearest(name, names)
-        hint = f"did you mean {close}?" if close else f"programs are {', '.join(names) or 'none'}"
-        raise ConfigError(f"there is no program {name!r}; {hint}")
+    module = _module(name)
     try:
-        found: Any = getattr(importlib.import_module(name if "." in name else f"{__package__}.{name}"), "PROGRAM", None)
+        found: Any = getattr(importlib.import_module(module), "PROGRAM", None)
     except ModuleNotFoundError as error:
         raise ConfigError(f"program {name!r}: {error}") from error
     if not isinstance(found, Program):
-        raise ConfigError(f"program {name!r}: the module must hold PROGRAM = Program(...)")
+        raise ConfigError(f"program {name!r}: {module} must hold PROGRAM = Program(...)")
     return found
+
+
+def program_source(name: str) -> Path:
+    """The file of the program that `find_program` finds."""
+    find_program(name)
+    return Path(str(sys.modules[_module(name)].__file__))
+
+
+def _module(name: str) -> str:
+    names = program_names()
+    if name in names:
+        return f"{__package__}.{name}"
+    if "." in name:
+        return name
+    close = nearest(name, names)
+    hint = f"did you mean {close}?" if close else f"programs are {', '.join(names) or 'none'}"
+    raise ConfigError(f"there is no program {name!r}; {hint}")
