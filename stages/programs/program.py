@@ -46,6 +46,7 @@ class Program:
     pure: no randomness, no state. It is called with valid values only.
     constraints: which combinations of values are valid.
     apart: pairs of labels whose parts may not intersect; samples in which they do are refused (geocode §3.1).
+    elevation: from how high pictures look at it, in degrees above the horizon; below it what hangs from a ceiling.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Program:
     build: Callable[[Values], Sequence[PartMesh]]
     constraints: tuple[Constraint, ...] = ()
     apart: tuple[tuple[str, str], ...] = ()
+    elevation: float = 25.0
 
     def __post_init__(self) -> None:
         for constraint in self.constraints:
