@@ -1,0 +1,1 @@
+"""Curve programs: shapes from interpretable parameters (geocode)."""
