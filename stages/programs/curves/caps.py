@@ -26,11 +26,11 @@ class Cap:
 
 def polygon_cap(points: FloatArray) -> Cap:
     """A filling of a simple counter-clockwise polygon, float64 (k, 2): from the middle where all of it is seen."""
+    from stages.programs.curves.kernels import all_seen
+
     count = len(points)
-    middle = points.mean(axis=0)
-    x, y = (points - middle).T
-    seen = bool((x * np.roll(y, -1) - y * np.roll(x, -1) > 1e-9 * (x @ x + y @ y) / count).all())
-    if seen and (count != 4 or _convex(points)):
+    seen, convex = all_seen(points)
+    if seen and (count != 4 or convex):
         return Cap(fan(count), count > 4)
     return Cap(_clipped(points.tobytes()), False)
 
@@ -45,12 +45,6 @@ def fan(count: int) -> IntArray:
     if count % 2:
         quads = np.concatenate([quads, [[count, count - 1, 0, 0]]])
     return quads.astype(np.int32)
-
-
-def _convex(points: FloatArray) -> bool:
-    arriving = points - np.roll(points, 1, axis=0)
-    leaving = np.roll(points, -1, axis=0) - points
-    return bool((arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0] > 0.0).all())
 
 
 @lru_cache(maxsize=1024)

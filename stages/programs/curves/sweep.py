@@ -95,39 +95,22 @@ def _carried(
     places: FloatArray | None = None,
 ) -> QuadMesh:
     """The skin over `outline` (k, 2), or over outlines (p, k, 2) at `places` (p,), at the stations of the rail."""
+    from stages.programs.curves.kernels import place_rings
+
     stations = _stations(rail, style, places)
     x, y = rail_axes(stations.points, stations.tangents, stations.positions, rail.closed, up)
-    if places is not None:
-        outline = _blended(outline, places, stations.positions)
-    axes = np.empty((len(x), 2, 3))
-    if style is None:
-        axes[:, 0], axes[:, 1] = x, y
-    else:
-        scale, twist = style.at(stations.positions)
-        if rail.closed:
-            _check_round(style)
-        if twist.any():
-            angle = np.radians(twist)
-            cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-            x, y = cosine * x + sine * y, cosine * y - sine * x
-        lone = (scale.min(axis=1) <= 0.0) & (scale.max(axis=1) > 0.0)
-        if lone.any():
-            where = stations.positions[lone.argmax()]
-            raise ValueError(f"the style's scale is 0 for one axis alone at position {where:g}: use a small one")
-        axes[:, 0], axes[:, 1] = scale[:, :1] * x, scale[:, 1:] * y
-    if stations.excess.any():
-        reach = (axes * stations.fold[:, None]).sum(axis=2) * stations.excess[:, None]
-        axes += reach[:, :, None] * stations.fold[:, None]
-    rings = outline @ axes + stations.points[:, None]
+    outlines = outline[None] if places is None else _blended(outline, places, stations.positions)
+    scale, twist = _styled(style, stations.positions, rail.closed)
+    rings = place_rings(stations.points, x, y, scale, twist, stations.fold, stations.excess, outlines)
     if not rail.closed and caps != "flat":
         start, end = (caps, caps) if isinstance(caps, str) else caps
-        first, last = (outline, outline) if outline.ndim == 2 else (outline[0], outline[-1])
-        domes = [
-            _dome(stations, -1, last, axes) if end == "round" else rings[:0],
-            _dome(stations, 0, first, axes)[::-1] if start == "round" else rings[:0],
-        ]
-        rings = np.concatenate([domes[1], rings, domes[0]])
-    return skin(rings, polygon_cap(outline[0]) if cap is None else cap, rail.closed)
+        pieces = [rings]
+        if start == "round":
+            pieces.insert(0, _dome(rings[0], stations.points[0], -stations.tangents[0], outlines[0], scale[0])[::-1])
+        if end == "round":
+            pieces.append(_dome(rings[-1], stations.points[-1], stations.tangents[-1], outlines[-1], scale[-1]))
+        rings = np.concatenate(pieces)
+    return skin(rings, polygon_cap(outlines[0]) if cap is None else cap, rail.closed)
 
 
 def _stations(rail: Curve, style: Style | None, places: FloatArray | None) -> Stations:
@@ -154,24 +137,33 @@ def _blended(outlines: FloatArray, places: FloatArray, positions: FloatArray) ->
     return blended
 
 
-def _check_round(style: Style) -> None:
-    if np.abs(style.scale[0] - style.scale[-1]).max() > 1e-9:
+def _styled(style: Style | None, positions: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
+    """Scale (n, 2) and twist (n,) at positions (n,)."""
+    if style is None:
+        return np.ones((len(positions), 2)), np.zeros(len(positions))
+    if closed and np.abs(style.scale[0] - style.scale[-1]).max() > 1e-9:
         raise ValueError("on a closed rail the style's last scale is its first")
     turns = (style.twist[-1] - style.twist[0]) / 360.0
-    if abs(turns - round(turns)) > 1e-9:
+    if closed and abs(turns - round(turns)) > 1e-9:
         raise ValueError(f"on a closed rail a twist is made of whole turns of 360 degrees, not {360.0 * turns:g}")
+    scale, twist = style.at(positions)
+    if scale.min() == 0.0 and ((scale[:, 0] == 0.0) != (scale[:, 1] == 0.0)).any():
+        where = positions[((scale[:, 0] == 0.0) != (scale[:, 1] == 0.0)).argmax()]
+        raise ValueError(f"the style's scale is 0 for one axis alone at position {where:g}: use a small one")
+    return scale, twist
 
 
-def _dome(stations: Stations, end: Literal[0, -1], outline: FloatArray, axes: FloatArray) -> FloatArray:
+def _dome(
+    ring: FloatArray, point: FloatArray, outwards: FloatArray, outline: FloatArray, scale: FloatArray
+) -> FloatArray:
     """The rings beyond an end, from the end outwards, float64 (DOME, k, 3)."""
-    extent = np.ptp(outline, axis=0) * np.sqrt((axes[end] * axes[end]).sum(axis=1))
-    depth = float(extent.min()) / 2.0
+    spokes = ring - point
+    depth = float((np.ptp(outline, axis=0) * scale).min()) / 2.0
     if depth <= 0.0:
         raise ValueError("an end whose scale is 0 is a point and takes no round cap: make it flat")
-    outwards = -stations.tangents[end] if end == 0 else stations.tangents[end]
     angles = np.pi / 2.0 * np.arange(1, DOME + 1) / DOME
     shrink = np.cos(angles)
     shrink[-1] = 0.0
     reach = depth * np.sin(angles)[:, None] * outwards
-    rings: FloatArray = shrink[:, None, None] * (outline @ axes[end]) + (stations.points[end] + reach)[:, None]
+    rings: FloatArray = shrink[:, None, None] * spokes + (point + reach)[:, None]
     return rings
