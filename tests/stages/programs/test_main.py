@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 
@@ -13,10 +12,11 @@ from PIL import Image
 
 from stages.programs.__main__ import main
 from stages.programs.program import shape_of
-from stages.programs.sheets import parameter_sheet, reveal
+from stages.programs.sheets import CELL, reveal
+from stages.views.portrait import PAPER
 from tests.stages.programs.stool import PROGRAM
 
-STOOL = "tests.stages.programs.stool"
+BLOCK, STOOL = "tests.stages.programs.block", "tests.stages.programs.stool"
 
 
 def written(folder: Path) -> set[str]:
@@ -56,16 +56,20 @@ def test_steps_lead_from_one_shape_to_the_other(tmp_path: Path) -> None:
 def test_inspect_prints_the_table_and_draws_a_row_a_parameter(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["inspect", STOOL, "--out", str(tmp_path)]) == 0
+    assert main(["inspect", BLOCK, "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert "| `rail_height` | continuous |" in printed
-    sheet = np.asarray(Image.open(io.BytesIO((tmp_path / "stool.png").read_bytes())))
-    np.testing.assert_array_equal(sheet, parameter_sheet(PROGRAM))
+    assert "| `height` | continuous | 1 to 2 (3 values) |" in printed
+    sheet = np.asarray(Image.open(tmp_path / "block.png")).astype(int)
+    # The third and last picture of the second row: the highest block fills the frame, and nothing stands beside it.
+    assert sheet.shape[1] > 3 * CELL
+    inked = np.abs(sheet - PAPER).sum(axis=2) > 150
+    assert inked[-CELL:, 2 * CELL : 3 * CELL].any()
+    assert not inked[-CELL:, 3 * CELL + 100 :].any()
 
 
 def test_random_shapes_of_one_seed_are_the_same_sheet(tmp_path: Path) -> None:
     for name in ("a.png", "b.png"):
-        assert main(["sheet", STOOL, "--count", "3", "--seed", "4", "--picture", str(tmp_path / name)]) == 0
+        assert main(["sheet", BLOCK, "--count", "2", "--seed", "4", "--picture", str(tmp_path / name)]) == 0
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 

@@ -26,8 +26,8 @@ def test_shape_has_a_mesh_a_part_at_identity_poses_labelled_by_name() -> None:
 def test_hidden_parameters_have_no_say() -> None:
     bare = {**PROGRAM.schema.base, "has_rail": False}
     for height in (0.1, 0.6):
-        for mesh, other in zip(PROGRAM.parts(bare), PROGRAM.parts({**bare, "rail_height": height}), strict=True):
-            np.testing.assert_array_equal(mesh.vertices, other.vertices)
+        for part, other in zip(PROGRAM.parts(bare), PROGRAM.parts({**bare, "rail_height": height}), strict=True):
+            np.testing.assert_array_equal(part.mesh.vertices, other.mesh.vertices)
 
 
 def test_shape_comes_back_from_its_text() -> None:
