@@ -11,7 +11,7 @@ from stages.programs.curves.part import Part
 from stages.programs.program import Program
 from stages.shape.arrays import FloatArray
 
-__all__ = ["intersecting", "meshes_intersect"]
+__all__ = ["intersecting", "meshes_meet"]
 
 
 def intersecting(program: Program, parts: Sequence[Part]) -> tuple[str, str] | None:
@@ -20,31 +20,33 @@ def intersecting(program: Program, parts: Sequence[Part]) -> tuple[str, str] | N
         for i, a in enumerate(parts):
             for j, b in enumerate(parts):
                 wanted = (a.label, b.label) == (first, second)
-                if wanted and (i < j or first != second) and meshes_intersect(a.mesh, b.mesh):
+                if wanted and (i < j or first != second) and meshes_meet(a.mesh, b.mesh):
                     return first, second
     return None
 
 
-def meshes_intersect(a: QuadMesh, b: QuadMesh) -> bool:
-    """Whether two closed meshes have a point in common: their surfaces meet, or one lies inside the other."""
-    low = np.maximum(a.bounds[0], b.bounds[0])
-    high = np.minimum(a.bounds[1], b.bounds[1])
+def meshes_meet(a: QuadMesh, b: QuadMesh, distance: float = 0.0) -> bool:
+    """Whether two closed meshes come within `distance` of each other: their surfaces do, or one lies in the other."""
+    low = np.maximum(a.bounds[0], b.bounds[0]) - distance
+    high = np.minimum(a.bounds[1], b.bounds[1]) + distance
     if np.any(low > high):
         return False
     mine, other = _between(a, low, high), _between(b, low, high)
-    if len(mine) and len(other) and _surfaces_meet(a.vertices, mine, b.vertices, other):
+    if len(mine) and len(other) and _surfaces_meet(a.vertices, mine, b.vertices, other, distance):
         return True
     return _inside(a.vertices[0], b) or _inside(b.vertices[0], a)
 
 
-def _surfaces_meet(vertices: FloatArray, faces: np.ndarray, others: FloatArray, other_faces: np.ndarray) -> bool:
+def _surfaces_meet(
+    vertices: FloatArray, faces: np.ndarray, others: FloatArray, other_faces: np.ndarray, distance: float
+) -> bool:
     from stages.shape.triangles import build_tree, first_contact
 
-    return first_contact(build_tree(vertices, faces), build_tree(others, other_faces), np.eye(4), 0.0)
+    return first_contact(build_tree(vertices, faces), build_tree(others, other_faces), np.eye(4), distance)
 
 
 def _between(mesh: QuadMesh, low: FloatArray, high: FloatArray) -> np.ndarray:
-    """The faces whose boxes reach into the box from `low` to `high`, int32 (k, 3)."""
+    """The triangles whose boxes reach into the box from `low` to `high`, int32 (k, 3)."""
     corners = mesh.vertices[mesh.triangles]
     reaching = (corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)
     faces: np.ndarray = mesh.triangles[reaching.all(axis=1)]

@@ -10,7 +10,7 @@ from pipeline.errors import ShardFailed
 from stages.programs.curves import box, ellipsoid
 from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect, same_geometry
-from stages.programs.intersection import meshes_intersect
+from stages.programs.intersection import meshes_meet
 from stages.programs.program import Constraint, Program
 from stages.programs.repair import repaired
 from stages.programs.rules import Rule
@@ -115,15 +115,16 @@ class TestEffect:
 class TestIntersection:
     @pytest.mark.parametrize(("gap", "met"), [(-0.2, True), (0.01, False), (3.0, False)])
     def test_boxes_side_by_side(self, gap: float, met: bool) -> None:
-        assert meshes_intersect(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2))) == met
+        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2))) == met
+        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2)), distance=0.02) == (gap < 0.02)
 
     def test_a_part_inside_another_meets_it_without_touching_its_surface(self) -> None:
         ball, crumb = ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2))
-        assert meshes_intersect(ball, crumb)
-        assert meshes_intersect(crumb, ball)
+        assert meshes_meet(ball, crumb)
+        assert meshes_meet(crumb, ball)
 
     def test_a_part_in_the_corner_of_a_box_around_another_does_not_meet_it(self) -> None:
-        assert not meshes_intersect(ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2), (0.85, 0.85, 0.85)))
+        assert not meshes_meet(ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2), (0.85, 0.85, 0.85)))
 
 
 class TestSampler:
