@@ -30,8 +30,10 @@ def polygon_cap(points: FloatArray) -> Cap:
 
     count = len(points)
     seen, convex = all_seen(points)
-    if seen and (count != 4 or convex):
+    if convex:
         return Cap(fan(count), count > 4)
+    if seen:
+        return Cap(_spokes(count), True)
     return Cap(_clipped(points.tobytes()), False)
 
 
@@ -45,6 +47,14 @@ def fan(count: int) -> IntArray:
     if count % 2:
         quads = np.concatenate([quads, [[count, count - 1, 0, 0]]])
     return quads.astype(np.int32)
+
+
+@lru_cache(maxsize=64)
+def _spokes(count: int) -> IntArray:
+    """Triangles between an outline and its middle: of two at a notch no quad could be made."""
+    place = np.arange(count, dtype=np.int32)
+    after = np.roll(place, -1)
+    return np.stack([place, after, np.full_like(place, count), np.full_like(place, count)], axis=1)
 
 
 @lru_cache(maxsize=1024)

@@ -92,7 +92,7 @@ class Curve:
 
     @cached_property
     def _measured(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Direction (m, 3), length (m,) and cosine of the turn before each segment (m,); 1 at the start of an open one."""
+        """Direction (m, 3), length (m,), and cosine of the turn before it (m,), of each segment; no turn is 1."""
         from stages.programs.curves.kernels import measure
 
         directions, lengths, turns = measure(self.points, self.closed)

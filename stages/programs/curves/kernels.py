@@ -118,7 +118,7 @@ def place_rings(points, x, y, scale, twist, fold, excess, outlines):
 
 @numba.njit(cache=True)
 def all_seen(points):
-    """Whether every side of a polygon (k, 2) is seen from the mean of its points, and whether every turn is left."""
+    """Whether every side of a polygon (k, 2) is seen from the mean of its points, and whether no turn is right."""
     count = len(points)
     mx, my = points[:, 0].mean(), points[:, 1].mean()
     size = 0.0
@@ -130,21 +130,22 @@ def all_seen(points):
         bx, by = points[(i + 1) % count, 0] - mx, points[(i + 1) % count, 1] - my
         cx, cy = points[(i + 2) % count, 0] - mx, points[(i + 2) % count, 1] - my
         seen = seen and ax * by - ay * bx > 1e-9 * size
-        convex = convex and (bx - ax) * (cy - by) - (by - ay) * (cx - bx) > 0.0
+        convex = convex and (bx - ax) * (cy - by) - (by - ay) * (cx - bx) >= -1e-9 * size
     return seen, convex
 
 
 @numba.njit(cache=True)
-def _area2(a, b, c):
-    """Squared area of a triangle, times 4."""
-    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    u, v, w = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    return (y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2
+def _facing(a, b, c, x, y, z):
+    """Area of a triangle (times 2) as seen along (x, y, z) (times its length); negative from behind."""
+    d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    e0, e1, e2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    return (d1 * e2 - d2 * e1) * x + (d2 * e0 - d0 * e2) * y + (d0 * e1 - d1 * e0) * z
 
 
 @numba.njit(cache=True)
 def cut(vertices, quads):
-    """Triangles, int32 (f, 3): each quad is cut where the smaller of its two pieces is the larger."""
+    """Triangles, int32 (f, 3): each quad is cut where the smaller of its two pieces is the larger, seen from its front:
+    a quad with a notch is cut there."""
     triangles = np.empty((2 * len(quads), 3), dtype=np.int32)
     made = 0
     for i in range(len(quads)):
@@ -154,9 +155,13 @@ def cut(vertices, quads):
             made += 1
             continue
         a, b, c, d = vertices[i0], vertices[i1], vertices[i2], vertices[i3]
-        one, other = min(_area2(a, b, c), _area2(a, c, d)), min(_area2(a, b, d), _area2(b, c, d))
+        e0, e1, e2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        f0, f1, f2 = d[0] - b[0], d[1] - b[1], d[2] - b[2]
+        x, y, z = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
+        one = min(_facing(a, b, c, x, y, z), _facing(a, c, d, x, y, z))
+        other = min(_facing(a, b, d, x, y, z), _facing(b, c, d, x, y, z))
         # Equal halves are cut along 0-2, whatever rounding says, so that a moved mesh is cut alike.
-        if other > 1.000001 * one:
+        if other > one + 1e-6 * abs(one):
             i0, i1, i2, i3 = i1, i2, i3, i0
         triangles[made, 0], triangles[made, 1], triangles[made, 2] = i0, i1, i2
         triangles[made + 1, 0], triangles[made + 1, 1], triangles[made + 1, 2] = i0, i2, i3

@@ -28,7 +28,7 @@ class QuadMesh:
 
     @cached_property
     def triangles(self) -> IntArray:
-        """The faces as triangles, int32 (f, 3), each quad cut where the smaller of the two pieces is the larger."""
+        """The faces as triangles, int32 (f, 3), each quad cut where the smaller of its pieces is the larger."""
         from stages.programs.curves.kernels import cut
 
         triangles: IntArray = cut(self.vertices, self.quads)
