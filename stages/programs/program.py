@@ -81,8 +81,15 @@ class Program:
         )
 
     def parts(self, values: Values) -> Sequence[Part]:
-        """The parts at `values`; hidden parameters have no say."""
-        return self.build(self.schema.settled(values)[0])
+        """The parts at `values`; hidden parameters have no say.
+
+        Raises ValueError where `build` does, and says at which values.
+        """
+        settled, _ = self.schema.settled(values)
+        try:
+            return self.build(settled)
+        except ValueError as error:
+            raise ValueError(f"program {self.name} fails at {self.schema.text(settled)}: {error}") from error
 
 
 def shape_of(program: Program, values: Values) -> Shape:
