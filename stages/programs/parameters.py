@@ -64,8 +64,10 @@ class Parameter:
 
     def checked(self, value: Any) -> Value:
         """`value` in the parameter's own type: float, int or bool. Raises ParameterError for one out of range."""
-        if isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating) and math.isfinite(value):
-            number = float(value)
+        yes_or_no = isinstance(value, bool | np.bool_)
+        number_like = isinstance(value, int | float | np.integer | np.floating) and math.isfinite(value)
+        if (yes_or_no and self.kind == "binary") or (number_like and not yes_or_no):
+            number = float(value) + 0.0  # there is one zero, with one text
             if self.kind == "continuous" and self.values[0] <= number <= self.values[-1]:
                 return number
             if self.kind != "continuous" and number in self.values:

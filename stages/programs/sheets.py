@@ -11,7 +11,6 @@ from stages.programs.recipe import parameter_range, value_text
 from stages.programs.repair import repaired
 from stages.programs.schema import Values
 from stages.shape.arrays import ByteArray
-from stages.views.buffers import Backend
 from stages.views.camera import Camera
 from stages.views.portrait import portrait
 from stages.views.scene import scene_of
@@ -24,10 +23,10 @@ CELL = 200
 COLUMNS, WIDE = 8, 15
 
 
-def shape_picture(program: Program, values: Values, size: int = CELL, backend: Backend = "raycast") -> ByteArray:
-    """A portrait of the shape at `values`, uint8 (size, size, 3)."""
+def shape_picture(program: Program, values: Values) -> ByteArray:
+    """A portrait of the shape at `values`, uint8 (CELL, CELL, 3), by ray casting: the same bytes on every machine."""
     camera = Camera(azimuth=AZIMUTH, elevation=program.elevation)
-    return portrait(scene_of(shape_of(program, values)), camera, (size, size), backend=backend)
+    return portrait(scene_of(shape_of(program, values)), camera, (CELL, CELL), backend="raycast")
 
 
 def row_sheet(program: Program, shapes: Sequence[Values], captions: Sequence[str], title: str) -> ByteArray:

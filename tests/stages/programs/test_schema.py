@@ -93,6 +93,7 @@ def test_a_value_between_two_has_the_class_of_the_nearer() -> None:
     [
         ('{"height": 2.0, "scale x": 0.4, "has_rail": false}', "height: 2.0 is out of range; it may be 0.3 to 1.0"),
         ('{"height": "x", "scale x": 0.4, "has_rail": false}', "height: 'x' is out of range; it may be 0.3 to 1.0"),
+        ('{"height": true, "scale x": 0.4, "has_rail": false}', "height: True is out of range"),
         ('{"height": NaN, "scale x": 0.4, "has_rail": false}', "height: nan is out of range"),
         ('{"height": 0.5, "scale x": 0.4, "has_rail": 0.5}', "has_rail: 0.5 is out of range; it may be false or true"),
         ('{"hieght": 0.5}', r"no parameter 'hieght'; did you mean height \(0.3 to 1.0\)"),
@@ -104,6 +105,11 @@ def test_a_value_between_two_has_the_class_of_the_nearer() -> None:
 def test_a_wrong_text_is_refused_with_the_parameter_and_its_range(text: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         SCHEMA.values(text)
+
+
+def test_zero_has_one_text() -> None:
+    schema = Schema((continuous("lean", -1, 1, 3, 0, "g", "."),))
+    assert schema.text(schema.values('{"lean": -0.0}')) == '{"lean":0.0}'
 
 
 def test_wrong_classes_and_vectors_are_refused() -> None:
