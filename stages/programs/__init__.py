@@ -1,1 +1,1 @@
-"""Curve programs: shapes from interpretable parameters (geocode)."""
+"""Curve programs: parameters with names and ranges in, parts of a shape out (geocode §3)."""
