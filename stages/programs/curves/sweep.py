@@ -56,9 +56,9 @@ def loft(
 ) -> QuadMesh:
     """A sweep whose profile changes: `(position, profile)` pairs from 0 to 1, blended in between.
 
-    Everything else is as in `sweep`; both ends are filled in the way of the first profile.
-    Raises ValueError for profiles of different counts of points (those of `square_circle` with one `count` fit each other), for other positions, and for a closed rail whose last profile is
-    not its first.
+    Everything else is as in `sweep`; both ends are filled in the way of the first profile. Raises ValueError for
+    profiles of different counts of points (those of `square_circle` with one `count` fit each other), for other
+    positions, and for a closed rail whose last profile is not its first.
     """
     places = np.array([place for place, _ in profiles], dtype=np.float64)
     if len(places) < 2 or places[0] != 0.0 or places[-1] != 1.0 or (np.diff(places) <= 0.0).any():
