@@ -22,6 +22,7 @@ OUT     ?= datasets
 WORKERS ?= $(shell nproc 2>/dev/null || echo 1)
 SEED    ?=
 MESH    ?=
+PROGRAM ?=
 
 PYTHON  := .venv/bin/python
 READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))
@@ -55,9 +56,10 @@ status: setup  ## Show what is done, failed, rejected and left
 	$(PYTHON) -m pipeline status $(ASKED) --workers $(WORKERS)
 verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes
 	$(PYTHON) -m pipeline verify $(ASKED)
-inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent
-	@test -n '$(MESH)' || { echo 'make inspect needs a model: make inspect MESH=my.glb' >&2; exit 2; }
-	$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png'
+inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or what PROGRAM can make
+	@test -n '$(MESH)$(PROGRAM)' || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
+	$(if $(PROGRAM),$(PYTHON) -m stages.programs inspect '$(PROGRAM)' --out '$(OUT)/inspect')
+	$(if $(MESH),$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png')
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	$(PYTHON) -m pipeline doctor --out $(OUT)
 
