@@ -31,18 +31,20 @@ RUN      = $(PYTHON) -m pipeline run $@ $(ASKED) --workers $(WORKERS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset exemplars variations strings points sketches package
+.PHONY: dataset exemplars variations programs strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
 exemplars: setup  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
 	$(RUN)
 variations: exemplars  ## Make new shapes from the exemplars' parts
 	$(RUN)
-strings: variations  ## Write each shape as strings, and the text corpus
+programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
-points: variations  ## Turn each shape into a labelled point cloud
+strings: variations programs  ## Write each shape as strings, and the text corpus
 	$(RUN)
-sketches: variations  ## Draw each shape as lines
+points: variations programs  ## Turn each shape into a labelled point cloud
+	$(RUN)
+sketches: variations programs  ## Draw each shape as lines
 	$(RUN)
 package: strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from stages.programs.curves.caps import Cap, polygon_cap
+from stages.programs.curves.caps import Cap, fan, polygon_cap
 from stages.programs.curves.curve import Curve, Stations
 from stages.programs.curves.frames import rail_axes
 from stages.programs.curves.mesh import QuadMesh
@@ -56,9 +56,9 @@ def loft(
 ) -> QuadMesh:
     """A sweep whose profile changes: `(position, profile)` pairs from 0 to 1, blended in between.
 
-    Everything else is as in `sweep`. Raises ValueError for profiles of different counts of points (those of
-    `square_circle` with one `count` fit each other), for other positions, and for a closed rail whose last profile is
-    not its first.
+    Everything else is as in `sweep`; both ends are filled in the way of the first profile. Raises ValueError for
+    profiles of different counts of points (those of `square_circle` with one `count` fit each other), for other
+    positions, and for a closed rail whose last profile is not its first.
     """
     places = np.array([place for place, _ in profiles], dtype=np.float64)
     if len(places) < 2 or places[0] != 0.0 or places[-1] != 1.0 or (np.diff(places) <= 0.0).any():
@@ -80,9 +80,8 @@ def loft_rings(rings: npt.ArrayLike, closed: bool = False) -> QuadMesh:
     given = np.asarray(rings, dtype=np.float64)
     if given.ndim != 3 or given.shape[2] != 3 or given.shape[1] < 3:
         raise ValueError(f"a loft needs rings of shape (r, k, 3) with k from 3, not {given.shape}")
-    flat = np.stack([np.cos(2 * np.pi * np.arange(given.shape[1]) / given.shape[1])] * 2, axis=1)
-    flat[:, 1] = np.sin(2 * np.pi * np.arange(given.shape[1]) / given.shape[1])
-    return skin(given, polygon_cap(flat), closed)
+    around = given.shape[1]
+    return skin(given, Cap(fan(around), around > 4), closed)
 
 
 def _carried(

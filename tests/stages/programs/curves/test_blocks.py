@@ -89,6 +89,13 @@ def test_a_hollow_vessel_has_the_wall_it_asks_for() -> None:
         hollow(line((0.05, 0, 0), (0.05, 1, 0)), 0.1)
 
 
+def test_a_vessel_may_have_its_foot_drawn() -> None:
+    bowl = revolve(hollow(polyline([(0, 0), (0.3, 0), (0.35, 0.5)]), 0.02))
+    assert mesh_faults(bowl) == []
+    middle = bowl.vertices[np.hypot(bowl.vertices[:, 0], bowl.vertices[:, 2]) < 1e-12]
+    assert sorted(middle[:, 1].tolist()) == pytest.approx([0, 0.02])
+
+
 def test_corners_of_a_swept_frame_are_mitred() -> None:
     rail = polyline([(0, 0), (0, 1), (1, 1), (1, 0)], closed=True)
     frame = sweep(rail, rectangle(0.1, 0.2))
