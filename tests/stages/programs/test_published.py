@@ -12,6 +12,7 @@ import pytest
 from stages.programs.parameters import Parameter
 from stages.programs.program import Constraint, find_program, program_names
 from stages.programs.rules import Rule
+from stages.programs.sampling import cells
 from stages.programs.schema import Schema
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "geocode"
@@ -70,6 +71,8 @@ def test_published_constraints_are_rules(domain: str) -> None:
 @pytest.mark.parametrize("domain", [each for each in DOMAINS if each in program_names()])
 def test_a_program_has_the_published_parameters(domain: str) -> None:
     table, program = published(domain), find_program(domain)
+    assert 30 * len(cells(program)) == table["train_size_30_variations"]
+    assert 3 * len(cells(program)) == table["val_or_test_size_3_variations"]
     assert [each.name for each in program.parameters] == [row["name"] for row in table["params"]]
     for each, row in zip(program.parameters, table["params"], strict=True):
         np.testing.assert_allclose(np.array(each.values, dtype=float), row["values"], atol=1e-4, err_msg=each.name)
