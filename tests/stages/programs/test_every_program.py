@@ -37,7 +37,7 @@ def pieces(parts: Sequence[Part]) -> int:
 
 
 def random_values(program: Program, count: int, between: bool) -> list[dict[str, float]]:
-    """Random values that keep the constraints, whether or not parts meet that shall stay apart."""
+    """Random values that keep the constraints and the parts apart."""
     sampler = Sampler(program, Share(), between)
     rng = np.random.default_rng(11)
     return [sampler.find(None, rng) for _ in range(count)]
