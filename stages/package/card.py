@@ -23,6 +23,15 @@ MADE = {
 }
 """How the samples of each producer come about."""
 
+SPLITS = {
+    "variations": "Samples whose shape graphs are equal stand in one split.",
+    "programs": "No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike up "
+    "to their continuous parameters stand in one split; where every value of every parameter is sampled, all splits "
+    "have all values, as published.",
+    "shapeassembly": "Samples of programs that are alike up to their numbers stand in one split.",
+}
+"""What keeps the splits apart, for each producer."""
+
 MEMBERS = {
     "glb": "The mesh: glTF 2.0, one node a part, named by its label (`tower.000`), equal parts sharing one mesh. Node "
     "`extras` hold `type` and `instance`.",
@@ -96,8 +105,7 @@ def card(
         "## What is in it",
         _split_table(splits, shards),
         _source_table(sources, rows),
-        "Samples of one structure (an equal shape graph, an equal program up to its continuous parameters) stand in "
-        "one split.",
+        SPLITS[producer],
         "## A sample",
         _member_table([str(member) for member in shards[0]["members"]]),
         "All coordinates are in the units of the kit or program and upright: y points up, in the mesh, the points and "

@@ -21,7 +21,7 @@ class Sample:
     key: unique in its dataset, without a dot; split: `train`, `val` or `test`; producer: the stage that made it;
     kit: name of the kit that its assembly refers to, or of the program or category that its text belongs to;
     graph: hex digest of its structure, for a kit that of its canonical type-coloured shape graph (equal exactly for
-    isomorphic graphs of one kit): samples of one kit that share it stand in one split;
+    isomorphic graphs of one kit), for a program that of its discrete part;
     lineage: JSON, how it was made (parents, cut, transform); assembly: its parts, for a kit;
     text: the producer's own text that the shape is made from (a program, its parameters); empty for a kit.
     """
