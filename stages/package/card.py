@@ -25,8 +25,8 @@ MADE = {
 
 SPLITS = {
     "variations": "Samples whose shape graphs are equal stand in one split.",
-    "programs": "No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike up "
-    "to their continuous parameters stand in one split; where every value of every parameter is sampled, all splits "
+    "programs": "No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike "
+    "up to their continuous parameters stand in one split; where every value of every parameter is sampled, all splits "
     "have all values, as published.",
     "shapeassembly": "Samples of programs that are alike up to their numbers stand in one split.",
 }
