@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 DATA_WAY = [
     "shape",
+    "physics",
     "views",
     "exemplars",
     "variations",
