@@ -20,7 +20,7 @@ from stages.shape.sample import read_samples
 from stages.strings.alphabet import make_alphabet
 from stages.strings.grammar import check
 
-STAGES = ("exemplars", "variations", "strings", "points", "sketches", "package")
+STAGES = ("exemplars", "variations", "validity", "strings", "points", "sketches", "package")
 
 pytestmark = pytest.mark.slow
 

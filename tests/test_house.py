@@ -19,6 +19,7 @@ DATA_WAY = [
     "programs",
     "shapeassembly",
     "collection",
+    "validity",
     "strings",
     "points",
     "sketches",

@@ -22,6 +22,9 @@ COLUMNS = {
     "contacts": "int32",
     "cycles": "int32",
     "types": "int32",
+    "rooted": "bool",
+    "stable": "bool",
+    "margin": "float64",
     "text": "string",
 }
 """Columns and their Arrow types. `shard` is relative to the dataset's folder; the `bytes` bytes at `offset` of that

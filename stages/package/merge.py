@@ -26,9 +26,10 @@ TEXT = "txt"
 
 
 def merged_stages(producer: str) -> tuple[str, ...]:
-    """The stages whose members a sample of this producer gets, in this order; the `json` of the points goes into the
-    sample's own. What is not made of kits brings its own text."""
-    return ("points", "sketches", "strings") if producer == KIT_PRODUCER else ("points", "sketches")
+    """The stages whose members a sample of this producer gets, in this order; the `json` of validity and points
+    goes into the sample's own. What is not made of kits brings its own text."""
+    stages = ("validity", "points", "sketches")
+    return (*stages, "strings") if producer == KIT_PRODUCER else stages
 
 
 def merge_shard(task: Task) -> Outcome:
@@ -50,13 +51,14 @@ def merge_shard(task: Task) -> Outcome:
             for sample, made in _samples(task, collection):
                 shape = collection.shape(sample)
                 shape = replace(shape, assembly=replace(shape.assembly, poses=rounded(shape.assembly.poses)))
+                judged = json.loads(made["validity"].pop("json"))
                 points = json.loads(made["points"].pop("json"))
                 members = {"glb": glb_bytes(shape)}
                 for stage_members in made.values():
                     members.update(stage_members)
                 members.setdefault(TEXT, sample.text.encode())
                 text = sample.text or members[TEXT].decode().split("\n", 1)[0]
-                record = describe_sample(sample, shape, text, points, views)
+                record = describe_sample(sample, shape, text, judged, points, views)
                 members["json"] = json_bytes(record)
                 if members_of_all and list(members) != members_of_all:
                     raise ShardFailed(f"{sample.key} has members {list(members)}, others have {members_of_all}")
@@ -137,5 +139,6 @@ def _row(record: Mapping[str, Any], path: str, offset: int, members: Mapping[str
         "offset": offset,
         "bytes": sum(sizes),
         **record["counts"],
+        **{name: record["physics"][name] for name in ("rooted", "stable", "margin")},
         "text": record["text"],
     }

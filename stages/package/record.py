@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,16 +21,22 @@ DECIMALS = 12
 
 
 def describe_sample(
-    sample: Sample, shape: Shape, text: str, points: Mapping[str, Any], views: Sequence[str]
+    sample: Sample,
+    shape: Shape,
+    text: str,
+    judged: Mapping[str, Any],
+    points: Mapping[str, Any],
+    views: Sequence[str],
 ) -> dict[str, Any]:
-    """What the JSON says. `text` is the producer's own: canonical string, parameters or program; `points` says how
+    """What the JSON says. `text` is the producer's own: canonical string, parameters or program; `judged` is
+    its physical validity and which of its parts touch; `points` says how
     the cloud was made; `views` names the views of the sketches.
 
     Nothing is null or empty: loaders guess a field's type from the first samples they see. The lineage differs from
     sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it. `type` is
     the index of a part's label.
     """
-    parts = shape.assembly
+    parts = replace(shape.assembly, edges=np.array(judged["contacts"], dtype=np.int32).reshape(-1, 2))
     return {
         "key": sample.key,
         "split": sample.split,
@@ -52,6 +59,7 @@ def describe_sample(
             "cycles": cycle_count(parts),
             "types": len(set(shape.part_labels.tolist())),
         },
+        "physics": dict(judged["physics"]),
         "bounds": rounded(shape_bounds(shape)).tolist(),
         "text": text,
         "points": dict(points),

@@ -16,7 +16,7 @@ from stages.shape.arrays import FloatArray
 
 __all__ = ["solve_interior"]
 
-VERB=0
+VERB = 0
 ROUNDS = 100
 EXACT = 1e-6
 """Largest residual of any equation at the end; forces and loads are to be of the order of 1."""
@@ -51,7 +51,8 @@ def solve_interior(
     for _ in range(ROUNDS):
         left = system.residuals(now, costs)
         gap = now.gap()
-        if VERB: print(_,now.f,gap,[np.abs(e).max() for e in left])
+        if VERB:
+            print(_, now.f, gap, [np.abs(e).max() for e in left])
         if gap < GAP and max(np.abs(each).max() for each in left) < EXACT:
             return now.f, now.y[rows]
         system.factor(now)

@@ -13,6 +13,7 @@ from stages.physics.settings import PhysicsConfig, Requirements
 from stages.physics.solids import Placed, Solids
 from stages.physics.stability import components, stability, standing_points, tipping_angle
 from stages.physics.structure import ground_share, mirror_score
+from stages.shape.arrays import IntArray
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 
@@ -58,6 +59,12 @@ class Judge:
         """Whether every part is connected to the ground (shapeassembly App. E), and nothing more."""
         placed = self._placed(assembly)
         return not _floating(placed, self._connected(placed, assembly), self.config).any()
+
+    def contacts(self, assembly: Assembly) -> IntArray:
+        """The pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order: those that the
+        assembly has, and those at most `config.touching` apart."""
+        placed = self._placed(assembly)
+        return self._touch.connected(placed, self.config.touching * placed.diagonal, assembly.edges)
 
     def validity(self, assembly: Assembly) -> Validity:
         """Everything. Raises ValueError for a shape without parts, extent or weight."""

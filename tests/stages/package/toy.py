@@ -18,12 +18,14 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.collection.shards import collection_shards
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
+from stages.physics.settings import PhysicsConfig
 from stages.points.stage import STAGE as POINTS
 from stages.points.stage import PointsConfig
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
 from stages.sketches.settings import SketchesConfig, SketchView
+from stages.validity.stage import STAGE as VALIDITY
 from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
 
 BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -165,6 +167,7 @@ TOY_STAGES: Mapping[str, Stage] = {
         "strings", 1, OtherNoConfig, ("exemplars", "variations"), collection_shards, _make_strings, _no_bytes
     ),
     "points": POINTS,
+    "validity": VALIDITY,
     "sketches": Stage(
         "sketches", 1, SketchesConfig, ("exemplars", "variations"), collection_shards, _make_sketches, _no_bytes
     ),
@@ -179,6 +182,7 @@ def toy_config(shards: int = 8) -> Config:
         "exemplars": NoConfig(),
         "variations": ToyConfig(shards=shards),
         "strings": OtherNoConfig(),
+        "validity": PhysicsConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right"))),
         "package": PackageConfig(previewed=2),

@@ -1,0 +1,1 @@
+"""Each sample of a collection is judged: does it stand? What is found becomes fields of its record."""

@@ -1,0 +1,115 @@
+"""The stage validity: fields of every sample, contacts of parts made from a text, what has no body is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.config import Config, StrictModel
+from pipeline.places import Places
+from pipeline.run import run_stage
+from pipeline.shards import ShardWriter, read_shard
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.physics.settings import PhysicsConfig
+from stages.programs.program import find_program
+from stages.shape.kit import Assembly
+from stages.shape.kit_files import write_kit
+from stages.shape.sample import Sample, write_sample
+from stages.validity.stage import STAGE
+from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.views.solids import box, kit_of, part_type, posed
+
+STOOL = "tests.stages.programs.stool"
+
+
+class KitsConfig(StrictModel):
+    """Nothing to set."""
+
+
+class SamplesConfig(StrictModel):
+    """Nothing to set."""
+
+
+def make_kit(task: Task) -> Outcome:
+    thread = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2]], dtype=np.int32)
+    with task.output("solids.json") as text, task.output("solids.tar") as arrays:
+        write_kit(kit_of(part_type("box", box()), part_type("thread", thread)), text, arrays)
+    return Outcome(1)
+
+
+def small(_: Plan) -> int:
+    return 1000
+
+
+def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
+    """The json of each sample and the rejects by reason, of a collection of `samples` of one producer."""
+
+    def make_samples(task: Task) -> Outcome:
+        with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+            for sample in samples:
+                write_sample(writer, sample)
+        return Outcome(len(samples), {"split": "train", "samples": len(samples)})
+
+    def plan(_: Plan) -> list[Shard]:
+        return [Shard("toys-train-000000")]
+
+    producer = samples[0].producer
+    stages: dict[str, Stage] = {
+        "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda _: [Shard("solids")], make_kit, small),
+        "variations": Stage("variations", 1, SamplesConfig, (), lambda _: [], make_samples, small),
+        **ABSENT_STAGES,
+    }
+    stages[producer] = Stage(producer, 1, SamplesConfig, (), plan, make_samples, small)
+    stages["validity"] = STAGE
+    sections = {
+        "exemplars": KitsConfig(),
+        "variations": SamplesConfig(),
+        **ABSENT_SECTIONS,
+        "validity": PhysicsConfig(),
+    }
+    config = Config(name="toys", version="1.0.0", seed=5, sections=sections, path=Path("toys.yaml"))
+    for name in stages:
+        assert not run_stage(name, stages, config, Places(out, "toys"), workers=1).failed
+    found = read_shard(next(out.rglob("validity/**/toys-train-000000.tar")))
+    record = json.loads(next(out.rglob("validity/**/records/toys-train-000000.json")).read_text())
+    return {key: json.loads(members["json"]) for key, members in found}, record["rejects"]
+
+
+def boxes(key: str, *offsets: tuple[float, float, float], kind: int = 0) -> Sample:
+    types = np.full(len(offsets), kind, dtype=np.int16)
+    assembly = Assembly(types, posed(*offsets), np.empty((0, 2), dtype=np.int32))
+    return Sample(key, "train", "variations", "solids", "0" * 64, {}, assembly)
+
+
+def test_a_tower_stands_and_what_hangs_in_the_air_does_not(tmp_path: Path) -> None:
+    found, rejects = judged(tmp_path, boxes("tower", (0, 0, 0), (0, 1, 0)), boxes("loose", (0, 0, 0), (0, 4, 0)))
+    assert found["tower"]["physics"]["rooted"]
+    assert found["tower"]["physics"]["stable"]
+    assert not found["loose"]["physics"]["rooted"]
+    assert found["loose"]["physics"]["floating"] == 1
+    assert rejects == {}
+
+
+def test_a_sample_without_a_body_is_refused_and_counted(tmp_path: Path) -> None:
+    found, rejects = judged(tmp_path, boxes("tower", (0, 0, 0)), boxes("thread", (0, 0, 0), kind=1))
+    assert list(found) == ["tower"]
+    assert rejects == {"no body to judge": 1}
+
+
+def test_parts_that_a_program_makes_are_asked_whether_they_touch(tmp_path: Path) -> None:
+    schema = find_program(STOOL).schema
+    found, _ = judged(
+        tmp_path, Sample("stool", "train", "programs", STOOL, "0" * 64, {}, text=schema.text(schema.base))
+    )
+    assert found["stool"]["contacts"] == [[0, 1], [0, 2], [1, 3], [2, 3]]
+    assert found["stool"]["physics"]["stable"]
+
+
+@pytest.mark.parametrize("friction", [-0.1, 11.0])
+def test_friction_out_of_range_is_a_mistake(friction: float) -> None:
+    with pytest.raises(ValueError, match="friction"):
+        PhysicsConfig(friction=friction)
