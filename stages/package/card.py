@@ -140,16 +140,20 @@ def _split_table(splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> 
 
 def _source_table(sources: Mapping[str, str], rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [
-        "| made of | samples | distinct structures | parts | contacts | cycles |",
-        "| --- | ---: | ---: | --- | --- | --- |",
+        "| made of | samples | distinct structures | parts | contacts | cycles | rooted | stable |",
+        "| --- | ---: | ---: | --- | --- | --- | ---: | ---: |",
     ]
     for name, described in sources.items():
         own = [row for row in rows if row["kit"] == name]
         spans = " | ".join(_span([row[each] for row in own]) for each in ("parts", "contacts", "cycles"))
         structures = len({row["graph"] for row in own})
         title = f"{name} ({described})" if described else name
-        lines.append(f"| {title} | {len(own):,} | {structures:,} | {spans} |")
-    return "\n".join(lines) + "\n\nParts, contacts and independent cycles: least, median, most."
+        shares = " | ".join(f"{sum(row[each] for row in own) / len(own):.1%}" for each in ("rooted", "stable"))
+        lines.append(f"| {title} | {len(own):,} | {structures:,} | {spans} | {shares} |")
+    return (
+        "\n".join(lines) + "\n\nParts, contacts and independent cycles: least, median, most. Rooted: every part is "
+        "connected to the ground. Stable: the shape stands and bears small pushes, by statics on its geometry."
+    )
 
 
 def _span(numbers: Sequence[int]) -> str:
