@@ -35,7 +35,9 @@ SUPPORT = "handles_state == 1 and is_handles_support"
 PARAMETERS = (
     continuous("scale x", 0.5, 2.0, 10, 1.0, "size", "Width of the seat, in half metres."),
     continuous("scale y", 0.5, 2.0, 10, 1.0, "size", "Depth of the seat, in half metres."),
-    continuous("scale z", 0.5, 2.0, 10, 1.0, "size", "Height of the posts of the back above the ground, in metres."),
+    continuous(
+        "scale z", 0.5, 2.0, 10, 1.0, "size", "Height of the posts of the back above the ground, in 0.95 metres."
+    ),
     continuous("bevel_rails", 0.0, 1.0, 3, 0.0, "back", "Section of the rails, from square to round.", OPEN),
     discrete("pillow_state", 0, 2, 1, "seat", "No cushion, a flat one or a puffed one."),
     discrete(

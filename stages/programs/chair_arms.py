@@ -45,12 +45,13 @@ def _arm(plan: Plan, state: int) -> Curve:
     side = 0.5 * plan.width + bow * float(values["handles_mid_pos_x_pct"])
     if state == 2:
         front += 0.2 * plan.depth
-    forward = start[2] + (front - start[2]) * float(values["handles_mid_pos_y_pct"])
+    forward = start[2] + (front - start[2]) * (0.1 + 0.8 * float(values["handles_mid_pos_y_pct"]))
     middle = np.array([side, start[1] + lift, forward])
     if state == 2:
         return bezier([start, middle, middle, _foot(plan)], count=16)
     end = np.array([plan.x + bow * float(values["handles_edge_pos_x_pct"]), start[1], front])
-    return bezier([start, middle, middle, end], count=14)
+    # Gently towards the middle, or the free end would be a hook where both are near each other.
+    return bezier([start, start + (middle - start) / 1.5, end + (middle - end) / 1.5, end], count=12)
 
 
 def _foot(plan: Plan) -> FloatArray:

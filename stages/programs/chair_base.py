@@ -57,59 +57,50 @@ def _width(plan: Plan, share: FloatArray) -> FloatArray:
     return width
 
 
-def _offset(plan: Plan, name: str) -> float:
-    return float(plan.values[f"monoleg_bezier_{name}"])
+def _handles(plan: Plan) -> FloatArray:
+    """The handles of the curve of a single foot, float64 (2, 2): relative reach, and share of the way down."""
+    return np.array(
+        [
+            [
+                0.12 + 0.88 * float(plan.values[f"monoleg_bezier_{end}_handle_x_offset"]),
+                float(plan.values[f"monoleg_bezier_{end}_handle_z_pct"]),
+            ]
+            for end in ("start", "end")
+        ]
+    )
 
 
 def _pedestal(plan: Plan) -> Part:
-    """A turned foot whose outline is the Bezier curve; its section goes from square to round."""
-    reach = 0.47 * min(plan.width, plan.depth)
-    foot, top = 0.5 * plan.unit, plan.seat_middle
-    height = top - foot
-    outline = bezier(
-        [
-            [reach * (0.12 + 0.58 * _offset(plan, "start_x_offset")), top],
-            [
-                reach * (0.12 + 0.88 * _offset(plan, "start_handle_x_offset")),
-                top - height * _offset(plan, "start_handle_z_pct"),
-            ],
-            [
-                reach * (0.12 + 0.88 * _offset(plan, "end_handle_x_offset")),
-                top - height * _offset(plan, "end_handle_z_pct"),
-            ],
-            [reach * (0.4 + 0.6 * _offset(plan, "end_x_offset")), foot],
-        ],
-        count=14,
-    ).points[::-1]
-    radii, heights = np.concatenate([outline[:1, 0], outline[:, 0]]), np.concatenate([[0.0], outline[:, 1]])
-    return Part(
-        "pedestal", _upright(square_circle(float(plan.values["legs_bevel"]), 2.0, count=24), heights, radii), WOOD
+    """A turned foot whose outline is the Bezier curve; its section goes from square to round and is long where the
+    seat is."""
+    lip = 0.5 * plan.unit
+    top = 0.12 + 0.58 * float(plan.values["monoleg_bezier_start_x_offset"])
+    ground = 0.4 + 0.6 * float(plan.values["monoleg_bezier_end_x_offset"])
+    outline = bezier([[top, 0.0], *_handles(plan), [ground, 1.0]], count=14).points[::-1]
+    heights = plan.seat_middle + (lip - plan.seat_middle) * outline[:, 1]
+    narrow = min(plan.width, plan.depth)
+    profile = square_circle(
+        float(plan.values["legs_bevel"]),
+        0.94 * (narrow * plan.width) ** 0.5,
+        0.94 * (narrow * plan.depth) ** 0.5,
+        count=24,
     )
+    # The lip stands upright on the ground: a foot that runs out flat has no sharp edge.
+    radii = np.concatenate([outline[:1, 0], outline[:, 0]])
+    return Part("pedestal", _upright(profile, np.concatenate([[0.0], heights]), radii), WOOD)
 
 
 def _star(plan: Plan) -> list[Part]:
     """A column on a hub from which curved legs reach out to glides on the ground."""
     unit, values = plan.unit, plan.values
-    reach = 0.5 * min(plan.width, plan.depth)
+    reach = 0.5 * (plan.width * plan.depth) ** 0.5
     level = plan.seat_middle * float(values["monoleg_tent_pct"])
-    hub = unit * 0.6 + 0.45 * reach * _offset(plan, "start_x_offset")
-    end, foot = 0.5 * reach + 0.6 * reach * _offset(plan, "end_x_offset"), 0.5 * unit
-    drop = level - foot
+    hub = 0.6 * unit + 0.45 * reach * float(values["monoleg_bezier_start_x_offset"])
+    end, foot = reach * (0.55 + 0.55 * float(values["monoleg_bezier_end_x_offset"])), 0.5 * unit
+    # The upper handle stays in the upper part and the lower one in the lower, or thick legs would cut themselves.
+    handles = _handles(plan) * [reach, 0.75] + [[0.0, 0.0], [0.0, 0.25]]
     rail = bezier(
-        [
-            [0.0, level, hub],
-            [
-                0.0,
-                level - 0.75 * drop * _offset(plan, "start_handle_z_pct"),
-                reach * (0.12 + 0.88 * _offset(plan, "start_handle_x_offset")),
-            ],
-            [
-                0.0,
-                level - drop * (0.25 + 0.75 * _offset(plan, "end_handle_z_pct")),
-                reach * (0.12 + 0.88 * _offset(plan, "end_handle_x_offset")),
-            ],
-            [0.0, foot, end],
-        ],
+        [[0.0, level + (foot - level) * down, out] for out, down in [(hub, 0.0), *handles.tolist(), (end, 1.0)]],
         count=12,
     )
     profile = square_circle(float(values["legs_bevel"]), 0.92 * unit)

@@ -24,7 +24,7 @@ OUTLINE = 32
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What the values mean in metres: a chair of scale 1 is half a metre wide and deep and a metre high.
+    """What the values mean in metres: a chair of scale 1 is half a metre wide and deep and 0.95 high.
 
     The seat's middle stands over the origin. `x`, `z`: how far from it, to each side, the legs and the posts of the
     back stand, within the seat's outline; a rounder seat brings them together. `unit`: thickness of a post.
@@ -47,7 +47,7 @@ class Plan:
 
     @cached_property
     def height(self) -> float:
-        return float(self.values["scale z"])
+        return 0.95 * float(self.values["scale z"])
 
     @cached_property
     def seat_top(self) -> float:
