@@ -18,7 +18,7 @@ WOOD, SEAT, METAL = (151, 104, 66), (176, 128, 84), (92, 96, 102)
 FABRIC, LEATHER = (64, 104, 122), (118, 66, 50)
 """The colours of what is turned or sawn, of the seat board, of a swivel base, of upholstery and of arm pads."""
 
-OUTLINE = 32
+OUTLINE = 40
 """Points of the seat's outline."""
 
 
