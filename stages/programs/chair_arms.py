@@ -21,7 +21,7 @@ def arm_parts(plan: Plan) -> list[Part]:
         return []
     width = 1.4 * plan.unit * float(values["handles_profile_width"])
     height = 1.05 * plan.unit * float(values["handles_profile_height"])
-    arm = _arm(plan, state)
+    arm = _arm(plan, state, width)
     profile = square_circle(0.4, width, height, 12)
     parts = [Part("arm", sweep(arm, profile, up=UP, caps=("flat", "round" if state == 1 else "flat")), WOOD)]
     if state == 1 and values["is_handles_support"]:
@@ -31,7 +31,7 @@ def arm_parts(plan: Plan) -> list[Part]:
     return symmetric(parts, "x")
 
 
-def _arm(plan: Plan, state: int) -> Curve:
+def _arm(plan: Plan, state: int, width: float) -> Curve:
     """The right arm from the post forwards."""
     values = plan.values
     above = 2.2 * plan.unit
@@ -39,6 +39,7 @@ def _arm(plan: Plan, state: int) -> Curve:
     rest = plan.back_height - above
     share = float(values["handles_base_pos_z_pct"])
     start = plan.back(plan.x, (above + rest * share) / plan.back_height)
+    start[0] += 0.3 * plan.unit
     bow = min(0.3 * plan.width, 0.5 * plan.depth)
     front = 0.95 * plan.z
     lift = (float(values["handles_mid_pos_z_pct"]) - 0.5) * 0.8 * rest * min(share, 0.45)
@@ -48,22 +49,23 @@ def _arm(plan: Plan, state: int) -> Curve:
     forward = start[2] + (front - start[2]) * (0.1 + 0.8 * float(values["handles_mid_pos_y_pct"]))
     middle = np.array([side, start[1] + lift, forward])
     if state == 2:
-        return bezier([start, middle, middle, _foot(plan)], count=16)
+        return bezier([start, middle, middle, _foot(plan, width)], count=16)
     end = np.array([plan.x + bow * float(values["handles_edge_pos_x_pct"]), start[1], front])
     # Gently towards the middle, or the free end would be a hook where both are near each other.
     return bezier([start, start + (middle - start) / 1.5, end + (middle - end) / 1.5, end], count=12)
 
 
-def _foot(plan: Plan) -> FloatArray:
-    """Where an arm or its support is fixed to the right side of the seat, (3,)."""
+def _foot(plan: Plan, width: float) -> FloatArray:
+    """Where an arm or a support of this width is sunk into the right side of the seat, beside the cushion, (3,)."""
     z = plan.z * (2.0 * float(plan.values["handles_bottom_pos_along_seat_pct"]) - 1.0)
-    return np.array([plan.rim(z) + 0.15 * plan.unit, plan.seat_middle, z])
+    return np.array([plan.rim(z) + 0.5 * width - 0.2 * plan.unit, plan.seat_middle, z])
 
 
 def _support(plan: Plan, arm: Curve) -> Part:
     """The post below the right arm."""
     values = plan.values
-    foot, top = _foot(plan), arm.at(float(values["handles_support_top_pos"]))
+    size = plan.unit * float(values["handles_support_thickness"])
+    foot, top = _foot(plan, size), arm.at(float(values["handles_support_top_pos"]))
     bow = np.array(
         [
             0.3 * min(plan.width, plan.depth) * float(values["handles_support_mid_x"]),
@@ -73,14 +75,13 @@ def _support(plan: Plan, arm: Curve) -> Part:
     )
     middle = (foot + top) / 2.0 + bow
     rail = bezier([foot, middle, middle, top], count=8)
-    size = plan.unit * float(values["handles_support_thickness"])
     return Part("arm support", sweep(rail, square_circle(0.5, size, count=12)), WOOD)
 
 
 def _pad(plan: Plan, arm: Curve, state: int, width: float, height: float) -> Part:
     """The pad on top of the right arm."""
     cover = float(plan.values["handles_cusion_cover_pct"])
-    middle, half = (0.5, 0.12 + 0.33 * cover) if state == 1 else (0.32, 0.08 + 0.19 * cover)
+    middle, half = (0.53, 0.11 + 0.31 * cover) if state == 1 else (0.36, 0.08 + 0.19 * cover)
     start, end = middle - half, middle + half
     profile = square_circle(0.6, 1.2 * width, 0.7 * plan.unit, 12).moved(0.0, 0.5 * height + 0.1 * plan.unit)
     lean = arm.frames(start, up=UP)[:3, 1]
