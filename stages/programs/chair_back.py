@@ -99,7 +99,7 @@ def _cross_rails(plan: Plan) -> list[Part]:
     room = _room(plan)
     low, high = room * float(values["cr_offset_bottom"]), room * float(values["cr_offset_top"])
     pitch = plan.back_height * (high - low) / (count - 1)
-    height = min(size * min(0.9 * plan.unit, 0.045 * plan.back_height), (0.25 + 0.3 * size) * pitch)
+    height = min(size * min(0.9 * plan.unit, 0.055 * plan.back_height), (0.25 + 0.3 * size) * pitch)
     profile = square_circle(float(values["bevel_rails"]), 0.55 * plan.unit * float(values["cr_scale_y"]), height, 12)
     lens = 1.0 - 0.34 * float(values["cr_shape_1"]) * ACROSS**2
     parts = []

@@ -42,7 +42,7 @@ def _four_legs(plan: Plan) -> list[Part]:
     foot = 0.35 * top * float(plan.values["back_leg_bottom_y_offset_pct"])
     centers = np.stack([np.full(RINGS, plan.x), top * (1.0 - share), np.full(RINGS, plan.z)], axis=1)
     behind = centers * [1.0, 1.0, -1.0]
-    behind[:, 2] -= 3.0 * share * (1.0 - share) * middle + share**3 * foot
+    behind[:, 2] -= 3.0 * share * (1.0 - share) * middle + share**2 * foot
     profile = square_circle(float(plan.values["legs_bevel"]), 1.2 * plan.unit)
     width = _width(plan, share)
     return symmetric([Part("leg", post(each, profile, width), WOOD) for each in (centers, behind)], "x")

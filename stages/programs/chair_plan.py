@@ -92,7 +92,7 @@ class Plan:
         u = np.asarray(u, dtype=np.float64)
         middle = 0.22 * float(self.values["back_frame_mid_y_offset_pct"])
         top = 0.35 * float(self.values["back_frame_top_y_offset_pct"])
-        leaning: FloatArray = self.back_height * (3.0 * u * (1.0 - u) * middle + u**3 * top)
+        leaning: FloatArray = self.back_height * (3.0 * u * (1.0 - u) * middle + u * u * top)
         return leaning
 
     def up(self, u: float) -> FloatArray:
