@@ -34,8 +34,8 @@ def arm_parts(plan: Plan) -> list[Part]:
 def _arm(plan: Plan, state: int, width: float) -> Curve:
     """The right arm from the post forwards."""
     values = plan.values
+    # Arms leave room for a cushion.
     above = 2.2 * plan.unit
-    """Room for a cushion below the arm."""
     rest = plan.back_height - above
     share = float(values["handles_base_pos_z_pct"])
     start = plan.back(plan.x, (above + rest * share) / plan.back_height)

@@ -19,7 +19,7 @@ FABRIC, LEATHER = (64, 104, 122), (118, 66, 50)
 """The colours of what is turned or sawn, of the seat board, of a swivel base, of upholstery and of arm pads."""
 
 OUTLINE = 40
-"""Points of the seat's outline."""
+"""Points of the seat's outline, a multiple of 8: the first stands at its corner."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,31 +82,32 @@ class Plan:
         return float(self.outline.points[0, 1]) - 0.72 * self.unit
 
     def rim(self, z: float) -> float:
-        """How far the outline reaches to the side at a depth."""
-        eighth = OUTLINE // 8
-        right = np.roll(self.outline.points, 2 * eighth, axis=0)[: 2 * eighth + 1]
+        """How far the seat reaches to the side at a depth between its corners."""
+        quarter = OUTLINE // 4
+        right = np.roll(self.outline.points, quarter, axis=0)[: quarter + 1]
         return float(np.interp(z, right[:, 1], right[:, 0]))
 
-    def lean(self, u: npt.ArrayLike) -> FloatArray:
-        """How far the back leans behind its foot at relative heights above the seat."""
-        u = np.asarray(u, dtype=np.float64)
-        middle = 0.22 * float(self.values["back_frame_mid_y_offset_pct"])
-        top = 0.35 * float(self.values["back_frame_top_y_offset_pct"])
-        leaning: FloatArray = self.back_height * (3.0 * u * (1.0 - u) * middle + u * u * top)
-        return leaning
+    @cached_property
+    def _leaning(self) -> tuple[float, float]:
+        """How far the back leans, as shares of its height: by its bend half way up, and by its top."""
+        middle, top = (float(self.values[f"back_frame_{place}_y_offset_pct"]) for place in ("mid", "top"))
+        return 0.66 * middle, 0.35 * top
 
     def up(self, u: float) -> FloatArray:
         """The direction in which the back rises at a relative height, of length 1, float64 (3,)."""
-        slope = (float(self.lean(u + 1e-4)) - float(self.lean(u - 1e-4))) / (2e-4 * self.back_height)
+        bend, recline = self._leaning
+        slope = bend * (1.0 - 2.0 * u) + recline * 2.0 * u
         return np.array([0.0, 1.0, -slope]) / np.hypot(1.0, slope)
 
     def back(self, x: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
         """Points of the surface in which all of the back lies, float64 (..., 3), at distances x from the middle and
         relative heights u. It stands straight on the seat between the posts, and bows back the more the higher."""
         x, u = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(u, dtype=np.float64))
+        bend, recline = self._leaning
         bow = 0.4 * float(self.values["curvature"]) * min(self.x, 0.5 * self.depth)
-        across = np.maximum(1.0 - (x / self.x) ** 2, 0.0) * (1.0 - (1.0 - np.minimum(u, 1.0)) ** 2)
-        return np.stack([x, self.seat_top + self.back_height * u, -self.z - self.lean(u) - bow * across], axis=-1)
+        behind = self.back_height * (bend * u * (1.0 - u) + recline * u * u)
+        behind += bow * np.maximum(1.0 - (x / self.x) ** 2, 0.0) * (1.0 - (1.0 - np.minimum(u, 1.0)) ** 2)
+        return np.stack([x, self.seat_top + self.back_height * u, -self.z - behind], axis=-1)
 
 
 def post(centers: FloatArray, profile: Profile, scale: FloatArray) -> QuadMesh:
