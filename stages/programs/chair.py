@@ -50,7 +50,9 @@ PARAMETERS = (
     continuous("cr_scale_z", 0.3, 2.0, 6, 0.98, "back", "Height of each cross rail.", CROSS),
     continuous("cr_offset_bottom", 0.15, 0.75, 8, 0.4071, "back", "Height of the lowest cross rail.", CROSS),
     continuous("cr_offset_top", 0.35, 0.95, 8, 0.7786, "back", "Height of the highest cross rail.", CROSS),
-    continuous("cr_shape_1", 0.0, 2.0, 7, 0.0, "back", "How much cross rails narrow towards their ends.", CROSS),
+    continuous(
+        "cr_shape_1", 0.0, 2.0, 7, 0.0, "back", "How far cross rails are arched, and narrow at their ends.", CROSS
+    ),
     continuous("curvature", 0.0, 1.0, 5, 0.25, "back", "How far the back bows backwards between its posts."),
     binary("is_top_rail", True, "back", "Whether a rail joins the tops of the posts."),
     discrete("tr_fill_edge", 0, 1, 1, "back", "Whether the top rail covers the posts or fits between.", "is_top_rail"),

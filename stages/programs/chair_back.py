@@ -101,10 +101,12 @@ def _cross_rails(plan: Plan) -> list[Part]:
     pitch = plan.back_height * (high - low) / (count - 1)
     height = min(size * min(0.9 * plan.unit, 0.055 * plan.back_height), (0.25 + 0.3 * size) * pitch)
     profile = square_circle(float(values["bevel_rails"]), 0.55 * plan.unit * float(values["cr_scale_y"]), height, 12)
-    lens = 1.0 - 0.34 * float(values["cr_shape_1"]) * ACROSS**2
+    # Arched: the ends lie lower than the middle, the lowest ones still above the seat.
+    shape = float(values["cr_shape_1"])
+    drop, lens = 0.045 * shape * ACROSS**2, 1.0 - 0.15 * shape * ACROSS**2
     parts = []
     for level in np.linspace(low, high, count).tolist():
-        rail = polyline(plan.back(plan.x * ACROSS, level))
+        rail = polyline(plan.back(plan.x * ACROSS, level - drop))
         parts.append(Part("cross rail", sweep(rail, profile, _styled(rail, 1.0, lens), up=plan.up(level)), SEAT))
     return parts
 

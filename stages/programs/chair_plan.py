@@ -104,7 +104,7 @@ class Plan:
         relative heights u. It stands straight on the seat between the posts, and bows back the more the higher."""
         x, u = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(u, dtype=np.float64))
         bend, recline = self._leaning
-        bow = 0.4 * float(self.values["curvature"]) * min(self.x, 0.5 * self.depth)
+        bow = 0.5 * float(self.values["curvature"]) * min(self.x, 0.5 * self.depth)
         behind = self.back_height * (bend * u * (1.0 - u) + recline * u * u)
         behind += bow * np.maximum(1.0 - (x / self.x) ** 2, 0.0) * (1.0 - (1.0 - np.minimum(u, 1.0)) ** 2)
         return np.stack([x, self.seat_top + self.back_height * u, -self.z - behind], axis=-1)
