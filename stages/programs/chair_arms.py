@@ -40,7 +40,7 @@ def _arm(plan: Plan, state: int, width: float) -> Curve:
     share = float(values["handles_base_pos_z_pct"])
     start = plan.back(plan.x, (above + rest * share) / plan.back_height)
     start[0] += 0.3 * plan.unit
-    bow = min(0.3 * plan.width, 0.5 * plan.depth)
+    bow = 0.4 * min(plan.width, plan.depth)
     front = 0.95 * plan.z
     lift = (float(values["handles_mid_pos_z_pct"]) - 0.5) * 0.8 * rest * min(share, 0.45)
     side = 0.5 * plan.width + bow * float(values["handles_mid_pos_x_pct"])

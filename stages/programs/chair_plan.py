@@ -91,7 +91,7 @@ class Plan:
     def _leaning(self) -> tuple[float, float]:
         """How far the back leans, as shares of its height: by its bend half way up, and by its top."""
         middle, top = (float(self.values[f"back_frame_{place}_y_offset_pct"]) for place in ("mid", "top"))
-        return 0.66 * middle, 0.35 * top
+        return 0.48 * middle, 0.35 * top
 
     def up(self, u: float) -> FloatArray:
         """The direction in which the back rises at a relative height, of length 1, float64 (3,)."""
