@@ -1,0 +1,118 @@
+"""The plan of a chair: the measures that all its parts are attached to (geocode §3.1, "structural integrity")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.programs.curves import Profile, QuadMesh, loft_rings, square_circle
+from stages.programs.schema import Values
+from stages.shape.arrays import FloatArray
+
+__all__ = ["FABRIC", "LEATHER", "METAL", "SEAT", "WOOD", "Plan", "post"]
+
+WOOD, SEAT, METAL = (151, 104, 66), (176, 128, 84), (92, 96, 102)
+FABRIC, LEATHER = (64, 104, 122), (118, 66, 50)
+"""The colours of what is turned or sawn, of the seat board, of a swivel base, of upholstery and of arm pads."""
+
+OUTLINE = 40
+"""Points of the seat's outline, a multiple of 8: the first stands at its corner."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What the values mean in metres: a chair of scale 1 is half a metre wide and deep and 0.95 high.
+
+    The seat's middle stands over the origin. `x`, `z`: how far from it, to each side, the legs and the posts of the
+    back stand, within the seat's outline; a rounder seat brings them together. `unit`: thickness of a post.
+    """
+
+    values: Values
+
+    @cached_property
+    def unit(self) -> float:
+        """Thicknesses grow with the chair, but much less."""
+        return 0.036 * float(self.values["scale x"] * self.values["scale y"] * self.values["scale z"]) ** (1.0 / 6.0)
+
+    @cached_property
+    def width(self) -> float:
+        return 0.5 * float(self.values["scale x"])
+
+    @cached_property
+    def depth(self) -> float:
+        return 0.5 * float(self.values["scale y"])
+
+    @cached_property
+    def height(self) -> float:
+        return 0.95 * float(self.values["scale z"])
+
+    @cached_property
+    def seat_top(self) -> float:
+        """Between a fourth of the chair's height and three fifths of it."""
+        return self.height * (0.16 + 0.44 * float(self.values["seat_pos"]))
+
+    @cached_property
+    def seat_thickness(self) -> float:
+        return 1.1 * self.unit
+
+    @cached_property
+    def seat_middle(self) -> float:
+        """The height to which what is attached from above or below is sunk into the seat."""
+        return self.seat_top - 0.55 * self.seat_thickness
+
+    @cached_property
+    def back_height(self) -> float:
+        """From the seat to the top of the posts."""
+        return self.height - self.seat_top
+
+    @cached_property
+    def outline(self) -> Profile:
+        """The seat from above; its first point is the corner at +x, +z."""
+        return square_circle(float(self.values["seat_shape"]), self.width, self.depth, OUTLINE)
+
+    @cached_property
+    def x(self) -> float:
+        return float(self.outline.points[0, 0]) - 0.72 * self.unit
+
+    @cached_property
+    def z(self) -> float:
+        return float(self.outline.points[0, 1]) - 0.72 * self.unit
+
+    def rim(self, z: float) -> float:
+        """How far the seat reaches to the side at a depth between its corners."""
+        quarter = OUTLINE // 4
+        right = np.roll(self.outline.points, quarter, axis=0)[: quarter + 1]
+        return float(np.interp(z, right[:, 1], right[:, 0]))
+
+    @cached_property
+    def _leaning(self) -> tuple[float, float]:
+        """How far the back leans, as shares of its height: by its bend half way up, and by its top."""
+        middle, top = (float(self.values[f"back_frame_{place}_y_offset_pct"]) for place in ("mid", "top"))
+        return 0.48 * middle, 0.35 * top
+
+    def up(self, u: float) -> FloatArray:
+        """The direction in which the back rises at a relative height, of length 1, float64 (3,)."""
+        bend, recline = self._leaning
+        slope = bend * (1.0 - 2.0 * u) + recline * 2.0 * u
+        return np.array([0.0, 1.0, -slope]) / np.hypot(1.0, slope)
+
+    def back(self, x: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
+        """Points of the surface in which all of the back lies, float64 (..., 3), at distances x from the middle and
+        relative heights u. It stands straight on the seat between the posts, and bows back the more the higher."""
+        x, u = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(u, dtype=np.float64))
+        bend, recline = self._leaning
+        bow = 0.5 * float(self.values["curvature"]) * min(self.x, 0.5 * self.depth)
+        behind = self.back_height * (bend * u * (1.0 - u) + recline * u * u)
+        behind += bow * np.maximum(1.0 - (x / self.x) ** 2, 0.0) * (1.0 - (1.0 - np.minimum(u, 1.0)) ** 2)
+        return np.stack([x, self.seat_top + self.back_height * u, -self.z - behind], axis=-1)
+
+
+def post(centers: FloatArray, profile: Profile, scale: FloatArray) -> QuadMesh:
+    """A post with level sections around centers (n, 3) from the lowest to the highest, each scaled by `scale` (n,):
+    it stands flat on the ground however it leans."""
+    flat = np.zeros((len(profile), 3))
+    flat[:, 0], flat[:, 2] = profile.points[:, 0], -profile.points[:, 1]
+    return loft_rings(centers[:, None] + scale[:, None, None] * flat)
