@@ -26,12 +26,14 @@ class Cap:
 
 def polygon_cap(points: FloatArray) -> Cap:
     """A filling of a simple counter-clockwise polygon, float64 (k, 2): from the middle where all of it is seen."""
+    from stages.programs.curves.kernels import all_seen
+
     count = len(points)
-    middle = points.mean(axis=0)
-    x, y = (points - middle).T
-    seen = bool((x * np.roll(y, -1) - y * np.roll(x, -1) > 1e-9 * (x @ x + y @ y) / count).all())
-    if seen and (count != 4 or _convex(points)):
+    seen, convex = all_seen(points)
+    if convex:
         return Cap(fan(count), count > 4)
+    if seen:
+        return Cap(_spokes(count), True)
     return Cap(_clipped(points.tobytes()), False)
 
 
@@ -47,10 +49,12 @@ def fan(count: int) -> IntArray:
     return quads.astype(np.int32)
 
 
-def _convex(points: FloatArray) -> bool:
-    arriving = points - np.roll(points, 1, axis=0)
-    leaving = np.roll(points, -1, axis=0) - points
-    return bool((arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0] > 0.0).all())
+@lru_cache(maxsize=64)
+def _spokes(count: int) -> IntArray:
+    """Triangles between an outline and its middle: of two at a notch no quad could be made."""
+    place = np.arange(count, dtype=np.int32)
+    after = np.roll(place, -1)
+    return np.stack([place, after, np.full_like(place, count), np.full_like(place, count)], axis=1)
 
 
 @lru_cache(maxsize=1024)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stages.programs.curves.frames import rail_axes
-from stages.programs.curves.vectors import dots, unit
+from stages.programs.curves.vectors import unit
 from stages.shape.arrays import BoolArray, FloatArray
 
 __all__ = ["Axis", "Curve", "Stations", "axis_index"]
@@ -76,43 +76,33 @@ class Curve:
             raise ValueError(f"a curve needs finite points of shape (n, 3) or (n, 2), these are {given.shape}")
         if given.shape[1] == 2:
             given = np.column_stack([given, np.zeros(len(given))])
-        steps = given[1:] - given[:-1]
-        lengths = np.sqrt(dots(steps, steps))
-        near = 1e-9 * max(float(lengths.sum()), 1e-300)
-        if lengths.size and lengths.min() <= near:
-            given = given[np.concatenate([[True], lengths > near])]
-        if closed and len(given) > 1 and np.abs(given[-1] - given[0]).max() <= near:
-            given = given[:-1]
+        found = Curve(given, closed)._measured if len(given) > 1 else None
+        if found is not None and found[1].min() <= 1e-9 * found[1].sum():
+            distinct = found[1] > 1e-9 * found[1].sum()
+            given = given[distinct if closed else np.concatenate([distinct, [True]])]
         if len(given) < (3 if closed else 2):
             kind = "closed curve needs three" if closed else "curve needs two"
             raise ValueError(f"a {kind} distinct points and has {len(given)}: move its points apart")
         curve = Curve(given, closed)
-        turns = curve._turns
-        if turns.size and turns.min() < TURNS_BACK - 1.0:
-            where = int(turns.argmin()) + (0 if closed else 1)
+        turns = curve._measured[2]
+        if turns.min() < TURNS_BACK - 1.0:
+            where = int(turns.argmin())
             raise ValueError(f"the curve turns back onto itself at point {where}: move that point aside, or end there")
         return curve
 
     @cached_property
-    def _segments(self) -> tuple[FloatArray, FloatArray]:
-        """Direction (m, 3) and length (m,) of each segment."""
-        points = self.points
-        steps = np.roll(points, -1, axis=0) - points if self.closed else points[1:] - points[:-1]
-        lengths = np.sqrt(dots(steps, steps))
-        return steps / lengths[:, None], lengths
+    def _measured(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Direction (m, 3), length (m,), and cosine of the turn before it (m,), of each segment; no turn is 1."""
+        from stages.programs.curves.kernels import measure
 
-    @cached_property
-    def _turns(self) -> FloatArray:
-        """Cosine of the turn at each point between two segments, (n,) of a closed curve, else (n - 2,)."""
-        directions = self._segments[0]
-        before = np.roll(directions, 1, axis=0) if self.closed else directions[:-1]
-        return dots(before, directions if self.closed else directions[1:])
+        directions, lengths, turns = measure(self.points, self.closed)
+        return directions, lengths, turns
 
     @cached_property
     def _reached(self) -> FloatArray:
         """Arc length at the start of each segment and at the end of the last, (m + 1,)."""
-        reached = np.zeros(len(self._segments[1]) + 1)
-        np.cumsum(self._segments[1], out=reached[1:])
+        reached = np.zeros(len(self._measured[1]) + 1)
+        np.cumsum(self._measured[1], out=reached[1:])
         return reached
 
     @property
@@ -129,29 +119,16 @@ class Curve:
     @cached_property
     def corners(self) -> BoolArray:
         """Whether the curve has a corner (turns by more than 30 degrees) at each point, bool (n,)."""
-        sharp = self._turns < CORNER
-        return sharp if self.closed else np.concatenate([[False], sharp, [False]])
+        sharp: BoolArray = self._measured[2] < CORNER
+        return sharp if self.closed else np.concatenate([sharp, [False]])
 
     @cached_property
     def own_stations(self) -> Stations:
         """The stations at the curve's own points. A tangent halves the turn between the segments beside it."""
-        directions = self._segments[0]
-        if len(directions) == 1:
-            zeros = np.zeros(2)
-            return Stations(self.positions, self.points, directions[[0, 0]], np.zeros((2, 3)), zeros)
-        before = np.roll(directions, 1, axis=0) if self.closed else directions[:-1]
-        after = directions if self.closed else directions[1:]
-        middle, fold = unit(before + after), after - before
-        widths = dots(fold, fold)
-        bent = widths > 1e-14
-        fold = np.where(bent[:, None], fold / np.sqrt(np.where(bent, widths, 1.0))[:, None], 0.0)
-        excess = np.minimum(np.sqrt(2.0 / (1.0 + self._turns)), SHARPEST) - 1.0
-        if self.closed:
-            return Stations(self.positions, self.points, middle, fold, excess)
-        tangents, folds, excesses = np.empty_like(self.points), np.zeros_like(self.points), np.zeros(len(self.points))
-        tangents[0], tangents[-1], tangents[1:-1] = directions[0], directions[-1], middle
-        folds[1:-1], excesses[1:-1] = fold, excess
-        return Stations(self.positions, self.points, tangents, folds, excesses)
+        from stages.programs.curves.kernels import halve_turns
+
+        directions, _, turns = self._measured
+        return Stations(self.positions, self.points, *halve_turns(directions, turns, self.closed, SHARPEST))
 
     def stations(self, positions: npt.ArrayLike) -> Stations:
         """The stations at relative positions (k,). Between smooth points the tangent turns evenly.
@@ -163,7 +140,7 @@ class Curve:
             where = where % 1.0
         elif where.size and (where.min() < -1e-9 or where.max() > 1.0 + 1e-9):
             raise ValueError(f"position {where[np.argmax(np.abs(where - 0.5))]:g} lies outside the curve, 0 to 1")
-        directions, lengths = self._segments
+        directions, lengths, _ = self._measured
         own = self.own_stations
         distance = np.clip(where, 0.0, 1.0) * self._reached[-1]
         segment = np.clip(np.searchsorted(self._reached, distance, side="right") - 1, 0, len(lengths) - 1)
@@ -225,7 +202,7 @@ class Curve:
             raise ValueError(f"the curve's {axis} is never {value:g}: it goes from {low:g} to {high:g}")
         first = int(crossed[0])
         share = 0.0 if before[first] == after[first] else before[first] / (before[first] - after[first])
-        return float((self._reached[first] + share * self._segments[1][first]) / self._reached[-1])
+        return float((self._reached[first] + share * self._measured[1][first]) / self._reached[-1])
 
     def resampled(self, count: int) -> Curve:
         """A curve of `count` segments of equal length; the corners stay, in addition."""

@@ -14,9 +14,9 @@ __all__ = ["mesh_faults"]
 def mesh_faults(mesh: QuadMesh) -> list[str]:
     """Every way in which a mesh is not closed, oriented outwards and two-manifold, one sentence each; none is good.
 
-    Checks finite numbers, indices, unused vertices, faces without area, open edges, edges of more than two faces, faces
-    turned against each other, points where surfaces touch in a vertex alone, and surfaces inside out, each connected
-    one by itself. It does not look for surfaces that pass through each other.
+    Checks finite numbers, indices, unused vertices, faces without area, folded quads, open edges, edges of more than
+    two faces, faces turned against each other, points where surfaces touch in a vertex alone, and surfaces inside out,
+    each connected one by itself. It does not look for surfaces that pass through each other.
     """
     if not len(mesh.quads):
         return ["the mesh has no faces"]
@@ -36,6 +36,9 @@ def mesh_faults(mesh: QuadMesh) -> list[str]:
     thin = int((dots(normals, normals) <= 1e-18 * longest * longest).sum())
     if thin:
         faults.append(f"{thin} triangles have no area")
+    folded = _folded(mesh)
+    if folded:
+        faults.append(f"{folded} quads are folded over themselves")
     starts, ends = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
     count = len(mesh.vertices)
     _, way, uses = np.unique(
@@ -49,9 +52,18 @@ def mesh_faults(mesh: QuadMesh) -> list[str]:
     ):
         if wrong.any():
             faults.append(f"{int(wrong.sum())} {sentence}")
-    if not faults or faults == [f"{thin} triangles have no area"]:
+    if (uses == 2).all() and not net.any():
         faults += _surface_faults(mesh, faces, way)
     return faults
+
+
+def _folded(mesh: QuadMesh) -> int:
+    """How many quads have halves that face against each other, whichever way they are cut."""
+    quads = mesh.quads[mesh.quads[:, 2] != mesh.quads[:, 3]]
+    a, b, c, d = (mesh.vertices[quads[:, k]] for k in range(4))
+    one = dots(cross(b - a, c - a), cross(c - a, d - a))
+    other = dots(cross(b - a, d - a), cross(c - b, d - b))
+    return int(((one < 0.0) & (other < 0.0)).sum())
 
 
 def _surface_faults(mesh: QuadMesh, faces: IntArray, way: np.ndarray) -> list[str]:

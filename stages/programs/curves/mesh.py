@@ -28,18 +28,11 @@ class QuadMesh:
 
     @cached_property
     def triangles(self) -> IntArray:
-        """The faces as triangles, int32 (f, 3), each quad cut where the smaller of the two pieces is the larger."""
-        four = self.quads[:, 2] != self.quads[:, 3]
-        quads = self.quads[four]
-        a, b, c, d = (self.vertices[quads[:, k]] for k in range(4))
-        one = np.minimum(_area2(a, b, c), _area2(a, c, d))
-        other = np.minimum(_area2(a, b, d), _area2(b, c, d))
-        # Equal halves are cut along 0-2, whatever rounding says, so that a moved mesh is cut alike.
-        turned = np.where((other > 1.000001 * one)[:, None], np.roll(quads, -1, axis=1), quads)
-        pieces = np.stack([turned[:, :3], turned[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
-        if len(pieces) == 2 * len(self.quads):
-            return pieces
-        return np.concatenate([pieces, self.quads[~four, :3]])
+        """The faces as triangles, int32 (f, 3), each quad cut where the smaller of its pieces is the larger."""
+        from stages.programs.curves.kernels import cut
+
+        triangles: IntArray = cut(self.vertices, self.quads)
+        return triangles
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -96,12 +89,6 @@ class QuadMesh:
         first = np.cumsum([0, *(len(mesh.vertices) for mesh in every[:-1])])
         quads = [mesh.quads + np.int32(start) for mesh, start in zip(every, first.tolist(), strict=True)]
         return QuadMesh(np.concatenate([mesh.vertices for mesh in every]), np.concatenate(quads))
-
-
-def _area2(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """Squared area of triangles, times 4."""
-    normals = cross(b - a, c - a)
-    return dots(normals, normals)
 
 
 def _turned(quads: IntArray) -> IntArray:

@@ -137,8 +137,12 @@ def _unit_superellipse(exponent: float, count: int) -> FloatArray:
     ray = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     across = np.abs(ray)
     longest = across.max(axis=1)
-    reach = longest * (((across / longest[:, None]) ** exponent).sum(axis=1)) ** (1.0 / exponent)
-    points: FloatArray = ray / (longest if np.isinf(exponent) else reach)[:, None]
+    if np.isinf(exponent):
+        # The cosine of 45 degrees is not quite its sine: what lies on a side lies there exactly.
+        points = np.where(across >= (1.0 - 1e-12) * longest[:, None], np.sign(ray), ray / longest[:, None])
+    else:
+        reach = longest * (((across / longest[:, None]) ** exponent).sum(axis=1)) ** (1.0 / exponent)
+        points = ray / reach[:, None]
     points.flags.writeable = False
     return points
 

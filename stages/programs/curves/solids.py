@@ -42,23 +42,21 @@ def rounded_box(
         raise ValueError(f"a box's edge radius lies within 0 and half its shortest side, {shortest / 2:g}")
     if radius < 1e-9 * shortest:
         return box(size, center)
-    # Just under half, where opposite edges would meet; the last rings keep a trace of a corner radius, without which
+    # Just under half, where opposite edges would meet; the first and last rings keep a trace of a corner radius, or
     # their points would meet.
     radius = min(radius, 0.499 * shortest)
     angles = np.linspace(0.0, np.pi / 2.0, steps + 1)
-    corners = np.maximum(radius * np.sin(angles), 0.02 * radius)
-    around = np.radians(np.arange(4)[:, None] * 90.0 + np.linspace(0.0, 90.0, steps + 1)).ravel()
-    quarter = np.repeat([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]], steps + 1, axis=0)
-    inner = quarter * (np.array([depth, width]) / 2.0 - radius)
-    plan = inner + corners[:, None, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
-    half = np.concatenate([plan, plan[::-1]])
+    radii = np.maximum(radius * np.sin(angles), 0.02 * radius)
     rise = radius * (1.0 - np.cos(angles))
-    heights = np.concatenate([rise, (height - rise)[::-1]]) - height / 2.0
-    rings = np.empty((*half.shape[:2], 3))
-    rings[..., 0], rings[..., 2] = half[..., 1], half[..., 0]
-    rings[..., 1] = heights[:, None]
-    count = rings.shape[1]
-    return skin(rings + np.asarray(center, dtype=np.float64), Cap(fan(count), count > 4))
+    around = np.radians(np.arange(4)[:, None] * 90.0 + np.linspace(0.0, 90.0, steps + 1)).ravel()
+    corner = np.repeat([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]], steps + 1, axis=0)
+    # The plane of z and x, in which counter-clockwise is seen from +y.
+    plan = corner * (np.array([depth, width]) / 2.0 - radius)
+    rounded = plan + radii[:, None, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
+    rings = np.empty((2 * len(radii), len(plan), 3))
+    rings[..., [2, 0]] = np.concatenate([rounded, rounded[::-1]])
+    rings[..., 1] = np.concatenate([rise - height / 2.0, (height / 2.0 - rise)[::-1]])[:, None]
+    return skin(rings + np.asarray(center, dtype=np.float64), Cap(fan(len(plan)), len(plan) > 4))
 
 
 def extrude(
@@ -81,7 +79,7 @@ def extrude(
         rise = bevel * (1.0 - np.cos(angles))
         outlines, heights = [*edge, *edge[::-1]], np.concatenate([rise, (height - rise)[::-1]])
     rings = np.empty((len(outlines), len(profile), 3))
-    # The two axes of the plane and the axis itself are right-handed but for y, where the board grows downwards.
+    # The plane's axes and the one across it are right-handed but for y, where rings go from the top down.
     first, second = {0: (1, 2), 1: (0, 2), 2: (0, 1)}[axis_index(axis)]
     rings[..., first], rings[..., second] = np.moveaxis(np.array(outlines), 2, 0)
     rings[..., axis_index(axis)] = base + (heights if axis != "y" else height - heights)[:, None]

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from stages.programs.curves.caps import Cap, polygon_cap
+from stages.programs.curves.caps import Cap, fan, polygon_cap
 from stages.programs.curves.curve import Curve, Stations
 from stages.programs.curves.frames import rail_axes
 from stages.programs.curves.mesh import QuadMesh
@@ -56,9 +56,9 @@ def loft(
 ) -> QuadMesh:
     """A sweep whose profile changes: `(position, profile)` pairs from 0 to 1, blended in between.
 
-    Everything else is as in `sweep`. Raises ValueError for profiles of different counts of points (those of
-    `square_circle` with one `count` fit each other), for other positions, and for a closed rail whose last profile is
-    not its first.
+    Everything else is as in `sweep`; both ends are filled in the way of the first profile. Raises ValueError for
+    profiles of different counts of points (those of `square_circle` with one `count` fit each other), for other
+    positions, and for a closed rail whose last profile is not its first.
     """
     places = np.array([place for place, _ in profiles], dtype=np.float64)
     if len(places) < 2 or places[0] != 0.0 or places[-1] != 1.0 or (np.diff(places) <= 0.0).any():
@@ -80,9 +80,8 @@ def loft_rings(rings: npt.ArrayLike, closed: bool = False) -> QuadMesh:
     given = np.asarray(rings, dtype=np.float64)
     if given.ndim != 3 or given.shape[2] != 3 or given.shape[1] < 3:
         raise ValueError(f"a loft needs rings of shape (r, k, 3) with k from 3, not {given.shape}")
-    flat = np.stack([np.cos(2 * np.pi * np.arange(given.shape[1]) / given.shape[1])] * 2, axis=1)
-    flat[:, 1] = np.sin(2 * np.pi * np.arange(given.shape[1]) / given.shape[1])
-    return skin(given, polygon_cap(flat), closed)
+    around = given.shape[1]
+    return skin(given, Cap(fan(around), around > 4), closed)
 
 
 def _carried(
@@ -95,39 +94,22 @@ def _carried(
     places: FloatArray | None = None,
 ) -> QuadMesh:
     """The skin over `outline` (k, 2), or over outlines (p, k, 2) at `places` (p,), at the stations of the rail."""
+    from stages.programs.curves.kernels import place_rings
+
     stations = _stations(rail, style, places)
     x, y = rail_axes(stations.points, stations.tangents, stations.positions, rail.closed, up)
-    if places is not None:
-        outline = _blended(outline, places, stations.positions)
-    axes = np.empty((len(x), 2, 3))
-    if style is None:
-        axes[:, 0], axes[:, 1] = x, y
-    else:
-        scale, twist = style.at(stations.positions)
-        if rail.closed:
-            _check_round(style)
-        if twist.any():
-            angle = np.radians(twist)
-            cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-            x, y = cosine * x + sine * y, cosine * y - sine * x
-        lone = (scale.min(axis=1) <= 0.0) & (scale.max(axis=1) > 0.0)
-        if lone.any():
-            where = stations.positions[lone.argmax()]
-            raise ValueError(f"the style's scale is 0 for one axis alone at position {where:g}: use a small one")
-        axes[:, 0], axes[:, 1] = scale[:, :1] * x, scale[:, 1:] * y
-    if stations.excess.any():
-        reach = (axes * stations.fold[:, None]).sum(axis=2) * stations.excess[:, None]
-        axes += reach[:, :, None] * stations.fold[:, None]
-    rings = outline @ axes + stations.points[:, None]
+    outlines = outline[None] if places is None else _blended(outline, places, stations.positions)
+    scale, twist = _styled(style, stations.positions, rail.closed)
+    rings = place_rings(stations.points, x, y, scale, twist, stations.fold, stations.excess, outlines)
     if not rail.closed and caps != "flat":
         start, end = (caps, caps) if isinstance(caps, str) else caps
-        first, last = (outline, outline) if outline.ndim == 2 else (outline[0], outline[-1])
-        domes = [
-            _dome(stations, -1, last, axes) if end == "round" else rings[:0],
-            _dome(stations, 0, first, axes)[::-1] if start == "round" else rings[:0],
-        ]
-        rings = np.concatenate([domes[1], rings, domes[0]])
-    return skin(rings, polygon_cap(outline[0]) if cap is None else cap, rail.closed)
+        pieces = [rings]
+        if start == "round":
+            pieces.insert(0, _dome(rings[0], stations.points[0], -stations.tangents[0], outlines[0], scale[0])[::-1])
+        if end == "round":
+            pieces.append(_dome(rings[-1], stations.points[-1], stations.tangents[-1], outlines[-1], scale[-1]))
+        rings = np.concatenate(pieces)
+    return skin(rings, polygon_cap(outlines[0]) if cap is None else cap, rail.closed)
 
 
 def _stations(rail: Curve, style: Style | None, places: FloatArray | None) -> Stations:
@@ -154,24 +136,33 @@ def _blended(outlines: FloatArray, places: FloatArray, positions: FloatArray) ->
     return blended
 
 
-def _check_round(style: Style) -> None:
-    if np.abs(style.scale[0] - style.scale[-1]).max() > 1e-9:
+def _styled(style: Style | None, positions: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
+    """Scale (n, 2) and twist (n,) at positions (n,)."""
+    if style is None:
+        return np.ones((len(positions), 2)), np.zeros(len(positions))
+    if closed and np.abs(style.scale[0] - style.scale[-1]).max() > 1e-9:
         raise ValueError("on a closed rail the style's last scale is its first")
     turns = (style.twist[-1] - style.twist[0]) / 360.0
-    if abs(turns - round(turns)) > 1e-9:
+    if closed and abs(turns - round(turns)) > 1e-9:
         raise ValueError(f"on a closed rail a twist is made of whole turns of 360 degrees, not {360.0 * turns:g}")
+    scale, twist = style.at(positions)
+    if scale.min() == 0.0 and ((scale[:, 0] == 0.0) != (scale[:, 1] == 0.0)).any():
+        where = positions[((scale[:, 0] == 0.0) != (scale[:, 1] == 0.0)).argmax()]
+        raise ValueError(f"the style's scale is 0 for one axis alone at position {where:g}: use a small one")
+    return scale, twist
 
 
-def _dome(stations: Stations, end: Literal[0, -1], outline: FloatArray, axes: FloatArray) -> FloatArray:
+def _dome(
+    ring: FloatArray, point: FloatArray, outwards: FloatArray, outline: FloatArray, scale: FloatArray
+) -> FloatArray:
     """The rings beyond an end, from the end outwards, float64 (DOME, k, 3)."""
-    extent = np.ptp(outline, axis=0) * np.sqrt((axes[end] * axes[end]).sum(axis=1))
-    depth = float(extent.min()) / 2.0
+    spokes = ring - point
+    depth = float((np.ptp(outline, axis=0) * scale).min()) / 2.0
     if depth <= 0.0:
         raise ValueError("an end whose scale is 0 is a point and takes no round cap: make it flat")
-    outwards = -stations.tangents[end] if end == 0 else stations.tangents[end]
     angles = np.pi / 2.0 * np.arange(1, DOME + 1) / DOME
     shrink = np.cos(angles)
     shrink[-1] = 0.0
     reach = depth * np.sin(angles)[:, None] * outwards
-    rings: FloatArray = shrink[:, None, None] * (outline @ axes[end]) + (stations.points[end] + reach)[:, None]
+    rings: FloatArray = shrink[:, None, None] * spokes + (point + reach)[:, None]
     return rings
