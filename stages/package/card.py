@@ -66,13 +66,14 @@ def card(
     sources: Mapping[str, str],
     search: Sequence[str],
     rejects: Mapping[str, int],
+    recipes: Sequence[str],
 ) -> str:
     """The card's text.
 
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
     of the package's shards; rows: those of the index; producer: the stage that made the samples; sources: the kits or
     programs by name, with what there is to say of them in short; search: how each search ended, in words; rejects:
-    refused items by reason.
+    refused items by reason; recipes: a section of Markdown for each program.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
@@ -109,6 +110,7 @@ def card(
         f"By Shapemill: {MADE[producer]} `{MANIFEST}` holds the whole config.",
         *([_list(search)] if search else []),
         *([_reject_table(rejects)] if rejects else []),
+        *recipes,
         "## Checking it",
         f"`sha256sum -c {CHECKSUMS}` compares every file; `make verify` also computes contacts anew from the meshes.",
         "## Licence and citation",

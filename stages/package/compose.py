@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pipeline.places import file_digest
@@ -29,6 +29,7 @@ def compose_dataset(task: Task) -> Outcome:
     (the shard with the picture) and `package` (the version of this stage).
     """
     params = task.shard.params
+    producer = params["producer"]
     shards, facts = params["shards"], params["facts"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)
     index = io.BytesIO()
@@ -42,7 +43,9 @@ def compose_dataset(task: Task) -> Outcome:
     sources = {name: _described(kits.get(name)) for name in sorted({row["kit"] for row in rows})}
     members = {member: member_text(member) for member in shards[0]["members"]}
     files = {
-        CARD: card(facts, shards, rows, params["producer"], sources, params["search"], params["rejects"]).encode(),
+        CARD: card(
+            facts, shards, rows, producer, sources, params["search"], params["rejects"], _recipes(producer, sources)
+        ).encode(),
         CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
         MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["package"])),
     }
@@ -54,6 +57,16 @@ def compose_dataset(task: Task) -> Outcome:
         with task.output(f"{task.shard.name}.{file}") as stream:
             stream.write(content)
     return Outcome(samples=0, summary={"samples": len(rows)})
+
+
+def _recipes(producer: str, names: Iterable[str]) -> list[str]:
+    """What there is to say of each program that the samples were made with."""
+    if producer != "programs":
+        return []
+    from stages.programs.program import find_program
+    from stages.programs.recipe import recipe_markdown
+
+    return [recipe_markdown(find_program(name)).rstrip() for name in names]
 
 
 def _described(kit: Kit | None) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.collection.shards import PRODUCERS, collection_shards, planned_producer
+from stages.collection.shards import PRODUCERS, check_producers, collection_shards, planned_producer
 from stages.package.compose import compose_dataset
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import config_sections
@@ -27,6 +27,8 @@ PICTURE_SHARDS = 8
 def plan(plan: Plan) -> list[Shard]:
     """One shard for each of the collection; when these are done, the picture, and the files about the whole."""
     producer = planned_producer(plan)
+    if producer is None:
+        return []
     merged = collection_shards(plan, *merged_stages(producer))
     summaries = [plan.summary("package", shard.name) for shard in merged]
     if not merged or any(summary is None for summary in summaries):
@@ -142,4 +144,5 @@ STAGE = Stage(
     estimate_bytes=estimate_bytes,
     report=report,
     publish=publish,
+    check=check_producers,
 )

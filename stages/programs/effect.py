@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stages.programs.curves.part import Part
 from stages.programs.program import Program
 from stages.programs.repair import repaired
 from stages.programs.schema import Values
-from stages.shape.kit import PartMesh
 
 __all__ = ["has_effect", "same_geometry"]
 
@@ -17,7 +17,7 @@ SAME = 1e-6
 """Vertices nearer than this, in the program's units, are at one place."""
 
 
-def has_effect(program: Program, values: Values, name: str, parts: Sequence[PartMesh]) -> bool:
+def has_effect(program: Program, values: Values, name: str, parts: Sequence[Part]) -> bool:
     """Whether the shape of valid, settled `values`, made of `parts`, changes when the parameter `name` alone changes
     to the next lower value that it can have here, and when it changes to the next higher.
 
@@ -39,12 +39,12 @@ def has_effect(program: Program, values: Values, name: str, parts: Sequence[Part
     return tried
 
 
-def same_geometry(parts: Sequence[PartMesh], others: Sequence[PartMesh]) -> bool:
+def same_geometry(parts: Sequence[Part], others: Sequence[Part]) -> bool:
     """Whether two shapes are made of the same parts in the same order at the same places."""
     return len(parts) == len(others) and all(
-        a.name == b.name
-        and a.vertices.shape == b.vertices.shape
-        and len(a.faces) == len(b.faces)
-        and bool(np.abs(a.vertices - b.vertices).max(initial=0.0) <= SAME)
+        a.label == b.label
+        and a.mesh.vertices.shape == b.mesh.vertices.shape
+        and a.mesh.quads.shape == b.mesh.quads.shape
+        and bool(np.abs(a.mesh.vertices - b.mesh.vertices).max(initial=0.0) <= SAME)
         for a, b in zip(parts, others, strict=True)
     )

@@ -15,10 +15,11 @@ import numpy as np
 
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
+from stages.programs.curves.part import Part
 from stages.programs.parameters import Parameter
 from stages.programs.rules import Rule
 from stages.programs.schema import Schema, Values
-from stages.shape.kit import Assembly, PartMesh
+from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
 __all__ = ["Constraint", "Program", "find_program", "program_names", "program_source", "shape_of", "shape_of_text"]
@@ -41,7 +42,7 @@ class Program:
     """One program. `PROGRAM = Program(...)` stands in a file of its own, `stages/programs/<name>.py`.
 
     name: the file's name; sentence: what it makes.
-    labels: the part labels, in a fixed order; every part that `build` returns has one of them as its name.
+    labels: the part labels, in a fixed order; every part that `build` returns has one of them.
     build: settled values (hidden parameters stand at their base) -> parts in world coordinates, y up, front at +z;
     pure: no randomness, no state. It is called with valid values only.
     constraints: which combinations of values are valid.
@@ -53,7 +54,7 @@ class Program:
     sentence: str
     parameters: tuple[Parameter, ...]
     labels: tuple[str, ...]
-    build: Callable[[Values], Sequence[PartMesh]]
+    build: Callable[[Values], Sequence[Part]]
     constraints: tuple[Constraint, ...] = ()
     apart: tuple[tuple[str, str], ...] = ()
     elevation: float = 25.0
@@ -79,14 +80,21 @@ class Program:
             each for each in self.constraints if visible.issuperset(each.rule.names) and not each.rule.holds(settled)
         )
 
-    def parts(self, values: Values) -> Sequence[PartMesh]:
-        """The parts at `values`; hidden parameters have no say."""
-        return self.build(self.schema.settled(values)[0])
+    def parts(self, values: Values) -> Sequence[Part]:
+        """The parts at `values`; hidden parameters have no say.
+
+        Raises ValueError where `build` does, and says at which values.
+        """
+        settled, _ = self.schema.settled(values)
+        try:
+            return self.build(settled)
+        except ValueError as error:
+            raise ValueError(f"program {self.name} fails at {self.schema.text(settled)}: {error}") from error
 
 
 def shape_of(program: Program, values: Values) -> Shape:
     """The shape at `values`: one mesh a part, y up, at identity poses, without contacts."""
-    meshes = tuple(program.parts(values))
+    meshes = tuple(part.part_mesh() for part in program.parts(values))
     poses = np.tile(np.eye(4), (len(meshes), 1, 1))
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, np.empty((0, 2), np.int32))
     return Shape(meshes=meshes, assembly=assembly, up="y", labels=program.labels)

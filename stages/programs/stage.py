@@ -110,9 +110,9 @@ def _share(config: ProgramsConfig, sizes: dict[str, int], split: str, start: int
 
 
 def _source_digest(name: str) -> str:
-    """Hex sha256 of what shapes are made with, the program's file and the curves: an edited program is another."""
+    """Hex sha256 of what shapes are made with, the program's file and this folder: an edited program is another."""
     digest = hashlib.sha256(program_source(name).read_bytes())
-    for path in sorted((Path(__file__).parent / "curves").glob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from stages.programs.curves import Part, box
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Program
 from stages.programs.schema import Values
-from stages.shape.kit import PartMesh
-from tests.stages.shape.bodies import box
+
+GREY = (180, 180, 180)
 
 
-def build(values: Values) -> Sequence[PartMesh]:
-    bodies = [box(values["width"], 0.1, 1, at=(0, 0.1 * number, 0)) for number in range(values["boards"])]
-    labelled = [("board", body) for body in bodies]
-    if values["has_top"]:
-        labelled.append(("top", box(1, 0.1, 1, at=(0, 0.1 * len(bodies), 0))))
-    return [PartMesh(label, *body, np.full((len(body[1]), 3), 180, dtype=np.uint8)) for label, body in labelled]
+def build(values: Values) -> Sequence[Part]:
+    count = values["boards"]
+    boards = [Part("board", box((values["width"], 0.1, 1), (0, 0.1 * number, 0)), GREY) for number in range(count)]
+    top = Part("top", box((1, 0.1, 1), (0, 0.1 * count, 0)), GREY)
+    return [*boards, top] if values["has_top"] else boards
 
 
 PROGRAM = Program(

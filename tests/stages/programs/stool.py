@@ -4,29 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from stages.programs.curves import Part, box
 from stages.programs.parameters import binary, continuous
 from stages.programs.program import Constraint, Program
 from stages.programs.rules import Rule
 from stages.programs.schema import Values
-from stages.shape.kit import PartMesh
-from tests.stages.shape.bodies import box
+
+GREY = (180, 180, 180)
 
 
-def build(values: Values) -> Sequence[PartMesh]:
+def build(values: Values) -> Sequence[Part]:
     height, width = values["height"], values["scale x"]
-    seat = _box("seat", (width, 0.1, 0.8), (0, height + 0.05, 0))
-    legs = [_box("leg", (0.1, height, 0.8), (side * (width / 2 - 0.05), height / 2, 0)) for side in (-1, 1)]
-    parts = [seat, *legs]
-    if values["has_rail"]:
-        parts.append(_box("rail", (width - 0.2, 0.1, 0.1), (0, values["rail_height"], 0)))
-    return parts
-
-
-def _box(label: str, size: tuple[float, float, float], at: tuple[float, float, float]) -> PartMesh:
-    vertices, faces = box(*size, at=at)
-    return PartMesh(label, vertices, faces, np.full((len(faces), 3), 180, dtype=np.uint8))
+    seat = Part("seat", box((width, 0.1, 0.8), (0, height + 0.05, 0)), GREY)
+    legs = [
+        Part("leg", box((0.1, height, 0.8), (x, height / 2, 0)), GREY) for x in (0.05 - width / 2, width / 2 - 0.05)
+    ]
+    rail = Part("rail", box((width - 0.2, 0.1, 0.1), (0, values["rail_height"], 0)), GREY)
+    return [seat, *legs, rail] if values["has_rail"] else [seat, *legs]
 
 
 PROGRAM = Program(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError
+from stages.programs.curves import Part, box
 from stages.programs.parameters import ParameterError
 from stages.programs.program import Constraint, find_program, shape_of, shape_of_text
 from stages.programs.rules import Rule
@@ -26,8 +27,8 @@ def test_shape_has_a_mesh_a_part_at_identity_poses_labelled_by_name() -> None:
 def test_hidden_parameters_have_no_say() -> None:
     bare = {**PROGRAM.schema.base, "has_rail": False}
     for height in (0.1, 0.6):
-        for mesh, other in zip(PROGRAM.parts(bare), PROGRAM.parts({**bare, "rail_height": height}), strict=True):
-            np.testing.assert_array_equal(mesh.vertices, other.vertices)
+        for part, other in zip(PROGRAM.parts(bare), PROGRAM.parts({**bare, "rail_height": height}), strict=True):
+            np.testing.assert_array_equal(part.mesh.vertices, other.mesh.vertices)
 
 
 def test_shape_comes_back_from_its_text() -> None:
@@ -44,6 +45,12 @@ def test_a_constraint_binds_only_while_all_it_speaks_of_is_visible() -> None:
     assert [each.name for each in PROGRAM.broken(low)] == ["rail_above_seat"]
     assert not PROGRAM.broken({**low, "has_rail": False})
     assert not PROGRAM.broken({**low, "rail_height": 0.3})
+
+
+def test_values_at_which_a_program_fails_are_named() -> None:
+    flat = replace(PROGRAM, build=lambda values: [Part("seat", box((values["height"] - 0.3, 1, 1)), (9, 9, 9))])
+    with pytest.raises(ValueError, match=r'program stool fails at {"height":0\.3,.*: three sizes'):
+        flat.parts({**PROGRAM.schema.base, "height": 0.3})
 
 
 def test_a_program_that_speaks_of_what_is_not_there_is_refused() -> None:

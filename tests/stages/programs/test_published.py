@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from stages.programs.parameters import Parameter
+from stages.programs.program import Constraint, find_program, program_names
 from stages.programs.rules import Rule
 from stages.programs.schema import Schema
 
@@ -64,3 +65,28 @@ def test_published_constraints_are_rules(domain: str) -> None:
     for text in table["constraints"].values():
         assert len(Rule(text).names) == 2
         assert set(Rule(text).names) <= names
+
+
+@pytest.mark.parametrize("domain", [each for each in DOMAINS if each in program_names()])
+def test_a_program_has_the_published_parameters(domain: str) -> None:
+    table, program = published(domain), find_program(domain)
+    assert [each.name for each in program.parameters] == [row["name"] for row in table["params"]]
+    for each, row in zip(program.parameters, table["params"], strict=True):
+        np.testing.assert_allclose(np.array(each.values, dtype=float), row["values"], atol=1e-4, err_msg=each.name)
+        assert each.classes == row["n_classes"], each.name
+        assert (each.kind == "continuous") == (row["type"] in {"Float", "Vector"}), each.name
+        assert float(each.base) == pytest.approx(row["base"], abs=0.01), each.name
+
+
+@pytest.mark.parametrize("domain", [each for each in DOMAINS if each in program_names()])
+def test_a_program_shows_and_constrains_what_is_published(domain: str) -> None:
+    table, program = published(domain), find_program(domain)
+    theirs = Schema(tuple(parameter(row) for row in table["params"]))
+    rules = [Constraint(name, Rule(text), ".") for name, text in table["constraints"].items()]
+    rng = np.random.default_rng(8)
+    for _ in range(500):
+        raw = {each.name: each.values[rng.integers(len(each.values))] for each in program.parameters}
+        visible = program.schema.settled(raw)[1]
+        assert visible == theirs.settled(raw)[1]
+        allowed = all(each.rule.holds(raw) for each in rules if visible.issuperset(each.rule.names))
+        assert allowed or program.broken(raw)

@@ -7,24 +7,19 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ShardFailed
+from stages.programs.curves import box, ellipsoid
 from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect, same_geometry
-from stages.programs.intersection import parts_intersect
-from stages.programs.parameters import continuous
+from stages.programs.intersection import meshes_meet
 from stages.programs.program import Constraint, Program
 from stages.programs.repair import repaired
 from stages.programs.rules import Rule
 from stages.programs.sampling import Sampler, cells, structure_digest
-from stages.shape.kit import PartMesh
+from tests.stages.programs.block import PROGRAM as BLOCK
 from tests.stages.programs.stool import PROGRAM
-from tests.stages.shape.bodies import Body, box, sphere
 
 SCHEMA = PROGRAM.schema
 BASE = SCHEMA.base
-
-
-def part(body: Body) -> PartMesh:
-    return PartMesh("part", body[0], body[1], np.zeros((len(body[1]), 3), dtype=np.uint8))
 
 
 class TestDraws:
@@ -113,22 +108,23 @@ class TestEffect:
         parts = PROGRAM.parts(BASE)
         assert same_geometry(parts, PROGRAM.parts(dict(BASE)))
         assert not same_geometry(parts, parts[:-1])
-        assert not same_geometry(parts, [*parts[:-1], replace(parts[-1], name="leg")])
+        assert not same_geometry(parts, [*parts[:-1], replace(parts[-1], label="leg")])
         assert not same_geometry(parts, PROGRAM.parts({**BASE, "scale x": 0.5001}))
 
 
 class TestIntersection:
     @pytest.mark.parametrize(("gap", "met"), [(-0.2, True), (0.01, False), (3.0, False)])
     def test_boxes_side_by_side(self, gap: float, met: bool) -> None:
-        assert parts_intersect(part(box()), part(box(at=(1 + gap, 0.1, 0.2)))) == met
+        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2))) == met
+        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2)), distance=0.02) == (gap < 0.02)
 
     def test_a_part_inside_another_meets_it_without_touching_its_surface(self) -> None:
-        ball = part(sphere())
-        assert parts_intersect(ball, part(box(0.2, 0.2, 0.2)))
-        assert parts_intersect(part(box(0.2, 0.2, 0.2)), ball)
+        ball, crumb = ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2))
+        assert meshes_meet(ball, crumb)
+        assert meshes_meet(crumb, ball)
 
     def test_a_part_in_the_corner_of_a_box_around_another_does_not_meet_it(self) -> None:
-        assert not parts_intersect(part(sphere()), part(box(0.2, 0.2, 0.2, at=(0.85, 0.85, 0.85))))
+        assert not meshes_meet(ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2), (0.85, 0.85, 0.85)))
 
 
 class TestSampler:
@@ -173,11 +169,9 @@ class TestSampler:
             self.sampler(never).find(("height", 1), np.random.default_rng(1))
 
     def test_a_finite_program_ends_when_all_its_shapes_are_found(self) -> None:
-        flat = (continuous("a", 0, 1, 2, 0, "g", "."), continuous("b", 0, 1, 3, 0, "g", "."))
-        blocks = Program("block", ".", flat, ("part",), lambda v: [part(box(1 + v["a"], 1 + v["b"], 1))])
-        sampler = self.sampler(blocks)
+        sampler = self.sampler(BLOCK)
         rng = np.random.default_rng(1)
-        found = {blocks.schema.text(sampler.find(None, rng)) for _ in range(6)}
+        found = {BLOCK.schema.text(sampler.find(None, rng)) for _ in range(6)}
         assert len(found) == 6
         with pytest.raises(ShardFailed, match="alike"):
             sampler.find(None, rng)
