@@ -23,7 +23,6 @@ from stages.programs.parameters import continuous, discrete
 from stages.programs.program import Program
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
-from stages.shape.kit import PartMesh
 
 PLATE, BRASS, LIGHT = (150, 158, 168), (186, 148, 84), (250, 238, 196)
 
@@ -31,7 +30,7 @@ PLAN, STEPS, AROUND, GLASS = 32, 16, 12, 16
 """Points around the plate; segments of an arm and points around it; points around a bulb."""
 
 
-def build(values: Values) -> Sequence[PartMesh]:
+def build(values: Values) -> Sequence[Part]:
     """The parts of a lamp that hangs from the plane y = 0 around the y axis; its first arm points to +x."""
     half = 0.05 + np.array([values["base_x"], values["base_y"]]) / 2.0
     parts = [Part("base", _base(values, half), PLATE)]
@@ -56,7 +55,7 @@ def build(values: Values) -> Sequence[PartMesh]:
         place = translation(seat[0] * share * across, 0.0, -seat[1] * share * along) @ rotation("y", angle)
         parts.append(Part("light_frame", arm.transformed(place), BRASS))
         parts.append(Part("lightbulb", light.transformed(place), LIGHT))
-    return [part.part_mesh() for part in parts]
+    return parts
 
 
 def _inset(values: Values, half: FloatArray) -> float:

@@ -13,7 +13,6 @@ from stages.programs.schema import Values
 from stages.programs.vase_handles import handles
 from stages.programs.vessel import CrossSection, Wall
 from stages.shape.arrays import FloatArray
-from stages.shape.kit import PartMesh
 
 CLAY, GLAZE, EARTH, IRON, KNOB = (196, 134, 96), (214, 170, 128), (128, 78, 56), (94, 70, 62), (72, 92, 104)
 
@@ -23,7 +22,7 @@ THIN = 0.008
 FIRST, SECOND = "handle_count > 0 and hndl_type == 1", "handle_count > 0 and hndl_type == 2"
 
 
-def build(values: Values) -> Sequence[PartMesh]:
+def build(values: Values) -> Sequence[Part]:
     """The parts of a vase that stands on y = 0 around the y axis; its first handle points to +x."""
     section = CrossSection(values["body_profile_blend"])
     thickness = values["body_thickness_val"] if values["has_body_thickness"] else THIN
@@ -44,7 +43,7 @@ def build(values: Values) -> Sequence[PartMesh]:
     parts.extend(handles(values, wall, section, body_top, IRON))
     if values["has_lid"]:
         parts.extend(_lid(values, wall, section))
-    return [part.part_mesh() for part in parts]
+    return parts
 
 
 def _body(values: Values, lift: float) -> FloatArray:
