@@ -21,6 +21,7 @@ from stages.programs.curves import (
 )
 from stages.programs.parameters import continuous, discrete
 from stages.programs.program import Program
+from stages.programs.rails import eased
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
@@ -43,10 +44,11 @@ def build(values: Values) -> Sequence[Part]:
     seat = values["light_frame_radius"] * (0.8 * half - _inset(values, half) - 0.5 * max(wide, thick)).clip(min=0.004)
     needed = (1.3 * bulb + 0.015) / np.sin(np.pi / count) if count > 1 else 0.0
     reach = max(float(needed) - float(seat.min()), 0.0) + values["light_frame_end_point_y"]
-    rail = _rail(values, reach)
     taper = Style.knots([(0.0, 1.0), (0.7, 0.7 + 0.15 * end), (1.0, end)], smooth=True, count=8)
+    rail = _rail(values, reach, 0.6 * max(wide, thick) * taper.scale.max())
     profile = square_circle(0.1 + 0.9 * values["light_frame_roundness"], thick, wide, count=AROUND)
-    arm = sweep(rail, profile, taper, up=(0.0, 0.0, 1.0))
+    scale, twist = taper.at(rail.positions)
+    arm = sweep(rail, profile, Style(rail.positions, scale, twist), up=(0.0, 0.0, 1.0))
     light = ellipsoid([bulb] * 3, rail.at(1.0) + 0.75 * bulb * rail.tangents(1.0), GLASS)
     shape = 0.1 + 0.9 * values["base_roundness"]
     for angle in (360.0 / count * np.arange(count)).tolist():
@@ -83,8 +85,9 @@ def _base(values: Values, half: FloatArray) -> QuadMesh:
     return loft_rings(rings)
 
 
-def _rail(values: Values, reach: float) -> Curve:
-    """The curve of an arm from within the plate at x = 0 to its end at x = `reach`, bowed sideways on its way."""
+def _rail(values: Values, reach: float, girth: float) -> Curve:
+    """The curve of an arm from within the plate at x = 0 to its end at x = `reach`, bowed sideways on its
+    way; `girth` is how far its profile reaches."""
     under = -values["base_thickness"]
     position = 0.25 + 0.5 * values["light_frame_mid_point_pos"]
     out = position * reach + 0.04 + 0.24 * values["light_frame_mid_point_offset_y"]
@@ -94,7 +97,8 @@ def _rail(values: Values, reach: float) -> Curve:
     rail = bezier([[0.0, 0.0], [0.0, -down], [out, -middle], [reach, -end]], STEPS)
     side = 0.3 * values["light_frame_turning_effect"] * rail.length * np.sin(np.pi * rail.positions) ** 2
     below = rail.points + np.column_stack([np.zeros_like(side), np.full_like(side, under), side])
-    return Curve.through(np.concatenate([[[0.0, 0.5 * under, 0.0]], below]))
+    points = np.concatenate([[[0.0, 0.5 * under, 0.0]], below])
+    return Curve.through(eased(points, np.full(len(points), girth)))
 
 
 PROGRAM = Program(

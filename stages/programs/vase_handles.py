@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.programs.curves import Part, QuadMesh, Style, bezier, polyline, rotation, square_circle, sweep
+from stages.programs.rails import eased
 from stages.programs.schema import Values
 from stages.programs.vessel import CrossSection, Wall
 from stages.shape.arrays import FloatArray
@@ -49,7 +50,7 @@ def _path(values: Values, wall: Wall, body_top: float, size: float) -> FloatArra
     else:
         end = start + room * (0.3 + 0.65 * values["hndl2_end_z"])
         away = size * (0.04 + 0.9 * values["hndl2_end_x"])
-        lift = (-0.3 + 0.9 * values["hndl2_end_bezier_handle_z"]) * (end - start)
+        lift = size * (1.3 * values["hndl2_end_bezier_handle_z"] - 0.5)
         second, last = [away + size * (0.25 + 1.1 * values["hndl2_end_bezier_handle_x"]), end + lift], [away, end]
     return bezier([[0.0, start], first, second, last], STEPS).points[:, :2]
 
@@ -59,22 +60,32 @@ def _bounded(rise: float, room: float) -> float:
     return rise if rise >= 0.0 else -room * (1.0 - float(np.exp(rise / room)))
 
 
+def _leaving(path: FloatArray, distance: float, free: bool) -> FloatArray:
+    """The path without what is nearer to the wall than `distance` next to its ends on the wall."""
+    away = np.flatnonzero(path[:, 0] > distance)
+    if len(away) == 0:
+        away = np.array([path[:, 0].argmax()])
+    last = len(path) - 1 if free else away[-1] + 1
+    return np.concatenate([path[:1], path[max(away[0], 1) : last], path[-1:]])
+
+
 def _handle(values: Values, wall: Wall, section: CrossSection, path: FloatArray, size: float, angle: float) -> QuadMesh:
     """The handle towards +x, shaped to the wall as it is at `angle`."""
+    free = values["hndl_type"] == 2
+    wide = size * (0.08 + 0.22 * values["hndl_profile_width"])
+    thick = size * (0.07 + 0.17 * values["hndl_profile_height"])
+    path = _leaving(path, 0.75 * thick, free)
     heights = path[:, 1]
     clear = _cover(wall, heights)
     t = np.linspace(0.0, 1.0, len(path))
-    free = values["hndl_type"] == 2
     ends = wall.radius(heights[[0, -1]]) - clear[[0, -1]]
     clear = clear + (1.0 - t) ** 5 * ends[0] + (0.0 if free else t**5 * ends[1])
-    out = section.reach(angle) * clear + path[:, 0]
-    rail = polyline(np.column_stack([out, heights]))
-    wide = size * (0.08 + 0.22 * values["hndl_profile_width"])
-    thick = size * (0.06 + 0.16 * values["hndl_profile_height"])
     swell = 0.45 + values["hndl_radius_along_path"]
     last = 0.5 + 0.5 * swell if free else 1.0
     rise = np.sin(np.pi * t) ** 2
     scale = np.where(t < 0.5, 1.0, last) * (1.0 - rise) + swell * rise
+    out = section.reach(angle) * clear + path[:, 0]
+    rail = polyline(eased(np.column_stack([out, heights, np.zeros_like(t)]), 0.5 * thick * scale))
     style = Style(rail.positions, np.stack([scale, scale], axis=1), np.zeros_like(t))
     profile = square_circle(0.16 + 0.84 * values["hndl_profile_blend"], thick, wide, count=AROUND)
     # The profile's y is the world's z, which stays across the curve.
@@ -91,7 +102,7 @@ def _grown_on(mesh: QuadMesh, wall: Wall, section: CrossSection, angle: float, f
         radius = depth * section.reach(angle + np.degrees(np.arctan2(-z, within)))
         within = np.sqrt(np.maximum(radius * radius - z * z, 0.09 * radius * radius))
     moved = np.maximum(x, within)
-    rings = AROUND * (STEPS + 1)
+    rings = len(x) - 2
     moved[:AROUND], moved[-2] = within[:AROUND], within[-2]
     if not free:
         moved[rings - AROUND : rings], moved[-1] = within[rings - AROUND : rings], within[-1]
