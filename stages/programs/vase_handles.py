@@ -48,11 +48,17 @@ def _path(values: Values, wall: Wall, body_top: float, size: float) -> FloatArra
         length = size * (0.4 + 0.9 * values["hndl1_end_bezier_handle_length"])
         second, last = [length * np.cos(arrive), end + length * np.sin(arrive)], [0.0, end]
     else:
-        end = start + room * (0.3 + 0.65 * values["hndl2_end_z"])
-        away = size * (0.04 + 0.9 * values["hndl2_end_x"])
+        end = start + room * (0.35 + 0.6 * values["hndl2_end_z"])
+        # A free end stands clear of the wall by its own thickness.
+        away = 0.8 * _girth(values, size)[0] + 0.9 * size * values["hndl2_end_x"]
         lift = size * (1.3 * values["hndl2_end_bezier_handle_z"] - 0.5)
         second, last = [away + size * (0.25 + 1.1 * values["hndl2_end_bezier_handle_x"]), end + lift], [away, end]
     return bezier([[0.0, start], first, second, last], STEPS).points[:, :2]
+
+
+def _girth(values: Values, size: float) -> tuple[float, float]:
+    """How thick and how wide a handle is at its start."""
+    return size * (0.07 + 0.17 * values["hndl_profile_height"]), size * (0.08 + 0.22 * values["hndl_profile_width"])
 
 
 def _bounded(rise: float, room: float) -> float:
@@ -72,8 +78,7 @@ def _leaving(path: FloatArray, distance: float, free: bool) -> FloatArray:
 def _handle(values: Values, wall: Wall, section: CrossSection, path: FloatArray, size: float, angle: float) -> QuadMesh:
     """The handle towards +x, shaped to the wall as it is at `angle`."""
     free = values["hndl_type"] == 2
-    wide = size * (0.08 + 0.22 * values["hndl_profile_width"])
-    thick = size * (0.07 + 0.17 * values["hndl_profile_height"])
+    thick, wide = _girth(values, size)
     path = _leaving(path, 0.75 * thick, free)
     heights = path[:, 1]
     clear = _cover(wall, heights)
@@ -101,6 +106,8 @@ def _grown_on(mesh: QuadMesh, wall: Wall, section: CrossSection, angle: float, f
     for _ in range(2):
         radius = depth * section.reach(angle + np.degrees(np.arctan2(-z, within)))
         within = np.sqrt(np.maximum(radius * radius - z * z, 0.09 * radius * radius))
+    # Not all the way: where the wall lies level, points of a ring one behind the other would meet.
+    within = x + 0.9 * (within - x)
     moved = np.maximum(x, within)
     rings = len(x) - 2
     moved[:AROUND], moved[-2] = within[:AROUND], within[-2]
