@@ -48,7 +48,11 @@ def build(values: Values) -> Sequence[Part]:
     rail = _rail(values, reach, 0.6 * max(wide, thick) * taper.scale.max())
     profile = square_circle(0.1 + 0.9 * values["light_frame_roundness"], thick, wide, count=AROUND)
     scale, twist = taper.at(rail.positions)
-    arm = sweep(rail, profile, Style(rail.positions, scale, twist), up=(0.0, 0.0, 1.0))
+    swept = sweep(rail, profile, Style(rail.positions, scale, twist), up=(0.0, 0.0, 1.0))
+    # An arm is cut level within the plate, whichever way it leaves.
+    level = swept.vertices.copy()
+    level[:AROUND, 1] = level[-2, 1] = -0.5 * values["base_thickness"]
+    arm = QuadMesh(level, swept.quads)
     light = ellipsoid([bulb] * 3, rail.at(1.0) + 0.75 * bulb * rail.tangents(1.0), GLASS)
     shape = 0.1 + 0.9 * values["base_roundness"]
     for angle in (360.0 / count * np.arange(count)).tolist():

@@ -14,7 +14,8 @@ from stages.programs.vase_handles import handles
 from stages.programs.vessel import CrossSection, Wall
 from stages.shape.arrays import FloatArray
 
-CLAY, GLAZE, EARTH, IRON, KNOB = (196, 134, 96), (214, 170, 128), (128, 78, 56), (94, 70, 62), (72, 92, 104)
+CLAY, SAND, EARTH, IRON = (196, 134, 96), (214, 170, 128), (128, 78, 56), (98, 70, 58)
+GLAZE, KNOB = (120, 146, 148), (72, 92, 104)
 
 THIN = 0.008
 """The wall of a vase without body thickness."""
@@ -35,7 +36,7 @@ def build(values: Values) -> Sequence[Part]:
     if values["has_neck"]:
         above, below = wall.parted(len(body) - 1)
         parts.append(Part("body", section.around(below), CLAY))
-        parts.append(Part("neck", section.around(above, ring=True), GLAZE))
+        parts.append(Part("neck", section.around(above, ring=True), SAND))
     else:
         parts.append(Part("body", section.around(wall.whole()), CLAY))
     if values["has_base"]:
