@@ -1,0 +1,156 @@
+"""The wall of a vessel: an inner outline, an outer one at equal distance, and meshes with one cross-section."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.programs.curves import QuadMesh, loft_rings, square_circle
+from stages.shape.arrays import FloatArray
+
+__all__ = ["CrossSection", "Wall"]
+
+AROUND = 32
+"""Points of a ring."""
+
+
+@dataclass(frozen=True)
+class CrossSection:
+    """What a vessel looks like from above: from a square with soft corners (roundness 0) to a circle (1)."""
+
+    roundness: float
+
+    @property
+    def _shape(self) -> float:
+        return 0.16 + 0.84 * self.roundness
+
+    def around(self, outline: npt.ArrayLike, ring: bool = False) -> QuadMesh:
+        """The mesh of an outline (n, 2) of radius and height around the y axis: a solid, from its foot to its top over
+        the outer side, with poles or flat ends; or, for a closed outline, a `ring`."""
+        points = np.asarray(outline, dtype=np.float64)
+        rings = points[:, None, :1] * _directions(self._shape)
+        rings[..., 1] = points[:, 1:]
+        return loft_rings(rings, closed=ring)
+
+    def reach(self, angle: npt.ArrayLike) -> FloatArray:
+        """Radius in a direction, as a multiple of half the width; degrees from +x towards -z."""
+        radians = np.radians(np.asarray(angle, dtype=np.float64))
+        exponent = 2.0 / self._shape
+        powers = np.abs(np.cos(radians)) ** exponent + np.abs(np.sin(radians)) ** exponent
+        found: FloatArray = powers ** (-1.0 / exponent)
+        return found
+
+
+@lru_cache(maxsize=64)
+def _directions(shape: float) -> FloatArray:
+    """A ring of half-width 1, counter-clockwise seen from above, float64 (AROUND, 3)."""
+    x, y = square_circle(shape, 2.0, count=AROUND).points.T
+    return np.stack([x, np.zeros(AROUND), -y], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """A wall of even thickness outside an inner outline.
+
+    inner: float64 (n, 2), radius and height, rising from the foot to the rim; thickness above 0. The vessel is cut
+    level at the height of the foot, and its floor lies `floor` above it.
+    """
+
+    inner: FloatArray
+    thickness: float
+    floor: float
+
+    @cached_property
+    def tangents(self) -> FloatArray:
+        """Unit directions of the inner outline at its points, float64 (n, 2)."""
+        steps = np.diff(self.inner, axis=0)
+        steps /= np.hypot(steps[:, 0], steps[:, 1])[:, None]
+        turning = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+        unit: FloatArray = turning / np.hypot(turning[:, 0], turning[:, 1])[:, None]
+        return unit
+
+    @cached_property
+    def _offset(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """The outer points that lie nowhere nearer to the inner outline than the wall is thick, and whose they are."""
+        normals = np.stack([self.tangents[:, 1], -self.tangents[:, 0]], axis=1)
+        points = self.inner + self.thickness * normals
+        starts, steps = self.inner[:-1], np.diff(self.inner, axis=0)
+        away = points[:, None] - starts
+        share = np.clip((away * steps).sum(axis=2) / (steps * steps).sum(axis=1), 0.0, 1.0)
+        away -= share[:, :, None] * steps
+        distance = np.sqrt((away * away).sum(axis=2).min(axis=1))
+        kept = np.flatnonzero((distance > 0.97 * self.thickness) & (points[:, 1] > self.inner[0, 1] + 1e-4))
+        return points[kept], kept
+
+    @cached_property
+    def outer(self) -> FloatArray:
+        """The outer outline from the level of the foot to the rim, float64 (m, 2)."""
+        points, kept = self._offset
+        foot = self.inner[0, 1]
+        first = points[0]
+        if kept[0] > 0:
+            # What bulges out at once is cut off where it passes the level of the foot.
+            ahead = self.inner[kept[0] - 1] + self.thickness * np.array(
+                [self.tangents[kept[0] - 1, 1], -self.tangents[kept[0] - 1, 0]]
+            )
+            share = np.clip((foot - ahead[1]) / (first[1] - ahead[1]), 0.0, 0.95) if first[1] > ahead[1] else 0.95
+            radius = ahead[0] + share * (first[0] - ahead[0])
+        else:
+            radius = first[0]
+        return np.concatenate([[[radius, foot]], points])
+
+    def parted(self, shoulder: int) -> tuple[FloatArray, FloatArray]:
+        """The closed outline of the wall above the inner point `shoulder`, with a tongue in the wall below, (a, 2);
+        and the outline of the vessel below it, from pole to pole, (b, 2)."""
+        _, kept = self._offset
+        place = int(np.searchsorted(kept, shoulder))
+        upper, lower = self.outer[place + 1 :], self.outer[: place + 2]
+        inside, outside = self.inner[shoulder], upper[0]
+        down = self.tangents[shoulder] * 0.5 * self.thickness
+        tongue = outside + np.array([[0.7], [0.3]]) * (inside - outside)
+        collar = np.concatenate([self._rim(), self.inner[-1:shoulder:-1], [inside]])
+        above = np.concatenate([upper, collar, tongue[:1], tongue - down, tongue[1:]])
+        return above, np.concatenate([self._closed(lower), self._cavity(shoulder)])
+
+    def whole(self) -> FloatArray:
+        """The outline of the vessel up to its rim, from pole to pole, float64 (a, 2)."""
+        return np.concatenate([self._closed(self.outer), self._rim(), self._cavity(len(self.inner) - 1)])
+
+    def _rim(self) -> FloatArray:
+        """Points that round off the rim, from the outside in, float64 (3, 2)."""
+        outside, inside = self.outer[-1], self.inner[-1]
+        middle, half = (outside + inside) / 2.0, (outside - inside) / 2.0
+        along = self.tangents[-1] * self.thickness / 2.0
+        angles = np.radians([[45.0], [90.0], [135.0]])
+        rounded: FloatArray = middle + np.cos(angles) * half + np.sin(angles) * along
+        return rounded
+
+    def seat(self) -> FloatArray:
+        """The highest point of the rim, on which a lid lies, float64 (2,)."""
+        rim = np.concatenate([self.outer[-1:], self._rim(), self.inner[-1:]])
+        highest: FloatArray = rim[rim[:, 1].argmax()]
+        return highest
+
+    def opening(self, depth: float) -> float:
+        """The smallest inner radius within `depth` of the rim."""
+        return float(self.inner[self.inner[:, 1] >= self.inner[-1, 1] - depth, 0].min())
+
+    def _closed(self, outer: FloatArray) -> FloatArray:
+        return np.concatenate([[[0.0, self.inner[0, 1]]], outer])
+
+    def _cavity(self, top: int) -> FloatArray:
+        """Down the inner side from its point `top` to the floor, and to the middle."""
+        level = self.inner[0, 1] + self.floor
+        inner = self.inner[: top + 1]
+        above = inner[inner[:, 1] > level + 1e-4][::-1]
+        radius = float(np.interp(level, inner[:, 1], inner[:, 0]))
+        return np.concatenate([above, [[radius, level], [0.0, level]]])
+
+    def radius(self, height: FloatArray) -> FloatArray:
+        """Outer radius at heights; that of the foot below it, that of the rim above it."""
+        rising = np.maximum.accumulate(self.outer[:, 1])
+        found: FloatArray = np.interp(height, rising, self.outer[:, 0])
+        return found
