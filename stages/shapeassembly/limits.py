@@ -1,0 +1,23 @@
+"""How large a program may be. The real ones stay far below: 3 levels, 9 cuboids an assembly, 36 copies, 80 leaves."""
+
+from __future__ import annotations
+
+__all__ = ["MAX_COPIES", "MAX_DEPTH", "MAX_LINES", "MAX_PARTS", "MAX_SIZE", "MAX_TEXT"]
+
+MAX_TEXT = 1_000_000
+"""Characters of a program's text."""
+
+MAX_LINES = 10_000
+"""Lines of one assembly."""
+
+MAX_DEPTH = 16
+"""Assemblies within each other."""
+
+MAX_COPIES = 1_000
+"""Copies that one translate makes."""
+
+MAX_PARTS = 10_000
+"""Cuboids of the executed program, those that are expanded and the bounding boxes included."""
+
+MAX_SIZE = 1e6
+"""Largest number in a program, and largest length of a cuboid: products of them stay exact enough."""
