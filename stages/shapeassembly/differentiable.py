@@ -1,8 +1,8 @@
-"""The differentiable interpreter: corners as functions of a program's continuous parameters, in torch (shapeassembly §4).
+"""The differentiable interpreter: corners as functions of continuous parameters, in torch (shapeassembly §4).
 
 What an attachment does depends on the parameters in steps: grow or stay, which axis is scaled, which grid points are
-nearest. The fast interpreter takes these decisions at the given parameters, and the arithmetic that follows them is done
-here, so that both have one meaning and the gradients are those of the branch that was taken.
+nearest. The fast interpreter takes these decisions at the given parameters, and the arithmetic that follows them is
+done here, so that both have one meaning and the gradients are those of the branch that was taken.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class DifferentiableProgram:
         self._rows: list[list[int]] = np.nan_to_num(self._flat.rows[:, :5]).astype(int).tolist()
 
     def corners(self, values: Tensor) -> Tensor:
-        """float64 (n, 8, 3), as `execute` orders them, at parameters `values`, float64 (k,) as `parameters` orders them.
+        """float64 (n, 8, 3), as `execute` orders them, at `values`, float64 (k,), as `parameters` orders them.
 
         Raises ProgramError where the program with these parameters cannot be executed.
         """

@@ -27,7 +27,7 @@ def parameters(program: Program) -> FloatArray:
 
 
 def with_parameters(program: Program, values: FloatArray) -> Program:
-    """The program with other continuous parameters, in the order of `parameters`. Raises ValueError on another count."""
+    """The program with other parameters, in the order of `parameters`. Raises ValueError for a wrong count."""
     rest = iter(np.asarray(values, dtype=np.float64).tolist())
     changed = program.with_lines(lambda line: _with_numbers(line, rest))
     if next(rest, None) is not None:
