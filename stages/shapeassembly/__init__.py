@@ -1,0 +1,10 @@
+"""ShapeAssembly: the language of attached cuboids, its interpreters, and programs from part hierarchies."""
+
+from __future__ import annotations
+
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.interpreter import Execution, execute, execute_all
+from stages.shapeassembly.parser import parse
+from stages.shapeassembly.printer import print_program
+
+__all__ = ["Execution", "ProgramError", "execute", "execute_all", "parse", "print_program"]

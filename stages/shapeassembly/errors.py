@@ -1,0 +1,25 @@
+"""What is wrong with a program, said so that its author finds the place."""
+
+from __future__ import annotations
+
+__all__ = ["ProgramError"]
+
+
+class ProgramError(ValueError):
+    """A program that cannot be read or executed.
+
+    reason: a short phrase that stays the same from program to program (it is what gets counted);
+    detail: what was special here, and the mend; line and column: place in the text, from 1, where there is a text;
+    source: the line of the text, shown with a caret under the place.
+    """
+
+    def __init__(self, reason: str, detail: str = "", line: int = 0, column: int = 0, source: str = "") -> None:
+        message = f"{reason}: {detail}" if detail else reason
+        if line:
+            shown = source.expandtabs(1)
+            message = f"line {line}, column {column}: {message}\n{shown}\n{' ' * (column - 1)}^"
+        super().__init__(message)
+        self.reason = reason
+        self.detail = detail
+        self.line = line
+        self.column = column
