@@ -1,0 +1,123 @@
+"""Extracts a ShapeAssembly program from a part hierarchy, and checks it (shapeassembly §5, App. C)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.errors import Rejected
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_parts, leaf_corners
+from stages.shapeassembly.extraction.boxes import around
+from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
+from stages.shapeassembly.extraction.rules import Rules
+from stages.shapeassembly.extraction.shortening import shorten_parts
+from stages.shapeassembly.extraction.validity import boxes_of_corners, f_score, is_rooted, overflow
+from stages.shapeassembly.extraction.writing import Order, write_program
+from stages.shapeassembly.printer import rounded
+from stages.shapeassembly.program import Program
+
+__all__ = ["Extraction", "Gates", "extract"]
+
+DIAGONAL = 2.0
+"""Of the bounding box of a shape in programs, as in PartNet, whose shapes lie in the unit sphere."""
+
+
+@dataclass(frozen=True)
+class Gates:
+    """What a program must pass (shapeassembly §5.3 and the published training set).
+
+    distance: of the F-score, where the diagonal of the shape is 2.
+    """
+
+    f_score: float = 75.0
+    distance: float = 0.05
+    fewest_leaves: int = 3
+    most_leaves: int = 12
+    overflow: float = 0.05
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """A program that passed every gate. program: with numbers to three decimals, centred at the origin.
+
+    f_score: 0 to 100, against the leaf boxes of the input; overflow: share of the bounding box by which parts reach
+    beyond it; leaves: cuboids declared that are not expanded; center (3,), scale: a point p of the program is
+    center + scale * p in the input; wanted, made: the input's leaf boxes and the executed ones, in the program's frame.
+    """
+
+    program: Program
+    f_score: float
+    overflow: float
+    leaves: int
+    center: FloatArray
+    scale: float
+    wanted: tuple[Box, ...]
+    made: tuple[Box, ...]
+
+
+def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
+    """The canonical program of a part hierarchy.
+
+    Raises Rejected with one of these reasons: "too few parts", "too many parts", "flat shape", "parts not connected",
+    "poor fit", "overflows its bounding box", "not rooted".
+    """
+    whole = around(leaf_corners(hierarchy.root), np.eye(3))
+    diagonal = float(np.linalg.norm(whole.size))
+    if diagonal <= 0:
+        raise Rejected("flat shape", f"{hierarchy.name} has no extent")
+    scale = diagonal / DIAGONAL
+    root = _rescaled(hierarchy.root, whole.center, scale)
+    wanted = [leaf.box for leaf in root.leaves()]
+    root = frame_parts(arrange_parts(shorten_parts(root), rules))
+    if not root.children:
+        raise Rejected("too few parts", f"{hierarchy.name} is one box")
+    program = rounded(write_program(root, order_of(rules)))
+    named = set(program.named)
+    leaves = sum(cuboid.name not in named for block in program.blocks for cuboid in block.cuboids)
+    if leaves < gates.fewest_leaves:
+        raise Rejected("too few parts", f"{hierarchy.name} has {leaves}, at least {gates.fewest_leaves} are wanted")
+    if leaves > gates.most_leaves:
+        raise Rejected("too many parts", f"{hierarchy.name} has {leaves}, at most {gates.most_leaves} are wanted")
+    return _checked(hierarchy.name, program, leaves, wanted, whole.center, scale, gates)
+
+
+def order_of(rules: Rules) -> Order:
+    """The canonical order: by semantic label, then by place: bottom to top, left to right, back to front."""
+    ranks = {label: rank for rank, label in enumerate(rules.order)}
+
+    def key(part: Part) -> tuple[object, ...]:
+        x, y, z = np.round(part.box.center, 3).tolist()
+        size = np.round(part.box.size, 3).tolist()
+        return (ranks.get(part.label, len(ranks)), part.label if ranks else "", y, x, z, *size)
+
+    return key
+
+
+def _checked(
+    name: str,
+    program: Program,
+    leaves: int,
+    wanted: list[Box],
+    center: FloatArray,
+    scale: float,
+    gates: Gates,
+) -> Extraction:
+    from stages.shapeassembly import execute
+
+    made = boxes_of_corners(execute(program).corners)
+    score = f_score(made, wanted, gates.distance)
+    if not score >= gates.f_score:
+        raise Rejected("poor fit", f"{name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
+    beyond = overflow(made, np.array(program.root.bbox.dims))
+    if beyond >= gates.overflow:
+        raise Rejected("overflows its bounding box", f"{name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
+    if not is_rooted(made):
+        raise Rejected("not rooted", f"{name} has a part without a way to the ground")
+    return Extraction(program, score, beyond, leaves, center, scale, tuple(wanted), tuple(made))
+
+
+def _rescaled(part: Part, center: FloatArray, scale: float) -> Part:
+    box = Box((part.box.center - center) / scale, part.box.size / scale, part.box.axes)
+    return replace(part, box=box, children=tuple(_rescaled(child, center, scale) for child in part.children))

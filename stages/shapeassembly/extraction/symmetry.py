@@ -1,0 +1,147 @@
+"""Symmetry groups among the parts of one node: reflections and translations along its axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.boxes import mirrored, same_box
+
+__all__ = ["Body", "Group", "reflections", "translations"]
+
+CLOSENESS = 0.03
+"""How near a moved part must come to its counterpart, as a share of the diagonal of the bounding box."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """What symmetry moves: one part, or several that are connected.
+
+    members: indices of its parts; boxes: corners (8, 3) of each leaf in the node's frame, whose origin is the centre
+    of the bounding box; touches: the parts outside itself that it is attached to, with -1 for the bottom and -2 for
+    the top of the bounding box.
+    """
+
+    members: tuple[int, ...]
+    boxes: tuple[FloatArray, ...]
+    touches: frozenset[int]
+
+    @property
+    def center(self) -> FloatArray:
+        """The middle of the extent, float64 (3,)."""
+        corners = np.concatenate(self.boxes)
+        middle: FloatArray = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        return middle
+
+
+@dataclass(frozen=True)
+class Group:
+    """Bodies that one macro makes of the first. bodies: indices, the first at the low end of the axis.
+    distance: from the first to the last, in the node's units (translate alone)."""
+
+    kind: Literal["reflect", "translate"]
+    axis: int
+    bodies: tuple[int, ...]
+    distance: float = 0.0
+
+
+def reflections(bodies: Sequence[Body], axis: int, diagonal: float) -> list[Group]:
+    """Pairs of bodies that are mirror images across the middle of the bounding box and touch the same parts.
+
+    diagonal: of the bounding box. A body that is its own image is in no pair.
+    """
+    tolerance = CLOSENESS * diagonal
+    origin = np.zeros(3)
+    groups: list[Group] = []
+    taken: set[int] = set()
+    for i, body in enumerate(bodies):
+        if i in taken or body.center[axis] > -1e-3 * diagonal:
+            continue
+        image = tuple(mirrored(corners, origin, axis) for corners in body.boxes)
+        swapped = _swapped(body.touches) if axis == 1 else body.touches
+        for j, other in enumerate(bodies):
+            if i == j or j in taken or other.center[axis] < 0 or not _alike(image, other.boxes, tolerance):
+                continue
+            if not _alike(body.boxes, other.boxes, tolerance) and _same_touches([(body, swapped), (other, other.touches)]):
+                groups.append(Group("reflect", axis, (i, j)))
+                taken |= {i, j}
+                break
+    return groups
+
+
+def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int) -> list[Group]:
+    """Rows of at least `fewest` equal bodies at equal distances along `axis` that touch the same parts."""
+    tolerance = CLOSENESS * diagonal
+    left = sorted(range(len(bodies)), key=lambda i: (bodies[i].center[axis], i))
+    groups: list[Group] = []
+    while left:
+        first = bodies[left[0]]
+        row = [i for i in left if _shifted_alike(first, bodies[i], axis, tolerance)]
+        row = [i for i in row if _same_touches([(first, first.touches), (bodies[i], bodies[i].touches)], row, bodies)]
+        row = _evenly_spaced([i for i in row if i != left[0]], left[0], bodies, axis, tolerance)
+        if len(row) >= fewest:
+            span = float(bodies[row[-1]].center[axis] - first.center[axis])
+            groups.append(Group("translate", axis, tuple(row), span))
+            left = [i for i in left if i not in row]
+        else:
+            left = left[1:]
+    return groups
+
+
+def _alike(first: Sequence[FloatArray], second: Sequence[FloatArray], tolerance: float) -> bool:
+    """Whether each box of one has its own counterpart in the other."""
+    if len(first) != len(second):
+        return False
+    left = list(second)
+    for corners in first:
+        for place, other in enumerate(left):
+            near = np.abs(corners.mean(axis=0) - other.mean(axis=0)).max() <= tolerance
+            if near and same_box(corners, other, tolerance):
+                del left[place]
+                break
+        else:
+            return False
+    return True
+
+
+def _shifted_alike(first: Body, second: Body, axis: int, tolerance: float) -> bool:
+    shift = np.zeros(3)
+    shift[axis] = second.center[axis] - first.center[axis]
+    return _alike([corners + shift for corners in first.boxes], second.boxes, tolerance)
+
+
+def _evenly_spaced(row: list[int], first: int, bodies: Sequence[Body], axis: int, tolerance: float) -> list[int]:
+    """The longest row that begins with `first` and goes on in equal steps, along ascending places."""
+    best = [first]
+    start = bodies[first].center[axis]
+    places = {i: float(bodies[i].center[axis] - start) for i in row}
+    for step in sorted({place for place in places.values() if place > tolerance / 2}):
+        found = [first]
+        while True:
+            wanted = step * len(found)
+            near = [i for i in row if i not in found and abs(places[i] - wanted) <= min(tolerance, step / 4)]
+            if not near:
+                break
+            found.append(min(near, key=lambda i: abs(places[i] - wanted)))
+        if len(found) > len(best):
+            best = found
+    return best
+
+
+def _swapped(touches: frozenset[int]) -> frozenset[int]:
+    """The same parts with the bottom and the top of the bounding box exchanged."""
+    return frozenset({-1: -2, -2: -1}.get(part, part) for part in touches)
+
+
+def _same_touches(
+    pairs: list[tuple[Body, frozenset[int]]], row: Sequence[int] = (), bodies: Sequence[Body] = ()
+) -> bool:
+    """Whether bodies touch the same parts, apart from each other and from further bodies `row` of one group."""
+    own = {member for body, _ in pairs for member in body.members}
+    own |= {member for i in row for member in bodies[i].members}
+    outside = [touches - own for _, touches in pairs]
+    return all(each == outside[0] for each in outside)

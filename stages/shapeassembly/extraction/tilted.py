@@ -1,0 +1,122 @@
+"""Places a tilted part: the attachments that turn it nearest to where it is (shapeassembly §5.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import permutations
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.boxes import box_corners
+from stages.shapeassembly.extraction.grounding import Placer
+from stages.shapeassembly.extraction.hierarchy import Box
+from stages.shapeassembly.extraction.joints import (
+    BACK,
+    BOTTOM,
+    LEFT,
+    TOP,
+    Joint,
+    Standing,
+    attach,
+    part_name,
+    squeeze,
+)
+from stages.shapeassembly.extraction.layout import BBOX, Layout
+from stages.shapeassembly.extraction.validity import boxes_of_corners
+from stages.shapeassembly.printer import rounded
+from stages.shapeassembly.program import Block, Cuboid, Program
+
+__all__ = ["cuboid_of", "tilted_placer"]
+
+SMALLEST = 0.01
+"""The least length of a cuboid (shapeassembly App. D)."""
+
+MOST_ATTACHMENTS = 3
+"""A part that is held at three points is held."""
+
+MOST_POINTS = 5
+"""Contacts of one part that are tried, those in canonical order first: their sequences number 85."""
+
+LINE_COST = 0.002
+"""Misplacement, as a share of the bounding box's diagonal, that is worth one line less."""
+
+
+def cuboid_of(layout: Layout, part: int) -> Cuboid:
+    """The declaration of a part."""
+    x, y, z = np.maximum(layout.parts[part].box.size, SMALLEST).tolist()
+    return Cuboid(part_name(part), (x, y, z), layout.aligned(part))
+
+
+def tilted_placer(layout: Layout) -> Placer:
+    """Places tilted parts of `layout` by trying their attachments in every order and executing each.
+
+    What is best is what brings the corners nearest to where they are in the input; a line must be worth its while.
+    """
+
+    def place(part: int, lines: list[Joint], standing: Standing) -> tuple[list[Joint], Box] | None:
+        wanted = box_corners(layout.parts[part].box)
+        best: tuple[float, list[Joint], Box] | None = None
+        for candidate in _candidates(layout, part, standing):
+            box = _executed(layout, part, [*lines, *candidate], standing)
+            away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
+            score = away + LINE_COST * len(candidate)
+            if best is None or score < best[0] - 1e-6:
+                best = (score, candidate, box)
+        return None if best is None else (best[1], best[2])
+
+    return place
+
+
+def _candidates(layout: Layout, part: int, standing: Standing) -> Iterator[list[Joint]]:
+    """Sequences of lines that could ground a part: squeezes, then attachments in every order."""
+    others = [other for other in layout.neighbours(part) if other in standing]
+    held = [BBOX, *others]
+    for face in (TOP, LEFT, BOTTOM, BACK):
+        for first in held:
+            for second in held:
+                line = squeeze(layout, standing, part, (first, second), face) if first != second or first == BBOX else None
+                if line is not None:
+                    yield [line]
+    ends = [point for point in (layout.bottoms[part], layout.tops[part]) if point is not None]
+    usual: list[Joint] = [attach(layout, standing, part, BBOX, point, point) for point in ends]
+    turning: list[Joint] = list(usual)
+    for other in others:
+        own, goal = layout.points(part, other)
+        usual.append(attach(layout, standing, part, other, own, goal))
+        point = _in_turning_plane(layout, part, other)
+        turning.append(attach(layout, standing, part, other, point, point))
+    yield from _sequences(usual)
+    yield from _sequences(turning)
+
+
+def _sequences(joints: Sequence[Joint]) -> Iterator[list[Joint]]:
+    for count in range(1, MOST_ATTACHMENTS + 1):
+        for chosen in permutations(joints[:MOST_POINTS], count):
+            yield list(chosen)
+
+
+def _in_turning_plane(layout: Layout, part: int, other: int) -> FloatArray:
+    """The point of a contact from which the part turns without rolling: nearest the plane through its centre that is
+    perpendicular to the axis about which it is tilted."""
+    box = layout.parts[part].box
+    region = layout.contacts[min(part, other), max(part, other)].region
+    turn = box.axes
+    axis = np.array([turn[1, 2] - turn[2, 1], turn[2, 0] - turn[0, 2], turn[0, 1] - turn[1, 0]])
+    axis /= max(float(np.linalg.norm(axis)), 1e-12)
+    away = np.abs((region - box.center) @ axis)
+    near = region[away <= away.min() + 1e-3 * layout.diagonal]
+    point: FloatArray = near.mean(axis=0)
+    return point
+
+
+def _executed(layout: Layout, part: int, lines: list[Joint], standing: Standing) -> Box:
+    """The box of a part after `lines`, with numbers as they will be printed."""
+    from stages.shapeassembly import execute
+
+    x, y, z = layout.bbox.size.tolist()
+    declared = sorted(each for each in (*standing, part) if each != BBOX)
+    cuboids = [cuboid_of(layout, each) for each in declared]
+    program = Program((Block("Program_0", Cuboid("bbox", (x, y, z), True), (*cuboids, *lines)),))
+    corners = execute(rounded(program)).corners
+    return boxes_of_corners(corners[[declared.index(part)]])[0]
