@@ -97,7 +97,9 @@ def frame_parts(root: Part) -> Part:
 
 def _framed(part: Part, frame: FloatArray, *, root_of_all: bool = False) -> Part:
     box = nearest_axes(part.box, frame)
-    if turn_between(box.axes, frame) < ALIGNED_DEGREES or (part.children and (root_of_all or _prefers(part, frame, box))):
+    if turn_between(box.axes, frame) < ALIGNED_DEGREES or (
+        part.children and (root_of_all or _prefers(part, frame, box))
+    ):
         box = Box(box.center, box.size, frame)
     if not part.children:
         return replace(part, box=box)

@@ -69,7 +69,9 @@ def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
         return found
     points = point_at(box, _GRID)
     near = np.abs(place_in(bbox, points)[:, 1] - edge) <= BAND
-    mean: FloatArray = points[near].mean(axis=0) if near.any() else box_corners(box)[int(np.abs(heights - edge).argmin())]
+    mean: FloatArray = (
+        points[near].mean(axis=0) if near.any() else box_corners(box)[int(np.abs(heights - edge).argmin())]
+    )
     return mean
 
 
@@ -107,7 +109,9 @@ def _faces(own: Box, other: Box, index: int, tolerance: float) -> bool:
     local = other.axes @ (point_at(own, _FACE_CENTERS[index]) - other.center)
     facing = -(other.axes @ outward)
     axis = int(np.abs(facing).argmax())
-    return bool(abs(facing[axis]) > 0.9 and abs(local[axis] - np.sign(facing[axis]) * other.size[axis] / 2) <= tolerance)
+    return bool(
+        abs(facing[axis]) > 0.9 and abs(local[axis] - np.sign(facing[axis]) * other.size[axis] / 2) <= tolerance
+    )
 
 
 def _onto(box: Box, point: FloatArray) -> FloatArray:

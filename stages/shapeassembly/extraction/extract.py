@@ -112,7 +112,9 @@ def _checked(
         raise Rejected("poor fit", f"{name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
     beyond = overflow(made, np.array(program.root.bbox.dims))
     if beyond >= gates.overflow:
-        raise Rejected("overflows its bounding box", f"{name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
+        raise Rejected(
+            "overflows its bounding box", f"{name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted"
+        )
     if not is_rooted(made):
         raise Rejected("not rooted", f"{name} has a part without a way to the ground")
     return Extraction(program, score, beyond, leaves, center, scale, tuple(wanted), tuple(made))

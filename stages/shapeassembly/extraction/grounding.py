@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.hierarchy import Box
@@ -18,6 +18,7 @@ from stages.shapeassembly.extraction.joints import (
     squeeze,
 )
 from stages.shapeassembly.extraction.layout import BBOX, Layout
+from stages.shapeassembly.program import Squeeze
 
 __all__ = ["Placer", "ground"]
 
@@ -26,12 +27,16 @@ Placer = Callable[[int, list[Joint], Standing], tuple[list[Joint], Box] | None]
 they make of it; None if it touches nothing that stands."""
 
 
-def ground(layout: Layout, place_tilted: Placer) -> list[Joint]:
-    """The attach and squeeze lines of a node whose parts hang together, in grounded order.
+MOST_JOINTS = 2
+"""Attachments of one aligned part, as in the published programs; the first places it, the second keeps it joined."""
+
+
+def ground(layout: Layout, place_tilted: Placer) -> list[Joint] | None:
+    """The attach and squeeze lines of a node in grounded order, or None if some part has no way to the box.
 
     Aligned parts at the bounding box come first, then in turns the aligned parts that touch what stands, in canonical
     order; a part that can be squeezed waits for both its partners, a tilted one for all aligned parts that can stand
-    without it. Further contacts of aligned parts are written too: they keep parts together when numbers change.
+    without it. A second contact of an aligned part is written too: it keeps parts together when numbers change.
     """
     return _Grounding(layout, place_tilted).run()
 
@@ -45,12 +50,13 @@ class _Grounding:
         self.lines: list[Joint] = []
         self.standing: dict[int, Box] = {BBOX: layout.bbox}
         self.joined: set[tuple[int, int]] = set()
+        self.joints = [0] * len(layout.parts)
 
-    def run(self) -> list[Joint]:
+    def run(self) -> list[Joint] | None:
         steps = (self._ground_at_box, self._turn, self._ground_tilted, self._ground_waiting)
         while any(step() for step in steps):
             pass
-        return self.lines
+        return self.lines if len(self.standing) > len(self.layout.parts) else None
 
     def _ground_at_box(self) -> bool:
         """Grounds aligned parts at the bounding box until all that are left there wait for a partner."""
@@ -74,6 +80,8 @@ class _Grounding:
         face = BOTTOM if bottom is not None else TOP
         waits = False
         for other in self.layout.neighbours(part):
+            if not self.layout.may_attach(part, other):
+                continue
             between = squeeze(self.layout, self.standing, part, (BBOX, other), face)
             if between is not None and other in self.standing:
                 return self._stand(part, [between], other)
@@ -81,18 +89,25 @@ class _Grounding:
         return not waits and self._stand(part, [self._at_box(part, point)])
 
     def _turn(self) -> bool:
-        """One turn over the aligned parts: what touches what stands is grounded, and all such contacts are written."""
+        """One turn over the aligned parts: what touches what stands is grounded or joined once more."""
         moved = False
         for part in range(len(self.layout.parts)):
-            others = [other for other in self.layout.neighbours(part) if other in self.standing]
-            if not self.layout.aligned(part):
+            others = self._targets(part)
+            if not others or not self.layout.aligned(part):
                 continue
             if part in self.standing:
-                others = [other for other in others if _pair(part, other) not in self.joined]
-                moved |= self._stand(part, [attach_contact(self.layout, self.standing, part, each) for each in others], *others)
-            elif self.layout.bottoms[part] is None and self.layout.tops[part] is None and others:
+                moved |= self._join(part, others[: MOST_JOINTS - self.joints[part]])
+            elif self.layout.bottoms[part] is None and self.layout.tops[part] is None:
                 moved |= self._ground_between(part, others)
         return moved
+
+    def _targets(self, part: int) -> list[int]:
+        """What a part may be attached to next: standing neighbours, those first that the centre of a face touches."""
+        others = [each for each in self.layout.neighbours(part) if each in self.standing]
+        others = [
+            each for each in others if self.layout.may_attach(part, each) and _pair(part, each) not in self.joined
+        ]
+        return sorted(others, key=lambda each: (not self.layout.at_face_center(part, each), each))
 
     def _ground_between(self, part: int, others: list[int]) -> bool:
         """Grounds a part at its neighbours: by a squeeze, if two of them hold it at opposite faces."""
@@ -102,17 +117,19 @@ class _Grounding:
                     line = squeeze(self.layout, self.standing, part, (first, second), face) if first != second else None
                     if line is not None:
                         return self._stand(part, [line], first, second)
-        lines: list[Joint] = [attach_contact(self.layout, self.standing, part, other) for other in others]
-        return self._stand(part, lines, *others)
+        return self._join(part, others[:MOST_JOINTS])
+
+    def _join(self, part: int, others: list[int]) -> bool:
+        return self._stand(part, [attach_contact(self.layout, self.standing, part, each) for each in others], *others)
 
     def _ground_tilted(self) -> bool:
         for part in self._loose(aligned=False):
             placed = self.place_tilted(part, self.lines, self.standing)
             if placed is not None:
                 lines, box = placed
-                joined = self._stand(part, lines, *(each for each in self.layout.neighbours(part) if each in self.standing))
+                self._stand(part, lines, *(each for each in self.layout.neighbours(part) if each in self.standing))
                 self.standing[part] = box
-                return joined
+                return True
         return False
 
     def _ground_waiting(self) -> bool:
@@ -130,11 +147,12 @@ class _Grounding:
     def _at_box(self, part: int, point: FloatArray) -> Joint:
         return attach(self.layout, self.standing, part, BBOX, point, point)
 
-    def _stand(self, part: int, lines: list[Joint], *others: int) -> bool:
+    def _stand(self, part: int, lines: Sequence[Joint], *others: int) -> bool:
         """Writes lines that ground or further join a part; whether there were any."""
         if lines:
             self.standing.setdefault(part, self.layout.parts[part].box)
             self.lines += lines
+            self.joints[part] += sum(2 if isinstance(line, Squeeze) else 1 for line in lines)
             self.joined |= {_pair(part, other) for other in others}
         return bool(lines)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -32,78 +33,76 @@ class Symmetry:
     distance: float | None
 
 
+@dataclass(frozen=True)
+class _Formed:
+    """A group: the part that stands for it, its macro, and the parts and ends of the box to which it is anchored."""
+
+    part: Part
+    symmetry: Symmetry
+    anchors: tuple[Part, ...]
+    ends: frozenset[int]
+
+
 def form_groups(layout: Layout, order: Callable[[Part], object]) -> tuple[Layout, list[Symmetry | None]]:
     """The layout of the parts that remain when groups are formed, and for each the macro that makes the others.
 
     Connected components that repeat become one sub-part each, before groups of single parts are formed. `order` is
-    the key of the canonical order of parts.
+    the key of the canonical order of parts. A part with a macro is anchored where its copies are attached too.
     """
-    found: dict[int, Symmetry] = {}
-    pooled = _pool_components(layout)
-    while pooled is not None:
-        parts, macro, chosen = pooled
-        ordered = sorted(range(len(parts)), key=lambda i: order(parts[i]))
-        known = {id(part): found[i] for i, part in enumerate(layout.parts) if i in found}
-        known[id(chosen)] = macro
-        layout = lay_out([parts[i] for i in ordered], layout.bbox.size)
-        found = {i: known[id(part)] for i, part in enumerate(layout.parts) if id(part) in known}
-        pooled = _pool_components(layout, set(found))
-    singles = [i for i in range(len(layout.parts)) if i not in found]
-    bodies = _bodies(layout, [(i,) for i in singles])
-    removed: set[int] = set()
+    formed: list[_Formed] = []
+    while (pooled := _pool_components(layout, {id(each.part) for each in formed})) is not None:
+        parts, each = pooled
+        formed.append(each)
+        layout = lay_out(sorted(parts, key=order), layout.bbox.size)
+    fixed = {id(each.part) for each in formed}
+    bodies = _bodies(layout, [(i,) for i, part in enumerate(layout.parts) if id(part) not in fixed])
+    gone: set[int] = set()
     for group in _single_groups(bodies, layout.diagonal):
         members = [bodies[each].members[0] for each in group.bodies]
-        found[members[0]] = _macro(group, layout)
-        removed |= set(members[1:])
-    kept = [i for i in range(len(layout.parts)) if i not in removed]
-    return _without(layout, kept), [found.get(i) for i in kept]
+        formed.append(_formed(group, layout, layout.parts[members[0]]))
+        gone |= set(members[1:])
+    return _reduced(layout, [i for i in range(len(layout.parts)) if i not in gone], formed)
+
+
+def _searches(diagonal: float, rows_of: int) -> list[Callable[[Sequence[Body]], list[Group]]]:
+    """Searches for groups: mirrored pairs, then rows of at least `rows_of`, along each axis."""
+    return [
+        *(partial(reflections, axis=axis, diagonal=diagonal) for axis in REFLECTION_AXES),
+        *(partial(translations, axis=axis, diagonal=diagonal, fewest=rows_of) for axis in range(3)),
+    ]
 
 
 def _single_groups(bodies: Sequence[Body], diagonal: float) -> list[Group]:
     """Groups of single parts: rows of three or more, then mirrored pairs, then rows of two."""
-    searches: list[Callable[[Sequence[Body]], list[Group]]] = [
-        *(lambda some, axis=axis: translations(some, axis, diagonal, 3) for axis in range(3)),
-        *(lambda some, axis=axis: reflections(some, axis, diagonal) for axis in REFLECTION_AXES),
-        *(lambda some, axis=axis: translations(some, axis, diagonal, 2) for axis in range(3)),
-    ]
+    long_rows = _searches(diagonal, rows_of=3)[len(REFLECTION_AXES) :]
     groups: list[Group] = []
     taken: set[int] = set()
-    for search in searches:
+    for search in (*long_rows, *_searches(diagonal, rows_of=2)):
         free = [i for i in range(len(bodies)) if i not in taken]
         for group in search([bodies[i] for i in free]):
             members = tuple(free[i] for i in group.bodies)
-            groups.append(Group(group.kind, group.axis, members, group.distance))
+            groups.append(replace(group, bodies=members))
             taken |= set(members)
     return groups
 
 
-def _pool_components(layout: Layout, fixed: set[int] | None = None) -> tuple[list[Part], Symmetry, Part] | None:
-    """The parts after one group of connected components has become one sub-part, with its macro and the sub-part."""
-    free = [i for i in range(len(layout.parts)) if i not in (fixed or set())]
-    singles = _bodies(layout, [(i,) for i in free])
-    blind = [Body(body.members, body.boxes, frozenset()) for body in singles]
-    for kind, axis in [*(("reflect", axis) for axis in REFLECTION_AXES), *(("translate", axis) for axis in range(3))]:
-        paired = (
-            reflections(blind, axis, layout.diagonal)
-            if kind == "reflect"
-            else translations(blind, axis, layout.diagonal, 2)
-        )
-        moving = sorted({free[body] for group in paired for body in group.bodies})
-        components = [each for each in _components(layout, moving) if len(each) > 1]
-        if len(components) < 2:
-            continue
-        bodies = _bodies(layout, components)
-        groups = (
-            reflections(bodies, axis, layout.diagonal)
-            if kind == "reflect"
-            else translations(bodies, axis, layout.diagonal, 2)
-        )
+def _pool_components(layout: Layout, fixed: set[int]) -> tuple[list[Part], _Formed] | None:
+    """The parts after one group of connected components has become one sub-part, and that group.
+
+    fixed: identities of the parts that are already groups.
+    """
+    free = [i for i, part in enumerate(layout.parts) if id(part) not in fixed]
+    unattached = [replace(body, touches=frozenset({BOTTOM, TOP})) for body in _bodies(layout, [(i,) for i in free])]
+    for find in _searches(layout.diagonal, rows_of=2):
+        moving = sorted({free[i] for group in find(unattached) for i in group.bodies})
+        bodies = _bodies(layout, [each for each in _components(layout, moving) if len(each) > 1])
+        groups = find(bodies)
         if groups:
-            group = groups[0]
-            gone = {member for body in group.bodies for member in bodies[body].members}
-            pooled = _pool([layout.parts[i] for i in bodies[group.bodies[0]].members])
+            first, *others = (bodies[i].members for i in groups[0].bodies)
+            pooled = _pool([layout.parts[i] for i in first])
+            gone = {member for members in (first, *others) for member in members}
             kept = [part for i, part in enumerate(layout.parts) if i not in gone]
-            return [*kept, pooled], _macro(group, layout), pooled
+            return [*kept, pooled], _formed(groups[0], layout, pooled)
     return None
 
 
@@ -113,10 +112,12 @@ def _pool(parts: Sequence[Part]) -> Part:
     return Part(parts[0].label, around(corners, np.eye(3)), tuple(parts))
 
 
-def _macro(group: Group, layout: Layout) -> Symmetry:
-    if group.kind == "reflect":
-        return Symmetry(group.axis, 1, None)
-    return Symmetry(group.axis, len(group.bodies) - 1, group.distance / float(layout.bbox.size[group.axis]))
+def _formed(group: Group, layout: Layout, part: Part) -> _Formed:
+    copies, distance = 1, None
+    if group.kind == "translate":
+        copies, distance = len(group.bodies) - 1, group.distance / float(layout.bbox.size[group.axis])
+    anchors = tuple(layout.parts[i] for i in sorted(group.anchors) if i >= 0)
+    return _Formed(part, Symmetry(group.axis, copies, distance), anchors, group.anchors & {BOTTOM, TOP})
 
 
 def _bodies(layout: Layout, members: Sequence[Sequence[int]]) -> list[Body]:
@@ -148,14 +149,23 @@ def _components(layout: Layout, parts: Sequence[int]) -> list[list[int]]:
     return components
 
 
-def _without(layout: Layout, kept: Sequence[int]) -> Layout:
-    """The layout of the parts `kept`, ascending."""
+def _reduced(layout: Layout, kept: Sequence[int], formed: Sequence[_Formed]) -> tuple[Layout, list[Symmetry | None]]:
+    """The layout of the parts `kept`, ascending, those of groups anchored, and the macro of each."""
     place = {part: index for index, part in enumerate(kept)}
-    contacts = {(place[i], place[j]): each for (i, j), each in layout.contacts.items() if i in place and j in place}
-    return Layout(
+    named = {id(layout.parts[part]): index for part, index in place.items()}
+    groups = {named[id(each.part)]: each for each in formed}
+    anchors: list[frozenset[int] | None] = [None] * len(kept)
+    bottoms, tops = [layout.bottoms[i] for i in kept], [layout.tops[i] for i in kept]
+    for index, each in groups.items():
+        anchors[index] = frozenset(named[id(part)] for part in each.anchors if id(part) in named)
+        bottoms[index] = bottoms[index] if BOTTOM in each.ends else None
+        tops[index] = tops[index] if TOP in each.ends else None
+    reduced = Layout(
         layout.bbox,
         tuple(layout.parts[i] for i in kept),
-        contacts,
-        tuple(layout.bottoms[i] for i in kept),
-        tuple(layout.tops[i] for i in kept),
+        {(place[i], place[j]): each for (i, j), each in layout.contacts.items() if i in place and j in place},
+        tuple(bottoms),
+        tuple(tops),
+        tuple(anchors),
     )
+    return reduced, [groups[i].symmetry if i in groups else None for i in range(len(kept))]

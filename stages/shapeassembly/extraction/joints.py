@@ -9,7 +9,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import place_in, point_at
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.layout import BBOX, Layout
+from stages.shapeassembly.extraction.layout import BBOX, REACHES, Layout
 from stages.shapeassembly.program import Attach, Face, Point, Squeeze
 
 __all__ = ["BACK", "BOTTOM", "LEFT", "TOP", "Joint", "Standing", "attach", "attach_contact", "part_name", "squeeze"]
@@ -58,7 +58,8 @@ def squeeze(
     """The line that puts `face` of a part on the first target and its opposite face on the second; None if the part
     does not stand so (shapeassembly App. B).
 
-    A target that does not stand yet is taken where the layout has it.
+    A target that does not stand yet is taken where the layout has it. An aligned part is placed by the first target;
+    from the second it may stay as far away as the interpreter leaves it.
     """
     axis, end = face
     box = layout.parts[part].box
@@ -71,7 +72,8 @@ def squeeze(
         target_box = standing[target] if target in standing else layout.parts[target].box
         place = place_in(target_box, point)
         wanted = side if target == BBOX else 1 - side
-        if abs(place[axis] - wanted) * target_box.size[axis] > flush:
+        near = REACHES[-1] * max(*box.size, *target_box.size) if side != end and layout.aligned(part) else flush
+        if abs(place[axis] - wanted) * target_box.size[axis] > near:
             return None
         places.append(np.delete(place, axis))
     if places[0].min() < -1e-3 or places[0].max() > 1 + 1e-3:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import turn_between
+from stages.shapeassembly.extraction.boxes import place_in, turn_between
 from stages.shapeassembly.extraction.contacts import Contact, bottom_or_top, contact_of
 from stages.shapeassembly.extraction.hierarchy import Box, Part
 
@@ -25,13 +25,16 @@ hangs together. The second is what the interpreter takes for touching."""
 @dataclass(frozen=True)
 class Layout:
     """parts: in canonical order, their boxes in the node's frame, whose origin is the centre of `bbox`.
-    contacts: by pairs i < j; bottoms, tops: where each part reaches the bottom and the top of the bounding box."""
+    contacts: by pairs i < j; bottoms, tops: where each part reaches the bottom and the top of the bounding box.
+    anchors: for each part the parts to which alone it may be attached, because its copies touch them too; None where
+    it may be attached to any that it touches."""
 
     bbox: Box
     parts: tuple[Part, ...]
     contacts: dict[tuple[int, int], Contact]
     bottoms: tuple[FloatArray | None, ...]
     tops: tuple[FloatArray | None, ...]
+    anchors: tuple[frozenset[int] | None, ...]
 
     @property
     def diagonal(self) -> float:
@@ -46,10 +49,20 @@ class Layout:
         """The parts that touch `part`, ascending."""
         return sorted({i + j - part for i, j in self.contacts if part in (i, j)})
 
+    def may_attach(self, mover: int, target: int) -> bool:
+        """Whether a part may be attached to a neighbour."""
+        anchors = self.anchors[mover]
+        return anchors is None or target in anchors
+
     def points(self, mover: int, target: int) -> tuple[FloatArray, FloatArray]:
         """The attachment point of a contact, (3,) on the mover and (3,) on the target."""
         contact = self.contacts[min(mover, target), max(mover, target)]
         return (contact.first, contact.second) if mover < target else (contact.second, contact.first)
+
+    def at_face_center(self, mover: int, target: int) -> bool:
+        """Whether the attachment point of a contact is the centre of a face of the mover."""
+        place = place_in(self.parts[mover].box, self.points(mover, target)[0])
+        return bool((np.abs(place - 0.5) < 1e-3).sum() >= 2)
 
     def hangs_together(self) -> bool:
         """Whether a way through contacts leads from the bounding box to every part."""
@@ -75,7 +88,7 @@ def lay_out(parts: Sequence[Part], size: FloatArray) -> Layout:
                     contacts[i, j] = contact
         bottoms = tuple(bottom_or_top(part.box, bbox, top=False) for part in parts)
         tops = tuple(bottom_or_top(part.box, bbox, top=True) for part in parts)
-        layout = Layout(bbox, tuple(parts), contacts, bottoms, tops)
+        layout = Layout(bbox, tuple(parts), contacts, bottoms, tops, (None,) * len(parts))
         if layout.hangs_together():
             break
     return layout

@@ -59,7 +59,9 @@ def _frames(normals: FloatArray, edges: FloatArray) -> FloatArray:
 
 def _spans(points: FloatArray, frames: FloatArray) -> FloatArray:
     """Lengths of the boxes around the points in each frame, (k, 3); in blocks, so that memory stays small."""
-    blocks = [np.ptp(points @ frames[start : start + 512].transpose(0, 2, 1), axis=1) for start in range(0, len(frames), 512)]
+    blocks = [
+        np.ptp(points @ frames[start : start + 512].transpose(0, 2, 1), axis=1) for start in range(0, len(frames), 512)
+    ]
     return np.concatenate(blocks)
 
 

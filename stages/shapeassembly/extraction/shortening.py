@@ -25,7 +25,9 @@ def shorten_parts(root: Part) -> Part:
     """
     leaves = list(root.leaves())
     boxes = [leaf.box for leaf in leaves]
-    order = sorted(range(len(boxes)), key=lambda i: (round(float(np.prod(boxes[i].size)), 9), *boxes[i].center.tolist()))
+    order = sorted(
+        range(len(boxes)), key=lambda i: (round(float(np.prod(boxes[i].size)), 9), *boxes[i].center.tolist())
+    )
     reach = [float(np.linalg.norm(box.size)) / 2 for box in boxes]
     for i in order:
         for j in range(len(boxes)):

@@ -41,16 +41,18 @@ class Body:
 @dataclass(frozen=True)
 class Group:
     """Bodies that one macro makes of the first. bodies: indices, the first at the low end of the axis.
-    distance: from the first to the last, in the node's units (translate alone)."""
+    anchors: what all of them touch, as the first touches it. distance: from the first to the last, in the node's
+    units (translate alone)."""
 
     kind: Literal["reflect", "translate"]
     axis: int
     bodies: tuple[int, ...]
+    anchors: frozenset[int]
     distance: float = 0.0
 
 
 def reflections(bodies: Sequence[Body], axis: int, diagonal: float) -> list[Group]:
-    """Pairs of bodies that are mirror images across the middle of the bounding box and touch the same parts.
+    """Pairs of bodies that are mirror images across the middle of the bounding box and touch a common part.
 
     diagonal: of the bounding box. A body that is its own image is in no pair.
     """
@@ -66,26 +68,28 @@ def reflections(bodies: Sequence[Body], axis: int, diagonal: float) -> list[Grou
         for j, other in enumerate(bodies):
             if i == j or j in taken or other.center[axis] < 0 or not _alike(image, other.boxes, tolerance):
                 continue
-            if not _alike(body.boxes, other.boxes, tolerance) and _same_touches([(body, swapped), (other, other.touches)]):
-                groups.append(Group("reflect", axis, (i, j)))
+            common = _common([swapped, other.touches], [body, other])
+            if common and not _alike(body.boxes, other.boxes, tolerance):
+                groups.append(Group("reflect", axis, (i, j), _swapped(common) if axis == 1 else common))
                 taken |= {i, j}
                 break
     return groups
 
 
 def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int) -> list[Group]:
-    """Rows of at least `fewest` equal bodies at equal distances along `axis` that touch the same parts."""
+    """Rows of at least `fewest` equal bodies at equal distances along `axis` that touch a common part."""
     tolerance = CLOSENESS * diagonal
     left = sorted(range(len(bodies)), key=lambda i: (bodies[i].center[axis], i))
     groups: list[Group] = []
     while left:
         first = bodies[left[0]]
         row = [i for i in left if _shifted_alike(first, bodies[i], axis, tolerance)]
-        row = [i for i in row if _same_touches([(first, first.touches), (bodies[i], bodies[i].touches)], row, bodies)]
         row = _evenly_spaced([i for i in row if i != left[0]], left[0], bodies, axis, tolerance)
-        if len(row) >= fewest:
-            span = float(bodies[row[-1]].center[axis] - first.center[axis])
-            groups.append(Group("translate", axis, tuple(row), span))
+        members = [bodies[i] for i in row]
+        common = _common([body.touches for body in members], members)
+        if len(row) >= fewest and common:
+            span = float(members[-1].center[axis] - first.center[axis])
+            groups.append(Group("translate", axis, tuple(row), common, span))
             left = [i for i in left if i not in row]
         else:
             left = left[1:]
@@ -137,11 +141,7 @@ def _swapped(touches: frozenset[int]) -> frozenset[int]:
     return frozenset({-1: -2, -2: -1}.get(part, part) for part in touches)
 
 
-def _same_touches(
-    pairs: list[tuple[Body, frozenset[int]]], row: Sequence[int] = (), bodies: Sequence[Body] = ()
-) -> bool:
-    """Whether bodies touch the same parts, apart from each other and from further bodies `row` of one group."""
-    own = {member for body, _ in pairs for member in body.members}
-    own |= {member for i in row for member in bodies[i].members}
-    outside = [touches - own for _, touches in pairs]
-    return all(each == outside[0] for each in outside)
+def _common(touches: Sequence[frozenset[int]], members: Sequence[Body]) -> frozenset[int]:
+    """What all members of a group touch outside the group."""
+    own = {member for body in members for member in body.members}
+    return frozenset.intersection(*touches) - own

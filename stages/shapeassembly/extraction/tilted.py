@@ -70,12 +70,14 @@ def tilted_placer(layout: Layout) -> Placer:
 
 def _candidates(layout: Layout, part: int, standing: Standing) -> Iterator[list[Joint]]:
     """Sequences of lines that could ground a part: squeezes, then attachments in every order."""
-    others = [other for other in layout.neighbours(part) if other in standing]
+    others = [other for other in layout.neighbours(part) if other in standing and layout.may_attach(part, other)]
     held = [BBOX, *others]
     for face in (TOP, LEFT, BOTTOM, BACK):
         for first in held:
             for second in held:
-                line = squeeze(layout, standing, part, (first, second), face) if first != second or first == BBOX else None
+                line = (
+                    squeeze(layout, standing, part, (first, second), face) if first != second or first == BBOX else None
+                )
                 if line is not None:
                     yield [line]
     ends = [point for point in (layout.bottoms[part], layout.tops[part]) if point is not None]

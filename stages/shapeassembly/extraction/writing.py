@@ -53,11 +53,14 @@ def write_program(root: Part, order: Order) -> Program:
 
 def _write_node(part: Part, order: Order) -> _Node:
     children = sorted((localised(child, part.box) for child in part.children), key=order)
-    layout = lay_out(children, part.box.size)
-    layout, symmetries = form_groups(layout, order)
-    if not layout.hangs_together():
-        raise Rejected("parts not connected", f"below {part.label!r}")
+    whole = lay_out(children, part.box.size)
+    layout, symmetries = form_groups(whole, order)
     joints = ground(layout, tilted_placer(layout))
+    if joints is None:
+        layout, symmetries = whole, [None] * len(children)
+        joints = ground(layout, tilted_placer(layout))
+    if joints is None:
+        raise Rejected("parts not connected", f"below {part.label!r}")
     indices = range(len(layout.parts))
     macros = [_macro(index, each) for index, each in enumerate(symmetries) if each is not None]
     lines = (*(cuboid_of(layout, index) for index in indices), *joints, *macros)
