@@ -58,7 +58,7 @@ def box_corners(box: Box) -> FloatArray:
 def inside(box: Box, points: FloatArray, tolerance: float) -> BoolArray:
     """Which of the points (n, 3) lie in `box`, or beyond a side by at most `tolerance`."""
     local = np.abs((points - box.center) @ box.axes.T)
-    within: BoolArray = (local <= box.size / 2 + tolerance).all(axis=-1)
+    within: BoolArray = np.all(local <= box.size / 2 + tolerance, axis=-1)
     return within
 
 

@@ -69,9 +69,9 @@ def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
         return found
     points = point_at(box, _GRID)
     near = np.abs(place_in(bbox, points)[:, 1] - edge) <= BAND
-    mean: FloatArray = (
-        points[near].mean(axis=0) if near.any() else box_corners(box)[int(np.abs(heights - edge).argmin())]
-    )
+    if not near.any():
+        points, near = box_corners(box), np.abs(heights - edge) <= BAND
+    mean: FloatArray = points[near].mean(axis=0)
     return mean
 
 

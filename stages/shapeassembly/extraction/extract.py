@@ -61,7 +61,7 @@ def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
     """The canonical program of a part hierarchy.
 
     Raises Rejected with one of these reasons: "too few parts", "too many parts", "flat shape", "parts not connected",
-    "poor fit", "overflows its bounding box", "not rooted".
+    "poor fit", "overflows its box", "not rooted".
     """
     whole = around(leaf_corners(hierarchy.root), np.eye(3))
     diagonal = float(np.linalg.norm(whole.size))
@@ -112,9 +112,7 @@ def _checked(
         raise Rejected("poor fit", f"{name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
     beyond = overflow(made, np.array(program.root.bbox.dims))
     if beyond >= gates.overflow:
-        raise Rejected(
-            "overflows its bounding box", f"{name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted"
-        )
+        raise Rejected("overflows its box", f"{name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
     if not is_rooted(made):
         raise Rejected("not rooted", f"{name} has a part without a way to the ground")
     return Extraction(program, score, beyond, leaves, center, scale, tuple(wanted), tuple(made))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,7 @@ class _Formed:
     ends: frozenset[int]
 
 
-def form_groups(layout: Layout, order: Callable[[Part], object]) -> tuple[Layout, list[Symmetry | None]]:
+def form_groups(layout: Layout, order: Callable[[Part], Any]) -> tuple[Layout, list[Symmetry | None]]:
     """The layout of the parts that remain when groups are formed, and for each the macro that makes the others.
 
     Connected components that repeat become one sub-part each, before groups of single parts are formed. `order` is

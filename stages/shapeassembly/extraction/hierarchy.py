@@ -69,14 +69,14 @@ def bounded(root: Part, source: str) -> Part:
     return root
 
 
-def box_of_rows(center: FloatArray, size: FloatArray, first: FloatArray, second: FloatArray, place: str) -> Box:
-    """A box from its centre, its lengths along `first`, `second` and their cross product, all float (3,).
+def box_of_rows(numbers: FloatArray, place: str) -> Box:
+    """A box from twelve numbers: its centre, its lengths, and the directions of the first two lengths.
 
     The axes are made unit and orthogonal: files give them to a few digits. Raises Rejected, naming `place`, for
     numbers that are not finite, negative sizes and axes that are no axes.
     """
-    rows = np.array([center, size, first, second], dtype=np.float64)
-    if rows.shape != (4, 3) or not np.isfinite(rows).all() or np.abs(rows).max() > 1e9:
+    rows = numbers.reshape(4, 3)
+    if not np.isfinite(rows).all() or np.abs(rows).max() > 1e9:
         raise Rejected(UNREADABLE, f"{place}: a box has twelve finite numbers: centre, size and two axes")
     if (rows[1] < 0).any():
         raise Rejected(UNREADABLE, f"{place}: a box has a negative size; write its lengths as positive numbers")

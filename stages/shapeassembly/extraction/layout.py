@@ -1,4 +1,4 @@
-"""One node of an arranged hierarchy as the program sees it: its parts as cuboids in its frame, and what touches what."""
+"""One node of an arranged hierarchy as the program sees it: its parts in its frame, and what touches what."""
 
 from __future__ import annotations
 

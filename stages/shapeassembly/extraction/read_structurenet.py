@@ -44,6 +44,5 @@ def _part(node: Any, place: str, depth: int) -> Part:
     children = node.get("children") or []
     if not isinstance(children, list):
         raise Rejected(UNREADABLE, f"{here}: `children` is a list of parts")
-    rows = np.array(numbers, dtype=np.float64).reshape(4, 3)
-    box = box_of_rows(*rows, place=here)
+    box = box_of_rows(np.array(numbers, dtype=np.float64), here)
     return Part(label, box, tuple(_part(child, here, depth + 1) for child in children))

@@ -30,7 +30,7 @@ def shorten_parts(root: Part) -> Part:
     )
     reach = [float(np.linalg.norm(box.size)) / 2 for box in boxes]
     for i in order:
-        for j in range(len(boxes)):
+        for j in order:
             if i != j and np.linalg.norm(boxes[i].center - boxes[j].center) <= reach[i] + reach[j]:
                 boxes[i] = _cut(boxes[i], boxes[j])
     return _with_boxes(root, iter(boxes))

@@ -20,7 +20,7 @@ _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 def boxes_of_corners(corners: FloatArray) -> list[Box]:
-    """Boxes from corners (n, 8, 3) in the order of the interpreter: from the highest x, y and z to the lowest, z first."""
+    """Boxes from corners (n, 8, 3) in the interpreter's order: from the highest x, y, z down, z first."""
     edges = corners[:, :1] - np.stack([corners[:, 4], corners[:, 2], corners[:, 1]], axis=1)
     sizes = np.linalg.norm(edges, axis=2)
     axes = edges / np.maximum(sizes, 1e-12)[..., None]

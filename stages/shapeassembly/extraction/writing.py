@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from stages.shapeassembly.program import AXES, Attach, Block, Cuboid, Line, Prog
 
 __all__ = ["Order", "write_program"]
 
-Order = Callable[[Part], tuple[object, ...]]
+Order = Callable[[Part], tuple[Any, ...]]
 """The key of the canonical order of the parts of one node, in the node's frame."""
 
 
