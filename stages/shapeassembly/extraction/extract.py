@@ -20,19 +20,22 @@ from stages.shapeassembly.program import Program
 
 __all__ = ["Extraction", "Gates", "extract"]
 
+USUAL_DIAGONALS = (1.0, 4.0)
+"""Of the bounding boxes of PartNet's shapes, which lie about the unit sphere: a shape of such size keeps it."""
+
 DIAGONAL = 2.0
-"""Of the bounding box of a shape in programs, as in PartNet, whose shapes lie in the unit sphere."""
+"""Of the bounding box to which other shapes are scaled."""
 
 
 @dataclass(frozen=True)
 class Gates:
     """What a program must pass (shapeassembly §5.3 and the published training set).
 
-    distance: of the F-score, where the diagonal of the shape is 2.
+    distance: of the F-score, as a share of the diagonal of the shape.
     """
 
     f_score: float = 75.0
-    distance: float = 0.05
+    distance: float = 0.02
     fewest_leaves: int = 3
     most_leaves: int = 12
     overflow: float = 0.05
@@ -67,7 +70,7 @@ def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
     diagonal = float(np.linalg.norm(whole.size))
     if diagonal <= 0:
         raise Rejected("flat shape", f"{hierarchy.name} has no extent")
-    scale = diagonal / DIAGONAL
+    scale = 1.0 if USUAL_DIAGONALS[0] <= diagonal <= USUAL_DIAGONALS[1] else diagonal / DIAGONAL
     root = _rescaled(hierarchy.root, whole.center, scale)
     wanted = [leaf.box for leaf in root.leaves()]
     root = frame_parts(arrange_parts(shorten_parts(root), rules))
@@ -107,7 +110,7 @@ def _checked(
     from stages.shapeassembly import execute
 
     made = boxes_of_corners(execute(program).corners)
-    score = f_score(made, wanted, gates.distance)
+    score = f_score(made, wanted, gates.distance * float(np.linalg.norm(program.root.bbox.dims)))
     if not score >= gates.f_score:
         raise Rejected("poor fit", f"{name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
     beyond = overflow(made, np.array(program.root.bbox.dims))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.hierarchy import Box
@@ -20,11 +21,24 @@ from stages.shapeassembly.extraction.joints import (
 from stages.shapeassembly.extraction.layout import BBOX, Layout
 from stages.shapeassembly.program import Squeeze
 
-__all__ = ["Placer", "ground"]
+__all__ = ["Placer", "Placing", "ground"]
 
-Placer = Callable[[int, list[Joint], Standing], tuple[list[Joint], Box] | None]
-"""Places a tilted part: given its index, the lines so far and what stands, the lines that ground it and the box that
-they make of it; None if it touches nothing that stands."""
+WELL_PLACED = 0.01
+"""Cost up to which a tilted part takes its place in canonical order; others wait for what they may be attached to."""
+
+
+@dataclass(frozen=True)
+class Placing:
+    """The lines that ground a tilted part, the box that they make of it, and their cost: mean misplacement of its
+    corners as a share of the bounding box's diagonal, and a little for each line."""
+
+    lines: tuple[Joint, ...]
+    box: Box
+    cost: float
+
+
+Placer = Callable[[int, list[Joint], Standing], Placing | None]
+"""Places a tilted part: given its index, the lines so far and what stands; None if it touches nothing that stands."""
 
 
 MOST_JOINTS = 2
@@ -53,7 +67,7 @@ class _Grounding:
         self.joints = [0] * len(layout.parts)
 
     def run(self) -> list[Joint] | None:
-        steps = (self._ground_at_box, self._turn, self._ground_tilted, self._ground_waiting)
+        steps = (self._ground_at_box, self._turn, self._ground_waiting, self._ground_tilted)
         while any(step() for step in steps):
             pass
         return self.lines if len(self.standing) > len(self.layout.parts) else None
@@ -123,14 +137,20 @@ class _Grounding:
         return self._stand(part, [attach_contact(self.layout, self.standing, part, each) for each in others], *others)
 
     def _ground_tilted(self) -> bool:
+        """Grounds the first tilted part that can be placed well, or else the one that can be placed best."""
+        best: tuple[int, Placing] | None = None
         for part in self._loose(aligned=False):
-            placed = self.place_tilted(part, self.lines, self.standing)
-            if placed is not None:
-                lines, box = placed
-                self._stand(part, lines, *(each for each in self.layout.neighbours(part) if each in self.standing))
-                self.standing[part] = box
-                return True
-        return False
+            placing = self.place_tilted(part, self.lines, self.standing)
+            if placing is not None and (best is None or placing.cost < best[1].cost):
+                best = (part, placing)
+                if placing.cost <= WELL_PLACED:
+                    break
+        if best is None:
+            return False
+        part, placing = best
+        self._stand(part, placing.lines, *(each for each in self.layout.neighbours(part) if each in self.standing))
+        self.standing[part] = placing.box
+        return True
 
     def _ground_waiting(self) -> bool:
         """Grounds the first part that waits at the bounding box for a partner that cannot stand before it."""

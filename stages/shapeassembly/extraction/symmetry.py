@@ -13,8 +13,9 @@ from stages.shapeassembly.extraction.boxes import mirrored, same_box
 
 __all__ = ["Body", "Group", "reflections", "translations"]
 
-CLOSENESS = 0.03
-"""How near a moved part must come to its counterpart, as a share of the diagonal of the bounding box."""
+CLOSENESS = 0.02
+"""How near corners must come to those of their counterpart, as a share of the diagonal of the bounding box; how far
+lengths may differ is half of it, or a tenth of the length."""
 
 
 @dataclass(frozen=True)
@@ -104,12 +105,18 @@ def _alike(first: Sequence[FloatArray], second: Sequence[FloatArray], tolerance:
     for corners in first:
         for place, other in enumerate(left):
             near = np.abs(corners.mean(axis=0) - other.mean(axis=0)).max() <= tolerance
-            if near and same_box(corners, other, tolerance):
+            if near and _same_size(corners, other, tolerance / 2) and same_box(corners, other, tolerance):
                 del left[place]
                 break
         else:
             return False
     return True
+
+
+def _same_size(first: FloatArray, second: FloatArray, tolerance: float) -> bool:
+    """Whether two boxes, corners (8, 3), have the same lengths in some order."""
+    one, two = (np.sort(np.linalg.norm(each[[4, 2, 1]] - each[0], axis=1)) for each in (first, second))
+    return bool((np.abs(one - two) <= np.maximum(0.1 * one, tolerance)).all())
 
 
 def _shifted_alike(first: Body, second: Body, axis: int, tolerance: float) -> bool:

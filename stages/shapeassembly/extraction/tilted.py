@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import box_corners
-from stages.shapeassembly.extraction.grounding import Placer
+from stages.shapeassembly.extraction.grounding import Placer, Placing
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.joints import (
     BACK,
@@ -54,32 +54,39 @@ def tilted_placer(layout: Layout) -> Placer:
     What is best is what brings the corners nearest to where they are in the input; a line must be worth its while.
     """
 
-    def place(part: int, lines: list[Joint], standing: Standing) -> tuple[list[Joint], Box] | None:
-        wanted = box_corners(layout.parts[part].box)
-        best: tuple[float, list[Joint], Box] | None = None
-        for candidate in _candidates(layout, part, standing):
-            box = _executed(layout, part, [*lines, *candidate], standing)
-            away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
-            score = away + LINE_COST * len(candidate)
-            if best is None or score < best[0] - 1e-6:
-                best = (score, candidate, box)
-        return None if best is None else (best[1], best[2])
+    known: dict[tuple[int, ...], Placing | None] = {}
+
+    def place(part: int, lines: list[Joint], standing: Standing) -> Placing | None:
+        about = (part, *(each for each in layout.neighbours(part) if each in standing))
+        if about not in known:
+            known[about] = _best(layout, part, lines, standing)
+        return known[about]
 
     return place
+
+
+def _best(layout: Layout, part: int, lines: list[Joint], standing: Standing) -> Placing | None:
+    wanted = box_corners(layout.parts[part].box)
+    best: Placing | None = None
+    for candidate in _candidates(layout, part, standing):
+        box = _executed(layout, part, [*lines, *candidate], standing)
+        away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
+        cost = away + LINE_COST * len(candidate)
+        if best is None or cost < best.cost - 1e-6:
+            best = Placing(tuple(candidate), box, cost)
+    return best
 
 
 def _candidates(layout: Layout, part: int, standing: Standing) -> Iterator[list[Joint]]:
     """Sequences of lines that could ground a part: squeezes, then attachments in every order."""
     others = [other for other in layout.neighbours(part) if other in standing and layout.may_attach(part, other)]
-    held = [BBOX, *others]
-    for face in (TOP, LEFT, BOTTOM, BACK):
-        for first in held:
-            for second in held:
-                line = (
-                    squeeze(layout, standing, part, (first, second), face) if first != second or first == BBOX else None
-                )
-                if line is not None:
-                    yield [line]
+    at_box = [(BBOX, BBOX), *((BBOX, other) for other in others)]
+    between = list(permutations(others, 2))
+    for face, pairs in ((TOP, at_box), (BOTTOM, at_box[1:]), (LEFT, between), (BOTTOM, between), (BACK, between)):
+        for first, second in pairs:
+            line = squeeze(layout, standing, part, (first, second), face)
+            if line is not None:
+                yield [line]
     ends = [point for point in (layout.bottoms[part], layout.tops[part]) if point is not None]
     usual: list[Joint] = [attach(layout, standing, part, BBOX, point, point) for point in ends]
     turning: list[Joint] = list(usual)
