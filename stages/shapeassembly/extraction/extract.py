@@ -72,18 +72,61 @@ def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
         raise Rejected("flat shape", f"{hierarchy.name} has no extent")
     scale = 1.0 if USUAL_DIAGONALS[0] <= diagonal <= USUAL_DIAGONALS[1] else diagonal / DIAGONAL
     root = _rescaled(hierarchy.root, whole.center, scale)
-    wanted = [leaf.box for leaf in root.leaves()]
-    root = frame_parts(arrange_parts(shorten_parts(root), rules))
+    shape = _Shape(hierarchy.name, tuple(leaf.box for leaf in root.leaves()), whole.center, scale)
+    first: Rejected | None = None
+    for regularised in (_REGULARISED, *_LESS):
+        try:
+            return _attempt(shape, root, rules, gates, regularised)
+        except Rejected as reason:
+            first = first or reason
+            if reason.reason in _FINAL:
+                break
+    assert first is not None
+    raise first
+
+
+@dataclass(frozen=True)
+class _Regularised:
+    """Which steps that make a program tidier are taken."""
+
+    shortened: bool
+    grouped: bool
+
+
+_REGULARISED = _Regularised(shortened=True, grouped=True)
+
+_LESS = (_Regularised(shortened=False, grouped=True), _Regularised(shortened=True, grouped=False))
+"""What is tried on a shape whose tidiest program fails: sunk ends may be what holds it together, and a part between
+two that a group makes of one may have nothing to stand on."""
+
+_FINAL = frozenset({"too few parts", "too many parts"})
+"""Reasons that no other attempt mends."""
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What an attempt is measured against: see Extraction."""
+
+    name: str
+    wanted: tuple[Box, ...]
+    center: FloatArray
+    scale: float
+
+
+def _attempt(shape: _Shape, root: Part, rules: Rules, gates: Gates, regularised: _Regularised) -> Extraction:
+    if regularised.shortened:
+        root = shorten_parts(root)
+    root = frame_parts(arrange_parts(root, rules))
     if not root.children:
-        raise Rejected("too few parts", f"{hierarchy.name} is one box")
-    program = rounded(write_program(root, order_of(rules)))
+        raise Rejected("too few parts", f"{shape.name} is one box")
+    program = rounded(write_program(root, order_of(rules), grouped=regularised.grouped))
     named = set(program.named)
     leaves = sum(cuboid.name not in named for block in program.blocks for cuboid in block.cuboids)
     if leaves < gates.fewest_leaves:
-        raise Rejected("too few parts", f"{hierarchy.name} has {leaves}, at least {gates.fewest_leaves} are wanted")
+        raise Rejected("too few parts", f"{shape.name} has {leaves}, at least {gates.fewest_leaves} are wanted")
     if leaves > gates.most_leaves:
-        raise Rejected("too many parts", f"{hierarchy.name} has {leaves}, at most {gates.most_leaves} are wanted")
-    return _checked(hierarchy.name, program, leaves, wanted, whole.center, scale, gates)
+        raise Rejected("too many parts", f"{shape.name} has {leaves}, at most {gates.most_leaves} are wanted")
+    return _checked(shape, program, leaves, gates)
 
 
 def order_of(rules: Rules) -> Order:
@@ -98,27 +141,20 @@ def order_of(rules: Rules) -> Order:
     return key
 
 
-def _checked(
-    name: str,
-    program: Program,
-    leaves: int,
-    wanted: list[Box],
-    center: FloatArray,
-    scale: float,
-    gates: Gates,
-) -> Extraction:
+def _checked(shape: _Shape, program: Program, leaves: int, gates: Gates) -> Extraction:
     from stages.shapeassembly import execute
 
-    made = boxes_of_corners(execute(program).corners)
-    score = f_score(made, wanted, gates.distance * float(np.linalg.norm(program.root.bbox.dims)))
+    made = tuple(boxes_of_corners(execute(program).corners))
+    bbox = np.array(program.root.bbox.dims)
+    score = f_score(made, shape.wanted, gates.distance * float(np.linalg.norm(bbox)))
     if not score >= gates.f_score:
-        raise Rejected("poor fit", f"{name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
-    beyond = overflow(made, np.array(program.root.bbox.dims))
+        raise Rejected("poor fit", f"{shape.name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
+    beyond = overflow(made, bbox)
     if beyond >= gates.overflow:
-        raise Rejected("overflows its box", f"{name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
+        raise Rejected("overflows its box", f"{shape.name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
     if not is_rooted(made):
-        raise Rejected("not rooted", f"{name} has a part without a way to the ground")
-    return Extraction(program, score, beyond, leaves, center, scale, tuple(wanted), tuple(made))
+        raise Rejected("not rooted", f"{shape.name} has a part without a way to the ground")
+    return Extraction(program, score, beyond, leaves, shape.center, shape.scale, shape.wanted, made)
 
 
 def _rescaled(part: Part, center: FloatArray, scale: float) -> Part:

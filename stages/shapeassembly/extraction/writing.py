@@ -32,8 +32,10 @@ class _Node:
     expanded: dict[str, Part]
 
 
-def write_program(root: Part, order: Order) -> Program:
+def write_program(root: Part, order: Order, *, grouped: bool) -> Program:
     """The program of an arranged hierarchy, root first, assemblies numbered in breadth-first order.
+
+    grouped: whether parts that repeat are made by macros.
 
     Raises Rejected where the parts of a node do not hang together.
     """
@@ -41,7 +43,7 @@ def write_program(root: Part, order: Order) -> Program:
     waiting = deque([root])
     count = 0
     while waiting:
-        node = _write_node(waiting.popleft(), order)
+        node = _write_node(waiting.popleft(), order, grouped)
         names = {}
         for name, part in node.expanded.items():
             count += 1
@@ -52,14 +54,11 @@ def write_program(root: Part, order: Order) -> Program:
     return Program(tuple(blocks))
 
 
-def _write_node(part: Part, order: Order) -> _Node:
+def _write_node(part: Part, order: Order, grouped: bool) -> _Node:
     children = sorted((localised(child, part.box) for child in part.children), key=order)
     whole = lay_out(children, part.box.size)
-    layout, symmetries = form_groups(whole, order)
+    layout, symmetries = form_groups(whole, order) if grouped else (whole, [None] * len(children))
     joints = ground(layout, tilted_placer(layout))
-    if joints is None:
-        layout, symmetries = whole, [None] * len(children)
-        joints = ground(layout, tilted_placer(layout))
     if joints is None:
         raise Rejected("parts not connected", f"below {part.label!r}")
     indices = range(len(layout.parts))
