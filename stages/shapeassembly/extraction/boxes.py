@@ -36,7 +36,7 @@ _TURNS = np.array(
 """The 24 rotations that map coordinate axes onto coordinate axes, float64 (24, 3, 3)."""
 
 _PROJECTIONS = 40
-"""Rounds of alternating projections; two rounds settle boxes with parallel sides, tilted ones take about ten."""
+"""Most rounds of alternating projections; two settle boxes with parallel sides, tilted ones take about ten."""
 
 
 def point_at(box: Box, place: FloatArray) -> FloatArray:
@@ -100,10 +100,14 @@ def gap(first: Box, second: Box) -> tuple[float, FloatArray, FloatArray]:
     By alternating projections, which approach the nearest pair of two convex bodies.
     """
     on_first, on_second = first.center, second.center
+    distance = np.inf
     for _ in range(_PROJECTIONS):
         on_second = _nearest_in(second, on_first)
         on_first = _nearest_in(first, on_second)
-    return float(np.linalg.norm(on_first - on_second)), on_first, on_second
+        before, distance = distance, float(np.linalg.norm(on_first - on_second))
+        if distance >= before or distance == 0:
+            break
+    return distance, on_first, on_second
 
 
 def _nearest_in(box: Box, point: FloatArray) -> FloatArray:

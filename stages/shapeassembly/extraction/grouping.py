@@ -57,12 +57,27 @@ def form_groups(layout: Layout, order: Callable[[Part], Any]) -> tuple[Layout, l
         layout = lay_out(sorted(parts, key=order), layout.bbox.size)
     fixed = {id(each.part) for each in formed}
     bodies = _bodies(layout, [(i,) for i, part in enumerate(layout.parts) if id(part) not in fixed])
-    gone: set[int] = set()
-    for group in _single_groups(bodies, layout.diagonal):
-        members = [bodies[each].members[0] for each in group.bodies]
-        formed.append(_formed(group, layout, layout.parts[members[0]]))
-        gone |= set(members[1:])
-    return _reduced(layout, [i for i in range(len(layout.parts)) if i not in gone], formed)
+    groups = _single_groups(bodies, layout.diagonal)
+    while True:
+        members = [tuple(bodies[i].members[0] for i in group.bodies) for group in groups]
+        gone = {part for _, *copies in members for part in copies}
+        singles = [_formed(group, layout, layout.parts[each[0]]) for group, each in zip(groups, members, strict=True)]
+        kept = [i for i in range(len(layout.parts)) if i not in gone]
+        reduced, macros = _reduced(layout, kept, [*formed, *singles])
+        loose = {kept[i] for i in reduced.ungroundable()}
+        if not loose or not groups:
+            return reduced, macros
+        del groups[_at_fault(layout, members, loose)]
+
+
+def _at_fault(layout: Layout, members: Sequence[tuple[int, ...]], loose: set[int]) -> int:
+    """The group to give up so that loose parts can stand: the last that is loose, or touches what is loose."""
+    beside = loose | {other for part in loose for other in layout.neighbours(part)}
+    for wanted in (loose, beside):
+        for index in reversed(range(len(members))):
+            if wanted & set(members[index]):
+                return index
+    return len(members) - 1
 
 
 def _searches(diagonal: float, rows_of: int) -> list[Callable[[Sequence[Body]], list[Group]]]:

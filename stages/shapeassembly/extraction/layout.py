@@ -64,15 +64,14 @@ class Layout:
         place = place_in(self.parts[mover].box, self.points(mover, target)[0])
         return bool((np.abs(place - 0.5) < 1e-3).sum() >= 2)
 
-    def hangs_together(self) -> bool:
-        """Whether a way through contacts leads from the bounding box to every part."""
-        reached = {i for i in range(len(self.parts)) if self.bottoms[i] is not None or self.tops[i] is not None}
-        frontier = sorted(reached)
-        while frontier:
-            fresh = set(self.neighbours(frontier.pop())) - reached
-            reached |= fresh
-            frontier += sorted(fresh)
-        return len(reached) == len(self.parts)
+    def ungroundable(self) -> list[int]:
+        """The parts that no chain of permitted attachments joins to the bounding box, ascending."""
+        left = set(range(len(self.parts)))
+        fresh = {i for i in left if self.bottoms[i] is not None or self.tops[i] is not None}
+        while fresh:
+            left -= fresh
+            fresh = {i for i in left if any(j not in left and self.may_attach(i, j) for j in self.neighbours(i))}
+        return sorted(left)
 
 
 def lay_out(parts: Sequence[Part], size: FloatArray) -> Layout:
@@ -89,7 +88,7 @@ def lay_out(parts: Sequence[Part], size: FloatArray) -> Layout:
         bottoms = tuple(bottom_or_top(part.box, bbox, top=False) for part in parts)
         tops = tuple(bottom_or_top(part.box, bbox, top=True) for part in parts)
         layout = Layout(bbox, tuple(parts), contacts, bottoms, tops, (None,) * len(parts))
-        if layout.hangs_together():
+        if not layout.ungroundable():
             break
     return layout
 

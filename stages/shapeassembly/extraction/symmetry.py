@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -31,7 +32,7 @@ class Body:
     boxes: tuple[FloatArray, ...]
     touches: frozenset[int]
 
-    @property
+    @cached_property
     def center(self) -> FloatArray:
         """The middle of the extent, float64 (3,)."""
         corners = np.concatenate(self.boxes)
@@ -120,8 +121,11 @@ def _same_size(first: FloatArray, second: FloatArray, tolerance: float) -> bool:
 
 
 def _shifted_alike(first: Body, second: Body, axis: int, tolerance: float) -> bool:
+    away = second.center - first.center
+    if np.abs(np.delete(away, axis)).max() > tolerance:
+        return False
     shift = np.zeros(3)
-    shift[axis] = second.center[axis] - first.center[axis]
+    shift[axis] = away[axis]
     return _alike([corners + shift for corners in first.boxes], second.boxes, tolerance)
 
 
