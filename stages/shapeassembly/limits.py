@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["MAX_COPIES", "MAX_DEPTH", "MAX_LINES", "MAX_PARTS", "MAX_SIZE", "MAX_TEXT"]
+__all__ = ["MAX_COPIES", "MAX_DEPTH", "MAX_EVENTS", "MAX_LINES", "MAX_PARTS", "MAX_SIZE", "MAX_TEXT", "MIN_SIZE"]
 
 MAX_TEXT = 1_000_000
 """Characters of a program's text."""
@@ -21,3 +21,9 @@ MAX_PARTS = 10_000
 
 MAX_SIZE = 1e6
 """Largest number in a program, and largest length of a cuboid: products of them stay exact enough."""
+
+MIN_SIZE = 1e-6
+"""Smallest size of a declared cuboid."""
+
+MAX_EVENTS = 20_000
+"""Attachments of one assembly, those of copies included."""

@@ -1,0 +1,283 @@
+"""What one attachment does to a cuboid, compiled (shapeassembly App. A).
+
+A cuboid is a row of 15 numbers: centre 3, sizes 3, then its x, y and z axes as unit vectors. Where the appendix and the
+programs' authors differ, it does as the authors do, because the published programs were made to be executed so.
+Each rule writes what it decided, so that the differentiable interpreter follows it.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+__all__ = ["GROW", "HINGE", "MOVE", "STAY", "SWING", "grow", "hinge", "hold", "local", "point", "swing"]
+
+MOVE, STAY, GROW, HINGE, SWING = range(5)
+"""What an attachment did: nothing was attached before; an aligned cuboid was near enough; it grew; one prior
+attachment; two or more."""
+
+_GRID = 10
+_NEAR = 0.05  # a gap below this share of the largest size of both cuboids is none
+_FACING = 0.9  # cosine between a face's normal and the way to the goal, above which the face is moved
+_AGREE = 0.01  # by how much prior attachments may be moved apart
+_COLINEAR = 0.01  # norm of the cross product of the ways from the first prior attachment to the others
+_TINY = 1e-9
+
+
+@numba.njit(cache=True)
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@numba.njit(cache=True)
+def _norm(a):
+    return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@numba.njit(cache=True)
+def _cross(a, b, out):
+    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@numba.njit(cache=True)
+def point(box, p, out):
+    """The point of a cuboid with local coordinates `p`."""
+    a, b, c = (p[0] - 0.5) * box[3], (p[1] - 0.5) * box[4], (p[2] - 0.5) * box[5]
+    for k in range(3):
+        out[k] = box[k] + a * box[6 + k] + b * box[9 + k] + c * box[12 + k]
+
+
+@numba.njit(cache=True)
+def local(box, point, out):
+    """The local coordinates of a point."""
+    x, y, z = point[0] - box[0], point[1] - box[1], point[2] - box[2]
+    for k in range(3):
+        along = x * box[6 + 3 * k] + y * box[7 + 3 * k] + z * box[8 + 3 * k]
+        out[k] = along / box[3 + k] + 0.5
+
+
+@numba.njit(cache=True)
+def _has_corner(box, other):
+    """Whether a corner of `other` lies in `box`."""
+    p, q, g = np.empty(3), np.empty(3), np.empty(3)
+    for corner in range(8):
+        p[0], p[1], p[2] = corner >> 2, (corner >> 1) & 1, corner & 1
+        point(other, p, g)
+        local(box, g, q)
+        if min(q[0], q[1], q[2]) >= -_TINY and max(q[0], q[1], q[2]) <= 1.0 + _TINY:
+            return True
+    return False
+
+
+@numba.njit(cache=True)
+def _nearest_straight(box, target, near, gap):
+    """The nearest grid points of two upright cuboids: each axis by itself."""
+    for k in range(3):
+        low, other = box[k] - box[3 + k] / 2, target[k] - target[3 + k] / 2
+        best = np.inf
+        for i in range(_GRID):
+            own = low + box[3 + k] * i / (_GRID - 1)
+            for j in range(_GRID):
+                way = other + target[3 + k] * j / (_GRID - 1) - own
+                if abs(way) < best - _TINY:
+                    best, near[k], gap[k] = abs(way), i / (_GRID - 1), way
+
+
+@numba.njit(cache=True)
+def _nearest_turned(box, target, near, gap):
+    """The nearest grid points of two cuboids of which `box` is upright: the target's is found by rounding."""
+    p, g, q, h = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    best = np.finfo(np.float64).max
+    for i in range(_GRID**3):
+        p[0], p[1], p[2] = i // _GRID**2, i // _GRID % _GRID, i % _GRID
+        p /= _GRID - 1
+        point(box, p, g)
+        local(target, g, q)
+        for k in range(3):
+            q[k] = min(max(np.ceil(q[k] * (_GRID - 1) - 0.5 - _TINY), 0.0), _GRID - 1.0) / (_GRID - 1)
+        point(target, q, h)
+        h -= g
+        distance = _dot(h, h)
+        if distance < best * (1 - 1e-12) - _TINY * _TINY:
+            best = distance
+            near[:] = p
+            gap[:] = h
+
+
+@numba.njit(cache=True)
+def grow(box, target, decision):
+    """A further attachment of an aligned cuboid, whatever its points: grow towards `target` if it is away."""
+    decision[0] = STAY
+    if _has_corner(target, box) or _has_corner(box, target):
+        return
+    near, gap = np.empty(3), np.empty(3)
+    if abs(target[6] - 1.0) + abs(target[10] - 1.0) + abs(target[14] - 1.0) < 1e-12:
+        _nearest_straight(box, target, near, gap)
+    else:
+        _nearest_turned(box, target, near, gap)
+    largest = max(max(box[3], box[4], box[5]), max(target[3], target[4], target[5]))
+    if _norm(gap) < _NEAR * largest:
+        return
+    decision[0] = GROW
+    decision[2:5] = near
+    for k in range(3):
+        # The point opposite `near` stays where it is.
+        more = gap[k] / (2 * near[k] - 1)
+        if more > 0:
+            box[3 + k] += more
+            box[k] += more * (near[k] - 0.5)
+
+
+@numba.njit(cache=True)
+def _turn_about(box, pivot, u, cosine, sine):
+    """Turn a cuboid about the axis through `pivot` along the unit vector `u`."""
+    for start in range(0, 15, 3):
+        if start == 3:
+            continue
+        x, y, z = box[start], box[start + 1], box[start + 2]
+        if start == 0:
+            x, y, z = x - pivot[0], y - pivot[1], z - pivot[2]
+        along = (u[0] * x + u[1] * y + u[2] * z) * (1 - cosine)
+        box[start] = x * cosine + (u[1] * z - u[2] * y) * sine + u[0] * along
+        box[start + 1] = y * cosine + (u[2] * x - u[0] * z) * sine + u[1] * along
+        box[start + 2] = z * cosine + (u[0] * y - u[1] * x) * sine + u[2] * along
+    for k in range(3):
+        box[k] += pivot[k]
+
+
+@numba.njit(cache=True)
+def _turn_onto(box, pivot, source, goal):
+    """Turn a cuboid about `pivot` so that `source` comes to lie towards `goal`, by the smallest angle.
+
+    0: it was there already; 1: turned; 2: by half a turn, about any axis across.
+    """
+    a, b, u = source - pivot, goal - pivot, np.empty(3)
+    _cross(a, b, u)
+    lengths = _norm(a) * _norm(b)
+    if lengths < _TINY * _TINY:
+        return 0
+    sine, cosine = _norm(u) / lengths, _dot(a, b) / lengths
+    if sine >= _TINY:
+        u /= sine * lengths
+        _turn_about(box, pivot, u, cosine, sine)
+        return 1
+    if cosine > 0:
+        return 0
+    _across(a, u)
+    _turn_about(box, pivot, u, -1.0, 0.0)
+    return 2
+
+
+@numba.njit(cache=True)
+def _across(a, u):
+    """A unit vector at right angles to `a`: across `a` and the coordinate axis that is least like it."""
+    k = 0
+    for j in range(1, 3):
+        if abs(a[j]) < abs(a[k]):
+            k = j
+    i, j = (k + 1) % 3, (k + 2) % 3
+    length = np.sqrt(a[i] ** 2 + a[j] ** 2)
+    u[k], u[i], u[j] = 0.0, a[j] / length, -a[i] / length
+
+
+@numba.njit(cache=True)
+def hinge(box, prior, p, goal, decision):
+    """A second attachment: one size is changed so that the distance is right, then the cuboid turns."""
+    decision[0], decision[1] = HINGE, -1
+    pivot, source = np.empty(3), np.empty(3)
+    point(box, prior, pivot)
+    way, arm = goal - pivot, (p - prior) * box[3:6]
+    wanted, has = _dot(way, way), _dot(arm, arm)
+    if wanted < _TINY * _TINY or has < _TINY * _TINY:
+        return
+    best = np.inf
+    for k in range(3):
+        if abs(arm[k]) < _TINY:
+            continue
+        square = 1 + (wanted - has) / arm[k] ** 2
+        if square > 1e-12 and abs(np.sqrt(square) - 1) * box[3 + k] < best - _TINY:
+            best = abs(np.sqrt(square) - 1) * box[3 + k]
+            decision[1] = k
+    if decision[1] < 0:
+        decision[1] = 3
+        box[3:6] *= np.sqrt(wanted / has)
+    else:
+        k = int(decision[1])
+        box[3 + k] *= np.sqrt(1 + (wanted - has) / arm[k] ** 2)
+    hold(box, prior, pivot)
+    point(box, p, source)
+    decision[2] = _turn_onto(box, pivot, source, goal)
+
+
+@numba.njit(cache=True)
+def hold(box, p, place):
+    """Move a cuboid so that its point `p` is at `place`."""
+    now = np.empty(3)
+    point(box, p, now)
+    for k in range(3):
+        box[k] += place[k] - now[k]
+
+
+@numba.njit(cache=True)
+def _face_of(p):
+    """The face that a local point lies on, or is nearest to: its axis, and 1 or -1."""
+    axis, side, best = 0, 1.0, np.inf
+    for k in range(3):
+        if abs(1 - p[k]) < best:
+            best, axis, side = abs(1 - p[k]), k, 1.0
+        if abs(p[k]) < best:
+            best, axis, side = abs(p[k]), k, -1.0
+    return axis, side
+
+
+@numba.njit(cache=True)
+def swing(box, priors, p, goal, decision):
+    """A further attachment after two or more: turn about their line, if they have one, then move the face nearer."""
+    decision[0], decision[1], decision[2] = SWING, -1, 0
+    pivot, other, source, u, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    point(box, priors[0], pivot)
+    point(box, priors[1], u)
+    u -= pivot
+    straight = True
+    for n in range(2, len(priors)):
+        point(box, priors[n], other)
+        other -= pivot
+        x, y, z = (
+            u[1] * other[2] - u[2] * other[1],
+            u[2] * other[0] - u[0] * other[2],
+            u[0] * other[1] - u[1] * other[0],
+        )
+        straight = straight and x * x + y * y + z * z < _AGREE * _AGREE
+    length = _norm(u)
+    if straight and length > _TINY:
+        u /= length
+        point(box, p, source)
+        s, t = source - pivot, goal - pivot
+        s -= u * _dot(u, s)
+        t -= u * _dot(u, t)
+        lengths = _norm(s) * _norm(t)
+        if lengths > _TINY:
+            _cross(s, t, normal)
+            _turn_about(box, pivot, u, _dot(s, t) / lengths, _dot(u, normal) / lengths)
+            decision[2] = 1
+    point(box, p, source)
+    _push(box, priors, p, goal - source, decision)
+
+
+@numba.njit(cache=True)
+def _push(box, priors, p, way, decision):
+    """Move the face of point `p` along `way` where it faces there and no prior attachment is torn."""
+    axis, side = _face_of(p)
+    along, distance = side * _dot(way, box[6 + 3 * axis : 9 + 3 * axis]), _norm(way)
+    apart = side * (p[axis] - priors[0][axis])
+    if distance < _TINY or along <= _FACING * distance or apart < 1e-6:
+        return
+    more = along / apart
+    for n in range(1, len(priors)):
+        if abs(priors[n][axis] - priors[0][axis]) * more > _AGREE:
+            return
+    decision[1] = axis
+    place = np.empty(3)
+    point(box, priors[0], place)
+    box[3 + axis] += more
+    hold(box, priors[0], place)

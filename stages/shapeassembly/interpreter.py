@@ -1,0 +1,108 @@
+"""Execute programs: the fast interpreter, one at a time or many at once (shapeassembly §4, App. A and B)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.flat import Flat, Indices, flatten
+from stages.shapeassembly.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS
+from stages.shapeassembly.program import Program
+
+if TYPE_CHECKING:
+    from stages.shapeassembly.kernels import Executed
+
+__all__ = ["Execution", "execute", "execute_all", "execute_flat"]
+
+_REFUSALS = {
+    1: ("too many cuboids", f"expanded it has more than {MAX_PARTS}"),
+    2: ("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle"),
+    3: ("too many attachments", f"an assembly has at most {MAX_EVENTS}, those of copies included"),
+}
+
+
+@dataclass(frozen=True)
+class Execution:
+    """The leaf cuboids of an executed program, assembly by assembly, breadth first, each in the order of its lines.
+
+    corners: float64 (n, 8, 3), the local points (1, 1, 1), (1, 1, 0), (1, 0, 1), ... (0, 0, 0) of each cuboid;
+    centres, sizes: float64 (n, 3); frames: float64 (n, 3, 3), rotations whose columns are the cuboids' axes;
+    nodes: int64 (n,), the assembly that each stands in, counted breadth first.
+    """
+
+    corners: FloatArray
+    centres: FloatArray
+    sizes: FloatArray
+    frames: FloatArray
+    nodes: Indices
+    _parts: Indices
+    _tree: Indices
+    _root: str
+    _names: tuple[tuple[str, ...], ...]
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    @cached_property
+    def node_names(self) -> tuple[str, ...]:
+        """The assemblies by path, the root first: `Program_0`, `Program_0/Program_1`, `Program_0/cube3` (a copy)."""
+        names = [self._root]
+        for _, parent, part in self._tree[1:].tolist():
+            names.append(f"{names[parent]}/{self._names[self._tree[parent, 0]][part]}")
+        return tuple(names)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The leaves by path: `Program_0/Program_1/cube0`."""
+        return tuple(
+            f"{self.node_names[node]}/{self._names[self._tree[node, 0]][part]}"
+            for node, part in zip(self.nodes.tolist(), self._parts.tolist(), strict=True)
+        )
+
+
+def execute(program: Program) -> Execution:
+    """The geometry of one program. Raises ProgramError where it cannot be executed or is beyond the limits."""
+    return execute_flat(flatten([program]), [program])[0]
+
+
+def execute_all(programs: Sequence[Program]) -> list[Execution]:
+    """The geometry of many programs, together faster than one by one. Raises ProgramError like `execute`."""
+    return execute_flat(flatten(programs), programs)
+
+
+def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
+    """The geometry of the programs that `flat` was made of."""
+    from stages.shapeassembly.kernels import run
+
+    done: Executed
+    done, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+    if done.status.any():
+        place = int(done.status.nonzero()[0][0])
+        reason, detail = _REFUSALS[int(done.status[place])]
+        raise ProgramError(reason, f"{programs[place].root.name}: {detail}")
+    executions = []
+    leaf_starts, node_starts, blocks = (
+        each.tolist() for each in (done.program_leaves, done.program_nodes, flat.program_blocks)
+    )
+    centres, sizes = done.leaves[:, :3], done.leaves[:, 3:6]
+    frames = done.leaves[:, 6:].reshape(-1, 3, 3).transpose(0, 2, 1)
+    for index, program in enumerate(programs):
+        low, high = leaf_starts[index], leaf_starts[index + 1]
+        executions.append(
+            Execution(
+                done.corners[low:high],
+                centres[low:high],
+                sizes[low:high],
+                frames[low:high],
+                done.leaf_node[low:high],
+                done.leaf_part[low:high],
+                done.node[node_starts[index] : node_starts[index + 1]],
+                program.root.name,
+                flat.names[blocks[index] : blocks[index + 1]],
+            )
+        )
+    return executions
