@@ -13,8 +13,9 @@ from stages.shapeassembly.extraction.boxes import around
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
 from stages.shapeassembly.extraction.rules import Rules
 from stages.shapeassembly.extraction.shortening import shorten_parts
-from stages.shapeassembly.extraction.validity import boxes_of_corners, f_score, is_rooted, overflow
+from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted, overflow
 from stages.shapeassembly.extraction.writing import Order, write_program
+from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.printer import rounded
 from stages.shapeassembly.program import Program
 
@@ -142,9 +143,7 @@ def order_of(rules: Rules) -> Order:
 
 
 def _checked(shape: _Shape, program: Program, leaves: int, gates: Gates) -> Extraction:
-    from stages.shapeassembly import execute
-
-    made = tuple(boxes_of_corners(execute(program).corners))
+    made = tuple(boxes_of(execute(program)))
     bbox = np.array(program.root.bbox.dims)
     score = f_score(made, shape.wanted, gates.distance * float(np.linalg.norm(bbox)))
     if not score >= gates.f_score:

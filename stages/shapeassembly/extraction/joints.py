@@ -10,6 +10,7 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import place_in, point_at
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.layout import BBOX, REACHES, Layout
+from stages.shapeassembly.program import BBOX as BBOX_NAME
 from stages.shapeassembly.program import Attach, Face, Point, Squeeze
 
 __all__ = ["BACK", "BOTTOM", "LEFT", "TOP", "Joint", "Standing", "attach", "attach_contact", "part_name", "squeeze"]
@@ -33,7 +34,7 @@ SAME_PLACE = 0.02
 
 def part_name(part: int) -> str:
     """What a part of a layout is called in its lines."""
-    return "bbox" if part == BBOX else f"cube{part}"
+    return BBOX_NAME if part == BBOX else f"cube{part}"
 
 
 def attach(layout: Layout, standing: Standing, part: int, target: int, own: FloatArray, goal: FloatArray) -> Attach:

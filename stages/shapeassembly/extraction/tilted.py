@@ -23,8 +23,10 @@ from stages.shapeassembly.extraction.joints import (
     squeeze,
 )
 from stages.shapeassembly.extraction.layout import BBOX, Layout
-from stages.shapeassembly.extraction.validity import boxes_of_corners
+from stages.shapeassembly.extraction.validity import boxes_of
+from stages.shapeassembly.interpreter import execute_all
 from stages.shapeassembly.printer import rounded
+from stages.shapeassembly.program import BBOX as BBOX_NAME
 from stages.shapeassembly.program import Block, Cuboid, Program
 
 __all__ = ["cuboid_of", "tilted_placer"]
@@ -67,9 +69,9 @@ def tilted_placer(layout: Layout) -> Placer:
 
 def _best(layout: Layout, part: int, lines: list[Joint], standing: Standing) -> Placing | None:
     wanted = box_corners(layout.parts[part].box)
+    candidates = list(_candidates(layout, part, standing))
     best: Placing | None = None
-    for candidate in _candidates(layout, part, standing):
-        box = _executed(layout, part, [*lines, *candidate], standing)
+    for candidate, box in zip(candidates, _executed(layout, part, lines, candidates, standing), strict=True):
         away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
         cost = away + LINE_COST * len(candidate)
         if best is None or cost < best.cost - 1e-6:
@@ -119,13 +121,14 @@ def _in_turning_plane(layout: Layout, part: int, other: int) -> FloatArray:
     return point
 
 
-def _executed(layout: Layout, part: int, lines: list[Joint], standing: Standing) -> Box:
-    """The box of a part after `lines`, with numbers as they will be printed."""
-    from stages.shapeassembly import execute
-
+def _executed(
+    layout: Layout, part: int, lines: list[Joint], candidates: Sequence[list[Joint]], standing: Standing
+) -> list[Box]:
+    """The box that each candidate after `lines` makes of a part, with numbers as they will be printed."""
     x, y, z = layout.bbox.size.tolist()
     declared = sorted(each for each in (*standing, part) if each != BBOX)
     cuboids = [cuboid_of(layout, each) for each in declared]
-    program = Program((Block("Program_0", Cuboid("bbox", (x, y, z), True), (*cuboids, *lines)),))
-    corners = execute(rounded(program)).corners
-    return boxes_of_corners(corners[[declared.index(part)]])[0]
+    bbox = Cuboid(BBOX_NAME, (x, y, z), True)
+    programs = [Program((Block("Program_0", bbox, (*cuboids, *lines, *each)),)) for each in candidates]
+    executions = execute_all([rounded(program) for program in programs])
+    return [boxes_of(execution)[declared.index(part)] for execution in executions]

@@ -9,8 +9,9 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import around, box_corners, gap, surface_distance
 from stages.shapeassembly.extraction.hierarchy import Box
+from stages.shapeassembly.interpreter import Execution
 
-__all__ = ["boxes_of_corners", "f_score", "is_rooted", "overflow", "surface_points"]
+__all__ = ["boxes_of", "f_score", "is_rooted", "overflow", "surface_points"]
 
 ROOTED_SHARE = 0.02
 """Parts further apart than this share of the shape's diagonal are not connected (shapeassembly App. E)."""
@@ -19,12 +20,10 @@ _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the additive recurrence that fills a square most evenly."""
 
 
-def boxes_of_corners(corners: FloatArray) -> list[Box]:
-    """Boxes from corners (n, 8, 3) in the interpreter's order: from the highest x, y, z down, z first."""
-    edges = corners[:, :1] - np.stack([corners[:, 4], corners[:, 2], corners[:, 1]], axis=1)
-    sizes = np.linalg.norm(edges, axis=2)
-    axes = edges / np.maximum(sizes, 1e-12)[..., None]
-    return [Box(*parts) for parts in zip(corners.mean(axis=1), sizes, axes, strict=True)]
+def boxes_of(execution: Execution) -> list[Box]:
+    """The boxes of the leaves of an executed program."""
+    frames = execution.frames.transpose(0, 2, 1)
+    return [Box(*each) for each in zip(execution.centres, execution.sizes, frames, strict=True)]
 
 
 def surface_points(boxes: Sequence[Box], count: int) -> FloatArray:

@@ -16,7 +16,7 @@ from stages.shapeassembly.extraction.hierarchy import Part
 from stages.shapeassembly.extraction.joints import part_name
 from stages.shapeassembly.extraction.layout import lay_out, localised
 from stages.shapeassembly.extraction.tilted import SMALLEST, cuboid_of, tilted_placer
-from stages.shapeassembly.program import AXES, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
+from stages.shapeassembly.program import AXES, BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
 
 __all__ = ["Order", "write_program"]
 
@@ -65,7 +65,7 @@ def _write_node(part: Part, order: Order, grouped: bool) -> _Node:
     macros = [_macro(index, each) for index, each in enumerate(symmetries) if each is not None]
     lines = (*(cuboid_of(layout, index) for index in indices), *joints, *macros)
     x, y, z = np.maximum(part.box.size, SMALLEST).tolist()
-    block = Block("", Cuboid("bbox", (x, y, z), True), lines)
+    block = Block("", Cuboid(BBOX, (x, y, z), True), lines)
     return _Node(block, {part_name(i): layout.parts[i] for i in indices if layout.parts[i].children})
 
 
