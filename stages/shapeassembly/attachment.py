@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["GROW", "HINGE", "MOVE", "STAY", "SWING", "grow", "hinge", "hold", "local", "point", "swing"]
+__all__ = ["GROW", "HINGE", "MOVE", "STAY", "SWING", "across", "grow", "hinge", "hold", "local", "point", "swing"]
 
 MOVE, STAY, GROW, HINGE, SWING = range(5)
 """What an attachment did: nothing was attached before; an aligned cuboid was near enough; it grew; one prior
@@ -70,7 +70,7 @@ def _has_corner(box, other):
 
 
 @numba.njit(cache=True)
-def _nearest_straight(box, target, near, gap):
+def _nearest_straight(box, target, near, far, gap):
     """The nearest grid points of two upright cuboids: each axis by itself."""
     for k in range(3):
         low, other = box[k] - box[3 + k] / 2, target[k] - target[3 + k] / 2
@@ -80,11 +80,11 @@ def _nearest_straight(box, target, near, gap):
             for j in range(_GRID):
                 way = other + target[3 + k] * j / (_GRID - 1) - own
                 if abs(way) < best - _TINY:
-                    best, near[k], gap[k] = abs(way), i / (_GRID - 1), way
+                    best, near[k], far[k], gap[k] = abs(way), i / (_GRID - 1), j / (_GRID - 1), way
 
 
 @numba.njit(cache=True)
-def _nearest_turned(box, target, near, gap):
+def _nearest_turned(box, target, near, far, gap):
     """The nearest grid points of two cuboids of which `box` is upright: the target's is found by rounding."""
     p, g, q, h = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     best = np.finfo(np.float64).max
@@ -101,6 +101,7 @@ def _nearest_turned(box, target, near, gap):
         if distance < best * (1 - 1e-12) - _TINY * _TINY:
             best = distance
             near[:] = p
+            far[:] = q
             gap[:] = h
 
 
@@ -110,16 +111,15 @@ def grow(box, target, decision):
     decision[0] = STAY
     if _has_corner(target, box) or _has_corner(box, target):
         return
-    near, gap = np.empty(3), np.empty(3)
+    near, far, gap = decision[2:5], decision[5:8], np.empty(3)
     if abs(target[6] - 1.0) + abs(target[10] - 1.0) + abs(target[14] - 1.0) < 1e-12:
-        _nearest_straight(box, target, near, gap)
+        _nearest_straight(box, target, near, far, gap)
     else:
-        _nearest_turned(box, target, near, gap)
+        _nearest_turned(box, target, near, far, gap)
     largest = max(max(box[3], box[4], box[5]), max(target[3], target[4], target[5]))
     if _norm(gap) < _NEAR * largest:
         return
     decision[0] = GROW
-    decision[2:5] = near
     for k in range(3):
         # The point opposite `near` stays where it is.
         more = gap[k] / (2 * near[k] - 1)
@@ -149,27 +149,25 @@ def _turn_about(box, pivot, u, cosine, sine):
 def _turn_onto(box, pivot, source, goal):
     """Turn a cuboid about `pivot` so that `source` comes to lie towards `goal`, by the smallest angle.
 
-    0: it was there already; 1: turned; 2: by half a turn, about any axis across.
+    Whether that was half a turn, which is about any axis across (`across` of the arm).
     """
     a, b, u = source - pivot, goal - pivot, np.empty(3)
     _cross(a, b, u)
     lengths = _norm(a) * _norm(b)
-    if lengths < _TINY * _TINY:
-        return 0
     sine, cosine = _norm(u) / lengths, _dot(a, b) / lengths
     if sine >= _TINY:
         u /= sine * lengths
         _turn_about(box, pivot, u, cosine, sine)
-        return 1
+        return False
     if cosine > 0:
-        return 0
-    _across(a, u)
+        return False
+    across(a, u)
     _turn_about(box, pivot, u, -1.0, 0.0)
-    return 2
+    return True
 
 
 @numba.njit(cache=True)
-def _across(a, u):
+def across(a, u):
     """A unit vector at right angles to `a`: across `a` and the coordinate axis that is least like it."""
     k = 0
     for j in range(1, 3):

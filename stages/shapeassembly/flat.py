@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from stages.shapeassembly.limits import MAX_LINES, MAX_PARTS, MIN_SIZE
 from stages.shapeassembly.printer import print_line
 from stages.shapeassembly.program import AXES, BBOX, FACES, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
 
-__all__ = ["ATTACH", "DECLARE", "REFLECT", "SQUEEZE", "TRANSLATE", "Flat", "Indices", "flatten"]
+__all__ = ["ATTACH", "DECLARE", "REFLECT", "SQUEEZE", "TRANSLATE", "Flat", "Indices", "copy_name", "flatten"]
 
 Indices = np.ndarray
 """int64."""
@@ -105,24 +105,25 @@ def _flatten_block(block: Block, assemblies: dict[str, int], rows: list[float]) 
                     raise _refused(block, line, places)
                 if isinstance(line, Reflect):
                     rows += (REFLECT, moved, _AXIS[line.axis], 0, 0, 0, 0, 0, 0, 0)
-                    _add_copy(places)
+                    places[copy_name(places)] = len(places)
                 else:
                     if not 1 <= line.copies <= MAX_PARTS - len(places):
                         raise ProgramError("too many cuboids", f"{_where(block, line)}; at most {MAX_PARTS} are made")
                     rows += (TRANSLATE, moved, _AXIS[line.axis], line.copies, line.distance, 0, 0, 0, 0, 0)
                     for _ in range(line.copies):
-                        _add_copy(places)
+                        places[copy_name(places)] = len(places)
         except KeyError as missing:
             detail = f"{_where(block, line)}: no line before it makes {missing.args[0]!r}"
             raise ProgramError("unknown name", detail) from None
     return places
 
 
-def _add_copy(places: dict[str, int]) -> None:
+def copy_name(places: Mapping[str, int]) -> str:
+    """What the next copy is called where the cuboids of `places`, bounding box included, are there."""
     number = len(places) - 1
     while f"cube{number}" in places:
         number += 1
-    places[f"cube{number}"] = len(places)
+    return f"cube{number}"
 
 
 def _where(block: Block, line: Line) -> str:

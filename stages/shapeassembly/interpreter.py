@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.flat import Flat, Indices, flatten
-from stages.shapeassembly.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS
+from stages.shapeassembly.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS, MAX_REACH
 from stages.shapeassembly.program import Program
 
 if TYPE_CHECKING:
     from stages.shapeassembly.kernels import Executed
 
-__all__ = ["Execution", "execute", "execute_all", "execute_flat"]
+__all__ = ["Execution", "check", "execute", "execute_all", "execute_flat"]
 
 _REFUSALS = {
     1: ("too many cuboids", f"expanded it has more than {MAX_PARTS}"),
     2: ("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle"),
     3: ("too many attachments", f"an assembly has at most {MAX_EVENTS}, those of copies included"),
+    4: ("too far", f"a cuboid reaches beyond {MAX_REACH:g}"),
 }
 
 
@@ -80,10 +81,7 @@ def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
 
     done: Executed
     done, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
-    if done.status.any():
-        place = int(done.status.nonzero()[0][0])
-        reason, detail = _REFUSALS[int(done.status[place])]
-        raise ProgramError(reason, f"{programs[place].root.name}: {detail}")
+    check(done)
     executions = []
     leaf_starts, node_starts, blocks = (
         each.tolist() for each in (done.program_leaves, done.program_nodes, flat.program_blocks)
@@ -106,3 +104,11 @@ def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
             )
         )
     return executions
+
+
+def check(done: Executed) -> None:
+    """Raises ProgramError if a program was not executed."""
+    if done.status.any():
+        place = int(done.status.nonzero()[0][0])
+        reason, detail = _REFUSALS[int(done.status[place])]
+        raise ProgramError(reason, f"program {place + 1} of {len(done.status)}: {detail}" if place else detail)

@@ -9,11 +9,11 @@ import numpy as np
 
 from stages.shapeassembly.attachment import MOVE, grow, hinge, hold, local, point, swing
 from stages.shapeassembly.flat import ATTACH, DECLARE, REFLECT, SQUEEZE
-from stages.shapeassembly.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS
+from stages.shapeassembly.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS, MAX_REACH
 
 __all__ = ["Executed", "run"]
 
-OK, TOO_MANY_PARTS, TOO_DEEP, TOO_MANY_EVENTS = range(4)
+OK, TOO_MANY_PARTS, TOO_DEEP, TOO_MANY_EVENTS, TOO_FAR = range(5)
 
 
 class Executed(NamedTuple):
@@ -113,8 +113,8 @@ def _execute(rows, boxes, child, mirrored, decisions):
     """Execute the lines of one assembly in its own coordinates.
 
     boxes (parts, 15), child (parts,): the assembly that expands each cuboid, or -1; mirrored (parts,): a bit for each
-    axis that it is mirrored along; decisions (events, 5): what each attachment did, the axis whose size changed, and
-    the point it grew from or whether it turned.
+    axis that it is mirrored along; decisions (events, 8): what each attachment did, the axis whose size changed
+    (3: all), then GROW: the near points of both cuboids; HINGE: whether it was half a turn; SWING: whether it turned.
     """
     events = _Events(np.empty((len(decisions), 2), np.int64), np.empty((len(decisions), 2, 3)))
     aligned = np.empty(len(boxes), np.bool_)
@@ -208,7 +208,7 @@ def _count_nodes(child, block_parts):
 
 @numba.njit(cache=True)
 def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node, leaf_part):
-    """Put the assemblies of one program within each other, breadth first."""
+    """Put the assemblies of one program within each other, breadth first: OK or TOO_FAR."""
     turns, places, scales = np.empty((len(node), 3, 3)), np.zeros((len(node), 3)), np.ones((len(node), 3))
     turns[0] = np.eye(3)
     first = block_parts[0]
@@ -247,11 +247,15 @@ def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node
                 point(world, p, corners[found, corner])
             leaf_node[found], leaf_part[found] = current, part - start
             found += 1
+            if not np.abs(world).max() <= MAX_REACH:
+                return TOO_FAR
+    return OK
 
 
 @numba.njit(cache=True)
 def run(rows, block_rows, block_parts, program_blocks):
-    """Execute all programs of a Flat: an Executed, and the decisions of all attachments, float64 (events, 5)."""
+    """Execute all programs of a Flat: an Executed, and the decisions of all attachments, float64
+    (events, 8), with the starts of each assembly's, int64 (b + 1,)."""
     programs = len(program_blocks) - 1
     boxes = np.empty((block_parts[-1], 15))
     child, mirrored = np.empty(block_parts[-1], np.int64), np.empty(block_parts[-1], np.int64)
@@ -264,7 +268,7 @@ def run(rows, block_rows, block_parts, program_blocks):
         block_events[block + 1] = block_events[block] + max(more, 0)
         if more < 0:
             status[np.searchsorted(program_blocks, block, side="right") - 1] = TOO_MANY_EVENTS
-    decisions = np.zeros((block_events[-1], 5))
+    decisions = np.zeros((block_events[-1], 8))
     for program in range(programs):
         low, high = program_blocks[program], program_blocks[program + 1]
         nodes, leaves = 0, 0
@@ -288,7 +292,7 @@ def run(rows, block_rows, block_parts, program_blocks):
         own = slice(block_parts[low], block_parts[high])
         inner = slice(program_nodes[program], program_nodes[program + 1])
         outer = slice(program_leaves[program], program_leaves[program + 1])
-        _place(
+        status[program] = _place(
             boxes[own], child[own], mirrored[own], block_parts[low : high + 1],
             node[inner], leaves[outer], corners[outer], leaf_node[outer], leaf_part[outer],
         )  # fmt: skip

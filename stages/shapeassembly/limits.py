@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-__all__ = ["MAX_COPIES", "MAX_DEPTH", "MAX_EVENTS", "MAX_LINES", "MAX_PARTS", "MAX_SIZE", "MAX_TEXT", "MIN_SIZE"]
+__all__ = [
+    "MAX_COPIES",
+    "MAX_DEPTH",
+    "MAX_EVENTS",
+    "MAX_LINES",
+    "MAX_PARTS",
+    "MAX_REACH",
+    "MAX_SIZE",
+    "MAX_TEXT",
+    "MIN_SIZE",
+]
 
 MAX_TEXT = 1_000_000
 """Characters of a program's text."""
@@ -20,10 +30,13 @@ MAX_PARTS = 10_000
 """Cuboids of the executed program, those that are expanded and the bounding boxes included."""
 
 MAX_SIZE = 1e6
-"""Largest number in a program, and largest length of a cuboid: products of them stay exact enough."""
+"""Largest number in a program."""
 
 MIN_SIZE = 1e-6
 """Smallest size of a declared cuboid."""
 
 MAX_EVENTS = 20_000
 """Attachments of one assembly, those of copies included."""
+
+MAX_REACH = 1e9
+"""Largest coordinate and size of an executed cuboid."""
