@@ -8,12 +8,13 @@ import numpy as np
 
 from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
+from stages.shapeassembly.checks import overflow, violations
 from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_parts, leaf_corners
 from stages.shapeassembly.extraction.boxes import around
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
 from stages.shapeassembly.extraction.rules import Rules
 from stages.shapeassembly.extraction.shortening import shorten_parts
-from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted, overflow
+from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted
 from stages.shapeassembly.extraction.writing import Order, write_program
 from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.printer import rounded
@@ -65,7 +66,7 @@ def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
     """The canonical program of a part hierarchy.
 
     Raises Rejected with one of these reasons: "too few parts", "too many parts", "flat shape", "parts not connected",
-    "poor fit", "overflows its box", "not rooted".
+    "breaks a rule of the language", "poor fit", "overflows its box", "not rooted".
     """
     whole = around(leaf_corners(hierarchy.root), np.eye(3))
     diagonal = float(np.linalg.norm(whole.size))
@@ -143,12 +144,17 @@ def order_of(rules: Rules) -> Order:
 
 
 def _checked(shape: _Shape, program: Program, leaves: int, gates: Gates) -> Extraction:
-    made = tuple(boxes_of(execute(program)))
-    bbox = np.array(program.root.bbox.dims)
-    score = f_score(made, shape.wanted, gates.distance * float(np.linalg.norm(bbox)))
+    # A tilted part may be longer than the bounding box is wide, as in the published programs.
+    broken = [each for each in violations(program) if each.rule != "size"]
+    if broken:
+        raise Rejected("breaks a rule of the language", f"{shape.name}: {broken[0]}")
+    execution = execute(program)
+    made = tuple(boxes_of(execution))
+    diagonal = float(np.linalg.norm(program.root.bbox.dims))
+    score = f_score(made, shape.wanted, gates.distance * diagonal)
     if not score >= gates.f_score:
         raise Rejected("poor fit", f"{shape.name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
-    beyond = overflow(made, bbox)
+    beyond = overflow(program, execution)
     if beyond >= gates.overflow:
         raise Rejected("overflows its box", f"{shape.name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
     if not is_rooted(made):

@@ -25,14 +25,12 @@ from stages.shapeassembly.extraction.joints import (
 from stages.shapeassembly.extraction.layout import BBOX, Layout
 from stages.shapeassembly.extraction.validity import boxes_of
 from stages.shapeassembly.interpreter import execute_all
+from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.printer import rounded
 from stages.shapeassembly.program import BBOX as BBOX_NAME
 from stages.shapeassembly.program import Block, Cuboid, Program
 
 __all__ = ["cuboid_of", "tilted_placer"]
-
-SMALLEST = 0.01
-"""The least length of a cuboid (shapeassembly App. D)."""
 
 MOST_ATTACHMENTS = 3
 """A part that is held at three points is held."""

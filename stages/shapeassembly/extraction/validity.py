@@ -1,4 +1,4 @@
-"""Checks of an extracted program's geometry against its input: F-score, overflow, rootedness (shapeassembly §5.3)."""
+"""Checks of an extracted program's geometry against its input: F-score and rootedness (shapeassembly §5.3)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stages.shapeassembly.extraction.boxes import around, box_corners, gap, surf
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.interpreter import Execution
 
-__all__ = ["boxes_of", "f_score", "is_rooted", "overflow", "surface_points"]
+__all__ = ["boxes_of", "f_score", "is_rooted", "surface_points"]
 
 ROOTED_SHARE = 0.02
 """Parts further apart than this share of the shape's diagonal are not connected (shapeassembly App. E)."""
@@ -48,13 +48,6 @@ def f_score(made: Sequence[Box], wanted: Sequence[Box], distance: float, count: 
     precision = float((surface_distance(surface_points(made, count), list(wanted)) <= distance).mean())
     recall = float((surface_distance(surface_points(wanted, count), list(made)) <= distance).mean())
     return 200 * precision * recall / (precision + recall) if precision + recall else 0.0
-
-
-def overflow(boxes: Sequence[Box], bbox: FloatArray) -> float:
-    """How far boxes reach beyond the bounding box of size `bbox` (3,) around the origin, as a share of its size."""
-    corners = np.concatenate([box_corners(box) for box in boxes])
-    beyond = np.maximum(np.abs(corners).max(axis=0) - bbox / 2, 0.0)
-    return float((beyond / np.maximum(bbox, 1e-12)).max())
 
 
 def is_rooted(boxes: Sequence[Box]) -> bool:

@@ -15,7 +15,8 @@ from stages.shapeassembly.extraction.grouping import Symmetry, form_groups
 from stages.shapeassembly.extraction.hierarchy import Part
 from stages.shapeassembly.extraction.joints import part_name
 from stages.shapeassembly.extraction.layout import lay_out, localised
-from stages.shapeassembly.extraction.tilted import SMALLEST, cuboid_of, tilted_placer
+from stages.shapeassembly.extraction.tilted import cuboid_of, tilted_placer
+from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.program import AXES, BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
 
 __all__ = ["Order", "write_program"]
