@@ -77,7 +77,7 @@ def squeeze(
         if abs(place[axis] - wanted) * target_box.size[axis] > near:
             return None
         places.append(np.delete(place, axis))
-    if places[0].min() < -1e-3 or places[0].max() > 1 + 1e-3:
+    if min(map(np.min, places)) < -1e-3 or max(map(np.max, places)) > 1 + 1e-3:
         return None
     if np.abs(places[0] - places[1]).max() > SAME_PLACE and not layout.aligned(part):
         return None
