@@ -13,6 +13,7 @@ from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_par
 from stages.shapeassembly.extraction.boxes import around
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
 from stages.shapeassembly.extraction.rules import Rules
+from stages.shapeassembly.extraction.settings import Gates
 from stages.shapeassembly.extraction.shortening import shorten_parts
 from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted
 from stages.shapeassembly.extraction.writing import Order, write_program
@@ -20,27 +21,13 @@ from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.printer import rounded
 from stages.shapeassembly.program import Program
 
-__all__ = ["Extraction", "Gates", "extract"]
+__all__ = ["Extraction", "extract"]
 
 USUAL_DIAGONALS = (1.0, 4.0)
 """Of the bounding boxes of PartNet's shapes, which lie about the unit sphere: a shape of such size keeps it."""
 
 DIAGONAL = 2.0
 """Of the bounding box to which other shapes are scaled."""
-
-
-@dataclass(frozen=True)
-class Gates:
-    """What a program must pass (shapeassembly §5.3 and the published training set).
-
-    distance: of the F-score, as a share of the diagonal of the shape.
-    """
-
-    f_score: float = 75.0
-    distance: float = 0.02
-    fewest_leaves: int = 3
-    most_leaves: int = 12
-    overflow: float = 0.05
 
 
 @dataclass(frozen=True)

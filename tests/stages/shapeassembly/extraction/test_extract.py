@@ -13,12 +13,13 @@ from pipeline.errors import Rejected
 from stages.shapeassembly import execute, parse, print_program
 from stages.shapeassembly.checks import violations
 from stages.shapeassembly.extraction.boxes import box_corners, same_box
-from stages.shapeassembly.extraction.extract import Extraction, Gates, extract
+from stages.shapeassembly.extraction.extract import Extraction, extract
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
 from stages.shapeassembly.extraction.read_glb import read_glb
 from stages.shapeassembly.extraction.read_grass import read_grass
 from stages.shapeassembly.extraction.read_structurenet import read_structurenet
 from stages.shapeassembly.extraction.rules import RULES
+from stages.shapeassembly.extraction.settings import Gates
 from stages.shapeassembly.extraction.validity import boxes_of
 from stages.shapeassembly.structure import program_distance
 from tests.stages.shapeassembly.extraction.shapes import hierarchy, leaf, node, table, turned
@@ -71,7 +72,7 @@ def test_program_makes_the_boxes_of_the_input() -> None:
 def test_slats_at_equal_distances_are_translated() -> None:
     rails = [leaf("rail", (0, y, 0), (2.0, 0.2, 0.1)) for y in (-0.5, 0.5)]
     slats = [leaf("slat", (x, 0, 0), (0.1, 0.8, 0.05)) for x in (-0.8, -0.4, 0, 0.4, 0.8)]
-    assert lines(hierarchy(*rails, *slats), replace(GATES, fewest_leaves=2))[2:] == [
+    assert lines(hierarchy(*rails, *slats), Gates(fewest_leaves=2))[2:] == [
         "attach(cube0, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5)",
         "attach(cube1, cube0, 0.5, 0.0, 0.5, 0.1, 1.0, 0.5)",
         "reflect(cube0, Y)",
@@ -130,7 +131,7 @@ def test_tilted_back_between_seat_and_top_is_where_it_was(axis: int, degrees: fl
 def test_mirrored_tilted_parts_are_reflected() -> None:
     top = leaf("top", (0, 0.5, 0), (2, 0.1, 1))
     legs = [leaf("leg", (sign * 0.8, 0, 0), (0.1, 0.98, 0.6), turned(2, sign * 12)) for sign in (-1, 1)]
-    extraction = extracted(hierarchy(top, *legs), replace(GATES, fewest_leaves=2))
+    extraction = extracted(hierarchy(top, *legs), Gates(fewest_leaves=2))
     assert print_program(extraction.program).count("reflect(") == 1
     assert covers(extraction.made, extraction.wanted, 0.05), "shortened where they are sunk in the top"
 
@@ -193,7 +194,7 @@ def test_fit_below_the_gate_is_refused() -> None:
     other = leaf("other", (0.3, -0.2, 0.8), (0.3, 0.6, 0.6))
     board = leaf("board", (0, 0.55, 0), (3, 0.1, 0.3), turned(1, 45))
     with pytest.raises(Rejected, match="poor fit"):
-        extracted(hierarchy(block, other, board), replace(GATES, f_score=99.9, distance=0.001))
+        extracted(hierarchy(block, other, board), Gates(f_score=99.9, distance=0.001))
 
 
 @pytest.mark.parametrize(
@@ -231,7 +232,7 @@ def test_labels_order_the_lines_of_a_known_category() -> None:
     back = leaf("chair_back", (0, 0.1, -0.45), (0.9, 0.8, 0.1))
     base = leaf("chair_base", (0, 0.6, 0), (0.3, 0.2, 0.2))
     holder = leaf("chair_head", (0, 0.55, -0.3), (0.3, 0.1, 0.4))
-    program = extract(hierarchy(back, holder, seat, base), RULES["chair"], replace(GATES, f_score=0)).program
+    program = extract(hierarchy(back, holder, seat, base), RULES["chair"], Gates(f_score=0)).program
     assert [cuboid.dims[0] for cuboid in program.root.cuboids] == [0.3, 1.0, 0.9, 0.3]
 
 

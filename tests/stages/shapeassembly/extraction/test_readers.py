@@ -70,7 +70,7 @@ def test_structurenet_file_of_many_levels_is_refused(tmp_path: Path) -> None:
 
 def grass(folder: Path, **arrays: np.ndarray) -> Path:
     path = folder / "chairs.npz"
-    np.savez(path, **arrays)
+    np.savez(path, allow_pickle=True, **arrays)
     return path
 
 
