@@ -39,4 +39,8 @@ def text_shape(producer: str, kit: str, text: str) -> Shape:
         from stages.programs.program import shape_of_text
 
         return upright(shape_of_text(kit, text))
+    if producer == "shapeassembly":
+        from stages.shapeassembly.shape import shape_of_text as shape_of_program_text
+
+        return upright(shape_of_program_text(text))
     raise ValueError(f"no producer {producer!r} makes shapes of text")

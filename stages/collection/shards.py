@@ -9,7 +9,7 @@ from pipeline.stage import Plan, Shard
 __all__ = ["KIT_PRODUCER", "PRODUCERS", "check_producers", "collection_shards", "planned_producer", "producer_of"]
 
 KIT_PRODUCER = "variations"
-PRODUCERS = (KIT_PRODUCER, "programs")
+PRODUCERS = (KIT_PRODUCER, "programs", "shapeassembly")
 """The stages that make samples, the first of them out of kits. A dataset has one of them."""
 
 
@@ -47,10 +47,12 @@ def check_producers(config: Config) -> None:
     """Raises ConfigError for a config that makes no shapes, or makes them in more than one way."""
     from stages.exemplars.settings import ExemplarsConfig
     from stages.programs.settings import ProgramsConfig
+    from stages.shapeassembly.settings import ShapeAssemblyConfig
 
     ways = {
         "exemplars.kits": bool(config.section(ExemplarsConfig).kits),
         "programs.program": bool(config.section(ProgramsConfig).program),
+        "shapeassembly.programs": bool(config.section(ShapeAssemblyConfig).programs),
     }
     used = [key for key, use in ways.items() if use]
     if len(used) != 1:

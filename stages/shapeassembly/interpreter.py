@@ -48,6 +48,12 @@ class Execution:
     def __len__(self) -> int:
         return len(self.corners)
 
+    @property
+    def blocks(self) -> Indices:
+        """Which assembly of the text each leaf is a line of, int64 (n,); copies of an assembly share it."""
+        blocks: Indices = self._tree[self.nodes, 0]
+        return blocks
+
     @cached_property
     def node_names(self) -> tuple[str, ...]:
         """The assemblies by path, the root first: `Program_0`, `Program_0/Program_1`, `Program_0/cube3` (a copy)."""

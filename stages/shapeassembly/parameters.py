@@ -38,24 +38,23 @@ def with_parameters(program: Program, values: FloatArray) -> Program:
 
 
 def parameter_ranges(program: Program) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest value of each parameter, float64 (k,) each.
+    """Lowest and highest value of each parameter, float64 (k,) each; the program's own values lie between.
 
-    Coordinates and distances lie in [0, 1]. A cuboid is from SMALLEST to the bounding box of its assembly, or to its
-    own size where that is more. A bounding box is kept as it is, since it says how large the whole is.
+    Coordinates and distances lie in [0, 1]; a size is from SMALLEST to that of the root's bounding box, which itself
+    stays as it is, since it says how large the whole is.
     """
+    whole = program.root.bbox
     low, high = [], []
     for block in program.blocks:
         for line in _lines(block):
             numbers = _numbers(line)
-            if line is block.bbox:
-                low += numbers
-                high += numbers
-            elif isinstance(line, Cuboid):
-                low += [min(SMALLEST, size) for size in numbers]
-                high += [max(size, whole) for size, whole in zip(numbers, block.bbox.dims, strict=True)]
-            else:
-                low += [min(0.0, number) for number in numbers]
-                high += [max(1.0, number) for number in numbers]
+            least, most = [0.0] * len(numbers), [1.0] * len(numbers)
+            if isinstance(line, Cuboid):
+                least, most = [SMALLEST] * 3, list(whole.dims)
+            if line is whole:
+                least = most = numbers
+            low += [min(bound, number) for bound, number in zip(least, numbers, strict=True)]
+            high += [max(bound, number) for bound, number in zip(most, numbers, strict=True)]
     return np.array(low), np.array(high)
 
 

@@ -23,7 +23,7 @@ _FACES = np.array(
 _COLORS = np.array(
     [[190, 140, 92], [126, 158, 171], [205, 178, 128], [136, 152, 106], [164, 114, 104], [150, 150, 156]], np.uint8
 )
-"""One colour after the other for the assemblies of a shape, sRGB."""
+"""One colour after the other for the assemblies of a program, sRGB."""
 
 
 def shape_of_text(text: str) -> Shape:
@@ -32,12 +32,12 @@ def shape_of_text(text: str) -> Shape:
 
 
 def shape_of_execution(execution: Execution) -> Shape:
-    """One mesh a leaf cuboid, centred, with its pose, `own_names` being the paths; cuboids of one assembly share a
-    colour."""
+    """One mesh a leaf cuboid, centred, with its pose, `own_names` being the paths; cuboids of one assembly of
+    the text share a colour."""
     halves = np.array([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)])
     meshes = tuple(
-        PartMesh(LABELS[0], halves * size, _FACES, np.tile(_COLORS[node % len(_COLORS)], (len(_FACES), 1)))
-        for size, node in zip(execution.sizes, execution.nodes.tolist(), strict=True)
+        PartMesh(LABELS[0], halves * size, _FACES, np.tile(_COLORS[block % len(_COLORS)], (len(_FACES), 1)))
+        for size, block in zip(execution.sizes, execution.blocks.tolist(), strict=True)
     )
     poses = np.tile(np.eye(4), (len(meshes), 1, 1))
     poses[:, :3, :3] = execution.frames

@@ -14,17 +14,15 @@ from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.sample import Sample, write_sample
+from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.variations.answers import ContactAnswers
 from stages.variations.backdrop import Backdrop
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex
 from stages.variations.selection import select
-from stages.variations.settings import SplitConfig, VariationsConfig
+from stages.variations.settings import VariationsConfig
 
 __all__ = ["assignment_shard", "collection_shards_of", "run_assignment", "run_collection"]
-
-SPLITS = ("train", "val", "test")
-
 
 def assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
     """The shard that shares out the variants, once the search of every kit has ended."""
@@ -73,15 +71,14 @@ def run_assignment(task: Task) -> Outcome:
             rows.append((number, lanes.setdefault(pool.lanes[lane], len(lanes)), index, place))
     if not rows:
         raise ShardFailed("the search found no variant of any kit; see `python -m pipeline status` for the reasons")
-    split_of = _share_out(list(groups.values()), config.splits, task.rng("splits"))
+    split_of = share_out(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
     order = task.rng("order").permutation(len(rows))
     placed: list[np.ndarray] = []
     shards: dict[str, int] = {}
     for split, name in enumerate(SPLITS):
         members = order[split_of[order] == split]
-        wanted = max(config.splits.shards, -(-len(members) // config.splits.samples_per_shard))
-        shards[name] = min(wanted, len(members))
-        shard = np.arange(len(members)) * shards[name] // max(len(members), 1)
+        shard = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
+        shards[name] = int(shard[-1]) + 1 if len(members) else 0
         placed.append(
             np.concatenate([np.array(rows)[members], np.full((len(members), 1), split), shard[:, None]], axis=1)
         )
@@ -90,20 +87,6 @@ def run_assignment(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.lanes.txt") as stream:
         stream.write("".join(f"{name}\n" for name in lanes).encode())
     return Outcome(0, {"shards": shards, "variants": len(rows), "graphs": len(groups), "kits": measures})
-
-
-def _share_out(groups: list[list[int]], config: SplitConfig, rng: np.random.Generator) -> np.ndarray:
-    """The split of each row: 0 train, 1 val, 2 test. Whole groups go to val and test until these have their share."""
-    total = sum(len(group) for group in groups)
-    split_of = np.zeros(total, dtype=np.int64)
-    left = {1: round(config.val * total), 2: round(config.test * total)}
-    for number in rng.permutation(len(groups)).tolist():
-        split = max(left, key=lambda each: (left[each], -each))
-        # A group much larger than what is left would swamp a small split; it stays in train.
-        if left[split] > 0 and len(groups[number]) <= max(2 * left[split], 1):
-            split_of[groups[number]] = split
-            left[split] -= len(groups[number])
-    return split_of
 
 
 def run_collection(task: Task) -> Outcome:

@@ -1,0 +1,67 @@
+"""The `shapeassembly` section of a config."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from pipeline.config import StrictModel
+from stages.shapeassembly.sources import existing_programs
+
+__all__ = ["ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig"]
+
+
+class ProgramFiles(StrictModel):
+    """Programs of one kind of shape."""
+
+    name: str = Field(
+        pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
+        max_length=64,
+        description="What the shapes are, such as chair; the keys of the samples begin with it.",
+    )
+    path: Annotated[Path, AfterValidator(existing_programs)] = Field(
+        description="A folder of .txt files, or a tar archive (also .tar.gz, .tar.xz), one program a file."
+    )
+    folder: str = Field(
+        "", description="Only the files below this folder of the archive, such as data/chair; empty for all."
+    )
+
+
+class ShapeAssemblySplitConfig(StrictModel):
+    """How the samples are shared out."""
+
+    val: float = Field(0.1, gt=0, lt=0.5, description="Share of programs in the validation split.")
+    test: float = Field(0.1, gt=0, lt=0.5, description="Share of programs in the test split.")
+    shards: int = Field(8, ge=1, description="Fewest shards of a split.")
+    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
+
+
+class ShapeAssemblyConfig(StrictModel):
+    """Shapes from ShapeAssembly programs."""
+
+    programs: tuple[ProgramFiles, ...] = Field(
+        (), description="Where the programs are; none for a dataset that is made in another way."
+    )
+    accept: Literal["executable", "valid"] = Field(
+        "executable",
+        description="Which programs become samples: all that can be executed, or those that keep every rule.",
+    )
+    overflow: float = Field(
+        0.05, ge=0, description="How far cuboids may reach out of the bounding box, as a share of its size."
+    )
+    least_parts: int = Field(1, ge=1, description="Fewest leaf cuboids of an executed program.")
+    most_parts: int = Field(10_000, ge=1, description="Most leaf cuboids of an executed program.")
+    splits: ShapeAssemblySplitConfig = Field(
+        default_factory=ShapeAssemblySplitConfig,
+        description="How the samples are shared out; programs that are alike up to continuous parameters stand in one "
+        "split.",
+    )
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        names = [each.name for each in self.programs]
+        if len(set(names)) < len(names):
+            raise ValueError(f"two entries of programs have one name: {', '.join(names)}")
+        return self

@@ -1,0 +1,177 @@
+"""Stage `shapeassembly`: ShapeAssembly programs in; those that pass, as the shards `<dataset>-<split>-<index>.tar`.
+
+Its first shard reads all programs, refuses what is no program, and gives each of the others its split and shard. A
+sample carries no meshes: its text is the canonical program, and `stages.shapeassembly.shape.shape_of_text` executes it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import Rejected, ShardFailed
+from pipeline.shards import ShardWriter, json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.shape.sample import Sample, write_sample
+from stages.shape.splits import SPLITS, shards_of_split, share_out
+from stages.shapeassembly.checks import overflow, violations
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.interpreter import execute
+from stages.shapeassembly.parser import parse
+from stages.shapeassembly.printer import print_program
+from stages.shapeassembly.settings import ShapeAssemblyConfig
+from stages.shapeassembly.sources import program_texts, source_digest
+from stages.shapeassembly.structure import signature
+
+__all__ = ["STAGE"]
+
+BYTES_A_PROGRAM = 12_000
+"""A sample in its shard, and its line in the assignment."""
+
+
+def planned_shards(plan: Plan) -> list[Shard]:
+    """The assignment; when it is made, the shards of the collection."""
+    config = plan.config.section(ShapeAssemblyConfig)
+    if not config.programs:
+        return []
+    digests = [source_digest(each.path) for each in config.programs]
+    assignment = Shard(f"{plan.config.name}-assignment", {"job": "assignment", "digests": digests})
+    summary = plan.summary("shapeassembly", assignment.name)
+    if summary is None:
+        return [assignment]
+    collection = [
+        Shard(
+            f"{plan.config.name}-{split}-{number:06d}",
+            {"job": "collection", "split": split, "number": number},
+            (f"shapeassembly/{assignment.name}",),
+        )
+        for split in SPLITS
+        for number in range(summary["shards"][split])
+    ]
+    return [assignment, *collection]
+
+
+def run_shard(task: Task) -> Outcome:
+    """The assignment, or one shard of the collection."""
+    return run_assignment(task) if task.shard.params["job"] == "assignment" else run_collection(task)
+
+
+def run_assignment(task: Task) -> Outcome:
+    """Read and check all programs, and share them out; programs of one signature stand in one split.
+
+    Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line.
+    """
+    config = task.config.section(ShapeAssemblyConfig)
+    rows = list(_accepted(task, config))
+    if not rows:
+        raise ShardFailed("no program was accepted; the rejects of this shard say why")
+    groups: dict[str, list[int]] = {}
+    for index, row in enumerate(rows):
+        groups.setdefault(row["graph"], []).append(index)
+    split_of = share_out(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
+    order = task.rng("order").permutation(len(rows))
+    shards: dict[str, int] = {}
+    for split, name in enumerate(SPLITS):
+        members = order[split_of[order] == split]
+        shard_of = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
+        shards[name] = int(shard_of[-1]) + 1 if len(members) else 0
+        for number in range(shards[name]):
+            with task.output(f"{task.shard.name}.{name}-{number:06d}.jsonl") as stream:
+                stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
+    counts = dict(sorted(Counter(row["kit"] for row in rows).items()))
+    parts = float(np.mean([row["parts"] for row in rows]))
+    return Outcome(0, {"shards": shards, "programs": counts, "structures": len(groups), "parts": round(parts, 2)})
+
+
+def _accepted(task: Task, config: ShapeAssemblyConfig) -> Iterator[dict[str, Any]]:
+    """The programs that become samples; the others are refused."""
+    known: set[str] = set()
+    for source in config.programs:
+        place = 0
+        for name, text in program_texts(source.path, source.folder):
+            try:
+                row = _row(text, config)
+                if row["text"] in known:
+                    raise Rejected("program is there already", name)
+            except ProgramError as error:
+                task.reject(f"{source.name}/{name}", error.reason, str(error))
+                continue
+            except Rejected as error:
+                task.reject(f"{source.name}/{name}", error.reason, error.detail)
+                continue
+            known.add(row["text"])
+            yield {"key": f"{source.name}-{place:06d}", "kit": source.name, "file": name, **row}
+            place += 1
+
+
+def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
+    """What there is to say of one program. Raises ProgramError or Rejected where it does not pass."""
+    program = parse(text)
+    execution = execute(program)
+    if not config.least_parts <= len(execution) <= config.most_parts:
+        raise Rejected("number of parts", f"{len(execution)} leaf cuboids")
+    beyond = overflow(program, execution)
+    if beyond > config.overflow:
+        raise Rejected("reaches out of the bounding box", f"by {100 * beyond:.1f} % of its size")
+    if config.accept == "valid":
+        broken = violations(program)
+        if broken:
+            raise Rejected(broken[0].rule, str(broken[0]))
+    return {"text": print_program(program), "graph": signature(program), "parts": len(execution)}
+
+
+def run_collection(task: Task) -> Outcome:
+    """Write the samples of one shard."""
+    split, number = task.shard.params["split"], task.shard.params["number"]
+    assignment = f"{task.config.name}-assignment"
+    listing = task.input("shapeassembly", f"{assignment}.{split}-{number:06d}.jsonl").read_text()
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for line in listing.rstrip("\n").split("\n"):
+            write_sample(writer, _sample(json.loads(line), split))
+    return Outcome(writer.samples, {"split": split, "samples": writer.samples})
+
+
+def _sample(row: dict[str, Any], split: str) -> Sample:
+    return Sample(
+        key=row["key"],
+        split=split,
+        producer="shapeassembly",
+        kit=row["kit"],
+        graph=row["graph"],
+        lineage={"file": row["file"]},
+        text=row["text"],
+    )
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """How many programs there are and of how many structures, and why the others were refused."""
+    name = f"{plan.config.name}-assignment"
+    summary = plan.summary("shapeassembly", name) if plan.config.section(ShapeAssemblyConfig).programs else None
+    if summary is None:
+        return []
+    counts = ", ".join(f"{count:,} {kit}" for kit, count in summary["programs"].items())
+    rejects = plan.rejects("shapeassembly", name)
+    why = ", ".join(f"{count:,} {reason}" for reason, count in sorted(rejects.items(), key=lambda each: -each[1]))
+    return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}"]
+
+
+def estimate_bytes(plan: Plan) -> int:
+    """Bytes of all samples, as far as they are known."""
+    summary = plan.summary("shapeassembly", f"{plan.config.name}-assignment")
+    return BYTES_A_PROGRAM * sum(summary["programs"].values()) if summary else 0
+
+
+STAGE = Stage(
+    name="shapeassembly",
+    version=1,
+    config=ShapeAssemblyConfig,
+    inputs=(),
+    plan=planned_shards,
+    run_shard=run_shard,
+    estimate_bytes=estimate_bytes,
+    report=report,
+)
