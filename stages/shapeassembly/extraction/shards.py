@@ -6,6 +6,8 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
@@ -21,13 +23,11 @@ HIERARCHIES_A_SHARD = 1000
 
 @dataclass(frozen=True)
 class Extracted:
-    """A program that was extracted. kind: the name of its source in the config; name: its hierarchy's in the source;
-    f_score: against the hierarchy, 0 to 100."""
+    """A program that was extracted. kind: the name of its source in the config; name: its hierarchy's in the source."""
 
     kind: str
     name: str
     text: str
-    f_score: float
 
 
 def extraction_shards(dataset: str, hierarchies: Sequence[HierarchyFiles]) -> list[Shard]:
@@ -47,7 +47,7 @@ def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gat
     """Extract the programs of one shard into `.jsonl`, one a line; the others are refused, by reason."""
     params = task.shard.params
     files = hierarchies[params["source"]]
-    rows = []
+    rows, scores = [], []
     for place, (name, hierarchy) in enumerate(files.source.read(params["first"], params["last"])):
         task.progress(place, params["last"] - params["first"])
         try:
@@ -57,11 +57,11 @@ def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gat
         except Rejected as error:
             task.reject(f"{files.name}/{name}", error.reason, error.detail)
             continue
-        text = print_program(extraction.program)
-        rows.append({"kind": files.name, "name": name, "text": text, "f_score": round(extraction.f_score, 2)})
+        rows.append({"kind": files.name, "name": name, "text": print_program(extraction.program)})
+        scores.append(extraction.f_score)
     with task.output(f"{task.shard.name}.jsonl") as stream:
         stream.writelines(json_bytes(row) for row in rows)
-    return Outcome(0, {"programs": len(rows)})
+    return Outcome(0, {"programs": len(rows), "f_score": round(float(np.mean(scores or [0.0])), 2)})
 
 
 def read_extracted(task: Task) -> Iterator[Extracted]:
