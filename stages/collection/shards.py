@@ -52,7 +52,7 @@ def check_producers(config: Config) -> None:
     ways = {
         "exemplars.kits": bool(config.section(ExemplarsConfig).kits),
         "programs.program": bool(config.section(ProgramsConfig).program),
-        "shapeassembly.programs": bool(config.section(ShapeAssemblyConfig).programs),
+        "shapeassembly.programs or hierarchies": config.section(ShapeAssemblyConfig).has_sources,
     }
     used = [key for key, use in ways.items() if use]
     if len(used) != 1:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config import StrictModel
+from stages.shapeassembly.extraction.settings import Gates, HierarchyFiles
 from stages.shapeassembly.sources import existing_programs
 
 __all__ = ["ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig"]
@@ -44,6 +45,10 @@ class ShapeAssemblyConfig(StrictModel):
     programs: tuple[ProgramFiles, ...] = Field(
         (), description="Where the programs are; none for a dataset that is made in another way."
     )
+    hierarchies: tuple[HierarchyFiles, ...] = Field(
+        (), description="Where the part hierarchies are from which programs are extracted."
+    )
+    extraction: Gates = Field(default_factory=Gates, description="What an extracted program must pass.")
     accept: Literal["executable", "valid"] = Field(
         "executable",
         description="Which programs become samples: all that can be executed, or those that keep every rule.",
@@ -61,7 +66,12 @@ class ShapeAssemblyConfig(StrictModel):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [each.name for each in self.programs]
+        names = [each.name for each in self.programs] + [each.name for each in self.hierarchies]
         if len(set(names)) < len(names):
-            raise ValueError(f"two entries of programs have one name: {', '.join(names)}")
+            raise ValueError(f"two entries of programs and hierarchies have one name: {', '.join(names)}")
         return self
+
+    @property
+    def has_sources(self) -> bool:
+        """Whether the dataset is made of programs."""
+        return bool(self.programs or self.hierarchies)

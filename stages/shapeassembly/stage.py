@@ -1,7 +1,8 @@
 """Stage `shapeassembly`: ShapeAssembly programs in; those that pass, as the shards `<dataset>-<split>-<index>.tar`.
 
-Its first shard reads all programs, refuses what is no program, and gives each of the others its split and shard. A
-sample carries no meshes: its text is the canonical program, and `stages.shapeassembly.shape.shape_of_text` executes it.
+Its first shards extract programs from part hierarchies, if there are any. Then one reads all programs, refuses what is
+no program, and gives each of the others its split and shard. A sample carries no meshes: its text is the canonical
+program, and `stages.shapeassembly.shape.shape_of_text` executes it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.shapeassembly.checks import overflow, violations
 from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
 from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.printer import print_program
@@ -34,15 +36,19 @@ BYTES_A_PROGRAM = 12_000
 
 
 def planned_shards(plan: Plan) -> list[Shard]:
-    """The assignment; when it is made, the shards of the collection."""
+    """The extraction; when it is made, the assignment; when that is made, the shards of the collection."""
     config = plan.config.section(ShapeAssemblyConfig)
-    if not config.programs:
+    if not config.has_sources:
         return []
+    extraction = extraction_shards(plan.config.name, config.hierarchies)
+    if any(plan.summary("shapeassembly", shard.name) is None for shard in extraction):
+        return extraction
     digests = [source_digest(each.path) for each in config.programs]
-    assignment = Shard(f"{plan.config.name}-assignment", {"job": "assignment", "digests": digests})
+    inputs = tuple(f"shapeassembly/{shard.name}" for shard in extraction)
+    assignment = Shard(f"{plan.config.name}-assignment", {"job": "assignment", "digests": digests}, inputs)
     summary = plan.summary("shapeassembly", assignment.name)
     if summary is None:
-        return [assignment]
+        return [*extraction, assignment]
     collection = [
         Shard(
             f"{plan.config.name}-{split}-{number:06d}",
@@ -52,11 +58,14 @@ def planned_shards(plan: Plan) -> list[Shard]:
         for split in SPLITS
         for number in range(summary["shards"][split])
     ]
-    return [assignment, *collection]
+    return [*extraction, assignment, *collection]
 
 
 def run_shard(task: Task) -> Outcome:
-    """The assignment, or one shard of the collection."""
+    """A shard of the extraction, the assignment, or a shard of the collection."""
+    if task.shard.params["job"] == "extraction":
+        config = task.config.section(ShapeAssemblyConfig)
+        return run_extraction(task, config.hierarchies, config.extraction)
     return run_assignment(task) if task.shard.params["job"] == "assignment" else run_collection(task)
 
 
@@ -90,22 +99,30 @@ def run_assignment(task: Task) -> Outcome:
 def _accepted(task: Task, config: ShapeAssemblyConfig) -> Iterator[dict[str, Any]]:
     """The programs that become samples; the others are refused."""
     known: set[str] = set()
+    places: Counter[str] = Counter()
+    for kind, name, text in _texts(task, config):
+        try:
+            row = _row(text, config)
+            if row["text"] in known:
+                raise Rejected("program is there already", name)
+        except ProgramError as error:
+            task.reject(f"{kind}/{name}", error.reason, str(error))
+            continue
+        except Rejected as error:
+            task.reject(f"{kind}/{name}", error.reason, error.detail)
+            continue
+        known.add(row["text"])
+        yield {"key": f"{kind}-{places[kind]:06d}", "kit": kind, "file": name, **row}
+        places[kind] += 1
+
+
+def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, str]]:
+    """Of each program the name of its source, its own name there, and its text: those read, then those extracted."""
     for source in config.programs:
-        place = 0
         for name, text in program_texts(source.path, source.folder):
-            try:
-                row = _row(text, config)
-                if row["text"] in known:
-                    raise Rejected("program is there already", name)
-            except ProgramError as error:
-                task.reject(f"{source.name}/{name}", error.reason, str(error))
-                continue
-            except Rejected as error:
-                task.reject(f"{source.name}/{name}", error.reason, error.detail)
-                continue
-            known.add(row["text"])
-            yield {"key": f"{source.name}-{place:06d}", "kit": source.name, "file": name, **row}
-            place += 1
+            yield source.name, name, text
+    for each in read_extracted(task):
+        yield each.kind, each.name, each.text
 
 
 def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
@@ -150,12 +167,16 @@ def _sample(row: dict[str, Any], split: str) -> Sample:
 def report(plan: Plan) -> Sequence[str]:
     """How many programs there are and of how many structures, and why the others were refused."""
     name = f"{plan.config.name}-assignment"
-    summary = plan.summary("shapeassembly", name) if plan.config.section(ShapeAssemblyConfig).programs else None
+    config = plan.config.section(ShapeAssemblyConfig)
+    summary = plan.summary("shapeassembly", name) if config.has_sources else None
     if summary is None:
         return []
+    extraction = [shard.name for shard in extraction_shards(plan.config.name, config.hierarchies)]
     counts = ", ".join(f"{count:,} {kit}" for kit, count in summary["programs"].items())
-    rejects = plan.rejects("shapeassembly", name)
-    why = ", ".join(f"{count:,} {reason}" for reason, count in sorted(rejects.items(), key=lambda each: -each[1]))
+    refused: Counter[str] = Counter()
+    for shard in (*extraction, name):
+        refused.update(plan.rejects("shapeassembly", shard))
+    why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
     return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}"]
 
 

@@ -1,0 +1,118 @@
+"""Arranges a part hierarchy for a program: semantic flattening and collapsing, and the frame of every part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.boxes import around, box_corners, nearest_axes, turn_between
+from stages.shapeassembly.extraction.hierarchy import Box, Part
+from stages.shapeassembly.extraction.rules import Rules
+
+__all__ = ["ALIGNED_DEGREES", "arrange_parts", "frame_parts", "leaf_corners"]
+
+ALIGNED_DEGREES = 5.0
+"""A part turned by less against its parent is aligned with it (shapeassembly §5.1)."""
+
+
+def leaf_corners(part: Part) -> FloatArray:
+    """The corners of all leaves of `part`, float64 (8 n, 3)."""
+    return np.concatenate([box_corners(leaf.box) for leaf in part.leaves()])
+
+
+def arrange_parts(root: Part, rules: Rules) -> Part:
+    """The tree flattened, collapsed and regrouped by `rules` (shapeassembly App. C).
+
+    A node with one child is that child, under the node's label: it says nothing that its child does not.
+    """
+    kept, moved = _gathered(root, rules, inside_frame=False)
+    if moved:
+        assert kept is not None
+        kept = _given(kept, tuple(moved), rules.gather_into)
+    return _arranged(kept or root, rules)
+
+
+def _arranged(part: Part, rules: Rules) -> Part:
+    if part.label in rules.collapse:
+        return replace(part, children=())
+    if part.label in rules.flatten:
+        children = tuple(_leaves(part, rules))
+    else:
+        children = tuple(_arranged(child, rules) for child in part.children)
+    if len(children) == 1:
+        return replace(children[0], label=part.label)
+    return replace(part, children=children)
+
+
+def _leaves(part: Part, rules: Rules) -> list[Part]:
+    """The leaves below a node; what collapses counts as a leaf."""
+    found: list[Part] = []
+    for child in part.children:
+        if not child.children or child.label in rules.collapse:
+            found.append(replace(child, children=()))
+        else:
+            found += _leaves(child, rules)
+    return found
+
+
+def _gathered(part: Part, rules: Rules, *, inside_frame: bool) -> tuple[Part | None, list[Part]]:
+    """`part` without the nodes that move, and those nodes."""
+    if part.label in rules.gather and not inside_frame:
+        return None, [part]
+    inside_frame |= part.label == rules.gather_into
+    found = [_gathered(child, rules, inside_frame=inside_frame) for child in part.children]
+    children = tuple(child for child, _ in found if child is not None)
+    moved = [each for _, parts in found for each in parts]
+    if part.children and not children:
+        return None, moved
+    return replace(part, children=children), moved
+
+
+def _given(part: Part, moved: tuple[Part, ...], label: str) -> Part:
+    """`part` with `moved` below its first node labelled `label`, or as a new child of that label."""
+
+    def place(node: Part) -> Part | None:
+        if node.label == label:
+            own = node.children or (node,)
+            return replace(node, children=own + moved)
+        for index, child in enumerate(node.children):
+            changed = place(child)
+            if changed is not None:
+                return replace(node, children=(*node.children[:index], changed, *node.children[index + 1 :]))
+        return None
+
+    return place(part) or replace(part, children=(*part.children, Part(label, moved[0].box, moved)))
+
+
+def frame_parts(root: Part) -> Part:
+    """The tree with every part in the frame that the program gives it.
+
+    The root stands upright. Sides are renamed so that a part is turned as little as can be against its parent, and
+    an aligned part is turned to it. The box of a part with children is the smallest around its leaves in its frame.
+    """
+    return _framed(root, np.eye(3), root_of_all=True)
+
+
+def _framed(part: Part, frame: FloatArray, *, root_of_all: bool = False) -> Part:
+    box = nearest_axes(part.box, frame)
+    if turn_between(box.axes, frame) < ALIGNED_DEGREES or (
+        part.children and (root_of_all or _prefers(part, frame, box))
+    ):
+        box = Box(box.center, box.size, frame)
+    if not part.children:
+        return replace(part, box=box)
+    children = tuple(_framed(child, box.axes) for child in part.children)
+    whole = replace(part, box=box, children=children)
+    return replace(whole, box=around(leaf_corners(whole), box.axes))
+
+
+def _prefers(part: Part, frame: FloatArray, box: Box) -> bool:
+    """Whether more leaves of `part` stand along `frame` than along its own box."""
+
+    def aligned(axes: FloatArray) -> int:
+        turns = [turn_between(nearest_axes(leaf.box, axes).axes, axes) for leaf in part.leaves()]
+        return sum(turn < ALIGNED_DEGREES for turn in turns)
+
+    return aligned(frame) >= aligned(box.axes)

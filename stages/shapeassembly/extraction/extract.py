@@ -1,0 +1,154 @@
+"""Extracts a ShapeAssembly program from a part hierarchy, and checks it (shapeassembly §5, App. C)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.errors import Rejected
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.checks import overflow, violations
+from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_parts, leaf_corners
+from stages.shapeassembly.extraction.boxes import around
+from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
+from stages.shapeassembly.extraction.rules import Rules
+from stages.shapeassembly.extraction.settings import Gates
+from stages.shapeassembly.extraction.shortening import shorten_parts
+from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted
+from stages.shapeassembly.extraction.writing import Order, write_program
+from stages.shapeassembly.interpreter import execute
+from stages.shapeassembly.printer import rounded
+from stages.shapeassembly.program import Program
+
+__all__ = ["Extraction", "extract"]
+
+USUAL_DIAGONALS = (1.0, 4.0)
+"""Of the bounding boxes of PartNet's shapes, which lie about the unit sphere: a shape of such size keeps it."""
+
+DIAGONAL = 2.0
+"""Of the bounding box to which other shapes are scaled."""
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """A program that passed every gate. program: with numbers to three decimals, centred at the origin.
+
+    f_score: 0 to 100, against the leaf boxes of the input; overflow: share of the bounding box by which parts reach
+    beyond it; leaves: cuboids declared that are not expanded; center (3,), scale: a point p of the program is
+    center + scale * p in the input; wanted, made: the input's leaf boxes and the executed ones, in the program's frame.
+    """
+
+    program: Program
+    f_score: float
+    overflow: float
+    leaves: int
+    center: FloatArray
+    scale: float
+    wanted: tuple[Box, ...]
+    made: tuple[Box, ...]
+
+
+def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
+    """The canonical program of a part hierarchy.
+
+    Raises Rejected with one of these reasons: "too few parts", "too many parts", "flat shape", "parts not connected",
+    "breaks a rule of the language", "poor fit", "overflows its box", "not rooted".
+    """
+    whole = around(leaf_corners(hierarchy.root), np.eye(3))
+    diagonal = float(np.linalg.norm(whole.size))
+    if diagonal <= 0:
+        raise Rejected("flat shape", f"{hierarchy.name} has no extent")
+    scale = 1.0 if USUAL_DIAGONALS[0] <= diagonal <= USUAL_DIAGONALS[1] else diagonal / DIAGONAL
+    root = _rescaled(hierarchy.root, whole.center, scale)
+    shape = _Shape(hierarchy.name, tuple(leaf.box for leaf in root.leaves()), whole.center, scale)
+    first: Rejected | None = None
+    for regularised in (_REGULARISED, *_LESS):
+        try:
+            return _attempt(shape, root, rules, gates, regularised)
+        except Rejected as reason:
+            first = first or reason
+            if reason.reason in _FINAL:
+                break
+    assert first is not None
+    raise first
+
+
+@dataclass(frozen=True)
+class _Regularised:
+    """Which steps that make a program tidier are taken."""
+
+    shortened: bool
+    grouped: bool
+
+
+_REGULARISED = _Regularised(shortened=True, grouped=True)
+
+_LESS = (_Regularised(shortened=False, grouped=True), _Regularised(shortened=True, grouped=False))
+"""What is tried on a shape whose tidiest program fails: sunk ends may be what holds it together, and a part between
+two that a group makes of one may have nothing to stand on."""
+
+_FINAL = frozenset({"too few parts", "too many parts"})
+"""Reasons that no other attempt mends."""
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What an attempt is measured against: see Extraction."""
+
+    name: str
+    wanted: tuple[Box, ...]
+    center: FloatArray
+    scale: float
+
+
+def _attempt(shape: _Shape, root: Part, rules: Rules, gates: Gates, regularised: _Regularised) -> Extraction:
+    if regularised.shortened:
+        root = shorten_parts(root)
+    root = frame_parts(arrange_parts(root, rules))
+    if not root.children:
+        raise Rejected("too few parts", f"{shape.name} is one box")
+    program = rounded(write_program(root, order_of(rules), grouped=regularised.grouped))
+    named = set(program.named)
+    leaves = sum(cuboid.name not in named for block in program.blocks for cuboid in block.cuboids)
+    if leaves < gates.fewest_leaves:
+        raise Rejected("too few parts", f"{shape.name} has {leaves}, at least {gates.fewest_leaves} are wanted")
+    if leaves > gates.most_leaves:
+        raise Rejected("too many parts", f"{shape.name} has {leaves}, at most {gates.most_leaves} are wanted")
+    return _checked(shape, program, leaves, gates)
+
+
+def order_of(rules: Rules) -> Order:
+    """The canonical order: by semantic label, then by place: bottom to top, left to right, back to front."""
+    ranks = {label: rank for rank, label in enumerate(rules.order)}
+
+    def key(part: Part) -> tuple[object, ...]:
+        x, y, z = np.round(part.box.center, 3).tolist()
+        size = np.round(part.box.size, 3).tolist()
+        return (ranks.get(part.label, len(ranks)), part.label if ranks else "", y, x, z, *size)
+
+    return key
+
+
+def _checked(shape: _Shape, program: Program, leaves: int, gates: Gates) -> Extraction:
+    # A tilted part may be longer than the bounding box is wide, as in the published programs.
+    broken = [each for each in violations(program) if each.rule != "size"]
+    if broken:
+        raise Rejected("breaks a rule of the language", f"{shape.name}: {broken[0]}")
+    execution = execute(program)
+    made = tuple(boxes_of(execution))
+    diagonal = float(np.linalg.norm(program.root.bbox.dims))
+    score = f_score(made, shape.wanted, gates.distance * diagonal)
+    if not score >= gates.f_score:
+        raise Rejected("poor fit", f"{shape.name} has F-score {score:.1f}, at least {gates.f_score:g} is wanted")
+    beyond = overflow(program, execution)
+    if beyond >= gates.overflow:
+        raise Rejected("overflows its box", f"{shape.name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
+    if not is_rooted(made):
+        raise Rejected("not rooted", f"{shape.name} has a part without a way to the ground")
+    return Extraction(program, score, beyond, leaves, shape.center, shape.scale, shape.wanted, made)
+
+
+def _rescaled(part: Part, center: FloatArray, scale: float) -> Part:
+    box = Box((part.box.center - center) / scale, part.box.size / scale, part.box.axes)
+    return replace(part, box=box, children=tuple(_rescaled(child, center, scale) for child in part.children))

@@ -1,0 +1,187 @@
+"""Forms symmetry groups in a node: one part stands for all that a macro makes of it (shapeassembly App. C)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.arrangement import leaf_corners
+from stages.shapeassembly.extraction.boxes import around, box_corners
+from stages.shapeassembly.extraction.hierarchy import Part
+from stages.shapeassembly.extraction.layout import Layout, lay_out
+from stages.shapeassembly.extraction.symmetry import Body, Group, reflections, translations
+
+__all__ = ["Symmetry", "form_groups"]
+
+BOTTOM, TOP = -1, -2
+
+REFLECTION_AXES = (0, 2, 1)
+"""Left and right first, then front and back, then bottom and top."""
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A macro on one part. copies: parts beside the first; distance: of the last copy, as a share of the box along
+    `axis`, for a translation; None for a reflection."""
+
+    axis: int
+    copies: int
+    distance: float | None
+
+
+@dataclass(frozen=True)
+class _Formed:
+    """A group: the part that stands for it, its macro, and the parts and ends of the box to which it is anchored."""
+
+    part: Part
+    symmetry: Symmetry
+    anchors: tuple[Part, ...]
+    ends: frozenset[int]
+
+
+def form_groups(layout: Layout, order: Callable[[Part], Any]) -> tuple[Layout, list[Symmetry | None]]:
+    """The layout of the parts that remain when groups are formed, and for each the macro that makes the others.
+
+    Connected components that repeat become one sub-part each, before groups of single parts are formed. `order` is
+    the key of the canonical order of parts. A part with a macro is anchored where its copies are attached too.
+    """
+    formed: list[_Formed] = []
+    while (pooled := _pool_components(layout, {id(each.part) for each in formed})) is not None:
+        parts, each = pooled
+        formed.append(each)
+        layout = lay_out(sorted(parts, key=order), layout.bbox.size)
+    fixed = {id(each.part) for each in formed}
+    bodies = _bodies(layout, [(i,) for i, part in enumerate(layout.parts) if id(part) not in fixed])
+    groups = _single_groups(bodies, layout.diagonal)
+    while True:
+        members = [tuple(bodies[i].members[0] for i in group.bodies) for group in groups]
+        gone = {part for _, *copies in members for part in copies}
+        singles = [_formed(group, layout, layout.parts[each[0]]) for group, each in zip(groups, members, strict=True)]
+        kept = [i for i in range(len(layout.parts)) if i not in gone]
+        reduced, macros = _reduced(layout, kept, [*formed, *singles])
+        loose = {kept[i] for i in reduced.ungroundable()}
+        if not loose or not groups:
+            return reduced, macros
+        del groups[_at_fault(layout, members, loose)]
+
+
+def _at_fault(layout: Layout, members: Sequence[tuple[int, ...]], loose: set[int]) -> int:
+    """The group to give up so that loose parts can stand: the last that is loose, or touches what is loose."""
+    beside = loose | {other for part in loose for other in layout.neighbours(part)}
+    for wanted in (loose, beside):
+        for index in reversed(range(len(members))):
+            if wanted & set(members[index]):
+                return index
+    return len(members) - 1
+
+
+def _searches(diagonal: float, rows_of: int) -> list[Callable[[Sequence[Body]], list[Group]]]:
+    """Searches for groups: mirrored pairs, then rows of at least `rows_of`, along each axis."""
+    return [
+        *(partial(reflections, axis=axis, diagonal=diagonal) for axis in REFLECTION_AXES),
+        *(partial(translations, axis=axis, diagonal=diagonal, fewest=rows_of) for axis in range(3)),
+    ]
+
+
+def _single_groups(bodies: Sequence[Body], diagonal: float) -> list[Group]:
+    """Groups of single parts: rows of three or more, then mirrored pairs, then rows of two."""
+    long_rows = _searches(diagonal, rows_of=3)[len(REFLECTION_AXES) :]
+    groups: list[Group] = []
+    taken: set[int] = set()
+    for search in (*long_rows, *_searches(diagonal, rows_of=2)):
+        free = [i for i in range(len(bodies)) if i not in taken]
+        for group in search([bodies[i] for i in free]):
+            members = tuple(free[i] for i in group.bodies)
+            groups.append(replace(group, bodies=members))
+            taken |= set(members)
+    return groups
+
+
+def _pool_components(layout: Layout, fixed: set[int]) -> tuple[list[Part], _Formed] | None:
+    """The parts after one group of connected components has become one sub-part, and that group.
+
+    fixed: identities of the parts that are already groups.
+    """
+    free = [i for i, part in enumerate(layout.parts) if id(part) not in fixed]
+    unattached = [replace(body, touches=frozenset({BOTTOM, TOP})) for body in _bodies(layout, [(i,) for i in free])]
+    for find in _searches(layout.diagonal, rows_of=2):
+        moving = sorted({free[i] for group in find(unattached) for i in group.bodies})
+        bodies = _bodies(layout, [each for each in _components(layout, moving) if len(each) > 1])
+        groups = find(bodies)
+        if groups:
+            first, *others = (bodies[i].members for i in groups[0].bodies)
+            pooled = _pool([layout.parts[i] for i in first])
+            gone = {member for members in (first, *others) for member in members}
+            kept = [part for i, part in enumerate(layout.parts) if i not in gone]
+            return [*kept, pooled], _formed(groups[0], layout, pooled)
+    return None
+
+
+def _pool(parts: Sequence[Part]) -> Part:
+    """One part that is made of `parts`, in a box along the node's frame."""
+    corners = np.concatenate([leaf_corners(part) for part in parts])
+    return Part(parts[0].label, around(corners, np.eye(3)), tuple(parts))
+
+
+def _formed(group: Group, layout: Layout, part: Part) -> _Formed:
+    copies, distance = 1, None
+    if group.kind == "translate":
+        copies, distance = len(group.bodies) - 1, group.distance / float(layout.bbox.size[group.axis])
+    anchors = tuple(layout.parts[i] for i in sorted(group.anchors) if i >= 0)
+    return _Formed(part, Symmetry(group.axis, copies, distance), anchors, group.anchors & {BOTTOM, TOP})
+
+
+def _bodies(layout: Layout, members: Sequence[Sequence[int]]) -> list[Body]:
+    """The given sets of parts as bodies."""
+    bodies = []
+    for each in members:
+        touches = {j for i in each for j in layout.neighbours(i)} - set(each)
+        touches |= {BOTTOM for i in each if layout.bottoms[i] is not None}
+        touches |= {TOP for i in each if layout.tops[i] is not None}
+        boxes: tuple[FloatArray, ...] = tuple(box_corners(leaf.box) for i in each for leaf in layout.parts[i].leaves())
+        bodies.append(Body(tuple(each), boxes, frozenset(touches)))
+    return bodies
+
+
+def _components(layout: Layout, parts: Sequence[int]) -> list[list[int]]:
+    """The sets of `parts` that hang together through contacts, each ascending."""
+    left, components = set(parts), []
+    for seed in parts:
+        if seed not in left:
+            continue
+        left.discard(seed)
+        frontier, component = [seed], [seed]
+        while frontier:
+            fresh = sorted(left & set(layout.neighbours(frontier.pop())))
+            left -= set(fresh)
+            frontier += fresh
+            component += fresh
+        components.append(sorted(component))
+    return components
+
+
+def _reduced(layout: Layout, kept: Sequence[int], formed: Sequence[_Formed]) -> tuple[Layout, list[Symmetry | None]]:
+    """The layout of the parts `kept`, ascending, those of groups anchored, and the macro of each."""
+    place = {part: index for index, part in enumerate(kept)}
+    named = {id(layout.parts[part]): index for part, index in place.items()}
+    groups = {named[id(each.part)]: each for each in formed}
+    anchors: list[frozenset[int] | None] = [None] * len(kept)
+    bottoms, tops = [layout.bottoms[i] for i in kept], [layout.tops[i] for i in kept]
+    for index, each in groups.items():
+        anchors[index] = frozenset(named[id(part)] for part in each.anchors if id(part) in named)
+        bottoms[index] = bottoms[index] if BOTTOM in each.ends else None
+        tops[index] = tops[index] if TOP in each.ends else None
+    reduced = Layout(
+        layout.bbox,
+        tuple(layout.parts[i] for i in kept),
+        {(place[i], place[j]): each for (i, j), each in layout.contacts.items() if i in place and j in place},
+        tuple(bottoms),
+        tuple(tops),
+        tuple(anchors),
+    )
+    return reduced, [groups[i].symmetry if i in groups else None for i in range(len(kept))]

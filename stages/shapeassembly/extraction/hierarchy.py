@@ -1,0 +1,92 @@
+"""What programs are extracted from: a tree of named parts with oriented boxes, whatever file it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.errors import Rejected
+from stages.shape.arrays import FloatArray
+
+__all__ = ["MAX_DEPTH", "MAX_PARTS", "UNREADABLE", "Box", "Part", "PartHierarchy", "bounded", "box_of_rows"]
+
+UNREADABLE = "unreadable hierarchy"
+"""The reason with which readers refuse a file."""
+
+MAX_PARTS = 2000
+"""Nodes that a hierarchy may have; the largest of PartNet has some hundreds."""
+
+MAX_DEPTH = 32
+"""Levels that a hierarchy may have; the deepest of PartNet has nine."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """An oriented box. center: float64 (3,); size: float64 (3,), full lengths; axes: float64 (3, 3), unit rows
+    right, top and front, right-handed."""
+
+    center: FloatArray
+    size: FloatArray
+    axes: FloatArray
+
+
+@dataclass(frozen=True)
+class Part:
+    """A node: its semantic label, its box, and the parts that it is made of (none for a leaf)."""
+
+    label: str
+    box: Box
+    children: tuple[Part, ...] = ()
+
+    def leaves(self) -> Iterator[Part]:
+        """The parts at the end of every branch below this one, in order; itself if it has no children."""
+        if not self.children:
+            yield self
+        for child in self.children:
+            yield from child.leaves()
+
+
+@dataclass(frozen=True)
+class PartHierarchy:
+    """A shape as a part hierarchy, y up. name: what the file calls it."""
+
+    name: str
+    root: Part
+
+
+def bounded(root: Part, source: str) -> Part:
+    """`root` itself. Raises Rejected if it has more parts or levels than a hierarchy may have."""
+    level, depth, count = [root], 0, 0
+    while level:
+        depth, count = depth + 1, count + len(level)
+        if depth > MAX_DEPTH or count > MAX_PARTS:
+            raise Rejected(
+                UNREADABLE, f"{source}: more than {MAX_PARTS} parts or {MAX_DEPTH} levels; split or simplify it"
+            )
+        level = [child for part in level for child in part.children]
+    return root
+
+
+def box_of_rows(numbers: FloatArray, place: str) -> Box:
+    """A box from twelve numbers: its centre, its lengths, and the directions of the first two lengths.
+
+    The axes are made unit and orthogonal: files give them to a few digits. Raises Rejected, naming `place`, for
+    numbers that are not finite, negative sizes and axes that are no axes.
+    """
+    rows = numbers.reshape(4, 3)
+    if not np.isfinite(rows).all() or np.abs(rows).max() > 1e9:
+        raise Rejected(UNREADABLE, f"{place}: a box has twelve finite numbers: centre, size and two axes")
+    if (rows[1] < 0).any():
+        raise Rejected(UNREADABLE, f"{place}: a box has a negative size; write its lengths as positive numbers")
+    right, top = rows[2], rows[3]
+    lengths = np.linalg.norm(right), np.linalg.norm(top)
+    if min(lengths) < 1e-6:
+        raise Rejected(UNREADABLE, f"{place}: an axis of the box has no length; give two unit vectors")
+    right, top = right / lengths[0], top / lengths[1]
+    top = top - right * (right @ top)
+    if np.linalg.norm(top) < 1e-2:
+        raise Rejected(UNREADABLE, f"{place}: the axes of the box are parallel; give two perpendicular ones")
+    top = top / np.linalg.norm(top)
+    return Box(rows[0], rows[1], np.stack([right, top, np.cross(right, top)]))

@@ -1,0 +1,99 @@
+"""One node of an arranged hierarchy as the program sees it: its parts in its frame, and what touches what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.boxes import place_in, turn_between
+from stages.shapeassembly.extraction.contacts import Contact, bottom_or_top, contact_of
+from stages.shapeassembly.extraction.hierarchy import Box, Part
+
+__all__ = ["BBOX", "Layout", "lay_out", "localised"]
+
+BBOX = -1
+"""The bounding box, where parts are meant by their index."""
+
+REACHES = (0.02, 0.05)
+"""How far apart parts in contact may be, as shares of the largest side of the two: the first with which every part
+hangs together. The second is what the interpreter takes for touching."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """parts: in canonical order, their boxes in the node's frame, whose origin is the centre of `bbox`.
+    contacts: by pairs i < j; bottoms, tops: where each part reaches the bottom and the top of the bounding box.
+    anchors: for each part the parts to which alone it may be attached, because its copies touch them too; None where
+    it may be attached to any that it touches."""
+
+    bbox: Box
+    parts: tuple[Part, ...]
+    contacts: dict[tuple[int, int], Contact]
+    bottoms: tuple[FloatArray | None, ...]
+    tops: tuple[FloatArray | None, ...]
+    anchors: tuple[frozenset[int] | None, ...]
+
+    @property
+    def diagonal(self) -> float:
+        """Of the bounding box."""
+        return float(np.linalg.norm(self.bbox.size))
+
+    def aligned(self, part: int) -> bool:
+        """Whether a part stands along the node's frame."""
+        return turn_between(self.parts[part].box.axes, np.eye(3)) < 1e-3
+
+    def neighbours(self, part: int) -> list[int]:
+        """The parts that touch `part`, ascending."""
+        return sorted({i + j - part for i, j in self.contacts if part in (i, j)})
+
+    def may_attach(self, mover: int, target: int) -> bool:
+        """Whether a part may be attached to a neighbour."""
+        anchors = self.anchors[mover]
+        return anchors is None or target in anchors
+
+    def points(self, mover: int, target: int) -> tuple[FloatArray, FloatArray]:
+        """The attachment point of a contact, (3,) on the mover and (3,) on the target."""
+        contact = self.contacts[min(mover, target), max(mover, target)]
+        return (contact.first, contact.second) if mover < target else (contact.second, contact.first)
+
+    def at_face_center(self, mover: int, target: int) -> bool:
+        """Whether the attachment point of a contact is the centre of a face of the mover."""
+        place = place_in(self.parts[mover].box, self.points(mover, target)[0])
+        return bool((np.abs(place - 0.5) < 1e-3).sum() >= 2)
+
+    def ungroundable(self) -> list[int]:
+        """The parts that no chain of permitted attachments joins to the bounding box, ascending."""
+        left = set(range(len(self.parts)))
+        fresh = {i for i in left if self.bottoms[i] is not None or self.tops[i] is not None}
+        while fresh:
+            left -= fresh
+            fresh = {i for i in left if any(j not in left and self.may_attach(i, j) for j in self.neighbours(i))}
+        return sorted(left)
+
+
+def lay_out(parts: Sequence[Part], size: FloatArray) -> Layout:
+    """The layout of parts, in canonical order and in the node's frame, in a bounding box of `size` (3,)."""
+    bbox = Box(np.zeros(3), size, np.eye(3))
+    for reach in REACHES:
+        contacts = {}
+        for j, second in enumerate(parts):
+            for i, first in enumerate(parts[:j]):
+                tolerance = reach * float(max(first.box.size.max(), second.box.size.max()))
+                contact = contact_of(first.box, second.box, tolerance)
+                if contact is not None:
+                    contacts[i, j] = contact
+        bottoms = tuple(bottom_or_top(part.box, bbox, top=False) for part in parts)
+        tops = tuple(bottom_or_top(part.box, bbox, top=True) for part in parts)
+        layout = Layout(bbox, tuple(parts), contacts, bottoms, tops, (None,) * len(parts))
+        if not layout.ungroundable():
+            break
+    return layout
+
+
+def localised(part: Part, frame: Box) -> Part:
+    """`part` and all below it in the coordinates of `frame`, whose centre becomes the origin."""
+    box = Box(frame.axes @ (part.box.center - frame.center), part.box.size, part.box.axes @ frame.axes.T)
+    return Part(part.label, box, tuple(localised(child, frame) for child in part.children))

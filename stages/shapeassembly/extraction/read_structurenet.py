@@ -1,0 +1,48 @@
+"""Reads part hierarchies in StructureNet's JSON: nested `{"label", "box": [12 numbers], "children"}`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import Rejected
+from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded, box_of_rows
+
+__all__ = ["read_structurenet"]
+
+
+def read_structurenet(path: Path) -> PartHierarchy:
+    """The hierarchy in the StructureNet file `path`; a box is centre, size, x axis, y axis.
+
+    Raises Rejected, naming file and part, for what is no such hierarchy. Relations (`edges`) are not read: the
+    extraction finds contacts and symmetries in the geometry itself (shapeassembly App. C).
+    """
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise Rejected(UNREADABLE, f"{path.name}: not JSON ({type(error).__name__}); export it again") from None
+    return PartHierarchy(path.stem, bounded(_part(tree, path.name, 0), path.name))
+
+
+def _part(node: Any, place: str, depth: int) -> Part:
+    if depth > MAX_DEPTH:
+        raise Rejected(UNREADABLE, f"{place}: more than {MAX_DEPTH} levels; simplify it")
+    if not isinstance(node, dict):
+        raise Rejected(UNREADABLE, f"{place}: a part is an object with `label`, `box` and `children`")
+    label = node.get("label")
+    if not isinstance(label, str) or not label:
+        raise Rejected(UNREADABLE, f"{place}: a part has no `label`; name it")
+    here = f"{place}/{label}" if depth else place
+    numbers = node.get("box")
+    if not isinstance(numbers, list) or len(numbers) != 12:
+        raise Rejected(UNREADABLE, f"{here}: `box` is a list of twelve numbers: centre, size, x axis, y axis")
+    if not all(isinstance(number, int | float) for number in numbers):
+        raise Rejected(UNREADABLE, f"{here}: `box` holds something that is no number")
+    children = node.get("children") or []
+    if not isinstance(children, list):
+        raise Rejected(UNREADABLE, f"{here}: `children` is a list of parts")
+    box = box_of_rows(np.array(numbers, dtype=np.float64), here)
+    return Part(label, box, tuple(_part(child, here, depth + 1) for child in children))

@@ -1,0 +1,71 @@
+"""Part shortening: a leaf whose end is sunk into another leaf is cut back to where it can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.boxes import UNIT_CORNERS, box_corners, inside
+from stages.shapeassembly.extraction.hierarchy import Box, Part
+
+__all__ = ["shorten_parts"]
+
+_KEPT = 0.05
+"""A part is never cut to less than this share of its length: a part hidden in another is left as it is."""
+
+
+def shorten_parts(root: Part) -> Part:
+    """The tree with every leaf cut back that can be without changing what is seen (shapeassembly App. C).
+
+    A leaf face that lies within another leaf moves inwards as long as what it leaves is inside that other leaf.
+    Smaller leaves first, so that the answer does not depend on the order of the file.
+    """
+    leaves = list(root.leaves())
+    boxes = [leaf.box for leaf in leaves]
+    order = sorted(
+        range(len(boxes)), key=lambda i: (round(float(np.prod(boxes[i].size)), 9), *boxes[i].center.tolist())
+    )
+    reach = [float(np.linalg.norm(box.size)) / 2 for box in boxes]
+    for i in order:
+        for j in order:
+            if i != j and np.linalg.norm(boxes[i].center - boxes[j].center) <= reach[i] + reach[j]:
+                boxes[i] = _cut(boxes[i], boxes[j])
+    return _with_boxes(root, iter(boxes))
+
+
+def _with_boxes(part: Part, boxes: Iterator[Box]) -> Part:
+    """The tree with the leaves' boxes taken in order from `boxes`."""
+    if not part.children:
+        return replace(part, box=next(boxes))
+    return replace(part, children=tuple(_with_boxes(child, boxes) for child in part.children))
+
+
+def _cut(box: Box, other: Box) -> Box:
+    """`box` without what of its ends lies inside `other`."""
+    corners = box_corners(box)
+    within = inside(other, corners, 1e-9)
+    if within.sum() < 4:
+        return box
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            face = UNIT_CORNERS[:, axis] == side
+            if not within[face].all() or box.size[axis] <= 0:
+                continue
+            inward = box.axes[axis] * (1.0 if side == 0.0 else -1.0)
+            depth = min(_exit(other, corner, inward) for corner in corners[face])
+            if 1e-6 * box.size[axis] < depth < box.size[axis] * (1 - _KEPT):
+                size = box.size.copy()
+                size[axis] -= depth
+                return _cut(Box(box.center + inward * depth / 2, size, box.axes), other)
+    return box
+
+
+def _exit(box: Box, start: FloatArray, direction: FloatArray) -> float:
+    """How far a ray from `start`, inside `box`, runs until it leaves it."""
+    local, slope = box.axes @ (start - box.center), box.axes @ direction
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lengths = (np.sign(slope) * box.size / 2 - local) / slope
+    return float(np.min(lengths[np.abs(slope) > 1e-12], initial=np.inf))

@@ -1,0 +1,132 @@
+"""Places a tilted part: the attachments that turn it nearest to where it is (shapeassembly §5.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import permutations
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.boxes import box_corners
+from stages.shapeassembly.extraction.grounding import Placer, Placing
+from stages.shapeassembly.extraction.hierarchy import Box
+from stages.shapeassembly.extraction.joints import (
+    BACK,
+    BOTTOM,
+    LEFT,
+    TOP,
+    Joint,
+    Standing,
+    attach,
+    part_name,
+    squeeze,
+)
+from stages.shapeassembly.extraction.layout import BBOX, Layout
+from stages.shapeassembly.extraction.validity import boxes_of
+from stages.shapeassembly.interpreter import execute_all
+from stages.shapeassembly.parameters import SMALLEST
+from stages.shapeassembly.printer import rounded
+from stages.shapeassembly.program import BBOX as BBOX_NAME
+from stages.shapeassembly.program import Block, Cuboid, Program
+
+__all__ = ["cuboid_of", "tilted_placer"]
+
+MOST_ATTACHMENTS = 3
+"""A part that is held at three points is held."""
+
+MOST_POINTS = 5
+"""Contacts of one part that are tried, those in canonical order first: their sequences number 85."""
+
+LINE_COST = 0.002
+"""Misplacement, as a share of the bounding box's diagonal, that is worth one line less."""
+
+
+def cuboid_of(layout: Layout, part: int) -> Cuboid:
+    """The declaration of a part."""
+    x, y, z = np.maximum(layout.parts[part].box.size, SMALLEST).tolist()
+    return Cuboid(part_name(part), (x, y, z), layout.aligned(part))
+
+
+def tilted_placer(layout: Layout) -> Placer:
+    """Places tilted parts of `layout` by trying their attachments in every order and executing each.
+
+    What is best is what brings the corners nearest to where they are in the input; a line must be worth its while.
+    """
+
+    known: dict[tuple[int, ...], Placing | None] = {}
+
+    def place(part: int, lines: list[Joint], standing: Standing) -> Placing | None:
+        about = (part, *(each for each in layout.neighbours(part) if each in standing))
+        if about not in known:
+            known[about] = _best(layout, part, lines, standing)
+        return known[about]
+
+    return place
+
+
+def _best(layout: Layout, part: int, lines: list[Joint], standing: Standing) -> Placing | None:
+    wanted = box_corners(layout.parts[part].box)
+    candidates = list(_candidates(layout, part, standing))
+    best: Placing | None = None
+    for candidate, box in zip(candidates, _executed(layout, part, lines, candidates, standing), strict=True):
+        away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
+        cost = away + LINE_COST * len(candidate)
+        if best is None or cost < best.cost - 1e-6:
+            best = Placing(tuple(candidate), box, cost)
+    return best
+
+
+def _candidates(layout: Layout, part: int, standing: Standing) -> Iterator[list[Joint]]:
+    """Sequences of lines that could ground a part: squeezes, then attachments in every order."""
+    others = [other for other in layout.neighbours(part) if other in standing and layout.may_attach(part, other)]
+    at_box = [(BBOX, BBOX), *((BBOX, other) for other in others)]
+    between = list(permutations(others, 2))
+    for face, pairs in ((TOP, at_box), (BOTTOM, at_box[1:]), (LEFT, between), (BOTTOM, between), (BACK, between)):
+        for first, second in pairs:
+            line = squeeze(layout, standing, part, (first, second), face)
+            if line is not None:
+                yield [line]
+    ends = [point for point in (layout.bottoms[part], layout.tops[part]) if point is not None]
+    usual: list[Joint] = [attach(layout, standing, part, BBOX, point, point) for point in ends]
+    turning: list[Joint] = list(usual)
+    for other in others:
+        own, goal = layout.points(part, other)
+        usual.append(attach(layout, standing, part, other, own, goal))
+        point = _in_turning_plane(layout, part, other)
+        turning.append(attach(layout, standing, part, other, point, point))
+    yield from _sequences(usual)
+    yield from _sequences(turning)
+
+
+def _sequences(joints: Sequence[Joint]) -> Iterator[list[Joint]]:
+    for count in range(1, MOST_ATTACHMENTS + 1):
+        for chosen in permutations(joints[:MOST_POINTS], count):
+            yield list(chosen)
+
+
+def _in_turning_plane(layout: Layout, part: int, other: int) -> FloatArray:
+    """The point of a contact from which the part turns without rolling: nearest the plane through its centre that is
+    perpendicular to the axis about which it is tilted."""
+    box = layout.parts[part].box
+    region = layout.contacts[min(part, other), max(part, other)].region
+    turn = box.axes
+    axis = np.array([turn[1, 2] - turn[2, 1], turn[2, 0] - turn[0, 2], turn[0, 1] - turn[1, 0]])
+    axis /= max(float(np.linalg.norm(axis)), 1e-12)
+    away = np.abs((region - box.center) @ axis)
+    near = region[away <= away.min() + 1e-3 * layout.diagonal]
+    point: FloatArray = near.mean(axis=0)
+    return point
+
+
+def _executed(
+    layout: Layout, part: int, lines: list[Joint], candidates: Sequence[list[Joint]], standing: Standing
+) -> list[Box]:
+    """The box that each candidate after `lines` makes of a part, with numbers as they will be printed."""
+    x, y, z = layout.bbox.size.tolist()
+    declared = sorted(each for each in (*standing, part) if each != BBOX)
+    cuboids = [cuboid_of(layout, each) for each in declared]
+    bbox = Cuboid(BBOX_NAME, (x, y, z), True)
+    programs = [Program((Block("Program_0", bbox, (*cuboids, *lines, *each)),)) for each in candidates]
+    executions = execute_all([rounded(program) for program in programs])
+    return [boxes_of(execution)[declared.index(part)] for execution in executions]
