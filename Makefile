@@ -31,7 +31,7 @@ RUN      = $(PYTHON) -m pipeline run $@ $(ASKED) --workers $(WORKERS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset exemplars variations programs validity strings points sketches package
+.PHONY: dataset exemplars variations programs shapeassembly validity strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
 exemplars: setup  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
@@ -40,13 +40,15 @@ variations: exemplars  ## Make new shapes from the exemplars' parts
 	$(RUN)
 programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
-validity: variations programs  ## Judge each shape: is it rooted, does it stand?
+shapeassembly: setup  ## Make shapes from ShapeAssembly programs, or from part hierarchies
 	$(RUN)
-strings: variations programs  ## Write each shape as strings, and the text corpus
+validity: variations programs shapeassembly  ## Judge each shape: is it rooted, does it stand?
 	$(RUN)
-points: variations programs  ## Turn each shape into a labelled point cloud
+strings: variations programs shapeassembly  ## Write each shape as strings, and the text corpus
 	$(RUN)
-sketches: variations programs  ## Draw each shape as lines
+points: variations programs shapeassembly  ## Turn each shape into a labelled point cloud
+	$(RUN)
+sketches: variations programs shapeassembly  ## Draw each shape as lines
 	$(RUN)
 package: validity strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)

@@ -9,20 +9,19 @@ from stages.programs.chair_back import back_parts
 from stages.programs.chair_base import base_parts
 from stages.programs.chair_plan import Plan
 from stages.programs.chair_seat import seat_parts
+from stages.programs.curves import Part
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
 from stages.programs.rules import Rule
 from stages.programs.schema import Values
-from stages.shape.kit import PartMesh
 
 __all__ = ["PROGRAM", "build"]
 
 
-def build(values: Values) -> Sequence[PartMesh]:
+def build(values: Values) -> Sequence[Part]:
     """The parts of the chair at `values`."""
     plan = Plan(values)
-    parts = [*seat_parts(plan), *base_parts(plan), *back_parts(plan), *arm_parts(plan)]
-    return [part.part_mesh() for part in parts]
+    return [*seat_parts(plan), *base_parts(plan), *back_parts(plan), *arm_parts(plan)]
 
 
 OPEN = "not is_back_rest"

@@ -17,7 +17,17 @@ from pipeline.shards import bytes_array
 from stages.package.verify_files import shard_samples
 from stages.package.verify_text import text_faults
 
-STAGES = ("exemplars", "variations", "programs", "validity", "strings", "points", "sketches", "package")
+STAGES = (
+    "exemplars",
+    "variations",
+    "programs",
+    "shapeassembly",
+    "validity",
+    "strings",
+    "points",
+    "sketches",
+    "package",
+)
 STOOLS = {
     "programs": {
         "program": "tests.stages.programs.stool",
