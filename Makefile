@@ -22,6 +22,7 @@ OUT     ?= datasets
 WORKERS ?= $(shell nproc 2>/dev/null || echo 1)
 SEED    ?=
 MESH    ?=
+TABLE   ?= physical
 
 PYTHON  := .venv/bin/python
 READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))
@@ -48,7 +49,7 @@ package: strings points sketches  ## Put the dataset's folder together: shards, 
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 
-.PHONY: status verify inspect doctor
+.PHONY: status verify inspect eval doctor
 status: setup  ## Show what is done, failed, rejected and left
 	$(PYTHON) -m pipeline status $(ASKED) --workers $(WORKERS)
 verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes
@@ -56,6 +57,8 @@ verify: setup  ## Check the finished dataset: checksums, members, and shapes com
 inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent
 	@test -n '$(MESH)' || { echo 'make inspect needs a model: make inspect MESH=my.glb' >&2; exit 2; }
 	$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png'
+eval: setup  ## Print TABLE (physical: does it stand?) about the finished dataset; keep it as Markdown, CSV, LaTeX
+	$(PYTHON) -m eval '$(TABLE)' --config $(CONFIG) --out $(OUT)
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	$(PYTHON) -m pipeline doctor --out $(OUT)
 
