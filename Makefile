@@ -23,6 +23,7 @@ WORKERS ?= $(shell nproc 2>/dev/null || echo 1)
 SEED    ?=
 MESH    ?=
 PROGRAM ?=
+TABLE   ?= physical
 
 PYTHON  := .venv/bin/python
 READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))
@@ -55,7 +56,7 @@ package: validity strings points sketches  ## Put the dataset's folder together:
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 
-.PHONY: status verify inspect doctor
+.PHONY: status verify inspect eval doctor
 status: setup  ## Show what is done, failed, rejected and left
 	$(PYTHON) -m pipeline status $(ASKED) --workers $(WORKERS)
 verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes
@@ -64,6 +65,8 @@ inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or 
 	@test -n '$(MESH)$(PROGRAM)' || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
 	$(if $(PROGRAM),$(PYTHON) -m stages.programs inspect '$(PROGRAM)' --out '$(OUT)/inspect')
 	$(if $(MESH),$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png')
+eval: setup  ## Print TABLE (physical: does it stand?) about the finished dataset; keep it as Markdown, CSV, LaTeX
+	$(PYTHON) -m eval '$(TABLE)' --config $(CONFIG) --out $(OUT)
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	$(PYTHON) -m pipeline doctor --out $(OUT)
 

@@ -1,11 +1,11 @@
 """Equilibrium of rigid bodies that press and rub on each other, as linear programmes.
 
-Each contact point bears any force in its friction cone, cut down to a pyramid of DIRECTIONS sides inside it, so what
-is found to stand does so with the round cone too; friction counts up to 8 % too weak between the directions. A glued
-joint bears pull up to a limit: then the cone begins that far behind. Bodies are rigid and joints do not crush, so this
-is limit analysis: what stands by it needs no more than friction and geometry, what falls by it falls by a mechanism of
-rigid bodies, which the dual solution tells. With friction of joints that do not open as they slide (no dilatancy) limit
-analysis may call some shapes stable that could slide; a simulation also moves, so it sees shapes settle elsewhere.
+Each contact point bears any force in its friction cone, cut down to a pyramid inside it, so what is found to stand
+does so with the round cone too: between the directions friction counts up to 8 % too weak in joints, where it is exact
+along the slope and across it, and up to 1 % on the ground. A glued joint bears pull up to a limit: then the cone
+begins that far behind. Bodies are rigid and joints do not crush, so this is limit analysis: what falls by it falls by
+a mechanism of rigid bodies, which the dual solution tells. Because joints do not open as they slide (no dilatancy),
+limit analysis may call a shape stable that could slide; a simulation also moves, so it sees shapes settle elsewhere.
 """
 
 from __future__ import annotations
@@ -20,8 +20,13 @@ from stages.shape.arrays import FloatArray
 __all__ = ["Limits", "load_limits"]
 
 DIRECTIONS = 8
+"""Sides of the friction pyramid of a joint."""
+GROUND_DIRECTIONS = 24
+"""Sides of the friction pyramid on the ground, where slopes tell nothing of the way in which things slide."""
 SMALL = 4_000
-"""Programmes of together so many columns are given to HiGHS; larger ones to an interior point method for bodies."""
+"""Programmes of together so many columns are given to HiGHS."""
+LIGHTEST = 1e-8
+"""Bodies lighter than this share of the heaviest count as that heavy where equations are scaled."""
 STEADY = 100.0
 """Worth of the steady load beside that of a growing one."""
 BORNE = 1e-5
@@ -32,9 +37,9 @@ BORNE = 1e-5
 class Limits:
     """How far loads can grow.
 
-    factors: float64 (loads,), the greatest factor up to the cap at which there is equilibrium, -1 where there is none
-    even at 0; motions: float64 (loads, n, 6), how each body begins to move, displacement of its centre and turn,
-    when the load grows beyond that; 0 where the cap was reached.
+    factors: float64 (loads,), the greatest factor up to the cap at which there is equilibrium, all -1 where there is
+    none even at 0, or none that a solver finds; motions: float64 (loads, n, 6), how each body begins to move,
+    displacement of its centre and turn, when the load grows beyond that; 0 where the cap was reached.
     """
 
     factors: FloatArray
@@ -57,15 +62,49 @@ def load_limits(
     body; growing: float64 (loads, n, 6); pull: float64 (q,), the pull that each contact point bears; azimuth: radians,
     where the friction directions on level ground are counted from.
     """
-    forces = _cone(patches.normals, friction, azimuth)
-    wrenches, bodies = _wrenches(patches, centres, forces)
-    load = -(steady + _glue(patches, centres, pull))
-    solve = _by_highs if len(wrenches) * len(growing) <= SMALL else _by_interior_point
-    return solve(wrenches, bodies, load, growing, cap)
+    ground = patches.second < 0
+    parts = [
+        _wrenches(patches.first[own], patches.second[own], patches.points[own], centres, forces)
+        for own, forces in (
+            (ground, _cone(patches.normals[ground], friction, azimuth, GROUND_DIRECTIONS)),
+            (~ground, _cone(patches.normals[~ground], friction, azimuth, DIRECTIONS)),
+        )
+    ]
+    wrenches, bodies = (np.concatenate(each) for each in zip(*parts, strict=True))
+    # Equations in weights of each body and forces in weights of the lighter of two, so that solvers see light bodies.
+    weights = np.linalg.norm(growing[:, :, :3], axis=2).max(axis=0)
+    weights = np.maximum(weights, LIGHTEST * weights.max())
+    wrenches = (
+        wrenches
+        / weights[bodies][:, :, None]
+        * np.where(bodies < 0, np.inf, weights[bodies]).min(axis=1)[:, None, None]
+    )
+    load = -(steady + _glue(patches, centres, pull)) / weights[:, None]
+    limits = _solved(wrenches, bodies, load, growing / weights[:, None], cap)
+    return Limits(limits.factors, limits.motions / weights[:, None])
 
 
-def _by_highs(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float) -> Limits:
-    """All loads as one programme of independent blocks: a call costs more than a small programme."""
+def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float) -> Limits:
+    """Small programmes by HiGHS, large ones by the interior point method for bodies, each by the other if it fails."""
+    if len(wrenches) * len(growing) <= SMALL:
+        found = _by_highs(wrenches, bodies, load, growing, cap)
+        if found is not None:
+            return found
+    factors, motions = np.full(len(growing), -1.0), np.zeros_like(growing)
+    for index in range(len(growing)):
+        one = growing[index : index + 1]
+        found = _by_interior_point(wrenches, bodies, load, one, cap) or _by_highs(wrenches, bodies, load, one, cap)
+        if found is None or found.factors[0] < 0:
+            return Limits(np.full(len(growing), -1.0), motions)
+        factors[index], motions[index] = found.factors[0], found.motions[0]
+    return Limits(factors, motions)
+
+
+def _by_highs(
+    wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
+) -> Limits | None:
+    """All loads as one programme of independent blocks: a call costs more than a small programme. None where HiGHS
+    finds no answer."""
     from scipy import sparse
     from scipy.optimize import linprog
 
@@ -85,35 +124,33 @@ def _by_highs(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growin
     if solved.status == 2:  # no equilibrium at factor 0, which is the same for all
         return Limits(np.full(loads, -1.0), np.zeros_like(growing))
     if solved.status != 0:
-        return _by_interior_point(wrenches, bodies, load, growing, cap)
+        return None
     return Limits(solved.x[-loads:], -solved.eqlin.marginals.reshape(growing.shape))
 
 
 def _by_interior_point(
     wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
-) -> Limits:
-    """One load after another. The steady load has a factor of its own, at most 1, that counts far more than the
-    growing one: so there is always a solution, and the steady load is borne where that factor is 1."""
+) -> Limits | None:
+    """One load. The steady load has a factor of its own, at most 1, that counts far more than the growing one: so
+    there always is a solution, and the steady load is borne where that factor is 1. None where the method fails."""
     from stages.physics.interior import solve_interior
 
-    factors, motions = np.full(len(growing), -1.0), np.zeros_like(growing)
-    unit = len(load)  # forces in weights of a body of mean weight
-    for index, each in enumerate(growing):
-        loads = unit * np.stack([-load.ravel(), each.ravel()])
+    loads = np.stack([-load.ravel(), growing.ravel()])
+    try:
         found, dual = solve_interior(
             wrenches, bodies, len(load), loads, np.array([1.0, cap]), np.array([-STEADY, -1.0])
         )
-        if found[0] < 1 - BORNE:
-            break
-        factors[index], motions[index] = found[1], -dual.reshape(load.shape)
-    return Limits(factors, motions)
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+    borne = found[0] >= 1 - BORNE
+    return Limits(np.array([found[1] if borne else -1.0]), -dual.reshape(growing.shape))
 
 
-def _cone(normals: FloatArray, friction: float, azimuth: float) -> FloatArray:
-    """The edges of the friction pyramid of each contact, float64 (q, DIRECTIONS, 3).
+def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int) -> FloatArray:
+    """The edges of the friction pyramid of each contact, float64 (q, directions, 3).
 
-    The first direction is level and the third the steepest, so that friction is exact on a slope; where the contact
-    itself is level they are counted from `azimuth`. Both turn with the shape about the vertical.
+    The first direction is level and one at a right angle the steepest, so that friction is exact on a slope; where
+    the contact itself is level they are counted from `azimuth`. Both turn with the shape about the vertical.
     """
     level = np.stack([-normals[:, 1], normals[:, 0], np.zeros(len(normals))], axis=1)
     lengths = np.linalg.norm(level, axis=1)
@@ -122,16 +159,18 @@ def _cone(normals: FloatArray, friction: float, azimuth: float) -> FloatArray:
     level[flat] = [np.cos(azimuth), np.sin(azimuth), 0.0]
     level[flat] -= (level[flat] * normals[flat]).sum(axis=1)[:, None] * normals[flat]
     steep = np.cross(normals, level)
-    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    angles = 2 * np.pi * np.arange(directions) / directions
     rubbing = np.cos(angles)[None, :, None] * level[:, None] + np.sin(angles)[None, :, None] * steep[:, None]
     edges: FloatArray = normals[:, None] + friction * rubbing
     return edges
 
 
-def _wrenches(patches: Patches, centres: FloatArray, forces: FloatArray) -> tuple[FloatArray, np.ndarray]:
+def _wrenches(
+    first: np.ndarray, second: np.ndarray, points: FloatArray, centres: FloatArray, forces: FloatArray
+) -> tuple[FloatArray, np.ndarray]:
     """What each edge of each cone does to its two bodies, float64 (c, 2, 6), and the bodies, int64 (c, 2)."""
-    bodies = np.stack([patches.first, patches.second], axis=1).astype(np.int64)
-    arms = patches.points[:, None] - centres[bodies]
+    bodies = np.stack([first, second], axis=1).astype(np.int64)
+    arms = points[:, None] - centres[bodies]
     both = np.array([1.0, -1.0])[:, None] * forces[:, :, None]
     wrenches = np.concatenate([both, np.cross(arms[:, None], both)], axis=3)
     return wrenches.reshape(-1, 2, 6), np.repeat(bodies, forces.shape[1], axis=0)

@@ -226,9 +226,10 @@ def _crossings(corners, axis, low, step, columns, out, counts):
 @numba.njit(cache=True)
 def overlap(ca, cb, pose, low, high):
     """Volume that two closed meshes share inside the box from `low` to `high`, in coordinates of the first, and how
-    deep: of the longest stretches of a line along each axis that lie in both, the shortest.
+    deep they reach into each other at least.
 
-    Measured on COLUMNS x COLUMNS lines along each axis: exact along the lines, sampled across them.
+    Measured on COLUMNS x COLUMNS lines along each axis: exact along the lines, sampled across them. A layer of
+    overlap, however it lies, has along some axis no stretch longer than the root of three times its thickness.
     """
     r, t = pose[:3, :3], pose[:3, 3]
     moved = np.empty_like(cb)
@@ -261,4 +262,4 @@ def overlap(ca, cb, pose, low, high):
                             sum_of += shared
         volume += sum_of * step[(axis + 1) % 3] * step[(axis + 2) % 3] / 3
         depth = min(depth, longest)
-    return volume, depth
+    return volume, depth / 3**0.5

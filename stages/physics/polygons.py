@@ -9,6 +9,8 @@ from stages.shape.arrays import FloatArray
 
 __all__ = ["convex_hull", "cut", "inside_margin", "polygon_area"]
 
+THIN = 1e-7
+
 
 @numba.njit(cache=True)
 def cut(polygon, count, n, sign, offset, out):
@@ -43,32 +45,36 @@ def polygon_area(polygon, count):
 
 @numba.njit(cache=True)
 def _chain(flat, order):
-    hull = np.empty(2 * len(order) + 2, dtype=np.int64)
+    """One side of a convex hull from the first to the last of the points, which are in order, counter-clockwise;
+    without corners that stand out by less than THIN of its length."""
+    hull = np.empty(len(order), dtype=np.int64)
     count = 0
-    span = max(np.ptp(flat[:, 0]), np.ptp(flat[:, 1]))
-    slack = 1e-9 * span * span
-    for turn in range(2):
-        floor = count
-        for step in range(len(order)):
-            index = order[step] if turn == 0 else order[len(order) - 1 - step]
-            while count - floor >= 2:
-                a, b = flat[hull[count - 2]], flat[hull[count - 1]]
-                c = flat[index]
-                if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > slack:
-                    break
-                count -= 1
-            hull[count] = index
-            count += 1
-        count -= 1
-    return hull[:count]
+    for index in order:
+        while count >= 2:
+            a, b, c = flat[hull[count - 2]], flat[hull[count - 1]], flat[index]
+            if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0:
+                break
+            count -= 1
+        hull[count] = index
+        count += 1
+    way = flat[hull[count - 1]] - flat[hull[0]]
+    thin = THIN * (way[0] * way[0] + way[1] * way[1]) ** 0.5
+    kept = 1
+    for k in range(1, count - 1):
+        a, b, c = flat[hull[kept - 1]], flat[hull[k]], flat[hull[k + 1]]
+        length = ((c[0] - a[0]) ** 2 + (c[1] - a[1]) ** 2) ** 0.5
+        if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > thin * length:
+            hull[kept] = hull[k]
+            kept += 1
+    return hull[:kept]
 
 
 def convex_hull(flat: FloatArray) -> np.ndarray:
     """Indices of the corners of the convex hull of points (q, 2), counter-clockwise; two for points in a line."""
     order = np.lexsort((flat[:, 1], flat[:, 0]))
-    if len(order) < 2 or np.ptp(flat, axis=0).max() == 0:
+    if np.ptp(flat, axis=0).max() == 0:
         return order[:1]
-    return _chain(flat, order)
+    return np.concatenate([_chain(flat, order), _chain(flat, order[::-1].copy())])
 
 
 def inside_margin(flat: FloatArray, point: FloatArray) -> float:

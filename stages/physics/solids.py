@@ -124,6 +124,9 @@ class Placed:
         spans = np.array([[each.min(axis=0), each.max(axis=0)] for each in points])
         low, high = spans[:, 0].min(axis=0), spans[:, 1].max(axis=0)
         diagonal = float(np.linalg.norm(high - low))
+        if not np.isfinite(diagonal):
+            part = int(np.argmin(np.isfinite(spans).all(axis=(1, 2))))
+            raise ValueError(f"part {part} stands nowhere: its vertices or its pose hold no finite numbers")
         if not diagonal > 0:
             raise ValueError("a shape without extent has no statics")
         drop = np.array([0.0, 0.0, low[2]])

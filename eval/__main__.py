@@ -1,0 +1,79 @@
+"""`make eval`: prints a table about a dataset or about files, and keeps it as Markdown, CSV and LaTeX.
+
+python -m eval physical [--config YAML] [--out FOLDER] [--most N] [--up y|z] [FILE...]
+
+FILE is a model (GLB, OBJ, ...) or an `.npz` of boxes; without any, the finished dataset of the config is measured. The
+table is written to `OUT/<dataset>-eval/physical.md`, `.csv` and `.tex`; of files it is only printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+__all__ = ["main"]
+
+TABLES = ("physical",)
+
+
+def main(arguments: list[str]) -> int:
+    """Print the table that the arguments ask for; 0, or 2 with a message where there is nothing to measure."""
+    parser = argparse.ArgumentParser(prog="python -m eval", description="Tables about datasets.")
+    parser.add_argument("table", choices=TABLES)
+    parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"), help="the dataset's YAML")
+    parser.add_argument("--out", type=Path, default=Path("datasets"), help="folder that datasets are made in")
+    parser.add_argument("--most", type=int, default=200, help="so many shapes of a dataset are measured at most")
+    parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that points up in the files")
+    parser.add_argument("files", nargs="*", type=Path, help="models or boxes instead of the dataset")
+    asked = parser.parse_args(arguments)
+    if asked.most < 1:
+        parser.error("--most must be at least 1")
+    # Solvers of small systems on a busy machine: threads that wait for each other take a hundred times as long.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from pipeline.errors import ConfigError
+
+    try:
+        return _physical(asked)
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _physical(asked: argparse.Namespace) -> int:
+    from eval.physical import PUBLISHED, physical_table
+    from eval.shapes import box_shapes, dataset_shapes, model_shapes
+    from pipeline.config import load_config
+    from pipeline.errors import ConfigError
+    from pipeline.places import write_whole
+    from pipeline.registry import find_stages
+    from stages.physics.settings import PhysicsConfig
+    from stages.shape.shape import Shape
+
+    def of_files() -> Iterator[tuple[str, Shape]]:
+        for path in asked.files:
+            if not path.is_file():
+                raise ConfigError(f"there is no file {path}")
+            yield from (box_shapes if path.suffix == ".npz" else model_shapes)(path, asked.up)
+
+    if asked.files:
+        published = [
+            name for name in PUBLISHED if any(name in path.stem and path.suffix == ".npz" for path in asked.files)
+        ]
+        print(physical_table(of_files(), PhysicsConfig(), published).markdown(), end="")
+        return 0
+    config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
+    table = physical_table(dataset_shapes(asked.out / config.name, asked.most), PhysicsConfig())
+    folder = asked.out / f"{config.name}-eval"
+    folder.mkdir(parents=True, exist_ok=True)
+    for suffix, text in (("md", table.markdown()), ("csv", table.csv()), ("tex", table.latex())):
+        write_whole(folder / f"physical.{suffix}", text.encode())
+    print(table.markdown(), end="")
+    print(f"\nAlso in {folder}: physical.md, physical.csv, physical.tex")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
