@@ -11,7 +11,6 @@ from stages.programs.curves import (
     Part,
     QuadMesh,
     Style,
-    bezier,
     ellipsoid,
     loft_rings,
     rotation,
@@ -21,7 +20,7 @@ from stages.programs.curves import (
 )
 from stages.programs.parameters import continuous, discrete
 from stages.programs.program import Program
-from stages.programs.rails import eased
+from stages.programs.rails import cubic, eased
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
@@ -98,9 +97,10 @@ def _rail(values: Values, reach: float, girth: float) -> Curve:
     down = 0.08 + 0.2 * out
     end = 0.08 + values["light_frame_end_point_z"]
     middle = down + position * (end - 0.08) + 0.3 * values["light_frame_mid_point_offset_z"]
-    rail = bezier([[0.0, 0.0], [0.0, -down], [out, -middle], [reach, -end]], STEPS)
-    side = 0.3 * values["light_frame_turning_effect"] * rail.length * np.sin(np.pi * rail.positions) ** 2
-    below = rail.points + np.column_stack([np.zeros_like(side), np.full_like(side, under), side])
+    way = cubic([[0.0, 0.0], [0.0, -down], [out, -middle], [reach, -end]], STEPS)
+    length = float(np.hypot(*np.diff(way, axis=0).T).sum())
+    side = 0.3 * values["light_frame_turning_effect"] * length * np.sin(np.linspace(0.0, np.pi, STEPS + 1)) ** 2
+    below = np.column_stack([way[:, 0], way[:, 1] + under, side])
     points = np.concatenate([[[0.0, 0.5 * under, 0.0]], below])
     return Curve.through(eased(points, np.full(len(points), girth)))
 

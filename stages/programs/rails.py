@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["eased"]
+__all__ = ["cubic", "eased"]
 
 ROUNDS, PATIENCE = 400, 40
 """So many times points are moved at most; from the second of them on all are, not only those beside a tight bend."""
+
+
+def cubic(controls: npt.ArrayLike, count: int) -> FloatArray:
+    """Points of a cubic Bezier piece, float64 (count + 1, k), of controls (4, k). It may have a cusp, which a curve may
+    not, before it is eased."""
+    t = np.linspace(0.0, 1.0, count + 1)
+    s = 1.0 - t
+    weights = np.stack([s**3, 3.0 * s * s * t, 3.0 * s * t * t, t**3], axis=1)
+    points: FloatArray = weights @ np.asarray(controls, dtype=np.float64)
+    return points
 
 
 def eased(points: FloatArray, girth: FloatArray) -> FloatArray:

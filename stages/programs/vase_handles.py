@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.programs.curves import Part, QuadMesh, Style, bezier, polyline, rotation, square_circle, sweep
-from stages.programs.rails import eased
+from stages.programs.curves import Part, QuadMesh, Style, polyline, rotation, square_circle, sweep
+from stages.programs.rails import cubic, eased
 from stages.programs.schema import Values
 from stages.programs.vessel import CrossSection, Wall
 from stages.shape.arrays import FloatArray
@@ -53,7 +53,7 @@ def _path(values: Values, wall: Wall, body_top: float, size: float) -> FloatArra
         away = 0.8 * _girth(values, size)[0] + 0.9 * size * values["hndl2_end_x"]
         lift = size * (1.3 * values["hndl2_end_bezier_handle_z"] - 0.5)
         second, last = [away + size * (0.25 + 1.1 * values["hndl2_end_bezier_handle_x"]), end + lift], [away, end]
-    return bezier([[0.0, start], first, second, last], STEPS).points[:, :2]
+    return cubic([[0.0, start], first, second, last], STEPS)
 
 
 def _girth(values: Values, size: float) -> tuple[float, float]:
