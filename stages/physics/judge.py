@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from stages.shape.arrays import IntArray
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 
-__all__ = ["Judge", "Validity", "judge_shape", "physical_fields", "unmet"]
+__all__ = ["Judge", "Validity", "judge_of", "judge_shape", "physical_fields", "unmet"]
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,12 @@ class Judge:
         return self._touch.connected(placed, self.config.connected * placed.diagonal, assembly.edges)
 
 
+@lru_cache(maxsize=16)
+def judge_of(meshes: tuple[PartMesh, ...], up: Literal["y", "z"], config: PhysicsConfig) -> Judge:
+    """The judge of all shapes with these meshes, kept from shape to shape."""
+    return Judge(meshes, up, config)
+
+
 def judge_shape(shape: Shape, config: PhysicsConfig) -> Validity:
     """The physical validity of one shape. Raises ValueError for a shape without parts, extent or weight."""
     return Judge(shape.meshes, shape.up, config).validity(shape.assembly)
@@ -111,13 +118,23 @@ def physical_fields(validity: Validity) -> dict[str, Any]:
     }
 
 
-def unmet(requirements: Requirements, validity: Validity) -> str | None:
-    """The reason, as it is counted among the rejects, why a sample is not kept; None if it is kept."""
+def unmet(requirements: Requirements, shape: Shape) -> str | None:
+    """The reason, as it is counted among the rejects, why a shape is not kept; None if it is kept.
+
+    Where nothing is required nothing is computed. A shape without a body to judge meets no requirement.
+    """
+    if not requirements.rooted and not requirements.stable:
+        return None
+    judge = judge_of(shape.meshes, shape.up, requirements.physics)
+    if not requirements.stable:
+        return None if judge.rooted(shape.assembly) else "not rooted"
+    try:
+        validity = judge.validity(shape.assembly)
+    except ValueError:
+        return "no body to judge"
     if requirements.rooted and not validity.rooted:
         return "not rooted"
-    if requirements.stable and not validity.stable:
-        return "not stable"
-    return None
+    return None if validity.stable else "not stable"
 
 
 def _floating(placed: Placed, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:

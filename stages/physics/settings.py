@@ -54,3 +54,7 @@ class Requirements(StrictModel):
 
     rooted: bool = Field(False, description="Whether every part must be connected to the ground.")
     stable: bool = Field(False, description="Whether the shape must stand and bear small pushes.")
+    physics: PhysicsConfig = Field(
+        default_factory=PhysicsConfig,
+        description="What they are judged by. Records are judged by the section validity: say the same there.",
+    )

@@ -22,7 +22,16 @@ from stages.programs.schema import Schema, Values
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
-__all__ = ["Constraint", "Program", "find_program", "program_names", "program_source", "shape_of", "shape_of_text"]
+__all__ = [
+    "Constraint",
+    "Program",
+    "find_program",
+    "program_names",
+    "program_source",
+    "shape_of",
+    "shape_of_parts",
+    "shape_of_text",
+]
 
 
 @dataclass(frozen=True)
@@ -94,7 +103,12 @@ class Program:
 
 def shape_of(program: Program, values: Values) -> Shape:
     """The shape at `values`: one mesh a part, y up, at identity poses, without contacts."""
-    meshes = tuple(part.part_mesh() for part in program.parts(values))
+    return shape_of_parts(program, program.parts(values))
+
+
+def shape_of_parts(program: Program, parts: Sequence[Part]) -> Shape:
+    """The shape of parts that `program` has made."""
+    meshes = tuple(part.part_mesh() for part in parts)
     poses = np.tile(np.eye(4), (len(meshes), 1, 1))
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, np.empty((0, 2), np.int32))
     return Shape(meshes=meshes, assembly=assembly, up="y", labels=program.labels)

@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.errors import ShardFailed
+from stages.physics.judge import unmet
+from stages.physics.settings import Requirements
 from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect
 from stages.programs.intersection import intersecting
 from stages.programs.parameters import Value
-from stages.programs.program import Program
+from stages.programs.program import Program, shape_of_parts
 
 __all__ = ["Cell", "Sampler", "cells", "structure_digest"]
 
@@ -47,13 +49,14 @@ def structure_digest(program: Program, values: dict[str, Value]) -> str:
 class Sampler:
     """Finds shapes within one share, no two alike.
 
-    between: whether continuous parameters may have any value of their range.
+    between: whether continuous parameters may have any value of their range; require: what shapes must be physically.
     refused: how many draws were refused, by cell's parameter (or `any`) and reason; tried: how many were looked at.
     """
 
     program: Program
     share: Share
     between: bool
+    require: Requirements = field(default_factory=Requirements)
     refused: Counter[tuple[str, str]] = field(default_factory=Counter)
     tried: int = 0
     _known: set[str] = field(default_factory=set)
@@ -102,5 +105,8 @@ class Sampler:
         met = intersecting(self.program, parts)
         if met is not None:
             return f"{met[0]} meets {met[1]}"
+        weak = unmet(self.require, shape_of_parts(self.program, parts))
+        if weak is not None:
+            return weak
         self._known.add(text)
         return None

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.physics.settings import Requirements
 
 __all__ = ["EachValueConfig", "ProgramSplitConfig", "ProgramsConfig", "SweepConfig"]
 
@@ -55,6 +56,9 @@ class ProgramsConfig(StrictModel):
         default_factory=SweepConfig,
         description="Shapes of a sweep, for mode sweep. Shapes that are alike up to their continuous parameters stand "
         "in one split.",
+    )
+    require: Requirements = Field(
+        default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
     )
     splits: ProgramSplitConfig = Field(
         default_factory=ProgramSplitConfig, description="How the samples are shared out."

@@ -59,7 +59,10 @@ def run_shard(task: Task) -> Outcome:
     params = task.shard.params
     structures, shapes = params["share"]
     sampler = Sampler(
-        program, Share((structures[0], structures[1]), (shapes[0], shapes[1])), between=config.mode == "sweep"
+        program,
+        Share((structures[0], structures[1]), (shapes[0], shapes[1])),
+        between=config.mode == "sweep",
+        require=config.require,
     )
     every = cells(program)
     order = task.rng("order").permutation(params["samples"]).tolist()

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config import StrictModel
+from stages.physics.settings import Requirements
 from stages.shapeassembly.extraction.settings import Gates, HierarchyFiles
 from stages.shapeassembly.sources import existing_programs
 
@@ -58,6 +59,9 @@ class ShapeAssemblyConfig(StrictModel):
     )
     least_parts: int = Field(1, ge=1, description="Fewest leaf cuboids of an executed program.")
     most_parts: int = Field(10_000, ge=1, description="Most leaf cuboids of an executed program.")
+    require: Requirements = Field(
+        default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
+    )
     splits: ShapeAssemblySplitConfig = Field(
         default_factory=ShapeAssemblySplitConfig,
         description="How the samples are shared out; programs that are alike up to continuous parameters stand in one "

@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.shapeassembly.checks import overflow, violations
@@ -26,6 +27,7 @@ from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig
+from stages.shapeassembly.shape import shape_of_execution
 from stages.shapeassembly.sources import program_texts, source_digest
 from stages.shapeassembly.structure import signature
 
@@ -138,6 +140,9 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
         broken = violations(program)
         if broken:
             raise Rejected(broken[0].rule, str(broken[0]))
+    weak = unmet(config.require, shape_of_execution(execution))
+    if weak is not None:
+        raise Rejected(weak)
     return {"text": print_program(program), "graph": signature(program), "parts": len(execution)}
 
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from functools import lru_cache
-from typing import Literal
 
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.collection.shapes import Collection
 from stages.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards
-from stages.physics.judge import Judge, physical_fields
+from stages.physics.judge import judge_of, physical_fields
 from stages.physics.settings import PhysicsConfig
-from stages.shape.kit import PartMesh
 
 __all__ = ["STAGE"]
 
@@ -36,7 +33,7 @@ def run_shard(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in collection.samples():
             shape = collection.shape(sample)
-            judge = _judge(shape.meshes, shape.up, config)
+            judge = judge_of(shape.meshes, shape.up, config)
             # a kit says itself what counts as contact; of parts made from a text nobody has asked yet
             known = shape.assembly.edges if collection.producer == KIT_PRODUCER else judge.contacts(shape.assembly)
             try:
@@ -49,12 +46,6 @@ def run_shard(task: Task) -> Outcome:
             task.progress(writer.samples, total)
     summary = {"split": task.shard.params["split"], **{each: counts[each] for each in COUNTED}}
     return Outcome(samples=writer.samples, summary={**summary, "samples": writer.samples})
-
-
-@lru_cache(maxsize=16)
-def _judge(meshes: tuple[PartMesh, ...], up: Literal["y", "z"], config: PhysicsConfig) -> Judge:
-    """The judge of all shapes with these meshes, whose answers about pairs recur."""
-    return Judge(meshes, up, config)
 
 
 def report(plan: Plan) -> Sequence[str]:
