@@ -131,10 +131,12 @@ def _vertical_rails(plan: Plan) -> list[Part]:
 
 
 def _panel(plan: Plan) -> Part:
-    """An upholstered panel between the posts, thin at its upper and lower edge."""
-    low, high = 0.13, _room(plan) + 0.4 * (_top_height(plan) / plan.back_height if plan.values["is_top_rail"] else 0.0)
+    """An upholstered panel between the posts, thin at its upper and lower edge; it follows the arch of a top rail."""
+    low, high = 0.13, np.full(len(ACROSS), _room(plan))
+    if plan.values["is_top_rail"]:
+        high += (0.4 * _top_height(plan) + 0.8 * _rise(plan, plan.x * ACROSS)) / plan.back_height
     angles = np.linspace(0.0, np.pi, 9)
-    levels = low + (high - low) * (1.0 - np.cos(angles)) / 2.0
-    grid = plan.back(plan.x * ACROSS[:, None], levels[None])
+    levels = low + (high[:, None] - low) * (1.0 - np.cos(angles)) / 2.0
+    grid = plan.back(plan.x * ACROSS[:, None], levels)
     thickness = plan.unit * (0.3 + 0.75 * np.sqrt(np.maximum(np.sin(angles), 0.0)))
     return Part("backrest", solidify(grid, np.broadcast_to(thickness, grid.shape[:2])), FABRIC)
