@@ -14,11 +14,9 @@ from stages.shapeassembly.extraction.arrangement import leaf_corners
 from stages.shapeassembly.extraction.boxes import around, box_corners
 from stages.shapeassembly.extraction.hierarchy import Part
 from stages.shapeassembly.extraction.layout import Layout, lay_out
-from stages.shapeassembly.extraction.symmetry import Body, Group, reflections, translations
+from stages.shapeassembly.extraction.symmetry import BOTTOM, TOP, Body, Group, reflections, translations
 
 __all__ = ["Symmetry", "form_groups"]
-
-BOTTOM, TOP = -1, -2
 
 REFLECTION_AXES = (0, 2, 1)
 """Left and right first, then front and back, then bottom and top."""

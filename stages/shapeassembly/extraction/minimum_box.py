@@ -5,67 +5,73 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.boxes import around
 from stages.shapeassembly.extraction.hierarchy import Box
 
 __all__ = ["minimum_box"]
 
+MOST_SIDES = 100
+"""Sides of the convex hull on which a side of the box may lie, the largest first: a rounded part has thousands."""
+
+WORTH_TURNING = 0.99
+"""How large a turned box may be, as a share of the upright one: a round or square part has many smallest boxes."""
+
 
 def minimum_box(points: FloatArray) -> Box:
-    """The box of least volume around `points`, float64 (n, 3), one of whose sides lies on the convex hull.
+    """The box of least volume around `points`, float64 (n, 3), among those with a side on a large side of their hull.
 
-    Box axes that fit as well as the coordinate axes (within 1 %) are the coordinate axes: round and square parts
-    have many smallest boxes. Points in a plane or on a line get a box of no thickness, turned within the plane.
+    It stands along the coordinate axes unless a turned one is smaller by more than a hundredth. Points in a plane get
+    a box of no thickness and least area, turned with the plane.
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    upright = _box(points, np.eye(3))
+    upright = around(points, np.eye(3))
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):
         return _flat(points, upright)
     corners = points[hull.vertices]
-    normals = hull.equations[:, :3]
-    edges = points[hull.simplices[:, [1, 2, 0]]] - points[hull.simplices]
-    frames = _frames(np.repeat(normals, 3, axis=0), edges.reshape(-1, 3))
-    best, volume = upright, float(np.prod(upright.size)) * 0.99
-    spans = _spans(corners, frames)
-    chosen = int(np.prod(spans, axis=1).argmin())
-    if np.prod(spans[chosen]) < volume:
-        best = _box(points, frames[chosen])
-    return best
+    normals = _largest_sides(hull.equations[:, :3], points[hull.simplices])
+    boxes = [_on_side(corners, normal) for normal in normals]
+    best = min(boxes, key=lambda box: float(np.prod(box.size)))
+    return best if np.prod(best.size) < WORTH_TURNING * np.prod(upright.size) else upright
+
+
+def _largest_sides(normals: FloatArray, triangles: FloatArray) -> FloatArray:
+    """Directions (k, 3) of the hull's largest sides; opposite and coplanar triangles (t, 3, 3) are one side."""
+    flipped = np.where(normals[np.arange(len(normals)), np.abs(normals).argmax(axis=1), None] < 0, -normals, normals)
+    kinds, kind = np.unique(np.round(flipped, 3) + 0.0, axis=0, return_inverse=True)
+    areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    total = np.bincount(kind.ravel(), areas, len(kinds))
+    first = np.unique(kind.ravel(), return_index=True)[1]
+    chosen = np.argsort(-total, kind="stable")[:MOST_SIDES]
+    sides: FloatArray = flipped[first[chosen]]
+    return sides
 
 
 def _flat(points: FloatArray, upright: Box) -> Box:
-    """The box of points whose hull has no volume: the least sum of lengths over turns of their principal frame."""
-    centred = points - points.mean(axis=0)
-    normal = np.linalg.svd(centred, full_matrices=True)[2][2] if len(points) > 1 else np.array([0.0, 0.0, 1.0])
-    edges = np.diff(np.vstack([points, points[:1]]), axis=0)[:256]
-    frames = _frames(np.repeat(normal[None], len(edges), axis=0), edges)
-    if not len(frames):
-        return upright
-    sums = _spans(points, frames).sum(axis=1)
-    chosen = int(sums.argmin())
-    return _box(points, frames[chosen]) if sums[chosen] < upright.size.sum() * 0.99 else upright
+    """The box of points in a plane, on a line, or all in one place."""
+    normal = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2][2]
+    turned = _on_side(points, normal)
+    return turned if turned.size.sum() < WORTH_TURNING * upright.size.sum() else upright
 
 
-def _frames(normals: FloatArray, edges: FloatArray) -> FloatArray:
-    """Right-handed frames (k, 3, 3) with a row along each normal and one along its edge; no-edge rows are left out."""
-    edges = edges - normals * (edges * normals).sum(axis=1, keepdims=True)
+def _on_side(points: FloatArray, normal: FloatArray) -> Box:
+    """The smallest box with a side perpendicular to `normal` (3,): one edge of the points' outline lies on a side."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    across = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
+    across /= np.linalg.norm(across)
+    plane = np.stack([across, np.cross(normal, across)])
+    flat = points @ plane.T
+    try:
+        outline = flat[ConvexHull(flat).vertices]
+        edges = np.roll(outline, -1, axis=0) - outline
+    except (QhullError, ValueError):
+        outline, edges = flat, flat[[int(np.linalg.norm(flat - flat[0], axis=1).argmax())]] - flat[0]
     lengths = np.linalg.norm(edges, axis=1)
-    kept = lengths > 1e-12
-    edges, normals = edges[kept] / lengths[kept, None], normals[kept]
-    return np.stack([edges, normals, np.cross(edges, normals)], axis=1)
-
-
-def _spans(points: FloatArray, frames: FloatArray) -> FloatArray:
-    """Lengths of the boxes around the points in each frame, (k, 3); in blocks, so that memory stays small."""
-    blocks = [
-        np.ptp(points @ frames[start : start + 512].transpose(0, 2, 1), axis=1) for start in range(0, len(frames), 512)
-    ]
-    return np.concatenate(blocks)
-
-
-def _box(points: FloatArray, axes: FloatArray) -> Box:
-    local = points @ axes.T
-    low, high = local.min(axis=0), local.max(axis=0)
-    return Box((low + high) / 2 @ axes, high - low, axes)
+    edges = edges[lengths > 0] / lengths[lengths > 0, None] if lengths.any() else np.array([[1.0, 0.0]])
+    beside = np.stack([-edges[:, 1], edges[:, 0]], axis=1)
+    areas = np.ptp(outline @ edges.T, axis=0) * np.ptp(outline @ beside.T, axis=0)
+    right = edges[int(areas.argmin())] @ plane
+    return around(points, np.stack([right, normal, np.cross(right, normal)]))

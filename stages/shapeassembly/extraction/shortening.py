@@ -28,10 +28,12 @@ def shorten_parts(root: Part) -> Part:
     order = sorted(
         range(len(boxes)), key=lambda i: (round(float(np.prod(boxes[i].size)), 9), *boxes[i].center.tolist())
     )
-    reach = [float(np.linalg.norm(box.size)) / 2 for box in boxes]
+    centers = np.stack([box.center for box in boxes])
+    reach = np.array([np.linalg.norm(box.size) / 2 for box in boxes])
     for i in order:
+        near = np.linalg.norm(centers - centers[i], axis=1) <= reach + reach[i]
         for j in order:
-            if i != j and np.linalg.norm(boxes[i].center - boxes[j].center) <= reach[i] + reach[j]:
+            if near[j] and i != j:
                 boxes[i] = _cut(boxes[i], boxes[j])
     return _with_boxes(root, iter(boxes))
 

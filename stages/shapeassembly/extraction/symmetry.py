@@ -12,7 +12,10 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import mirrored, same_box
 
-__all__ = ["Body", "Group", "reflections", "translations"]
+__all__ = ["BOTTOM", "TOP", "Body", "Group", "reflections", "translations"]
+
+BOTTOM, TOP = -1, -2
+"""The ends of the bounding box, among indices of parts."""
 
 CLOSENESS = 0.02
 """How near corners must come to those of their counterpart, as a share of the diagonal of the bounding box; how far
@@ -24,8 +27,8 @@ class Body:
     """What symmetry moves: one part, or several that are connected.
 
     members: indices of its parts; boxes: corners (8, 3) of each leaf in the node's frame, whose origin is the centre
-    of the bounding box; touches: the parts outside itself that it is attached to, with -1 for the bottom and -2 for
-    the top of the bounding box.
+    of the bounding box; touches: the parts outside itself that it is attached to, with BOTTOM and TOP for
+    the ends of the bounding box.
     """
 
     members: tuple[int, ...]
@@ -149,7 +152,7 @@ def _evenly_spaced(row: list[int], first: int, bodies: Sequence[Body], axis: int
 
 def _swapped(touches: frozenset[int]) -> frozenset[int]:
     """The same parts with the bottom and the top of the bounding box exchanged."""
-    return frozenset({-1: -2, -2: -1}.get(part, part) for part in touches)
+    return frozenset({BOTTOM: TOP, TOP: BOTTOM}.get(part, part) for part in touches)
 
 
 def _common(touches: Sequence[frozenset[int]], members: Sequence[Body]) -> frozenset[int]:

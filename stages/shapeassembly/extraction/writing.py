@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import Rejected
+from stages.shapeassembly.checks import MOST_CUBOIDS
 from stages.shapeassembly.extraction.grounding import ground
 from stages.shapeassembly.extraction.grouping import Symmetry, form_groups
 from stages.shapeassembly.extraction.hierarchy import Part
@@ -20,6 +21,9 @@ from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.program import AXES, BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
 
 __all__ = ["Order", "write_program"]
+
+MOST_CHILDREN = 100
+"""Parts of one node before groups are formed: all pairs of them are looked at, and a program declares ten at most."""
 
 Order = Callable[[Part], tuple[Any, ...]]
 """The key of the canonical order of the parts of one node, in the node's frame."""
@@ -38,7 +42,7 @@ def write_program(root: Part, order: Order, *, grouped: bool) -> Program:
 
     grouped: whether parts that repeat are made by macros.
 
-    Raises Rejected where the parts of a node do not hang together.
+    Raises Rejected where the parts of a node do not hang together, or are too many.
     """
     blocks: list[Block] = []
     waiting = deque([root])
@@ -57,8 +61,12 @@ def write_program(root: Part, order: Order, *, grouped: bool) -> Program:
 
 def _write_node(part: Part, order: Order, grouped: bool) -> _Node:
     children = sorted((localised(child, part.box) for child in part.children), key=order)
+    if len(children) > MOST_CHILDREN:
+        raise Rejected("too many parts", f"{len(children)} below {part.label!r}, at most {MOST_CHILDREN} are looked at")
     whole = lay_out(children, part.box.size)
     layout, symmetries = form_groups(whole, order) if grouped else (whole, [None] * len(children))
+    if len(layout.parts) > MOST_CUBOIDS:
+        raise Rejected("too many parts", f"{len(layout.parts)} below {part.label!r}, at most {MOST_CUBOIDS} are wanted")
     joints = ground(layout, tilted_placer(layout))
     if joints is None:
         raise Rejected("parts not connected", f"below {part.label!r}")

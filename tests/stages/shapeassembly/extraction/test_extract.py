@@ -188,6 +188,12 @@ def test_what_cannot_be_a_training_program_is_refused_by_name(shape: PartHierarc
     assert caught.value.reason == reason
 
 
+def test_many_boxes_are_refused_before_hours_are_spent_on_them() -> None:
+    boxes = [leaf("a", (x, 0.0, z), (1, 1 + x / 90, 1), turned(0, 20)) for x in range(45) for z in range(44)]
+    with pytest.raises(Rejected, match="too many parts"):
+        extracted(hierarchy(*boxes))
+
+
 def test_fit_below_the_gate_is_refused() -> None:
     # Nothing but the block holds the board, so that no attachment can turn it about the upright axis.
     block = leaf("block", (0, 0, 0), (1, 1, 1))
