@@ -111,6 +111,6 @@ help:  ## Show this
 	@echo 'make <target> [VARIABLE=value]'
 	@echo
 	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | while IFS='|' read -r target text; do \
-	    printf '  %-12s %s\n' $$target "$$text"; done
+	    printf '  %-13s %s\n' $$target "$$text"; done
 	@echo
-	@printf '  %-12s %s\n' CONFIG '$(CONFIG)' OUT '$(OUT)' WORKERS '$(WORKERS)' SEED '$(or $(SEED),as in CONFIG)'
+	@printf '  %-13s %s\n' CONFIG '$(CONFIG)' OUT '$(OUT)' WORKERS '$(WORKERS)' SEED '$(or $(SEED),as in CONFIG)'
