@@ -155,21 +155,21 @@ def _execute(rows, boxes, child, mirrored, decisions):
                     mirrored[made] ^= 1 << b
                 for k in range(before):
                     if events.who[k, 0] == a:
-                        _copy_event(boxes, events, k, made, count, b, 0.0 if kind == REFLECT else row[4] * n / copies)
+                        _copy_event(boxes, events, k, made, count, b, kind == REFLECT, row[4] * n / copies)
                         _attach(boxes, aligned, events, count, decisions[count])
                         count += 1
                 made += 1
 
 
 @numba.njit(cache=True)
-def _copy_event(boxes, events, original, copy, count, axis, share):
-    """Attachment `original` for a copy: its actual place mirrored (share 0) or moved by a share of the bounding box."""
+def _copy_event(boxes, events, original, copy, count, axis, mirror, share):
+    """Attachment `original` for a copy: its actual place mirrored, or moved by a share of the bounding box."""
     moved, target = events.who[original]
     p, q = events.where[count]
     p[:] = events.where[original, 0]
     place = np.empty(3)
     point(boxes[moved], p, place)
-    if share == 0.0:
+    if mirror:
         p[axis] = 1.0 - p[axis]
         place[axis] = -place[axis]
     else:

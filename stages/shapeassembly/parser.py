@@ -31,12 +31,12 @@ from stages.shapeassembly.program import (
 __all__ = ["parse"]
 
 _TOKEN = re.compile(
-    r"[A-Za-z_][A-Za-z0-9_]*|[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?(?![A-Za-z0-9_.])|[=(),{}]|[^ \t\r\n]"
+    r"[A-Za-z_][A-Za-z0-9_]*|[-+.0-9](?:[A-Za-z0-9_.]|(?<=[eE])[-+])*|[=(),{}]|[^ \t\r\n]"
 )
 _COMMANDS = ("attach", "squeeze", "reflect", "translate")
 _RESERVED = frozenset({"Assembly", "Cuboid", "True", "False", *_COMMANDS})
 _NAME_START = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_")
-_NUMBER_START = frozenset("+-.0123456789")
+_NUMBER_START, _NUMBER_END = frozenset("+-.0123456789"), frozenset(".0123456789")
 
 
 def parse(text: str) -> Program:
@@ -167,9 +167,12 @@ class _Reader:
 
     def number(self) -> float:
         word = self.words[self.place]
-        if word[:1] not in _NUMBER_START or word in "+-.":
+        if word[:1] not in _NUMBER_START or word[-1] not in _NUMBER_END or "_" in word:
             self.unexpected("a number")
-        value = float(word)
+        try:
+            value = float(word)
+        except ValueError:
+            self.unexpected("a number")
         if not -MAX_SIZE <= value <= MAX_SIZE:
             self.refuse("number too large", f"{word} is beyond {MAX_SIZE:g}")
         self.place += 1

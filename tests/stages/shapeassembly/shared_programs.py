@@ -1,0 +1,22 @@
+"""The programs and truth files beside the project, where they are there."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import pytest
+
+from stages.shapeassembly.sources import program_texts
+
+__all__ = ["CATEGORIES", "SHARED", "needs_shared", "shared_texts"]
+
+SHARED = Path(__file__).resolve().parents[3].parent / "shared" / "shapeassembly"
+CATEGORIES = {"chair": 3835, "table": 6536, "storage": 1551}
+needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="no programs beside the project")
+
+
+@lru_cache(maxsize=3)
+def shared_texts(category: str) -> dict[str, str]:
+    """The real programs of a category by file name."""
+    return dict(program_texts(SHARED / "programs.tar.xz", f"data/{category}"))

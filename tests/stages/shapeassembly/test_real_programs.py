@@ -1,0 +1,78 @@
+"""All published programs are read, printed back, executed; and executed as their authors do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.shapeassembly import execute, execute_all, parse, print_program
+from stages.shapeassembly.checks import overflow, violations
+from stages.shapeassembly.statistics import cluster_curves, program_statistics
+from tests.stages.shapeassembly.shared_programs import CATEGORIES, SHARED, needs_shared, shared_texts
+
+pytestmark = needs_shared
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_every_program_prints_back_equal_and_is_executed_to_finite_boxes(category: str) -> None:
+    texts = shared_texts(category)
+    assert len(texts) == CATEGORIES[category]
+    programs = [parse(text) for text in texts.values()]
+    assert [print_program(program) for program in programs] == list(texts.values())
+    executions = execute_all(programs)
+    assert all(len(done) and np.isfinite(done.corners).all() for done in executions)
+    # Six chairs ask for attachments that lie much farther apart than their cuboid is long; all others keep inside.
+    beyond = [overflow(program, done) for program, done in zip(programs, executions, strict=True)]
+    assert sum(each > 0.03 for each in beyond) <= (6 if category == "chair" else 0)
+
+
+MISSES = {"random_small": 1}
+"""One attachment to a cuboid with two prior ones would be turned by 1.7 degrees; the authors leave it as it is."""
+
+
+@pytest.mark.parametrize("name", ["chair", "table", "storage", "random_flat", "random_hier", "random_small"])
+def test_corners_are_where_the_authors_have_them(name: str) -> None:
+    with np.load(SHARED / f"truth_{name}.npz", allow_pickle=False) as truth:
+        texts, corners, nodes, starts = (truth[key] for key in ("program", "part_corners", "part_node", "part_offsets"))
+    missed = []
+    for index, text in enumerate(texts.tolist()):
+        done = execute(parse(text))
+        own = slice(starts[index], starts[index + 1])
+        assert np.array_equal(done.nodes, nodes[own])
+        if np.abs(done.corners - corners[own]).max() > 1e-3:
+            missed.append(index)
+    assert len(missed) <= MISSES.get(name, 0), missed
+
+
+PUBLISHED = {
+    "chair": (24.4, 0.0090, 0.113, 0.207, 9.7),
+    "table": (20.0, 0.0050, 0.145, 0.246, 8.4),
+    "storage": (24.7, 0.0147, 0.151, 0.232, 10.8),
+}
+"""Lines, translates, squeezes, all macros a line, leaf parts (shapeassembly tables 3 and 5, ground truth).
+
+Reflects are left out: the table's 0.0880 for chairs and its total do not agree by 0.003, ours do."""
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_statistics_are_the_published_ones(category: str) -> None:
+    found = program_statistics([parse(text) for text in shared_texts(category).values()])
+    lines, translates, squeezes, macros, parts = PUBLISHED[category]
+    assert found.lines == pytest.approx(lines, abs=0.1)
+    assert found.translates == pytest.approx(translates, abs=3e-4)
+    assert found.squeezes == pytest.approx(squeezes, abs=1.1e-3)
+    assert found.macros == pytest.approx(macros, abs=1.1e-3)
+    assert found.leaf_parts == pytest.approx(parts, abs=0.15)
+
+
+def test_assemblies_share_their_structure_more_than_whole_programs_do() -> None:
+    whole, parts = cluster_curves([parse(text) for text in shared_texts("chair").values()])
+    assert whole[99] < 0.35 < 0.5 < parts[99]
+    assert whole[-1] == parts[-1] == pytest.approx(1.0)
+
+
+def test_nearly_all_programs_keep_every_rule() -> None:
+    texts = [text for category in CATEGORIES for text in shared_texts(category).values()]
+    broken = [each for text in texts[::4] for each in violations(parse(text))[:1]]
+    assert len(broken) < 0.03 * len(texts[::4])
+    assert {each.rule for each in broken} <= {"size", "attached twice", "bounding box at its sides"}

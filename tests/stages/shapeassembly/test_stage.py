@@ -1,0 +1,130 @@
+"""The stage in the real mill: what becomes a sample, what is refused and why, splits, the same bytes always."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+import pytest
+import yaml
+
+from stages.shape.sample import Sample, read_samples
+from stages.shapeassembly import parse
+from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.structure import signature
+
+EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
+CHAIR = next(path.read_text() for path in EXAMPLES if path.stem == "chair-slats")
+BAD = {
+    "binary.txt": b"\xff\xfe\x00",
+    "circle.txt": b"Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) P = Cuboid(0.5, 0.5, 0.5, True) }",
+    "outside.txt": b"Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) a = Cuboid(1.5, 0.5, 0.5, True) }",
+    "again.txt": CHAIR.replace("\t", "  ").encode(),
+    "empty.txt": b"Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) }",
+}
+REASONS = {
+    "binary.txt": "syntax",
+    "circle.txt": "too deep",
+    "outside.txt": "reaches out of the bounding box",
+    "again.txt": "program is there already",
+    "empty.txt": "number of parts",
+}
+
+
+def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[int, str, Path]:
+    """Run the stage; its exit code, what it printed and its folder."""
+    path = folder / "toy.yaml"
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "shapeassembly": section}))
+    out = folder / f"out-{workers}"
+    command = [sys.executable, "-m", "pipeline", "run", "shapeassembly", "--config", str(path), "--out", str(out)]
+    done = subprocess.run([*command, "--workers", str(workers)], capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr, out / ".work" / "toy" / "shapeassembly"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Our own programs, each in three sizes that have one structure; and bad ones."""
+    folder = tmp_path_factory.mktemp("programs")
+    (folder / "good").mkdir()
+    for path in EXAMPLES:
+        for number in range(3):
+            text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
+            (folder / "good" / f"{path.stem}-{number}.txt").write_text(text if number else path.read_text())
+    (folder / "bad").mkdir()
+    for name, content in BAD.items():
+        (folder / "bad" / name).write_bytes(content)
+    (folder / "bad" / "link.txt").symlink_to(EXAMPLES[0].resolve())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(folder: Path) -> tuple[str, Path]:
+    sources = [{"name": "good", "path": str(folder / "good")}, {"name": "bad", "path": str(folder / "bad")}]
+    code, printed, out = make(folder, {"programs": sources, "splits": {"shards": 2, "val": 0.2, "test": 0.2}})
+    assert code == 0, printed
+    return printed, out
+
+
+def samples(out: Path) -> dict[str, list[Sample]]:
+    return {path.stem: list(read_samples(path)) for path in sorted(out.glob("toy-*.tar"))}
+
+
+def test_samples_are_canonical_programs_shared_out_by_structure(made: tuple[str, Path]) -> None:
+    found = [sample for shard in samples(made[1]).values() for sample in shard]
+    splits: dict[str, set[str]] = {}
+    for sample in found:
+        assert (sample.producer, sample.kit) == ("shapeassembly", "good")
+        assert sample.graph == signature(parse(sample.text))
+        assert len(shape_of_text(sample.text)) > 0
+        splits.setdefault(sample.graph, set()).add(sample.split)
+    assert len(splits) == len(EXAMPLES)
+    assert all(len(each) == 1 for each in splits.values())
+    assert {split for each in splits.values() for split in each} == {"train", "val", "test"}
+    assert len({sample.key for sample in found}) == len(found)
+    assert "12 structures" in made[0]
+
+
+def test_what_is_no_good_program_is_refused_with_its_reason(made: tuple[str, Path]) -> None:
+    lines = [json.loads(line) for path in (made[1] / "rejects").iterdir() for line in path.read_text().splitlines()]
+    found = {line["item"]: line["reason"] for line in lines if line["item"].startswith("bad/")}
+    assert found == {f"bad/{name}": reason for name, reason in REASONS.items()}
+
+
+def test_the_bytes_do_not_depend_on_the_number_of_workers(folder: Path, made: tuple[str, Path]) -> None:
+    sources = [{"name": "good", "path": str(folder / "good")}, {"name": "bad", "path": str(folder / "bad")}]
+    code, printed, out = make(folder, {"programs": sources, "splits": {"shards": 2, "val": 0.2, "test": 0.2}}, 2)
+    assert code == 0, printed
+
+    def digests(path: Path) -> dict[str, str]:
+        return {each.name: hashlib.sha256(each.read_bytes()).hexdigest() for each in sorted(path.glob("toy-*"))}
+
+    assert digests(out) == digests(made[1])
+
+
+def test_an_archive_is_read_like_a_folder(folder: Path, tmp_path: Path) -> None:
+    archive = tmp_path / "programs.tar.xz"
+    with tarfile.open(archive, "w:xz") as tar:
+        for path in EXAMPLES[::-1]:
+            tar.add(path, f"data/furniture/{path.name}")
+        stray = tarfile.TarInfo("../data/furniture/stray.txt")
+        tar.addfile(stray, io.BytesIO())
+    section = {"programs": [{"name": "furniture", "path": str(archive), "folder": "data/furniture"}], "accept": "valid"}
+    code, printed, out = make(tmp_path, section)
+    assert code == 0, printed
+    found = [sample for shard in samples(out).values() for sample in shard]
+    assert sorted(str(sample.lineage["file"]) for sample in found) == [f"data/furniture/{e.name}" for e in EXAMPLES]
+
+
+def test_a_source_that_is_not_there_is_said_before_anything_starts(tmp_path: Path) -> None:
+    code, printed, _ = make(tmp_path, {"programs": [{"name": "a", "path": str(tmp_path / "nothing")}]})
+    assert code == 2
+    assert "there is no folder and no file" in printed
+    (tmp_path / "a.txt").write_text(CHAIR)
+    code, printed, _ = make(tmp_path, {"programs": [{"name": "a", "path": str(tmp_path / "a.txt")}]})
+    assert code == 2
+    assert "neither a folder nor a tar archive" in printed
