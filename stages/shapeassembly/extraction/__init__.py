@@ -1,0 +1,1 @@
+"""From part hierarchies to ShapeAssembly programs (shapeassembly §5, App. C)."""
