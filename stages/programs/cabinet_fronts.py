@@ -165,7 +165,7 @@ def _bars(inner: Opening, back: float, face: float) -> list[QuadMesh]:
 
 def _length(plan: Plan, room: float) -> float:
     """How long a handle is where it has `room`."""
-    return (0.2 + 0.4 * plan.values["handle_size"]) * room
+    return (0.25 + 0.4 * plan.values["handle_size"]) * room
 
 
 def _handle(plan: Plan, room: float) -> QuadMesh:
@@ -175,11 +175,12 @@ def _handle(plan: Plan, room: float) -> QuadMesh:
         radius = (0.009 + 0.01 * plan.values["handle_size"]) * min(1.0, room / 0.11)
         stem = sweep(line((0.0, 0.0, -0.006), (0.0, 0.0, 0.02)), circle(0.45 * radius, 8))
         return QuadMesh.joined([stem, ellipsoid((radius, radius, 0.7 * radius), (0.0, 0.0, 0.02), count=12)])
-    thick = 0.005
+    # What is short is thin, or it would not bend.
+    thick, rise = min(0.005, 0.2 * half), min(0.045, 1.5 * half)
     if kind == 1:
         post = 0.75 * half
         bar = sweep(line((-half, 0.0, 0.028), (half, 0.0, 0.028)), circle(thick, 8))
         posts = [sweep(line((x, 0.0, -0.006), (x, 0.0, 0.028)), circle(0.8 * thick, 8)) for x in (-post, post)]
         return QuadMesh.joined([bar, *posts])
-    bow = bezier([(-half, 0.0, -0.006), (-0.9 * half, 0.0, 0.045), (0.9 * half, 0.0, 0.045), (half, 0.0, -0.006)], 12)
+    bow = bezier([(-half, 0.0, -0.006), (-0.9 * half, 0.0, rise), (0.9 * half, 0.0, rise), (half, 0.0, -0.006)], 12)
     return sweep(bow, circle(thick, 8), up=(0.0, 1.0, 0.0))
