@@ -9,6 +9,7 @@ from stages.programs.curves import (
     Part,
     QuadMesh,
     bezier,
+    box,
     circle,
     ellipsoid,
     line,
@@ -141,7 +142,7 @@ def _slats(inner: Opening, back: float, face: float) -> list[QuadMesh]:
     width, height = inner.size
     count = max(2, round(height / 0.05))
     depth, step = 0.8 * (face - back), height / count
-    slat = rounded_box([width, 1.05 * step, 0.006], 0.0).transformed(rotation("x", -_lean(step, depth)))
+    slat = box([width, 1.05 * step, 0.006]).transformed(rotation("x", -_lean(step, depth)))
     x, z = (inner.low[0] + inner.high[0]) / 2.0, (back + face) / 2.0
     return [slat.transformed(translation(x, inner.low[1] + (row + 0.5) * step, z)) for row in range(count)]
 

@@ -9,6 +9,7 @@ import pytest
 
 from stages.programs.cabinet import PROGRAM, build
 from stages.programs.cabinet_plan import Plan
+from stages.programs.curves import mesh_faults
 from stages.programs.draws import draw
 from stages.programs.schema import Values
 
@@ -80,3 +81,11 @@ def test_handles_sit_on_their_fronts() -> None:
                 low, high = part.mesh.bounds
                 held = [a for a, b in fronts if (a[:2] < low[:2]).all() and (high[:2] < b[:2]).all()]
                 assert len(held) == 1, PROGRAM.schema.text(values)
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_handles_of_the_lowest_doors_are_sound(kind: int) -> None:
+    low = {"height": 0.7, "base_height": 0.24, "drawer_rows": 4, "drawer_share": 1.0, "open_columns": 0}
+    for values in cabinets(20, **low, handle_type=kind, handle_size=0.0):
+        for part in build(values):
+            assert part.label != "handle" or not mesh_faults(part.mesh), PROGRAM.schema.text(values)
