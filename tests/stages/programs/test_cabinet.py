@@ -89,3 +89,13 @@ def test_handles_of_the_lowest_doors_are_sound(kind: int) -> None:
     for values in cabinets(20, **low, handle_type=kind, handle_size=0.0):
         for part in build(values):
             assert part.label != "handle" or not mesh_faults(part.mesh), PROGRAM.schema.text(values)
+
+
+def test_handles_of_framed_drawers_reach_the_panel() -> None:
+    for values in cabinets(40, open_columns=0, door_style=1, drawer_rows=2):
+        parts = build(values)
+        for drawer, handle in zip(parts, parts[1:], strict=False):
+            if drawer.label == "drawer":
+                panel = drawer.mesh.vertices[-8:, 2].max()
+                assert panel < Plan(values).face - 0.005
+                assert handle.mesh.bounds[0, 2] < panel
