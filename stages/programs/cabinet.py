@@ -1,4 +1,4 @@
-"""The program of cabinets (geocode §6): columns with doors and drawers, or open with shelves, on a base of its own."""
+"""The program of cabinets (geocode §5): columns with doors and drawers, or open with shelves, on a base of its own."""
 
 from __future__ import annotations
 

@@ -95,14 +95,14 @@ def base_parts(plan: Plan) -> list[Part]:
     if kind == 0:
         low, high = (0.005 + inset - plan.half, 0.0, plan.back), (plan.half - 0.005 - inset, top, plan.front - inset)
         return [Part("plinth", block(low, high), DARK)]
-    thick = 0.05 if kind == 1 else 0.03
+    thick = 0.06 if kind == 1 else 0.03
     x, z = plan.half - thick / 2.0 - 0.006 - inset, plan.front - thick / 2.0 - 0.006 - 0.6 * inset
     if kind == 2:
         return symmetric([Part("runner", _runner(x, z, thick, top), DARK)], "x")
     section = square_circle(plan.values["leg_roundness"], thick)
     style = Style.taper(1.0 - 0.6 * plan.values["leg_taper"], 1.0)
     # A wide cabinet has a pair of legs in its middle, too.
-    sides = [(x, z), (x, -z), (-x, z), (-x, -z), *([(0.0, z), (0.0, -z)] if plan.half > 0.8 else [])]
+    sides = [(x, z), (x, -z), (-x, z), (-x, -z), *([(0.0, z), (0.0, -z)] if plan.half > 0.9 else [])]
     return [
         Part("leg", sweep(line((across, 0.0, along), (across, top, along)), section, style), DARK)
         for across, along in sides

@@ -9,6 +9,7 @@ from stages.programs.curves import (
     Part,
     QuadMesh,
     bezier,
+    box,
     circle,
     ellipsoid,
     line,
@@ -27,6 +28,9 @@ GAP = 0.002
 
 WIDEST = 0.55
 """A wider column has two doors."""
+
+ROOT = 0.014
+"""How deep handles are sunk: they reach the panel within a frame, too."""
 
 SLAB, FRAMED, LOUVRED, GLAZED = range(4)
 
@@ -141,7 +145,7 @@ def _slats(inner: Opening, back: float, face: float) -> list[QuadMesh]:
     width, height = inner.size
     count = max(2, round(height / 0.05))
     depth, step = 0.8 * (face - back), height / count
-    slat = rounded_box([width, 1.05 * step, 0.006], 0.0).transformed(rotation("x", -_lean(step, depth)))
+    slat = box([width, 1.05 * step, 0.006]).transformed(rotation("x", -_lean(step, depth)))
     x, z = (inner.low[0] + inner.high[0]) / 2.0, (back + face) / 2.0
     return [slat.transformed(translation(x, inner.low[1] + (row + 0.5) * step, z)) for row in range(count)]
 
@@ -165,7 +169,7 @@ def _bars(inner: Opening, back: float, face: float) -> list[QuadMesh]:
 
 def _length(plan: Plan, room: float) -> float:
     """How long a handle is where it has `room`."""
-    return (0.2 + 0.4 * plan.values["handle_size"]) * room
+    return (0.25 + 0.4 * plan.values["handle_size"]) * room
 
 
 def _handle(plan: Plan, room: float) -> QuadMesh:
@@ -173,13 +177,14 @@ def _handle(plan: Plan, room: float) -> QuadMesh:
     kind, half = plan.values["handle_type"], _length(plan, room) / 2.0
     if kind == 0:
         radius = (0.009 + 0.01 * plan.values["handle_size"]) * min(1.0, room / 0.11)
-        stem = sweep(line((0.0, 0.0, -0.006), (0.0, 0.0, 0.02)), circle(0.45 * radius, 8))
+        stem = sweep(line((0.0, 0.0, -ROOT), (0.0, 0.0, 0.02)), circle(0.45 * radius, 8))
         return QuadMesh.joined([stem, ellipsoid((radius, radius, 0.7 * radius), (0.0, 0.0, 0.02), count=12)])
-    thick = 0.005
+    # What is short is thin, or it would not bend.
+    thick, rise = min(0.005, 0.2 * half), min(0.045, 1.5 * half)
     if kind == 1:
         post = 0.75 * half
         bar = sweep(line((-half, 0.0, 0.028), (half, 0.0, 0.028)), circle(thick, 8))
-        posts = [sweep(line((x, 0.0, -0.006), (x, 0.0, 0.028)), circle(0.8 * thick, 8)) for x in (-post, post)]
+        posts = [sweep(line((x, 0.0, -ROOT), (x, 0.0, 0.028)), circle(0.8 * thick, 8)) for x in (-post, post)]
         return QuadMesh.joined([bar, *posts])
-    bow = bezier([(-half, 0.0, -0.006), (-0.9 * half, 0.0, 0.045), (0.9 * half, 0.0, 0.045), (half, 0.0, -0.006)], 12)
+    bow = bezier([(-half, 0.0, -ROOT), (-0.9 * half, 0.0, rise), (0.9 * half, 0.0, rise), (half, 0.0, -ROOT)], 12)
     return sweep(bow, circle(thick, 8), up=(0.0, 1.0, 0.0))

@@ -58,11 +58,11 @@ class Plan:
             turn = np.linspace(-np.pi / 2.0, np.pi / 2.0, 9)
             shares, most = [(1.0 - np.cos(each), 0.5 + 0.5 * np.sin(each)) for each in turn.tolist()], 0.9
         elif state == 2:  # cut away below, so that it looks thin
-            shares, most = [(0.0, 0.0), (0.0, 0.25), (1.0, 1.0)], 2.2
+            shares, most = [(0.0, 0.0), (0.0, 0.25), (1.0, 1.0)], 2.6
         else:  # an ogee above a lip
             swing = [(0.5 + 0.5 * np.cos(np.pi * t), 0.12 + 0.6 * t) for t in np.linspace(0.0, 1.0, 7).tolist()]
             shares, most = [(1.0, 0.0), *swing, (0.0, 1.0)], 1.3
-        reach = amount * min(most * self.thickness, 0.22 * float(self.half.min()))
+        reach = amount * min(most * (self.thickness + 0.01), 0.22 * float(self.half.min()))
         return np.array(shares) * [reach, self.thickness]
 
     @cached_property

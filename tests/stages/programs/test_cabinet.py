@@ -9,6 +9,7 @@ import pytest
 
 from stages.programs.cabinet import PROGRAM, build
 from stages.programs.cabinet_plan import Plan
+from stages.programs.curves import mesh_faults
 from stages.programs.draws import draw
 from stages.programs.schema import Values
 
@@ -80,3 +81,21 @@ def test_handles_sit_on_their_fronts() -> None:
                 low, high = part.mesh.bounds
                 held = [a for a, b in fronts if (a[:2] < low[:2]).all() and (high[:2] < b[:2]).all()]
                 assert len(held) == 1, PROGRAM.schema.text(values)
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_handles_of_the_lowest_doors_are_sound(kind: int) -> None:
+    low = {"height": 0.7, "base_height": 0.24, "drawer_rows": 4, "drawer_share": 1.0, "open_columns": 0}
+    for values in cabinets(20, **low, handle_type=kind, handle_size=0.0):
+        for part in build(values):
+            assert part.label != "handle" or not mesh_faults(part.mesh), PROGRAM.schema.text(values)
+
+
+def test_handles_of_framed_drawers_reach_the_panel() -> None:
+    for values in cabinets(40, open_columns=0, door_style=1, drawer_rows=2):
+        parts = build(values)
+        for drawer, handle in zip(parts, parts[1:], strict=False):
+            if drawer.label == "drawer":
+                panel = drawer.mesh.vertices[-8:, 2].max()
+                assert panel < Plan(values).face - 0.005
+                assert handle.mesh.bounds[0, 2] < panel
