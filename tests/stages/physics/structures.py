@@ -65,11 +65,12 @@ def arch(blocks: int, thickness: float, radius: float = 1.0, depth: float = 0.3)
     faces = box()[1]
     bodies = []
     for k in range(blocks):
-        corners = []
-        for angle in (np.pi * k / blocks, np.pi * (k + 1) / blocks):
-            for y in (-depth / 2, depth / 2):
-                for r in (radius - thickness / 2, radius + thickness / 2):
-                    corners.append((r * np.cos(angle), y, r * np.sin(angle)))
+        corners = [
+            (r * np.cos(angle), y, r * np.sin(angle))
+            for angle in (np.pi * k / blocks, np.pi * (k + 1) / blocks)
+            for y in (-depth / 2, depth / 2)
+            for r in (radius - thickness / 2, radius + thickness / 2)
+        ]
         # Corners as those of a box in x, y, z: along the arch, across it, outwards; turned so that faces look out.
         bodies.append((np.array(corners), faces[:, ::-1].copy()))
     return bodies
