@@ -20,31 +20,47 @@ LEAF = 4
 def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
     """The box tree of a mesh: median split along the longest axis of the triangle centres."""
     corners = np.ascontiguousarray(vertices[faces])
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    centres = (low + high) / 2
-    order: list[np.ndarray] = []
-    boxes: list[np.ndarray] = []
-    links: list[list[int]] = []
-    placed = 0
-    stack = [(np.arange(len(faces)), -1, 0)]
-    while stack:
-        chosen, parent, side = stack.pop()
-        node = len(boxes)
+    order, boxes, links = _split(corners.min(axis=1), corners.max(axis=1))
+    return np.ascontiguousarray(corners[order]), boxes, links
+
+
+@numba.njit(cache=True)
+def _split(low, high):
+    """Order of the triangles, boxes and links of the tree over triangles with these lowest and highest corners."""
+    count = len(low)
+    order, centres = np.arange(count), (low + high) / 2
+    boxes, links = np.empty((2 * count + 1, 6)), np.zeros((2 * count + 1, 2), dtype=np.int64)
+    # the stack is as deep as the tree, whose halves differ by one triangle at most
+    waiting = np.empty((128, 4), dtype=np.int64)
+    waiting[0] = 0, count, -1, 0
+    depth, nodes = 1, 0
+    while depth > 0:
+        depth -= 1
+        begin, end, parent, side = waiting[depth]
+        node = nodes
+        nodes += 1
         if parent >= 0:
-            links[parent][side] = node
-        bottom, top = low[chosen].min(axis=0), high[chosen].max(axis=0)
-        boxes.append(np.concatenate([(bottom + top) / 2, (top - bottom) / 2]))
-        if len(chosen) <= LEAF:
-            links.append([-placed - 1, len(chosen)])
-            order.append(chosen)
-            placed += len(chosen)
+            links[parent, side] = node
+        longest, axis = -1.0, 0
+        for k in range(3):
+            bottom, top, least, most = np.inf, -np.inf, np.inf, -np.inf
+            for place in range(begin, end):
+                face = order[place]
+                bottom, top = min(bottom, low[face, k]), max(top, high[face, k])
+                least, most = min(least, centres[face, k]), max(most, centres[face, k])
+            boxes[node, k], boxes[node, 3 + k] = (bottom + top) / 2, (top - bottom) / 2
+            if most - least > longest:
+                longest, axis = most - least, k
+        if end - begin <= LEAF:
+            links[node] = -begin - 1, end - begin
             continue
-        axis = int(np.argmax(np.ptp(centres[chosen], axis=0)))
-        ranked = chosen[np.argsort(centres[chosen, axis], kind="stable")]
-        links.append([0, 0])
-        stack.append((ranked[len(ranked) // 2 :], node, 1))
-        stack.append((ranked[: len(ranked) // 2], node, 0))
-    return np.ascontiguousarray(corners[np.concatenate(order)]), np.array(boxes), np.array(links, dtype=np.int64)
+        own = order[begin:end].copy()
+        order[begin:end] = own[np.argsort(centres[own, axis], kind="mergesort")]
+        middle = begin + (end - begin) // 2
+        waiting[depth] = middle, end, node, 1
+        waiting[depth + 1] = begin, middle, node, 0
+        depth += 2
+    return order, boxes[:nodes].copy(), links[:nodes].copy()
 
 
 @numba.njit(cache=True, inline="always")

@@ -24,6 +24,7 @@ from stages.variations.settings import VariationsConfig
 
 __all__ = ["assignment_shard", "collection_shards_of", "run_assignment", "run_collection"]
 
+
 def assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
     """The shard that shares out the variants, once the search of every kit has ended."""
     kits = [kit.name for kit in plan.config.section(ExemplarsConfig).kits]

@@ -84,7 +84,7 @@ def test_make_inspect_without_a_model_says_what_is_missing() -> None:
     command = ["make", "READY=Makefile", "inspect"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "make inspect MESH=my.glb" in done.stderr
+    assert "make inspect needs MESH=my.glb or PROGRAM=chair" in done.stderr
 
 
 @pytest.mark.slow
