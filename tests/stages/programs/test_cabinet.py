@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 
 import numpy as np
@@ -94,7 +95,7 @@ def test_handles_of_the_lowest_doors_are_sound(kind: int) -> None:
 def test_handles_of_framed_drawers_reach_the_panel() -> None:
     for values in cabinets(40, open_columns=0, door_style=1, drawer_rows=2):
         parts = build(values)
-        for drawer, handle in zip(parts, parts[1:], strict=False):
+        for drawer, handle in itertools.pairwise(parts):
             if drawer.label == "drawer":
                 panel = drawer.mesh.vertices[-8:, 2].max()
                 assert panel < Plan(values).face - 0.005
