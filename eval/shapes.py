@@ -123,9 +123,10 @@ def shared_meshes(shapes: Sequence[Shape]) -> list[Shape]:
             own.append(places[key])
         place_of.append(own)
     labels = tuple(dict.fromkeys(mesh.name for mesh in meshes))
+    shared = tuple(meshes)
     return [
         Shape(
-            tuple(meshes),
+            shared,
             Assembly(np.array(own)[shape.assembly.types], shape.assembly.poses, shape.assembly.edges),
             shape.up,
             labels,
