@@ -69,11 +69,17 @@ def box_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:
 
 
 def box_shape(corners: FloatArray, up: str) -> Shape:
-    """The shape of boxes with these corners, float64 (n, 8, 3), in any order; boxes without volume are left out."""
+    """The shape of boxes with these corners, float64 (n, 8, 3), in any order; boxes without volume are left out.
+
+    Raises ConfigError for corners that are not those of a box.
+    """
     from stages.physics.boxes import recognise_boxes
 
-    _, centres, axes, halves = recognise_boxes(corners)
-    full = halves.min(axis=1) > 1e-6 * halves.max(axis=1)
+    found, centres, axes, halves = recognise_boxes(corners)
+    spans = np.linalg.svd(corners - corners.mean(axis=1, keepdims=True), compute_uv=False)
+    full = spans[:, 2] > 1e-4 * spans[:, 0]
+    if (full & ~found).any():
+        raise ConfigError(f"the corners of part {int(np.argmax(full & ~found))} are not those of a box")
     axes[np.linalg.det(axes) < 0, 2] *= -1
     poses = np.tile(np.eye(4), (int(full.sum()), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = axes[full].transpose(0, 2, 1), centres[full]
@@ -123,9 +129,10 @@ def shared_meshes(shapes: Sequence[Shape]) -> list[Shape]:
             own.append(places[key])
         place_of.append(own)
     labels = tuple(dict.fromkeys(mesh.name for mesh in meshes))
+    shared = tuple(meshes)
     return [
         Shape(
-            tuple(meshes),
+            shared,
             Assembly(np.array(own)[shape.assembly.types], shape.assembly.poses, shape.assembly.edges),
             shape.up,
             labels,

@@ -25,6 +25,8 @@ GROUND_DIRECTIONS = 24
 """Sides of the friction pyramid on the ground, where slopes tell nothing of the way in which things slide."""
 SMALL = 4_000
 """Programmes of together so many columns are given to HiGHS."""
+PATIENCE = 20_000
+"""Iterations after which HiGHS gives up."""
 LIGHTEST = 1e-8
 """Bodies lighter than this share of the heaviest count as that heavy where equations are scaled."""
 STEADY = 100.0
@@ -120,7 +122,14 @@ def _by_highs(
     costs = np.concatenate([np.zeros(loads * columns), -np.ones(loads)])
     bounds = np.column_stack([np.zeros(len(costs)), np.full(len(costs), np.inf)])
     bounds[-loads:, 1] = cap
-    solved = linprog(costs, A_eq=system, b_eq=np.tile(load.ravel(), loads), bounds=bounds, method="highs")
+    solved = linprog(
+        costs,
+        A_eq=system,
+        b_eq=np.tile(load.ravel(), loads),
+        bounds=bounds,
+        method="highs",
+        options={"maxiter": PATIENCE},
+    )
     if solved.status == 2:  # no equilibrium at factor 0, which is the same for all
         return Limits(np.full(loads, -1.0), np.zeros_like(growing))
     if solved.status != 0:

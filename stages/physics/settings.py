@@ -19,14 +19,14 @@ class PhysicsConfig(StrictModel):
         ge=0,
         le=0.1,
         description="Largest distance of connected parts, and of a part that stands from the ground, as a share of "
-        "the diagonal of the shape's bounding box.",
+        "the shape's diagonal (of its height and greatest breadth).",
     )
     touching: float = Field(
         0.001,
         gt=0,
         le=0.02,
-        description="Largest distance of faces that press on each other, as a share of the diagonal of the shape's "
-        "bounding box; parts that reach deeper than this into each other are one piece.",
+        description="Largest distance of faces that press on each other, as a share of the shape's diagonal; "
+        "parts that reach deeper than this into each other are one piece.",
     )
     joints: Literal["rigid", "dry"] = Field(
         "rigid",

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from stages.physics.boxes import box_corners, recognise_boxes
+from stages.physics.polygons import convex_hull
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.kit import Assembly, PartMesh
 
@@ -70,6 +71,13 @@ class Solids:
             self.centroids[index] = mesh.centroid
 
 
+def _breadth(points: Sequence[FloatArray]) -> float:
+    """The greatest distance of two of the points, seen from above."""
+    flat = np.concatenate(points)[:, :2]
+    hull = flat[convex_hull(flat)]
+    return float(np.linalg.norm(hull[:, None] - hull[None], axis=2).max())
+
+
 def _has_inside(faces: IntArray) -> bool:
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     size = int(faces.max()) + 1
@@ -82,7 +90,9 @@ class Placed:
     """The parts of one assembly as bodies in a world whose third axis points up, the ground at height 0.
 
     types: the mesh of each part; poses: float64 (n, 4, 4); spans: float64 (n, 2, 3), their upright boxes;
-    points: for each part its vertices, float64 (v, 3); diagonal: of the box around the shape;
+    points: for each part its vertices, float64 (v, 3); diagonal: of the height and the greatest
+    breadth, which is that of the box around a shape whose outline from above is a rectangle, and which no turn about
+    the vertical changes;
     weights: float64 (n,), they sum to 1; weighed: whether by volume or, where a part is open, all by area;
     centroids: float64 (n, 3); boxes: bool (n,); centres, axes, halves: of the parts that are boxes.
     """
@@ -123,10 +133,10 @@ class Placed:
         ]
         spans = np.array([[each.min(axis=0), each.max(axis=0)] for each in points])
         low, high = spans[:, 0].min(axis=0), spans[:, 1].max(axis=0)
-        diagonal = float(np.linalg.norm(high - low))
-        if not np.isfinite(diagonal):
+        if not np.isfinite(spans).all():
             part = int(np.argmin(np.isfinite(spans).all(axis=(1, 2))))
             raise ValueError(f"part {part} stands nowhere: its vertices or its pose hold no finite numbers")
+        diagonal = float(np.hypot(high[2] - low[2], _breadth(points)))
         if not diagonal > 0:
             raise ValueError("a shape without extent has no statics")
         drop = np.array([0.0, 0.0, low[2]])
