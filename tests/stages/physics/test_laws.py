@@ -181,9 +181,8 @@ def test_what_has_no_statics_is_named(place: str) -> None:
 
 
 def test_requirements_name_what_is_not_met() -> None:
-    stands = judged(solid(box()), PhysicsConfig())
-    floats = judged(solid(box(), box(at=(0, 0, 9))), PhysicsConfig())
-    falls = judged(solid(box(0.1, 0.1, 1), box(1, 1, 1, at=(0.5, 0, 1))), PhysicsConfig())
+    stands, floats = solid(box()), solid(box(), box(at=(0, 0, 9)))
+    falls = solid(box(0.1, 0.1, 1), box(1, 1, 1, at=(0.5, 0, 1)))
     asked = Requirements(rooted=True, stable=True)
     assert [unmet(asked, each) for each in (stands, floats, falls)] == [None, "not rooted", "not stable"]
     assert unmet(Requirements(), floats) is None
