@@ -101,7 +101,7 @@ def _sample_shape(content: bytes, record: dict[str, Any]) -> Shape:
     assembly = Assembly(
         types=np.array([geometries.index(geometry) for _, geometry in placed], dtype=np.int16),
         poses=np.array([pose for pose, _ in placed], dtype=np.float64),
-        edges=np.array(record["contacts"], dtype=np.int32).reshape(-1, 2),
+        edges=np.array(json.loads(record["contacts"]), dtype=np.int32).reshape(-1, 2),
     )
     meshes = tuple(_welded(label_of[geometry], scene.geometry[geometry]) for geometry in geometries)
     return Shape(meshes, assembly, "y", tuple(dict.fromkeys(names)))

@@ -103,6 +103,24 @@ def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tup
     assert text_faults({**samples[0], "txt": other["txt"]}) == ["its txt and its json hold different texts"]
 
 
+def test_records_index_card_and_table_say_the_same_of_physics(made: tuple[Path, tuple[str, ...]]) -> None:
+    import pyarrow.parquet
+
+    records = [json.loads(members["json"]) for members in samples_of(made[0]).values()]
+    rows = pyarrow.parquet.read_table(made[0] / "toy-index" / "toy.parquet").to_pylist()
+    stable = {record["key"]: record["physics"]["stable"] for record in records}
+    assert {row["key"]: row["stable"] for row in rows} == stable
+    share = 100 * sum(stable.values()) / len(stable)
+    assert f"| {share:.1f}% |" in (made[0] / "toy" / "README.md").read_text()
+    command = [sys.executable, "-m", "eval", "physical", *made[1]]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    row = next(line for line in done.stdout.splitlines() if line.startswith("| tests.stages.programs.stool"))
+    columns = [each.strip() for each in row.strip("|").split("|")]
+    assert float(columns[4]) == pytest.approx(share, abs=0.1)
+    assert {path.suffix for path in (made[0] / "toy-eval").iterdir()} == {".md", ".csv", ".tex"}
+
+
 def test_a_row_of_the_index_finds_its_sample(made: tuple[Path, tuple[str, ...]]) -> None:
     import pyarrow.parquet
 
