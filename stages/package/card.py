@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW
+from stages.variations.measures import measure_table
 
 __all__ = ["card", "citation", "member_text", "size_category"]
 
@@ -55,12 +56,13 @@ def card(
     kits: Sequence[Mapping[str, Any]],
     search: Sequence[str],
     rejects: Mapping[str, int],
+    measures: Mapping[str, Mapping[str, Any]],
 ) -> str:
     """The card's text.
 
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
     of the package's shards; rows: those of the index; kits: name, types, exemplars, triangles of each kit; search:
-    how each kit's search ended, in words; rejects: refused items by reason.
+    how each kit's search ended, in words; rejects: refused items by reason; measures: of the variants of each kit.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
@@ -84,6 +86,7 @@ def card(
         _split_table(splits, shards),
         _kit_table(kits, rows),
         "Samples whose shape graphs are equal stand in one split.",
+        *(["## How different they are", measure_table(measures)] if measures else []),
         "## A sample",
         _member_table([str(member) for member in shards[0]["members"]]),
         "All coordinates are in the kit's units and upright: y points up, in the mesh, the points and the poses alike. "

@@ -17,7 +17,7 @@ from stages.shape.collection import collection_shards
 
 __all__ = ["STAGE"]
 
-VERSION = 1
+VERSION = 2
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
@@ -49,6 +49,7 @@ def plan(plan: Plan) -> list[Shard]:
         "shards": filled,
         "search": _search_endings(plan),
         "rejects": _search_rejects(plan),
+        "measures": (plan.summary("variations", f"{plan.config.name}-assignment") or {}).get("kits", {}),
         "preview": PICTURE,
         "package": VERSION,
     }

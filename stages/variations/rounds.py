@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -38,7 +39,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     config = plan.config.section(VariationsConfig)
     shards: list[Shard] = []
     found: list[str] = []
-    state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": []}
+    state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], "crossings": {}}
     target = math.ceil(config.selection.oversample * config.per_kit)
     for number in range(config.search.rounds):
         name = f"{kit}-r{number:03d}"
@@ -63,8 +64,9 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
             "kit": kit,
             "tried": sum(each["tries"] for each in done),
             "spares": sum(each["spares"] for each in done),
+            "crossed": _added(*(each["crossings"] for each in done)),
             "last": number == config.search.rounds - 1,
-            **{key: state[key] for key in ("telling", "tries", "idle", "curve")},
+            **{key: state[key] for key in ("telling", "tries", "idle", "curve", "crossings")},
         }
         pool = Shard(f"{name}-pool", params, (f"exemplars/{kit}", *found))
         shards.append(pool)
@@ -167,10 +169,18 @@ def run_pool(task: Task) -> Outcome:
             "telling": telling,
             **measures,
             "curve": [*params["curve"], [tries, total, measures["histograms"]]],
+            "crossings": _added(params["crossings"], params["crossed"]),
             "ended": ended,
             "why": _why(kit, config, total, tries, idle) if ended else "",
         },
     )
+
+
+def _added(*counts: Mapping[str, int]) -> dict[str, int]:
+    total: Counter[str] = Counter()
+    for each in counts:
+        total.update(each)
+    return dict(sorted(total.items()))
 
 
 def _why(kit: Kit, config: VariationsConfig, found: int, tries: int, idle: int) -> str:
