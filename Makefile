@@ -22,6 +22,7 @@ OUT     ?= datasets
 WORKERS ?= $(shell nproc 2>/dev/null || echo 1)
 SEED    ?=
 MESH    ?=
+PROGRAM ?=
 
 PYTHON  := .venv/bin/python
 READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))
@@ -30,18 +31,20 @@ RUN      = $(PYTHON) -m pipeline run $@ $(ASKED) --workers $(WORKERS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset exemplars variations strings points sketches package
+.PHONY: dataset exemplars variations programs strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
 exemplars: setup  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
 	$(RUN)
 variations: exemplars  ## Make new shapes from the exemplars' parts
 	$(RUN)
-strings: variations  ## Write each shape as strings, and the text corpus
+programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
-points: variations  ## Turn each shape into a labelled point cloud
+strings: variations programs  ## Write each shape as strings, and the text corpus
 	$(RUN)
-sketches: variations  ## Draw each shape as lines
+points: variations programs  ## Turn each shape into a labelled point cloud
+	$(RUN)
+sketches: variations programs  ## Draw each shape as lines
 	$(RUN)
 package: strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)
@@ -53,9 +56,10 @@ status: setup  ## Show what is done, failed, rejected and left
 	$(PYTHON) -m pipeline status $(ASKED) --workers $(WORKERS)
 verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes
 	$(PYTHON) -m pipeline verify $(ASKED)
-inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent
-	@test -n '$(MESH)' || { echo 'make inspect needs a model: make inspect MESH=my.glb' >&2; exit 2; }
-	$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png'
+inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or what PROGRAM can make
+	@test -n '$(MESH)$(PROGRAM)' || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
+	$(if $(PROGRAM),$(PYTHON) -m stages.programs inspect '$(PROGRAM)' --out '$(OUT)/inspect')
+	$(if $(MESH),$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png')
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	$(PYTHON) -m pipeline doctor --out $(OUT)
 

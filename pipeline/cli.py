@@ -152,7 +152,10 @@ def _slice(text: str) -> tuple[int, int]:
 
 def _load(stages: Mapping[str, Stage], config: Path, seed: int | None) -> Config:
     overrides = {} if seed is None else {"seed": seed}
-    return load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
+    loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
+    for stage in stages.values():
+        stage.check(loaded)
+    return loaded
 
 
 def _entry(context: typer.Context, module: str) -> Callable[[list[str]], int]:

@@ -102,6 +102,10 @@ class Task(Protocol):
         """Tell the bar how far this shard is."""
 
 
+def _nothing_wrong(_: Config) -> None:
+    return
+
+
 def _no_report(_: Plan) -> Sequence[str]:
     return ()
 
@@ -118,6 +122,8 @@ class Stage:
     finished part of the stage, for people, shown after a run and by `status`. `publish`: asked when every shard
     is done, which files stand in the output folder itself, `{path below OUT: file of a shard}`; the mill links
     them there (or copies, where the disk has no links) and takes away what it published before and no more.
+    `check`: asked with the whole config before anything starts; raises ConfigError for sections that do not go
+    together.
     """
 
     name: str
@@ -129,3 +135,4 @@ class Stage:
     estimate_bytes: Callable[[Plan], int]
     report: Callable[[Plan], Sequence[str]] = _no_report
     publish: Callable[[Plan], Mapping[str, str]] = _nothing_published
+    check: Callable[[Config], None] = _nothing_wrong

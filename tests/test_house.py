@@ -12,13 +12,14 @@ ROOT = Path(__file__).resolve().parents[1]
 
 DATA_WAY = [
     "shape",
+    "physics",
     "views",
     "exemplars",
     "variations",
-    "strings",
     "programs",
     "shapeassembly",
     "collection",
+    "strings",
     "points",
     "sketches",
     "package",

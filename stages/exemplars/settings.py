@@ -84,9 +84,11 @@ class KitConfig(StrictModel):
 
 
 class ExemplarsConfig(StrictModel):
-    """The kits of a dataset."""
+    """The kits of a dataset that is made of exemplars."""
 
-    kits: tuple[KitConfig, ...] = Field(min_length=1, description="One or more kits.")
+    kits: tuple[KitConfig, ...] = Field(
+        (), description="One or more kits; none for a dataset that is made of programs."
+    )
 
     @field_validator("kits")
     @classmethod

@@ -15,14 +15,33 @@ __all__ = ["card", "citation", "member_text", "size_category"]
 
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
+MADE = {
+    "variations": "exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
+    "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's `parents` are "
+    "exemplars, or variants by the `name` in their own `lineage`.",
+    "programs": "curve programs are run on parameters drawn from their ranges; a shape's parameters are its `txt`.",
+    "shapeassembly": "ShapeAssembly programs are executed; a shape's program is its `txt`.",
+}
+"""How the samples of each producer come about."""
+
+SPLITS = {
+    "variations": "Samples whose shape graphs are equal stand in one split.",
+    "programs": "No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike "
+    "up to their continuous parameters stand in one split; where every value of every parameter is sampled, all splits "
+    "have all values, as published.",
+    "shapeassembly": "Samples of programs that are alike up to their numbers stand in one split.",
+}
+"""What keeps the splits apart, for each producer."""
+
 MEMBERS = {
-    "glb": "The mesh: glTF 2.0, one node a part, named by its type (`tower.000`), equal parts sharing one mesh. Node "
+    "glb": "The mesh: glTF 2.0, one node a part, named by its label (`tower.000`), equal parts sharing one mesh. Node "
     "`extras` hold `type` and `instance`.",
     "points.npy": "Point cloud, float32 (n, 3).",
     "normals.npy": "Unit normals of the points, float32 (n, 3).",
-    "labels.npy": "Part type of each point, int16 (n,).",
+    "labels.npy": "Part label of each point, int16 (n,).",
     "instances.npy": "Part of each point, int16 (n,).",
-    "txt": "The shape's graph as strings, SMILES-like, one a line; the first is canonical.",
+    "txt": "The shape as text: of a kit its graph as strings, SMILES-like, one a line, the first canonical; else its "
+    "parameters as JSON, or its program.",
     "json": "Everything else: parts with label, type and pose (4x4), contacts, counts, bounds, parents and lineage.",
 }
 
@@ -53,16 +72,19 @@ def card(
     facts: Mapping[str, Any],
     shards: Sequence[Mapping[str, Any]],
     rows: Sequence[Mapping[str, Any]],
-    kits: Sequence[Mapping[str, Any]],
+    producer: str,
+    sources: Mapping[str, str],
     search: Sequence[str],
     rejects: Mapping[str, int],
     measures: Mapping[str, Mapping[str, Any]],
+    recipes: Sequence[str],
 ) -> str:
     """The card's text.
 
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
-    of the package's shards; rows: those of the index; kits: name, types, exemplars, triangles of each kit; search:
-    how each kit's search ended, in words; rejects: refused items by reason; measures: of the variants of each kit.
+    of the package's shards; rows: those of the index; producer: the stage that made the samples; sources: the kits or
+    programs by name, with what there is to say of them in short; search: how each search ended, in words; rejects:
+    refused items by reason; measures: of the variants of each kit; recipes: a section of Markdown for each program.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
@@ -70,7 +92,7 @@ def card(
         "pretty_name": facts["title"],
         "task_categories": list(facts["task_categories"]),
         "size_categories": [size_category(len(rows))],
-        "tags": list(dict.fromkeys([*facts["tags"], *(str(kit["name"]) for kit in kits)])),
+        "tags": list(dict.fromkeys([*facts["tags"], *sources])),
         "configs": [
             {
                 "config_name": "default",
@@ -80,27 +102,26 @@ def card(
     }
     sections = [
         f"# {facts['title']}",
-        f"![Exemplars, variants, their points and their sketches]({PREVIEW})",
+        f"![Shapes, their points and their sketches]({PREVIEW})",
         str(facts["description"]),
         "## What is in it",
         _split_table(splits, shards),
-        _kit_table(kits, rows),
-        "Samples whose shape graphs are equal stand in one split.",
+        _source_table(sources, rows),
+        SPLITS[producer],
         *(["## How different they are", measure_table(measures)] if measures else []),
         "## A sample",
         _member_table([str(member) for member in shards[0]["members"]]),
-        "All coordinates are in the kit's units and upright: y points up, in the mesh, the points and the poses alike. "
+        "All coordinates are in the units of the kit or program and upright: y points up, in the mesh, the points and "
+        "the poses alike. "
         "Points lie on every part's whole surface, also where it is hidden inside another part. Vertex colours of the "
         "mesh are linear, as glTF asks. No key holds a dot, no value is null, and each sample has all members.",
         "## Loading it",
         _loading(facts, splits, shards),
         "## How it was made",
-        "By Shapemill: exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new "
-        "shapes are made whose every neighbourhood and every docking of two parts was seen in an exemplar. "
-        f"`{MANIFEST}` holds the whole config. A sample's `parents` are exemplars, or variants by the `name` in their "
-        "own `lineage`.",
+        f"By Shapemill: {MADE[producer]} `{MANIFEST}` holds the whole config.",
         *([_list(search)] if search else []),
         *([_reject_table(rejects)] if rejects else []),
+        *recipes,
         "## Checking it",
         f"`sha256sum -c {CHECKSUMS}` compares every file; `make verify` also computes contacts anew from the meshes.",
         "## Licence and citation",
@@ -120,16 +141,17 @@ def _split_table(splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> 
     return "\n".join(lines)
 
 
-def _kit_table(kits: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]) -> str:
+def _source_table(sources: Mapping[str, str], rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [
-        "| kit | samples | distinct graphs | exemplars | part types | parts | contacts | cycles |",
-        "| --- | ---: | ---: | ---: | ---: | --- | --- | --- |",
+        "| made of | samples | distinct structures | parts | contacts | cycles |",
+        "| --- | ---: | ---: | --- | --- | --- |",
     ]
-    for kit in kits:
-        own = [row for row in rows if row["kit"] == kit["name"]]
-        spans = " | ".join(_span([row[name] for row in own]) for name in ("parts", "contacts", "cycles"))
-        graphs = len({row["graph"] for row in own})
-        lines.append(f"| {kit['name']} | {len(own):,} | {graphs:,} | {kit['exemplars']} | {kit['types']} | {spans} |")
+    for name, described in sources.items():
+        own = [row for row in rows if row["kit"] == name]
+        spans = " | ".join(_span([row[each] for row in own]) for each in ("parts", "contacts", "cycles"))
+        structures = len({row["graph"] for row in own})
+        title = f"{name} ({described})" if described else name
+        lines.append(f"| {title} | {len(own):,} | {structures:,} | {spans} |")
     return "\n".join(lines) + "\n\nParts, contacts and independent cycles: least, median, most."
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pipeline.places import file_digest
@@ -15,8 +15,8 @@ from stages.package.croissant import croissant
 from stages.package.index import read_rows, write_index
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import checksums, manifest
-from stages.shape.collection import collection_kits
 from stages.shape.kit import Kit
+from stages.shape.kit_input import input_kits
 
 __all__ = ["compose_dataset"]
 
@@ -24,11 +24,12 @@ __all__ = ["compose_dataset"]
 def compose_dataset(task: Task) -> Outcome:
     """Write card, Croissant, manifest, checksums and index.
 
-    The shard's params hold `facts`, `sections` (the whole config), `shards` (summaries of the package's shards),
-    `search`, `rejects` and `measures` (what the card says of the search and its finds), `preview` (the shard with the
-    picture) and `package` (the version of this stage).
+    The shard's params hold `facts`, `producer` (the stage that made the samples), `sections` (the whole config),
+    `shards` (summaries of the package's shards), `search`, `rejects` and `measures` (what the card says of the search
+    and its finds), `preview` (the shard with the picture) and `package` (the version of this stage).
     """
     params = task.shard.params
+    producer = params["producer"]
     shards, facts = params["shards"], params["facts"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)
     index = io.BytesIO()
@@ -38,10 +39,14 @@ def compose_dataset(task: Task) -> Outcome:
         "bytes": len(index.getvalue()),
         "sha256": hashlib.sha256(index.getvalue()).hexdigest(),
     }
-    kits = [_described(kit) for kit in collection_kits(task).values()]
+    kits = input_kits(task)
+    sources = {name: _described(kits.get(name)) for name in sorted({row["kit"] for row in rows})}
     members = {member: member_text(member) for member in shards[0]["members"]}
     files = {
-        CARD: card(facts, shards, rows, kits, params["search"], params["rejects"], params["measures"]).encode(),
+        CARD: card(
+            *(facts, shards, rows, producer, sources, params["search"], params["rejects"], params["measures"]),
+            _recipes(producer, sources),
+        ).encode(),
         CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
         MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["measures"], params["package"])),
     }
@@ -55,8 +60,22 @@ def compose_dataset(task: Task) -> Outcome:
     return Outcome(samples=0, summary={"samples": len(rows)})
 
 
-def _described(kit: Kit) -> dict[str, Any]:
-    return {"name": kit.name, "types": len(kit.types), "exemplars": len(kit.exemplars)}
+def _recipes(producer: str, names: Iterable[str]) -> list[str]:
+    """What there is to say of each program that the samples were made with."""
+    if producer != "programs":
+        return []
+    from stages.programs.program import find_program
+    from stages.programs.recipe import recipe_markdown
+
+    return [recipe_markdown(find_program(name)).rstrip() for name in names]
+
+
+def _described(kit: Kit | None) -> str:
+    """What stands behind the name of a kit on the card; of a program nothing does."""
+    if kit is None:
+        return ""
+    count = len(kit.exemplars)
+    return f"{count} exemplar{'' if count == 1 else 's'}, {len(kit.types)} part types"
 
 
 def _text(document: Mapping[str, Any]) -> bytes:

@@ -1,24 +1,25 @@
-"""GLB files of assemblies (glTF 2.0): one node a part, one mesh a part type, colours at the vertices.
+"""GLB files of shapes (glTF 2.0): one node a part, each mesh once, colours at the vertices.
 
-The binary part of a type never changes, so it is built once for each kit; a file is these parts put one behind
-another and a JSON of nodes. Bytes depend on the assembly alone. There is no material: trimesh, and with it Hugging
-Face `datasets`, drops vertex colours where there is one.
+The binary part of a mesh never changes, so it is built once for all shapes of a kit; a file is these parts put one
+behind another and a JSON of nodes. Bytes depend on the shape alone. There is no material: trimesh, and with it
+Hugging Face `datasets`, drops vertex colours where there is one.
 """
 
 from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from stages.shape.arrays import ByteArray
-from stages.shape.kit import Assembly, PartType
+from stages.shape.kit import PartMesh
+from stages.shape.shape import Shape
 
-__all__ = ["GlbWriter", "linear_colors", "node_names"]
+__all__ = ["glb_bytes", "linear_colors"]
 
 FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT = 5126, 5121, 5123, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -26,8 +27,8 @@ ASSET = {"version": "2.0", "generator": "Shapemill"}
 
 
 @dataclass(frozen=True)
-class TypeChunk:
-    """The mesh of one type as it stands in a file: `content`, and where in it which array lies.
+class MeshChunk:
+    """One mesh as it stands in a file: `content`, and where in it which array lies.
 
     views: `(offset, length, target)` of positions, colours and indices; accessors: the three glTF accessors without
     their views.
@@ -39,65 +40,54 @@ class TypeChunk:
     accessors: tuple[dict[str, Any], ...]
 
 
-class GlbWriter:
-    """Writes assemblies of one kit's part types."""
+def glb_bytes(shape: Shape) -> bytes:
+    """The GLB of `shape`: nodes in the order of the parts, with their names; only meshes in use.
 
-    def __init__(self, types: Sequence[PartType]) -> None:
-        self._chunks = [_chunk(each) for each in types]
-        self._names = [each.name for each in types]
-
-    def write(self, assembly: Assembly) -> bytes:
-        """The GLB of `assembly`: nodes in the order of the parts, named `<type>.<number>`; only types in use.
-
-        Vertices stay in each part's own coordinates as float32; the poses stand in the nodes as 4x4 matrices. Each
-        node's `extras` has `type` and `instance`, the indices that point labels refer to.
-        """
-        used = sorted(set(assembly.types.tolist()))
-        mesh_of = {index: mesh for mesh, index in enumerate(used)}
-        content: list[bytes] = []
-        views: list[dict[str, int]] = []
-        accessors: list[dict[str, Any]] = []
-        meshes: list[dict[str, Any]] = []
-        start = 0
-        for index in used:
-            chunk = self._chunks[index]
-            first = len(accessors)
-            for (offset, length, target), accessor in zip(chunk.views, chunk.accessors, strict=True):
-                views.append({"buffer": 0, "byteOffset": start + offset, "byteLength": length, "target": target})
-                accessors.append({"bufferView": len(accessors), **accessor})
-            attributes = {"POSITION": first, "COLOR_0": first + 1}
-            primitive = {"attributes": attributes, "indices": first + 2}
-            meshes.append({"name": chunk.name, "primitives": [primitive]})
-            content.append(chunk.content)
-            start += len(chunk.content)
-        columns = assembly.poses.transpose(0, 2, 1).reshape(len(assembly), 16).tolist()
-        nodes = [
-            {"name": name, "mesh": mesh_of[kind], "matrix": matrix, "extras": {"type": kind, "instance": instance}}
-            for instance, (name, kind, matrix) in enumerate(
-                zip(node_names(self._names, assembly), assembly.types.tolist(), columns, strict=True)
-            )
-        ]
-        header = {
-            "asset": ASSET,
-            "scene": 0,
-            "scenes": [{"nodes": list(range(len(nodes)))}],
-            "nodes": nodes,
-            "meshes": meshes,
-            "accessors": accessors,
-            "bufferViews": views,
-            "buffers": [{"byteLength": start}],
-        }
-        return _container(header, b"".join(content))
+    Vertices stay in each mesh's own coordinates as float32; the poses stand in the nodes as 4x4 matrices. Each
+    node's `extras` has `type` and `instance`, the indices that point labels refer to.
+    """
+    chunks, assembly = _chunks(shape.meshes), shape.assembly
+    used = sorted(set(assembly.types.tolist()))
+    mesh_of = {index: mesh for mesh, index in enumerate(used)}
+    content: list[bytes] = []
+    views: list[dict[str, int]] = []
+    accessors: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    start = 0
+    for index in used:
+        chunk = chunks[index]
+        first = len(accessors)
+        for (offset, length, target), accessor in zip(chunk.views, chunk.accessors, strict=True):
+            views.append({"buffer": 0, "byteOffset": start + offset, "byteLength": length, "target": target})
+            accessors.append({"bufferView": len(accessors), **accessor})
+        attributes = {"POSITION": first, "COLOR_0": first + 1}
+        primitive = {"attributes": attributes, "indices": first + 2}
+        meshes.append({"name": chunk.name, "primitives": [primitive]})
+        content.append(chunk.content)
+        start += len(chunk.content)
+    columns = assembly.poses.transpose(0, 2, 1).reshape(len(assembly), 16).tolist()
+    nodes = [
+        {"name": name, "mesh": mesh_of[kind], "matrix": matrix, "extras": {"type": label, "instance": instance}}
+        for instance, (name, kind, label, matrix) in enumerate(
+            zip(shape.part_names, assembly.types.tolist(), shape.part_labels.tolist(), columns, strict=True)
+        )
+    ]
+    header = {
+        "asset": ASSET,
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(nodes)))}],
+        "nodes": nodes,
+        "meshes": meshes,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": start}],
+    }
+    return _container(header, b"".join(content))
 
 
-def node_names(type_names: Sequence[str], assembly: Assembly) -> list[str]:
-    """The name of each part: its type's name and its number among the parts of that type, `tower.000`."""
-    counts: dict[int, int] = {}
-    names = []
-    for kind in assembly.types.tolist():
-        counts[kind] = counts.get(kind, -1) + 1
-        names.append(f"{type_names[kind]}.{counts[kind]:03d}")
-    return names
+@lru_cache(maxsize=16)
+def _chunks(meshes: tuple[PartMesh, ...]) -> list[MeshChunk]:
+    return [_chunk(each) for each in meshes]
 
 
 def linear_colors(colors: ByteArray) -> ByteArray:
@@ -109,13 +99,13 @@ def linear_colors(colors: ByteArray) -> ByteArray:
     return full
 
 
-def _chunk(part_type: PartType) -> TypeChunk:
-    """The arrays of a type: a vertex stands once for each colour that its faces have, so that faces keep theirs."""
-    faces = part_type.faces.astype(np.int64)
-    shades, shade_of_face = np.unique(part_type.face_colors, axis=0, return_inverse=True)
+def _chunk(mesh: PartMesh) -> MeshChunk:
+    """The arrays of a mesh: a vertex stands once for each colour that its faces have, so that faces keep theirs."""
+    faces = mesh.faces.astype(np.int64)
+    shades, shade_of_face = np.unique(mesh.face_colors, axis=0, return_inverse=True)
     coded = faces * len(shades) + shade_of_face.reshape(-1, 1)
     pairs, indices = np.unique(coded, return_inverse=True)
-    positions = part_type.vertices[pairs // len(shades)].astype(np.float32)
+    positions = mesh.vertices[pairs // len(shades)].astype(np.float32)
     colors = linear_colors(shades[pairs % len(shades)])
     short = len(pairs) <= 65535
     flat = indices.reshape(-1).astype(np.uint16 if short else np.uint32)
@@ -139,7 +129,7 @@ def _chunk(part_type: PartType) -> TypeChunk:
         {"componentType": UNSIGNED_BYTE, "normalized": True, "count": len(pairs), "type": "VEC4"},
         {"componentType": UNSIGNED_SHORT if short else UNSIGNED_INT, "count": flat.size, "type": "SCALAR"},
     )
-    return TypeChunk(part_type.name, content, tuple(views), accessors)
+    return MeshChunk(mesh.name, content, tuple(views), accessors)
 
 
 def _container(header: dict[str, Any], content: bytes) -> bytes:

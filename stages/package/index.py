@@ -22,7 +22,7 @@ COLUMNS = {
     "contacts": "int32",
     "cycles": "int32",
     "types": "int32",
-    "string": "string",
+    "text": "string",
 }
 """Columns and their Arrow types. `shard` is relative to the dataset's folder; the `bytes` bytes at `offset` of that
 file are the sample's members as a tar."""

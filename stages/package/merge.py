@@ -12,18 +12,23 @@ from typing import Any, BinaryIO, cast
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes, read_shard
 from pipeline.stage import Outcome, Task
-from stages.package.glb import GlbWriter
+from stages.collection.shapes import Collection
+from stages.collection.shards import KIT_PRODUCER
+from stages.package.glb import glb_bytes
 from stages.package.layout import shard_path
 from stages.package.record import describe_sample, rounded
-from stages.points.frame import upright
-from stages.shape.collection import collection_kits
-from stages.shape.sample import Sample, read_samples
+from stages.shape.sample import Sample
 from stages.sketches.settings import SketchesConfig
 
-__all__ = ["MERGED", "merge_shard"]
+__all__ = ["merge_shard", "merged_stages"]
 
-MERGED = ("points", "sketches", "strings")
-"""The stages whose members a sample gets, in this order; the `json` of the points goes into the sample's own."""
+TEXT = "txt"
+
+
+def merged_stages(producer: str) -> tuple[str, ...]:
+    """The stages whose members a sample of this producer gets, in this order; the `json` of the points goes into the
+    sample's own. What is not made of kits brings its own text."""
+    return ("points", "sketches", "strings") if producer == KIT_PRODUCER else ("points", "sketches")
 
 
 def merge_shard(task: Task) -> Outcome:
@@ -35,33 +40,29 @@ def merge_shard(task: Task) -> Outcome:
     config, split = task.config, str(task.shard.params["split"])
     path = shard_path(config, split, int(task.shard.name.rpartition("-")[2]))
     views = [view.name for view in config.section(SketchesConfig).views]
-    kits = collection_kits(task)
-    writers = {name: GlbWriter(kit.types) for name, kit in kits.items()}
+    collection = Collection(task)
     total, rows = int(task.shard.params["samples"]), []
     members_of_all: list[str] = []
     counts: Counter[str] = Counter()
     with task.output(f"{task.shard.name}.tar") as file:
         stream = HashingStream(file)
         with ShardWriter(cast(BinaryIO, stream)) as writer:
-            for sample, made in _samples(task):
-                kit = kits[sample.kit]
-                assembly = upright(sample.assembly, kit)
-                assembly = replace(assembly, poses=rounded(assembly.poses))
-                if len(assembly.edges) == 0:
-                    task.reject(sample.key, "no contact between parts")
-                    continue
-                string = made["strings"]["txt"].decode().split("\n", 1)[0]
+            for sample, made in _samples(task, collection):
+                shape = collection.shape(sample)
+                shape = replace(shape, assembly=replace(shape.assembly, poses=rounded(shape.assembly.poses)))
                 points = json.loads(made["points"].pop("json"))
-                record = describe_sample(sample, kit, assembly, string, points, views)
-                members = {"glb": writers[kit.name].write(assembly)}
-                for stage in MERGED:
-                    members.update(made[stage])
+                members = {"glb": glb_bytes(shape)}
+                for stage_members in made.values():
+                    members.update(stage_members)
+                members.setdefault(TEXT, sample.text.encode())
+                text = sample.text or members[TEXT].decode().split("\n", 1)[0]
+                record = describe_sample(sample, shape, text, points, views)
                 members["json"] = json_bytes(record)
                 if members_of_all and list(members) != members_of_all:
                     raise ShardFailed(f"{sample.key} has members {list(members)}, others have {members_of_all}")
                 members_of_all = list(members)
                 writer.write(sample.key, members)
-                counts[kit.name] += 1
+                counts[sample.kit] += 1
                 rows.append(_row(record, path, writer.offsets[sample.key], members))
                 task.progress(writer.samples, total)
     with task.output(f"{task.shard.name}.jsonl") as listing:
@@ -101,19 +102,19 @@ class HashingStream:
         return self._hash.hexdigest()
 
 
-def _samples(task: Task) -> Iterator[tuple[Sample, dict[str, dict[str, bytes]]]]:
+def _samples(task: Task, collection: Collection) -> Iterator[tuple[Sample, dict[str, dict[str, bytes]]]]:
     """Each sample with what each stage made of it. The stages keep the order of the collection, with gaps."""
     name = f"{task.shard.name}.tar"
-    readers = {stage: read_shard(task.input(stage, name)) for stage in MERGED}
+    readers = {stage: read_shard(task.input(stage, name)) for stage in merged_stages(collection.producer)}
     heads = {stage: next(reader, None) for stage, reader in readers.items()}
-    for sample in read_samples(task.input("variations", name)):
+    for sample in collection.samples():
         made: dict[str, dict[str, bytes]] = {}
         for stage, reader in readers.items():
             head = heads[stage]
             if head is not None and head[0] == sample.key:
                 made[stage] = head[1]
                 heads[stage] = next(reader, None)
-        missing = [stage for stage in MERGED if stage not in made]
+        missing = [stage for stage in readers if stage not in made]
         if missing:
             task.reject(sample.key, f"refused by {missing[0]}")
         else:
@@ -136,5 +137,5 @@ def _row(record: Mapping[str, Any], path: str, offset: int, members: Mapping[str
         "offset": offset,
         "bytes": sum(sizes),
         **record["counts"],
-        "string": record["string"],
+        "text": record["text"],
     }

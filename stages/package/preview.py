@@ -1,19 +1,20 @@
-"""`preview.png`: what the dataset holds, on one sheet: exemplars, variants, and some variants' points and sketches."""
+"""`preview.png`: what the dataset holds, on one sheet: exemplars, shapes, and some shapes' points and sketches."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from pipeline.shards import bytes_array, read_shard
 from pipeline.stage import Outcome, Task
+from stages.collection.shapes import Collection
 from stages.package.settings import PackageConfig
 from stages.shape.arrays import ByteArray
-from stages.shape.collection import collection_kits
 from stages.shape.kit import Assembly, Kit
-from stages.shape.sample import Sample, read_samples
+from stages.shape.sample import Sample
+from stages.shape.shape import Shape, kit_shape, upright
 from stages.sketches.settings import SketchesConfig
 from stages.views.buffers import Backend
 from stages.views.camera import Camera
@@ -32,31 +33,35 @@ MARK = 12
 """What differs from the background by more than so many levels is something shown."""
 PAD = 0.02
 """Height of the strip left above and below what a row shows, as a share of the pictures' height."""
+CHOSEN_FROM = 512
+"""At most so many shapes, evenly spread over the samples, are looked at to choose those that are shown."""
 CAMERA = Camera(azimuth=-40.0, elevation=25.0)
 
 
 def draw_preview(task: Task) -> Outcome:
     """File of the shard: `.png`. Its params: `title`, all `samples`, and the `shards` to choose from.
 
-    The first row of variants, the points and the sketches show the same shapes, one a column.
+    The first row of shapes, the points and the sketches show the same shapes, one a column.
     """
     config, sketches = task.config.section(PackageConfig), task.config.section(SketchesConfig)
     backend = backend_for(sketches.backend)
-    kits, shards = collection_kits(task), task.shard.params["shards"]
+    collection, shards = Collection(task), task.shard.params["shards"]
     made = {stage: _members(task, stage, shards) for stage in ("points", "sketches")}
-    samples = [each for shard in shards for each in read_samples(task.input("variations", f"{shard}.tar"))]
+    samples = [each for shard in shards for each in collection.samples(shard)]
     whole = [each for each in samples if all(each.key in members for members in made.values())]
-    shown = varied(whole, list(kits), config.previewed)
-    columns = [each.key for each in shown[:COLUMNS]]
+    whole = whole[:: -(-len(whole) // CHOSEN_FROM)]
+    shown = varied([(each, collection.shape(each)) for each in whole], config.previewed)
+    columns = [sample.key for sample, _ in shown[:COLUMNS]]
     clouds = {key: {name: bytes_array(made["points"][key][name]) for name in _CLOUD} for key in columns}
-    variants = [Cell(_picture(each.assembly, kits[each.kit], backend), _size(each.assembly)) for each in shown]
+    variants = [Cell(_picture(shape, backend), _size(shape)) for _, shape in shown]
     points = [Cell(_cloud_picture(clouds[key])) for key in columns]
     drawings = [Cell(_decoded(made["sketches"][key]["sketch0.png"])) for key in columns]
     count = len(clouds[columns[0]]["points.npy"])
+    exemplars = [Section("Exemplars", _rows(_exemplars(list(collection.kits.values()), backend)), "what goes in")]
     sections = [
-        Section("Exemplars", _rows(_exemplars(kits.values(), backend)), "what goes in"),
-        Section("Variants", _rows(variants), f"what comes out: {len(shown)} of {task.shard.params['samples']:,}"),
-        Section("Points", _rows(points), f"{count:,} a shape, coloured by part type"),
+        *(exemplars if collection.kits else []),
+        Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {task.shard.params['samples']:,}"),
+        Section("Points", _rows(points), f"{count:,} a shape, coloured by part label"),
         Section("Sketches", _rows(drawings), f"{len(sketches.views)} a shape, {sketches.size} × {sketches.size}"),
     ]
     with task.output(f"{task.shard.name}.png") as stream:
@@ -64,19 +69,18 @@ def draw_preview(task: Task) -> Outcome:
     return Outcome(samples=0)
 
 
-def varied(samples: Sequence[Sample], kits: Sequence[str], count: int) -> list[Sample]:
+def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:
     """`count` samples, or all if there are fewer: the kits take turns, each beginning with its largest sample and
-    going on with the one that differs most from those before in how many parts of which type it has."""
-    queues = [_farthest([each for each in samples if each.kit == kit], count) for kit in kits]
+    going on with the one that differs most from those before in how many parts of which label it has."""
+    kits = dict.fromkeys(sorted(sample.kit for sample, _ in samples))
+    queues = [_farthest([each for each in samples if each[0].kit == kit], count) for kit in kits]
     turns = [queue[turn] for turn in range(count) for queue in queues if turn < len(queue)]
     return turns[:count]
 
 
-def _farthest(samples: Sequence[Sample], count: int) -> list[Sample]:
-    if not samples:
-        return []
-    types = 1 + max(int(each.assembly.types.max()) for each in samples)
-    counts = np.array([np.bincount(each.assembly.types, minlength=types) for each in samples], dtype=np.float64)
+def _farthest(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:
+    labels = max(len(shape.labels) for _, shape in samples)
+    counts = np.array([np.bincount(shape.part_labels, minlength=labels) for _, shape in samples], dtype=np.float64)
     chosen = [int(np.argmax(counts.sum(axis=1)))]
     apart = np.full(len(samples), np.inf)
     while len(chosen) < min(count, len(samples)):
@@ -93,13 +97,12 @@ def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[st
     return {key: members for shard in shards for key, members in read_shard(task.input(stage, f"{shard}.tar"))}
 
 
-def _exemplars(kits: Iterable[Kit], backend: Backend) -> list[Cell]:
+def _exemplars(kits: Sequence[Kit], backend: Backend) -> list[Cell]:
     """Exemplars of all kits; where they leave room in their row, the commonest part types of the kits as well."""
-    listed = list(kits)
-    shown = [(each, kit) for kit in listed for each in kit.exemplars][:EXEMPLARS]
-    cells = [Cell(_picture(each.assembly, kit, backend), f"{each.name}, {_size(each.assembly)}") for each, kit in shown]
+    exemplars = [(each.name, kit_shape(kit, each.assembly)) for kit in kits for each in kit.exemplars][:EXEMPLARS]
+    cells = [Cell(_picture(shape, backend), f"{name}, {_size(shape)}") for name, shape in exemplars]
     room = -len(cells) % COLUMNS
-    return [*cells, *_part_types(listed, room, backend)]
+    return [*cells, *_part_types(kits, room, backend)]
 
 
 def _part_types(kits: Sequence[Kit], count: int, backend: Backend) -> list[Cell]:
@@ -111,12 +114,12 @@ def _part_types(kits: Sequence[Kit], count: int, backend: Backend) -> list[Cell]
             exemplar = next(each.assembly for each in kit.exemplars if index in each.assembly.types)
             pose = exemplar.poses[exemplar.types == index][:1]
             alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
-            cells.append(Cell(_picture(alone, kit, backend), f"part {kit.types[index].name}"))
+            cells.append(Cell(_picture(kit_shape(kit, alone), backend), f"part {kit.types[index].name}"))
     return cells[:count]
 
 
-def _picture(assembly: Assembly, kit: Kit, backend: Backend) -> ByteArray:
-    return portrait(scene_of(assembly, kit), CAMERA, (CELL, CELL), backend=backend)
+def _picture(shape: Shape, backend: Backend) -> ByteArray:
+    return portrait(scene_of(upright(shape)), CAMERA, (CELL, CELL), backend=backend)
 
 
 def _cloud_picture(cloud: Mapping[str, np.ndarray]) -> ByteArray:
@@ -131,8 +134,8 @@ def _decoded(png: bytes) -> ByteArray:
     return np.asarray(Image.open(io.BytesIO(png)).convert("L"))
 
 
-def _size(assembly: Assembly) -> str:
-    return f"{len(assembly)} parts"
+def _size(shape: Shape) -> str:
+    return f"{len(shape)} part" + ("" if len(shape) == 1 else "s")
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[Cell]]:

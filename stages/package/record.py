@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from stages.package.glb import node_names
-from stages.points.frame import assembly_bounds
+from stages.points.frame import shape_bounds
 from stages.shape.arrays import FloatArray
-from stages.shape.kit import Assembly, Kit
+from stages.shape.kit import Assembly
 from stages.shape.sample import Sample
+from stages.shape.shape import Shape
 
 __all__ = ["cycle_count", "describe_sample", "rounded"]
 
@@ -20,26 +20,16 @@ DECIMALS = 12
 
 
 def describe_sample(
-    sample: Sample,
-    kit: Kit,
-    assembly: Assembly,
-    string: str,
-    points: Mapping[str, Any],
-    views: Sequence[str],
+    sample: Sample, shape: Shape, text: str, points: Mapping[str, Any], views: Sequence[str]
 ) -> dict[str, Any]:
-    """What the JSON says. `assembly` is the sample's, upright; `string` is its canonical string; `points`
-    says how its cloud was made; `views` names the views of its sketches.
+    """What the JSON says. `text` is the producer's own: canonical string, parameters or program; `points` says how
+    the cloud was made; `views` names the views of the sketches.
 
     Nothing is null or empty: loaders guess a field's type from the first samples they see. The lineage differs from
-    sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it.
+    sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it. `type` is
+    the index of a part's label.
     """
-    names = kit.type_names()
-    parts = [
-        {"name": name, "label": names[kind], "type": kind, "instance": instance, "pose": pose}
-        for instance, (name, kind, pose) in enumerate(
-            zip(node_names(names, assembly), assembly.types.tolist(), assembly.poses.tolist(), strict=True)
-        )
-    ]
+    parts = shape.assembly
     return {
         "key": sample.key,
         "split": sample.split,
@@ -48,16 +38,22 @@ def describe_sample(
         "graph": sample.graph,
         "parents": list(sample.lineage.get("parents", ())) or [sample.kit],
         "lineage": json.dumps(sample.lineage, sort_keys=True, allow_nan=False),
-        "parts": parts,
-        "contacts": assembly.edges.tolist(),
+        "parts": [
+            {"name": name, "label": shape.labels[label], "type": label, "instance": instance, "pose": pose}
+            for instance, (name, label, pose) in enumerate(
+                zip(shape.part_names, shape.part_labels.tolist(), parts.poses.tolist(), strict=True)
+            )
+        ],
+        # a list of pairs would be empty for a shape of one part
+        "contacts": json.dumps(parts.edges.tolist()),
         "counts": {
-            "parts": len(assembly),
-            "contacts": len(assembly.edges),
-            "cycles": cycle_count(assembly),
-            "types": len(set(assembly.types.tolist())),
+            "parts": len(parts),
+            "contacts": len(parts.edges),
+            "cycles": cycle_count(parts),
+            "types": len(set(shape.part_labels.tolist())),
         },
-        "bounds": rounded(assembly_bounds(kit.types, assembly)).tolist(),
-        "string": string,
+        "bounds": rounded(shape_bounds(shape)).tolist(),
+        "text": text,
         "points": dict(points),
         "sketches": list(views),
     }

@@ -7,17 +7,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.collection.shards import PRODUCERS, check_producers, collection_shards, planned_producer
 from stages.package.compose import compose_dataset
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import config_sections
-from stages.package.merge import MERGED, merge_shard
+from stages.package.merge import merge_shard, merged_stages
 from stages.package.preview import draw_preview
 from stages.package.settings import PackageConfig
-from stages.shape.collection import collection_shards
 
 __all__ = ["STAGE"]
 
-VERSION = 2
+VERSION = 3
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
@@ -26,7 +26,10 @@ PICTURE_SHARDS = 8
 
 def plan(plan: Plan) -> list[Shard]:
     """One shard for each of the collection; when these are done, the picture, and the files about the whole."""
-    merged = collection_shards(plan, *MERGED)
+    producer = planned_producer(plan)
+    if producer is None:
+        return []
+    merged = collection_shards(plan, *merged_stages(producer))
     summaries = [plan.summary("package", shard.name) for shard in merged]
     if not merged or any(summary is None for summary in summaries):
         return merged
@@ -36,7 +39,7 @@ def plan(plan: Plan) -> list[Shard]:
         return merged
     kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
     shown = [shard["name"] for shard in filled[:PICTURE_SHARDS]]
-    stages = ("variations", "points", "sketches")
+    stages = (producer, "points", "sketches")
     pictured = {
         "title": plan.config.title or plan.config.name,
         "samples": sum(shard["samples"] for shard in filled),
@@ -45,11 +48,12 @@ def plan(plan: Plan) -> list[Shard]:
     picture = Shard(PICTURE, pictured, (*kits, *(f"{stage}/{name}" for name in shown for stage in stages)))
     params = {
         "facts": _facts(plan),
+        "producer": producer,
         "sections": config_sections(plan.config),
         "shards": filled,
         "search": _search_endings(plan),
-        "rejects": _search_rejects(plan),
-        "measures": (plan.summary("variations", f"{plan.config.name}-assignment") or {}).get("kits", {}),
+        "rejects": _rejects(plan, producer),
+        "measures": _measures(plan),
         "preview": PICTURE,
         "package": VERSION,
     }
@@ -107,12 +111,19 @@ def _search_endings(plan: Plan) -> list[str]:
     ]
 
 
-def _search_rejects(plan: Plan) -> dict[str, int]:
-    """Refused tries of all searches by reason."""
+def _rejects(plan: Plan, producer: str) -> dict[str, int]:
+    """What the producer refused, by reason."""
     counts: Counter[str] = Counter()
-    for shard in plan.shards("variations"):
-        counts.update(plan.rejects("variations", shard))
+    for shard in plan.shards(producer):
+        counts.update(plan.rejects(producer, shard))
     return dict(sorted(counts.items()))
+
+
+def _measures(plan: Plan) -> dict[str, Any]:
+    """What the variants of each kit are worth, where they are variants."""
+    assignment = f"{plan.config.name}-assignment"
+    summary = plan.summary("variations", assignment) if assignment in plan.shards("variations") else None
+    return dict(summary["kits"]) if summary is not None else {}
 
 
 def _facts(plan: Plan) -> dict[str, Any]:
@@ -122,7 +133,7 @@ def _facts(plan: Plan) -> dict[str, Any]:
         "version": config.version,
         "seed": config.seed,
         "title": config.title or config.name,
-        "description": config.description or f"3D shapes made of the parts of {len(plan.shards('exemplars'))} kits.",
+        "description": config.description or "3D shapes, made by Shapemill.",
         "license": config.license,
         "creator": section.creator,
         "published": section.published,
@@ -135,10 +146,11 @@ STAGE = Stage(
     name="package",
     version=VERSION,
     config=PackageConfig,
-    inputs=("exemplars", "variations", "strings", "points", "sketches"),
+    inputs=("exemplars", *PRODUCERS, "strings", "points", "sketches"),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
     report=report,
     publish=publish,
+    check=check_producers,
 )

@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ import numpy as np
 from pipeline.places import Places
 from pipeline.randomness import decision_rng
 from pipeline.yaml_text import read_yaml
+from stages.collection.shards import KIT_PRODUCER
 from stages.package.layout import MANIFEST
 from stages.package.verify_files import FileFindings, check_files, shard_samples
 from stages.shape.kit import Kit
@@ -59,13 +60,8 @@ def _arguments(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def _check_geometry(folder: Path, count: int, seed: int, findings: FileFindings) -> None:
-    """Compute contacts anew for `count` random samples of the dataset."""
-    from stages.package.verify_geometry import geometry_faults
-
+    """Compute contacts anew for `count` random samples of the dataset, or the whole shape where it is made of text."""
     kits = _kits(folder)
-    if not kits:
-        findings.fault("geometry", str(folder), "has no kits beside it in .work: make the dataset here, or --samples 0")
-        return
     manifest = json.loads((folder / MANIFEST).read_text())
     total = manifest["samples"]
     chosen = np.sort(decision_rng(seed, "verify").choice(total, size=min(count, total), replace=False))
@@ -78,9 +74,20 @@ def _check_geometry(folder: Path, count: int, seed: int, findings: FileFindings)
         for position, (key, _, members) in enumerate(shard_samples(folder / shard["path"])):
             if position in wanted:
                 findings.look("geometry")
-                kit = kits[json.loads(members["json"])["kit"]]
-                for what in geometry_faults(kit, members):
+                for what in _sample_faults(kits, members):
                     findings.fault("geometry", f"{shard['path']}: {key}", what)
+
+
+def _sample_faults(kits: Mapping[str, Kit], members: Mapping[str, bytes]) -> Sequence[str]:
+    from stages.package.verify_geometry import geometry_faults
+    from stages.package.verify_text import text_faults
+
+    record = json.loads(members["json"])
+    if record["producer"] != KIT_PRODUCER:
+        return text_faults(members)
+    if record["kit"] not in kits:
+        return [f"its kit {record['kit']} is not beside the dataset in .work: make the dataset here, or --samples 0"]
+    return geometry_faults(kits[record["kit"]], members)
 
 
 def _kits(folder: Path) -> dict[str, Kit]:

@@ -201,7 +201,7 @@ def _sample_faults(key: str, split: str, members: Mapping[str, bytes]) -> Iterat
     empty = list(empty_values(record))
     if empty:
         yield f"its json has nothing at {', '.join(empty[:3])}"
-    counts = {"parts": len(record["parts"]), "contacts": len(record["contacts"])}
+    counts = {"parts": len(record["parts"]), "contacts": len(json.loads(record["contacts"]))}
     for name, count in counts.items():
         if record["counts"][name] != count:
             yield f"its json counts {record['counts'][name]} {name} and lists {count}"

@@ -39,7 +39,7 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     meshes, poses = _parts_of(members["glb"], names)
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
-    stored = {tuple(sorted(pair)) for pair in record["contacts"]}
+    stored = {tuple(sorted(pair)) for pair in json.loads(record["contacts"])}
     found, doubtful = _contacts(meshes, poses, pairs, kit.contact_tolerance)
     contact = ContactTest(kit.types, kit.contact_tolerance)
     faults: list[str] = []

@@ -10,11 +10,11 @@ from pydantic import Field, model_validator
 from pipeline.config import StrictModel
 from pipeline.shards import ShardWriter, array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.collection.shapes import Collection
+from stages.collection.shards import PRODUCERS, collection_shards
 from stages.points.cloud import sample_cloud
-from stages.points.frame import Normalization, normalization, upright
-from stages.points.surface import SurfacePoints, type_table
-from stages.shape.collection import collection_kits, collection_shards
-from stages.shape.sample import read_samples
+from stages.points.frame import Normalization, normalization
+from stages.points.surface import SurfacePoints
 
 __all__ = ["STAGE", "PointsConfig"]
 
@@ -59,16 +59,13 @@ def run_shard(task: Task) -> Outcome:
     """Members of each sample: `points.npy`, `normals.npy` float32 (n, 3), `labels.npy`, `instances.npy` int16 (n,),
     and `json`: how many points stand in which order, and how they were moved."""
     config = task.config.section(PointsConfig)
-    kits = collection_kits(task)
-    tables = {name: type_table(kit.types) for name, kit in kits.items()}
+    collection = Collection(task)
     total = int(task.shard.params["samples"])
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
-            kit = kits[sample.kit]
-            assembly = upright(sample.assembly, kit)
-            rng = task.rng(sample.key)
-            cloud = sample_cloud(tables[kit.name], assembly, config.uniform, config.farthest, config.pool, rng)
-            moved = normalization(kit.types, assembly, config.normalize)
+        for sample in collection.samples():
+            shape = collection.shape(sample)
+            cloud = sample_cloud(shape, config.uniform, config.farthest, config.pool, task.rng(sample.key))
+            moved = normalization(shape, config.normalize)
             writer.write(sample.key, _members(cloud, moved, config))
             task.progress(writer.samples, total)
     return Outcome(samples=writer.samples, summary={"split": task.shard.params["split"]})
@@ -100,9 +97,9 @@ def estimate_bytes(plan: Plan) -> int:
 
 STAGE = Stage(
     name="points",
-    version=1,
+    version=2,
     config=PointsConfig,
-    inputs=("exemplars", "variations"),
+    inputs=("exemplars", *PRODUCERS),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

@@ -1,9 +1,10 @@
-"""Points on surfaces, uniform by area: on one mesh, or on all parts of an assembly without building its mesh."""
+"""Points on surfaces, uniform by area: on one mesh, or on all parts of a shape without building its whole mesh."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numba
@@ -11,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray, IntArray, TypeArray
-from stages.shape.kit import Assembly, PartType
+from stages.shape.kit import PartMesh
+from stages.shape.shape import Shape
 
-__all__ = ["SurfacePoints", "SurfaceTable", "sample_assembly", "sample_surface", "surface_table", "type_table"]
+__all__ = ["SurfacePoints", "SurfaceTable", "mesh_table", "sample_shape", "sample_surface", "surface_table"]
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class SurfaceTable:
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points on an assembly: points and normals float64 (n, 3); labels int16 (n,), the index of the part's type;
+    """Points on a shape: points and normals float64 (n, 3); labels int16 (n,), the index of the part's label;
     instances int16 (n,), the index of the part."""
 
     points: FloatArray
@@ -84,27 +86,26 @@ def sample_surface(
     return _points_of_meshes(table, np.zeros(n, dtype=np.int64), rng)
 
 
-def sample_assembly(table: SurfaceTable, assembly: Assembly, n: int, rng: np.random.Generator) -> SurfacePoints:
-    """`n` independent points on all parts of `assembly`, uniform by area over the parts together.
+def sample_shape(shape: Shape, n: int, rng: np.random.Generator) -> SurfacePoints:
+    """`n` independent points on all parts of `shape`, uniform by area over the parts together.
 
-    `table` is the surface table of the kit's types, in order (`type_table`). Surface that lies inside another
-    part, or where two parts meet, counts like any other: nothing is removed.
+    Surface that lies inside another part, or where two parts meet, counts like any other: nothing is removed.
     """
-    poses = assembly.poses
-    part_reach = np.cumsum(table.area[assembly.types])
+    table, meshes, poses = mesh_table(shape.meshes), shape.assembly.types, shape.assembly.poses
+    part_reach = np.cumsum(table.area[meshes])
     parts = np.searchsorted(part_reach, rng.random(n) * part_reach[-1], side="right")
     parts = np.minimum(parts, len(part_reach) - 1)
-    labels = assembly.types[parts]
-    points, normals, _ = _points_of_meshes(table, labels.astype(np.int64), rng)
+    points, normals, _ = _points_of_meshes(table, meshes[parts].astype(np.int64), rng)
     rotations = poses[parts, :3, :3]
     points = np.einsum("nij,nj->ni", rotations, points) + poses[parts, :3, 3]
     normals = np.einsum("nij,nj->ni", rotations, normals)
-    return SurfacePoints(points, normals, labels, parts.astype(np.int16))
+    return SurfacePoints(points, normals, shape.part_labels[parts], parts.astype(np.int16))
 
 
-def type_table(types: Sequence[PartType]) -> SurfaceTable:
-    """The surface table of a kit's part types, in their order."""
-    return surface_table([(each.vertices, each.faces) for each in types])
+@lru_cache(maxsize=16)
+def mesh_table(meshes: tuple[PartMesh, ...]) -> SurfaceTable:
+    """The surface table of a shape's meshes, in their order; made once for each set of meshes."""
+    return surface_table([(each.vertices, each.faces) for each in meshes])
 
 
 def _points_of_meshes(

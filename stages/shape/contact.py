@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.kit import ContactKind, PartType
+from stages.shape.kit import ContactKind, PartMesh
 from stages.shape.pose import relative_poses, transform_points
 
 __all__ = ["ContactTest", "overlapping_boxes", "world_boxes"]
@@ -33,7 +33,7 @@ class ContactTest:
     `tolerance` is the largest distance in contact, in the units of the parts.
     """
 
-    def __init__(self, types: Sequence[PartType], tolerance: float) -> None:
+    def __init__(self, types: Sequence[PartMesh], tolerance: float) -> None:
         self.types = tuple(types)
         self.tolerance = tolerance
         self._meshes: dict[int, Mesh] = {}
@@ -97,7 +97,7 @@ class ContactTest:
         return pairs[np.array(touching, dtype=bool)] if len(pairs) else pairs
 
 
-def world_boxes(part_types: Sequence[PartType], types: np.ndarray, poses: FloatArray) -> FloatArray:
+def world_boxes(part_types: Sequence[PartMesh], types: np.ndarray, poses: FloatArray) -> FloatArray:
     """The tight axis-aligned boxes of posed parts, float64 (n, 2, 3)."""
     boxes = np.empty((len(types), 2, 3))
     for index, (part_type, pose) in enumerate(zip(types, poses, strict=True)):

@@ -34,9 +34,9 @@ Multiset = tuple[tuple[int, int], ...]
 """Neighbour counts of a part: `(type index, count)` pairs in ascending order of type index."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PartMesh:
-    """The surface of a part. Its coordinates are its own; poses move them into the world.
+    """The surface of a part, compared by identity. Its coordinates are its own; poses move them into the world.
 
     name: what the part is called; parts of one name have one label.
     vertices: float64 (v, 3); faces: int32 (f, 3); face_colors: uint8 (f, 3) sRGB.
@@ -66,7 +66,7 @@ class PartMesh:
         return centroid
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PartType(PartMesh):
     """One building block of a kit: a surface that recurs.
 

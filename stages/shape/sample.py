@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
-from stages.shape.kit import Assembly
+from stages.shape.kit import NOTHING, Assembly
 
 __all__ = ["Sample", "read_samples", "write_sample"]
 
@@ -19,8 +19,11 @@ class Sample:
     """One shape.
 
     key: unique in its dataset, without a dot; split: `train`, `val` or `test`; producer: the stage that made it;
-    kit: name of the kit that its assembly refers to; lineage: JSON, how it was made (parents, cut, transform);
-    graph: hex digest of its canonical type-coloured shape graph (equal exactly for isomorphic graphs of one kit).
+    kit: name of the kit that its assembly refers to, or of the program or category that its text belongs to;
+    graph: hex digest of its structure, for a kit that of its canonical type-coloured shape graph (equal exactly for
+    isomorphic graphs of one kit), for a program that of its discrete part;
+    lineage: JSON, how it was made (parents, cut, transform); assembly: its parts, for a kit;
+    text: the producer's own text that the shape is made from (a program, its parameters); empty for a kit.
     """
 
     key: str
@@ -28,8 +31,9 @@ class Sample:
     producer: str
     kit: str
     graph: str
-    assembly: Assembly
     lineage: Mapping[str, Any]
+    assembly: Assembly = field(default_factory=lambda: NOTHING)
+    text: str = ""
 
 
 def write_sample(writer: ShardWriter, sample: Sample) -> None:
@@ -41,6 +45,7 @@ def write_sample(writer: ShardWriter, sample: Sample) -> None:
         "kit": sample.kit,
         "graph": sample.graph,
         "lineage": dict(sample.lineage),
+        "text": sample.text,
     }
     writer.write(
         sample.key,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from stages.shape.arrays import TypeArray
-from stages.shape.kit import Assembly, PartMesh
+from stages.shape.kit import Assembly, Kit, PartMesh
 
-__all__ = ["Shape"]
+__all__ = ["Shape", "kit_shape", "upright"]
+
+Z_TO_Y = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)
@@ -22,12 +25,14 @@ class Shape:
     assembly: which mesh stands where, and which parts touch; its edges are empty where nobody has asked yet.
     up: the axis that points up, `"y"` or `"z"`; labels: the vocabulary of part labels, the same for every shape of
     one kit or program, in a fixed order. The name of each mesh is one of them.
+    own_names: a name for each part that no other part of the shape has; without, its label and a number.
     """
 
     meshes: tuple[PartMesh, ...]
     assembly: Assembly
     up: Literal["y", "z"]
     labels: tuple[str, ...]
+    own_names: tuple[str, ...] = ()
 
     @cached_property
     def label_of(self) -> TypeArray:
@@ -35,5 +40,36 @@ class Shape:
         places = {name: index for index, name in enumerate(self.labels)}
         return np.array([places[mesh.name] for mesh in self.meshes], dtype=np.int16)
 
+    @cached_property
+    def part_labels(self) -> TypeArray:
+        """For each part the index of its label in `labels`, int16 (n,)."""
+        labels: TypeArray = self.label_of[self.assembly.types]
+        return labels
+
+    @cached_property
+    def part_names(self) -> tuple[str, ...]:
+        """A name for each part: its own, or its label and its number among the parts of that label, `tower.000`."""
+        if self.own_names:
+            return self.own_names
+        counts: Counter[int] = Counter()
+        names = []
+        for label in self.part_labels.tolist():
+            names.append(f"{self.labels[label]}.{counts[label]:03d}")
+            counts[label] += 1
+        return tuple(names)
+
     def __len__(self) -> int:
         return len(self.assembly)
+
+
+def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
+    """The shape of an assembly of the kit's types; the label of a part is its type."""
+    return Shape(kit.types, assembly, kit.up, kit.type_names())
+
+
+def upright(shape: Shape) -> Shape:
+    """`shape` turned so that y points up, which is a quarter turn about x where z points up."""
+    if shape.up == "y":
+        return shape
+    # adding zero turns the minus zeros of the product into zeros, which read better in text
+    return replace(shape, assembly=replace(shape.assembly, poses=Z_TO_Y @ shape.assembly.poses + 0.0), up="y")

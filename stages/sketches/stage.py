@@ -5,8 +5,9 @@ from __future__ import annotations
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.shape.collection import collection_kits, collection_shards
-from stages.shape.sample import Sample, read_samples
+from stages.collection.shapes import Collection
+from stages.collection.shards import PRODUCERS, collection_shards
+from stages.shape.sample import Sample
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment, png_bytes
 from stages.sketches.settings import SketchesConfig
@@ -28,12 +29,12 @@ def run_shard(task: Task) -> Outcome:
     Raises ShardFailed, naming the sample, for a drawing without a line.
     """
     config = task.config.section(SketchesConfig)
-    kits = collection_kits(task)
+    collection = Collection(task)
     backend = backend_for(config.backend)
     total = int(task.shard.params["samples"])
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
-            scene = scene_of(sample.assembly, kits[sample.kit])
+        for sample in collection.samples():
+            scene = scene_of(collection.shape(sample))
             writer.write(sample.key, _drawings(task, config, sample, scene, backend))
             task.progress(writer.samples, total)
     summary = {"split": task.shard.params["split"], "views": [view.name for view in config.views], "backend": backend}
@@ -66,7 +67,7 @@ STAGE = Stage(
     name="sketches",
     version=1,
     config=SketchesConfig,
-    inputs=("exemplars", "variations"),
+    inputs=("exemplars", *PRODUCERS),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from pipeline.errors import ShardFailed
 from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Task
-from stages.shape.collection import collection_kits
+from stages.shape.kit_input import input_kits
 from stages.strings.alphabet import make_alphabet
 from stages.strings.statistics import StringStatistics
 from stages.strings.tokens import number_value
@@ -105,7 +105,7 @@ def _rows_and_strings(task: Task, shard: str) -> Iterator[tuple[dict[str, Any], 
 def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]]) -> dict[str, Any]:
     """For each kit with strings: `types`, type name by token; `tokens`, types first, then parentheses and numbers."""
     described = {}
-    for name, kit in sorted(collection_kits(task).items()):
+    for name, kit in sorted(input_kits(task).items()):
         if name in statistics:
             types = make_alphabet(kit.type_names()).vocabulary()
             seen = {token for counted in statistics[name].values() for token in counted.seen}

@@ -9,10 +9,12 @@ import numpy as np
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.collection.shapes import Collection
+from stages.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards, producer_of
 from stages.shape.canonical import graph_digest
-from stages.shape.collection import collection_kits, collection_shards
 from stages.shape.kit import Assembly
-from stages.shape.sample import Sample, read_samples
+from stages.shape.kit_input import input_kits
+from stages.shape.sample import Sample
 from stages.strings.alphabet import Alphabet, make_alphabet
 from stages.strings.corpus import CORPUS, compose_corpus
 from stages.strings.decoder import decode
@@ -26,8 +28,9 @@ BYTES_A_STRING = 3000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard for each shard of the collection; when all are done, the corpus, which reads them all."""
-    shards = collection_shards(plan)
+    """One shard for each shard of the collection; when all are done, the corpus, which reads them all. None for
+    samples that are not made of kits: they come with a text of their own."""
+    shards = _kit_shards(plan)
     if not shards or any(plan.summary("strings", shard.name) is None for shard in shards):
         return shards
     kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
@@ -49,10 +52,10 @@ def write_strings(task: Task) -> Outcome:
     refused. Raises ShardFailed where a string does not stand for its graph, or a sample is filed under a wrong graph.
     """
     config = task.config.section(StringsConfig)
-    alphabets = {name: make_alphabet(kit.type_names()) for name, kit in collection_kits(task).items()}
+    alphabets = {name: make_alphabet(kit.type_names()) for name, kit in input_kits(task).items()}
     total, written, rows = int(task.shard.params["samples"]), 0, []
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
+        for sample in Collection(task).samples():
             try:
                 strings = _strings(sample, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
             except NotConnectedError as error:
@@ -87,8 +90,12 @@ def report(plan: Plan) -> Sequence[str]:
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all strings, in the shards and once more in the corpus."""
     strings = plan.config.section(StringsConfig).strings_per_shape + 1
-    samples = sum(int(shard.params["samples"]) for shard in collection_shards(plan))
+    samples = sum(int(shard.params["samples"]) for shard in _kit_shards(plan))
     return samples * (2 * strings * BYTES_A_STRING + 2048)
+
+
+def _kit_shards(plan: Plan) -> list[Shard]:
+    return [each for each in collection_shards(plan) if producer_of(each) == KIT_PRODUCER]
 
 
 def _strings(sample: Sample, alphabet: Alphabet, count: int, rng: np.random.Generator) -> list[str]:
@@ -120,7 +127,7 @@ STAGE = Stage(
     name="strings",
     version=1,
     config=StringsConfig,
-    inputs=("exemplars", "variations"),
+    inputs=("exemplars", *PRODUCERS),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

@@ -12,7 +12,7 @@ from pipeline.shards import ShardWriter, array_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.canonical import graph_digest
-from stages.shape.collection import input_kit
+from stages.shape.kit_input import input_kit
 from stages.shape.sample import Sample, write_sample
 from stages.variations.answers import ContactAnswers
 from stages.variations.backdrop import Backdrop

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.stage import Outcome, Plan, Shard, Task
-from stages.shape.collection import input_kit
 from stages.shape.kit import Kit
+from stages.shape.kit_input import input_kit
 from stages.variations.answers import ContactAnswers
 from stages.variations.archive import cell_of
 from stages.variations.measures import pool_measures

@@ -23,6 +23,8 @@ _JOBS = {"lane": run_lane, "pool": run_pool, "assignment": run_assignment, "coll
 
 def plan(plan: Plan) -> list[Shard]:
     """The rounds of every kit as far as they are known, then the assignment and the collection."""
+    if not plan.shards("exemplars"):
+        return []
     search: list[Shard] = []
     ended = True
     for kit in plan.shards("exemplars"):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
-from stages.shape.kit import Assembly, Kit
+from stages.shape.kit import PartMesh
+from stages.shape.shape import Shape
 
 __all__ = ["MeshSet", "Scene", "mesh_scene", "scene_of"]
 
@@ -138,10 +138,11 @@ class Scene:
         return np.concatenate(points) if points else np.empty((0, 3))
 
 
-def scene_of(assembly: Assembly, kit: Kit) -> Scene:
-    """The scene of an assembly. Scenes of one kit object share its mesh set."""
-    layers = _layers(len(assembly), assembly.edges)
-    return Scene(_kit_meshes(kit), assembly.types.astype(np.int32), assembly.poses, layers, kit.up)
+def scene_of(shape: Shape) -> Scene:
+    """The scene of a shape. Scenes of shapes with the same meshes share one mesh set."""
+    parts = shape.assembly
+    layers = _layers(len(parts), parts.edges)
+    return Scene(mesh_set(shape.meshes), parts.types.astype(np.int32), parts.poses, layers, shape.up)
 
 
 def mesh_scene(vertices: FloatArray, faces: IntArray, face_colors: ByteArray, up: Literal["y", "z"]) -> Scene:
@@ -150,18 +151,10 @@ def mesh_scene(vertices: FloatArray, faces: IntArray, face_colors: ByteArray, up
     return Scene(MeshSet.of([(vertices, faces, face_colors)]), single, np.eye(4)[None], single, up)
 
 
-_KNOWN: dict[int, tuple[weakref.ref[Kit], MeshSet]] = {}
-
-
-def _kit_meshes(kit: Kit) -> MeshSet:
-    """The mesh set of a kit, made once for each kit object (kits hold arrays and cannot be hashed)."""
-    known = _KNOWN.get(id(kit))
-    if known is None or known[0]() is not kit:
-        for key in [key for key, (ref, _) in _KNOWN.items() if ref() is None]:
-            del _KNOWN[key]
-        meshes = MeshSet.of([(each.vertices, each.faces, each.face_colors) for each in kit.types])
-        known = _KNOWN[id(kit)] = weakref.ref(kit), meshes
-    return known[1]
+@lru_cache(maxsize=16)
+def mesh_set(meshes: tuple[PartMesh, ...]) -> MeshSet:
+    """The set of these meshes; the same object for the same meshes, so that a renderer keeps what it has uploaded."""
+    return MeshSet.of([(each.vertices, each.faces, each.face_colors) for each in meshes])
 
 
 def _layers(parts: int, edges: IntArray) -> IntArray:

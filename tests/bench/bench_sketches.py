@@ -8,6 +8,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
+from stages.shape.shape import kit_shape
 from stages.sketches.draw import draw_sketch
 from stages.sketches.image import png_bytes
 from stages.sketches.settings import StrokeOptions
@@ -106,7 +107,7 @@ def _colonnade() -> Scene:
     placed[:, :3, 3] = poses
     gaps = np.abs(placed[:, None, :3, 3] - placed[None, :, :3, 3])
     near = np.argwhere(np.triu((gaps <= [0.7, 1.2, 0.1]).all(axis=2), 1)).astype(np.int32)
-    return scene_of(Assembly(np.array(types, dtype=np.int16), placed, near), _KIT)
+    return scene_of(kit_shape(_KIT, Assembly(np.array(types, dtype=np.int16), placed, near)))
 
 
 def _prism(sides: int, radius: float, height: float, stretch: float = 1.0) -> tuple[FloatArray, IntArray]:

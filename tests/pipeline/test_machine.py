@@ -67,7 +67,7 @@ def make(*arguments: str) -> str:
 def test_make_dataset_runs_each_stage_once_after_what_it_reads() -> None:
     lines = make("-n", "dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7").splitlines()
     assert [line.split(" run ")[1].split()[0] for line in lines] == [
-        "exemplars", "variations", "strings", "points", "sketches", "package",
+        "exemplars", "variations", "programs", "strings", "points", "sketches", "package",
     ]  # fmt: skip
     assert all(line.endswith("--config c.yaml --out /data --seed 7 --workers 3") for line in lines)
 

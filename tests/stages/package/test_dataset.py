@@ -80,7 +80,7 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
         *(sample.key, "val", sample.kit),
         sample.graph,
     )
-    assert record["contacts"] == sample.assembly.edges.tolist()
+    assert json.loads(record["contacts"]) == sample.assembly.edges.tolist()
     assert [part["type"] for part in record["parts"]] == sample.assembly.types.tolist()
     assert [part["label"] for part in record["parts"]] == [("tower", "long.wall")[k] for k in sample.assembly.types]
     assert record["counts"] == {
@@ -131,7 +131,7 @@ def test_a_row_of_the_index_leads_to_its_sample(toy_folder: Path) -> None:
         assert found == {f"{row['key']}.{member}": content for member, content in samples[row["key"]].items()}
         record = json.loads(samples[row["key"]]["json"])
         assert {name: row[name] for name in record["counts"]} == record["counts"]
-        assert row["string"] == record["string"]
+        assert row["text"] == record["text"]
 
 
 def test_the_card_has_what_hugging_face_asks_for(toy_folder: Path) -> None:

@@ -9,9 +9,10 @@ import struct
 import numpy as np
 import pytest
 
-from stages.package.glb import GlbWriter, linear_colors, node_names
+from stages.package.glb import glb_bytes, linear_colors
 from stages.shape.kit import Assembly, PartType
 from stages.shape.pose import transform_points
+from stages.shape.shape import Shape, kit_shape
 from tests.stages.package.toy import BOX, BOX_FACES, chain, toy_kit
 
 
@@ -37,9 +38,9 @@ def turned_chain() -> Assembly:
 
 def test_every_part_is_a_node_named_by_type_with_the_triangles_of_its_type_in_its_place() -> None:
     kit, assembly = toy_kit("blocks"), turned_chain()
-    scene = loaded(GlbWriter(kit.types).write(assembly))
-    names = node_names(kit.type_names(), assembly)
-    assert names == ["long.wall.000", "tower.000", "long.wall.001", "tower.001", "long.wall.002"]
+    scene = loaded(glb_bytes(kit_shape(kit, assembly)))
+    names = kit_shape(kit, assembly).part_names
+    assert names == ("long.wall.000", "tower.000", "long.wall.001", "tower.001", "long.wall.002")
     assert sorted(scene.graph.nodes_geometry) == sorted(names)
     for part, name in enumerate(names):
         pose, geometry = scene.graph.get(name)
@@ -53,15 +54,15 @@ def test_every_part_is_a_node_named_by_type_with_the_triangles_of_its_type_in_it
 
 def test_equal_parts_share_one_mesh_and_types_not_in_use_are_left_out() -> None:
     kit = toy_kit("blocks")
-    assert len(header_of(GlbWriter(kit.types).write(chain(6, 0)))["meshes"]) == 2
-    only = header_of(GlbWriter(kit.types).write(chain(1, 1)))
+    assert len(header_of(glb_bytes(kit_shape(kit, chain(6, 0))))["meshes"]) == 2
+    only = header_of(glb_bytes(kit_shape(kit, chain(1, 1))))
     assert [mesh["name"] for mesh in only["meshes"]] == ["long.wall"]
     assert only["nodes"][0]["extras"] == {"type": 1, "instance": 0}
 
 
 def test_each_face_keeps_its_colour_in_linear_light() -> None:
     kit = toy_kit("blocks")
-    scene = loaded(GlbWriter(kit.types).write(chain(2, 0)))
+    scene = loaded(glb_bytes(kit_shape(kit, chain(2, 0))))
     for part_type in kit.types:
         mesh = scene.geometry[part_type.name]
         corners = np.asarray(mesh.visual.vertex_colors)[mesh.faces]
@@ -75,7 +76,7 @@ def test_linear_colours_follow_the_srgb_curve() -> None:
 
 
 def test_the_container_is_aligned_and_its_arrays_lie_inside() -> None:
-    content = GlbWriter(toy_kit("blocks").types).write(turned_chain())
+    content = glb_bytes(kit_shape(toy_kit("blocks"), turned_chain()))
     magic, version, length = struct.unpack("<4sII", content[:12])
     assert (magic, version, length) == (b"glTF", 2, len(content))
     header = header_of(content)
@@ -93,7 +94,7 @@ def test_a_vertex_stands_once_for_each_colour_around_it(colors: int, vertices: i
     face_colors = np.full((12, 3), 90, dtype=np.uint8)
     face_colors[10:] += colors - 1
     part_type = PartType("box", BOX, BOX_FACES, face_colors, np.eye(4), np.eye(4)[None])
-    scene = loaded(GlbWriter([part_type]).write(chain(1, 0)))
+    scene = loaded(glb_bytes(Shape((part_type,), chain(1, 0), "y", (part_type.name,))))
     assert len(scene.geometry["box"].vertices) == vertices
 
 
@@ -102,10 +103,10 @@ def test_a_type_of_more_than_65535_vertices_has_wide_indices() -> None:
     vertices = np.random.default_rng(0).random((3 * count, 3))
     faces = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
     part_type = PartType("dust", vertices, faces, np.zeros((count, 3), dtype=np.uint8), np.eye(4), np.eye(4)[None])
-    mesh = loaded(GlbWriter([part_type]).write(chain(1, 0))).geometry["dust"]
+    mesh = loaded(glb_bytes(Shape((part_type,), chain(1, 0), "y", (part_type.name,)))).geometry["dust"]
     assert np.abs(mesh.vertices[mesh.faces] - vertices[faces]).max() < 1e-6
 
 
 def test_the_same_assembly_gives_the_same_bytes() -> None:
     kit = toy_kit("planks")
-    assert GlbWriter(kit.types).write(turned_chain()) == GlbWriter(kit.types).write(turned_chain())
+    assert glb_bytes(kit_shape(kit, turned_chain())) == glb_bytes(kit_shape(kit, turned_chain()))

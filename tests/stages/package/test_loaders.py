@@ -47,7 +47,7 @@ def test_webdataset_yields_each_sample_once_and_decoded(toy_folder: Path, split:
         assert sample["points.npy"].dtype == np.float32
         assert sample["labels.npy"].dtype == sample["instances.npy"].dtype == np.int16
         assert sample["json"]["key"] == sample["__key__"]
-        assert sample["txt"].split()[0] == sample["json"]["string"]
+        assert sample["txt"].split()[0] == sample["json"]["text"]
 
 
 @pytest.mark.filterwarnings("ignore:This DataLoader will create")

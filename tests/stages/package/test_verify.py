@@ -138,7 +138,7 @@ def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_pa
     record = json.loads(members["json"])
     kit = toy_kit(record["kit"])
     assert geometry_faults(kit, members) == []
-    record["contacts"].append([0, 2])
+    record["contacts"] = json.dumps([*json.loads(record["contacts"]), [0, 2]])
     faults = geometry_faults(kit, {**members, "json": json.dumps(record).encode()})
     ends = (record["parts"][0]["name"], record["parts"][2]["name"])
     assert f"{ends[0]} and {ends[1]} are recorded as neighbours and do not touch" in faults

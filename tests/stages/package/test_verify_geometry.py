@@ -7,9 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from stages.package.glb import GlbWriter, node_names
+from stages.package.glb import glb_bytes
 from stages.package.verify_geometry import geometry_faults
 from stages.shape.kit import Assembly, Kit
+from stages.shape.shape import kit_shape
 from tests.stages.variations.toy import ROAD, kit_of, ring
 
 
@@ -21,10 +22,10 @@ def kit() -> Kit:
 def faults(kit: Kit, assembly: Assembly) -> list[str]:
     parts = [
         {"name": name, "type": index}
-        for name, index in zip(node_names(kit.type_names(), assembly), assembly.types.tolist(), strict=True)
+        for name, index in zip(kit_shape(kit, assembly).part_names, assembly.types.tolist(), strict=True)
     ]
-    record = json.dumps({"parts": parts, "contacts": assembly.edges.tolist()}).encode()
-    return geometry_faults(kit, {"json": record, "glb": GlbWriter(kit.types).write(assembly)})
+    record = json.dumps({"parts": parts, "contacts": json.dumps(assembly.edges.tolist())}).encode()
+    return geometry_faults(kit, {"json": record, "glb": glb_bytes(kit_shape(kit, assembly))})
 
 
 def test_exemplars_have_no_faults(kit: Kit) -> None:
@@ -35,7 +36,7 @@ def test_exemplars_have_no_faults(kit: Kit) -> None:
 def test_a_contact_that_is_not_recorded_is_named(kit: Kit) -> None:
     whole = kit.exemplars[0].assembly
     found = faults(kit, Assembly(whole.types, whole.poses, whole.edges[1:]))
-    first, second = (node_names(kit.type_names(), whole)[each] for each in whole.edges[0])
+    first, second = (kit_shape(kit, whole).part_names[each] for each in whole.edges[0])
     assert any(f"{first} and {second} touch and are not recorded" in each for each in found)
     assert any("neighbourhood that the grammar does not admit" in each for each in found)
 
@@ -50,7 +51,7 @@ def test_a_recorded_contact_that_is_none_is_named(kit: Kit) -> None:
 
 def test_parts_that_reach_into_each_other_deeper_than_in_the_exemplars_are_named(kit: Kit) -> None:
     whole = kit.exemplars[0].assembly
-    names = node_names(kit.type_names(), whole)
+    names = kit_shape(kit, whole).part_names
     i, j = whole.edges[0].tolist()
     poses = whole.poses.copy()
     towards = poses[i, :3, 3] - poses[j, :3, 3]

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from stages.points.surface import sample_assembly, sample_surface, surface_table, type_table
+from stages.points.surface import sample_shape, sample_surface, surface_table
 from stages.shape.kit import Assembly, PartType
 from stages.shape.pose import invert, transform_points
+from stages.shape.shape import Shape
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
 
@@ -96,7 +97,7 @@ def test_every_point_lies_on_the_part_that_its_labels_name(seed: int, parts: int
     types = [part_type(f"soup{count}", *soup(rng, count)) for count in (1, 4, 7)]
     poses = np.stack([rotation(rng) for _ in range(parts)])
     assembly = Assembly(rng.integers(0, 3, parts).astype(np.int16), poses, np.empty((0, 2), dtype=np.int32))
-    cloud = sample_assembly(type_table(types), assembly, 200, rng)
+    cloud = sample_shape(Shape(tuple(types), assembly, "y", tuple(each.name for each in types)), 200, rng)
     assert cloud.labels.dtype == cloud.instances.dtype == np.int16
     assert (cloud.labels == assembly.types[cloud.instances]).all()
     for instance in np.unique(cloud.instances):
@@ -119,7 +120,7 @@ def test_parts_of_an_assembly_are_hit_in_the_ratio_of_their_areas() -> None:
     assembly = Assembly(
         np.array([1, 0, 1], dtype=np.int16), np.stack([np.eye(4)] * 3), np.empty((0, 2), dtype=np.int32)
     )
-    cloud = sample_assembly(type_table([small, large]), assembly, 45_000, np.random.default_rng(4))
+    cloud = sample_shape(Shape((small, large), assembly, "y", ("small", "large")), 45_000, np.random.default_rng(4))
     for part, share in enumerate((4 / 9, 1 / 9, 4 / 9)):
         assert binomtest(int((cloud.instances == part).sum()), 45_000, share).pvalue > 1e-4
 

@@ -18,6 +18,7 @@ from stages.shape.sample import Sample, write_sample
 from stages.sketches.image import png_array
 from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
 from stages.sketches.stage import STAGE
+from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
 from tests.stages.views.solids import box, cylinder, kit_of, part_type, posed
 
 SHARDS = {"toys-train-000000": ("train", 3), "toys-val-000000": ("val", 2)}
@@ -54,7 +55,7 @@ def make_shapes(task: Task) -> Outcome:
             poses = posed(*[(k, 0.0, 0.0) for k in range(len(types))])
             edges = np.array([(k, k + 1) for k in range(len(types) - 1)], dtype=np.int32).reshape(-1, 2)
             assembly = Assembly(types, poses, edges)
-            write_sample(writer, Sample(f"{split}-{index}", split, "variations", "solids", "0" * 64, assembly, {}))
+            write_sample(writer, Sample(f"{split}-{index}", split, "variations", "solids", "0" * 64, {}, assembly))
     return Outcome(count, {"split": split, "samples": count})
 
 
@@ -63,6 +64,7 @@ def small(plan: Plan) -> int:
 
 
 STAGES = {
+    **ABSENT_STAGES,
     "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
     "variations": Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
     "sketches": STAGE,
@@ -72,7 +74,12 @@ STAGES = {
 def turn(out: Path, flat: bool = False, **keys: object) -> dict[str, RunResult]:
     """Run all stages in this process."""
     sketches = SketchesConfig.model_validate({"size": 48, "backend": "raycast", **keys})
-    sections = {"exemplars": KitsConfig(), "variations": ShapesConfig(flat=flat), "sketches": sketches}
+    sections = {
+        **ABSENT_SECTIONS,
+        "exemplars": KitsConfig(),
+        "variations": ShapesConfig(flat=flat),
+        "sketches": sketches,
+    }
     config = Config(name="toys", version="1.0.0", seed=5, sections=sections, path=Path("toys.yaml"))
     return {name: run_stage(name, STAGES, config, Places(out, "toys"), workers=1) for name in STAGES}
 

@@ -26,6 +26,7 @@ from stages.strings.decoder import decode
 from stages.strings.settings import StringsConfig
 from stages.strings.stage import STAGE
 from stages.strings.statistics import measure_string
+from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
 from tests.stages.strings.graphs import arrays
 
 KITS = {"castle": ("tower", "gate", "wall"), "chain": tuple(f"link {index}" for index in range(53))}
@@ -83,7 +84,7 @@ def make_shapes(task: Task) -> Outcome:
             poses = np.tile(np.eye(4), (len(types), 1, 1))
             poses[:, 0, 3] = rng.random(len(types))
             key = f"{name}-{index}"
-            sample = Sample(key, SPLITS[name], "variations", kit, digest, Assembly(types, poses, edges), {})
+            sample = Sample(key, SPLITS[name], "variations", kit, digest, {}, Assembly(types, poses, edges))
             write_sample(writer, sample)
     return Outcome(len(shapes), {"split": SPLITS[name], "samples": len(shapes)})
 
@@ -93,6 +94,7 @@ def small(plan: Plan) -> int:
 
 
 STAGES: Mapping[str, Stage] = {
+    **ABSENT_STAGES,
     "exemplars": Stage("exemplars", 1, KitsConfig, (), plan_kits, make_kit, small),
     "variations": Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
     "strings": STAGE,
@@ -101,6 +103,7 @@ STAGES: Mapping[str, Stage] = {
 
 def config(flaw: str = "", count: int = 8) -> Config:
     sections = {
+        **ABSENT_SECTIONS,
         "exemplars": KitsConfig(),
         "variations": ShapesConfig(flaw=flaw),
         "strings": StringsConfig(strings_per_shape=count),

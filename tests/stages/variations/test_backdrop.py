@@ -9,9 +9,10 @@ import pytest
 from trimesh.transformations import translation_matrix
 
 from stages.exemplars.settings import HubConfig
-from stages.package.glb import GlbWriter, node_names
+from stages.package.glb import glb_bytes
 from stages.package.verify_geometry import geometry_faults
 from stages.shape.kit import Assembly, Kit
+from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar import check
@@ -90,10 +91,10 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
     alphabet = make_alphabet(kit.type_names())
     for exemplar in kit.exemplars:
         whole = backdrop.fit(exemplar.assembly)
-        names = node_names(kit.type_names(), whole)
+        names = kit_shape(kit, whole).part_names
         parts = [{"name": name, "type": index} for name, index in zip(names, whole.types.tolist(), strict=True)]
-        record = json.dumps({"parts": parts, "contacts": whole.edges.tolist()}).encode()
-        assert geometry_faults(kit, {"json": record, "glb": GlbWriter(kit.types).write(whole)}) == []
+        record = json.dumps({"parts": parts, "contacts": json.dumps(whole.edges.tolist())}).encode()
+        assert geometry_faults(kit, {"json": record, "glb": glb_bytes(kit_shape(kit, whole))}) == []
         string = canonical_string(whole.types, whole.edges, alphabet).string
         assert len(check(string, alphabet, kit.grammar).types) == len(whole)
     link, plate = (alphabet.tokens[kit.type_names().index(name)] for name in ("link", "plate"))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
+from stages.shape.shape import kit_shape
 from stages.views.scene import Scene, scene_of
 
 __all__ = ["BOX_EDGES", "box", "boxes_scene", "cylinder", "exemplar_scene", "kit_of", "part_type", "posed"]
@@ -75,7 +76,7 @@ def boxes_scene(offsets, sizes=None, edges=(), up="y"):
     sizes = [(1.0, 1.0, 1.0)] * len(offsets) if sizes is None else sizes
     kit = kit_of(*(part_type(f"box{k}", box(size)) for k, size in enumerate(sizes)), up=up)
     contacts = np.array(edges, dtype=np.int32).reshape(-1, 2)
-    return scene_of(Assembly(np.arange(len(offsets), dtype=np.int16), posed(*offsets), contacts), kit)
+    return scene_of(kit_shape(kit, Assembly(np.arange(len(offsets), dtype=np.int16), posed(*offsets), contacts)))
 
 
 def exemplar_scene(name) -> Scene:
@@ -98,4 +99,5 @@ def exemplar_scene(name) -> Scene:
         index.append(known[geometry])
         poses.append(pose)
     contacts = np.array([edge[:2] for edge in listed["edge_list"]], dtype=np.int32).reshape(-1, 2)
-    return scene_of(Assembly(np.array(index, dtype=np.int16), np.array(poses), contacts), kit_of(*types))
+    assembly = Assembly(np.array(index, dtype=np.int16), np.array(poses), contacts)
+    return scene_of(kit_shape(kit_of(*types), assembly))

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.kit import Assembly
+from stages.shape.shape import kit_shape
 from stages.views.scene import MeshSet, mesh_scene, scene_of
 from tests.stages.views.solids import box, boxes_scene, cylinder, kit_of, part_type, posed
 
@@ -41,8 +42,9 @@ def test_scenes_of_one_kit_share_its_meshes():
     kit = kit_of(part_type("box", box()))
     one = Assembly(np.zeros(1, dtype=np.int16), posed((0, 0, 0)), np.empty((0, 2), dtype=np.int32))
     two = Assembly(np.zeros(2, dtype=np.int16), posed((0, 0, 0), (2, 0, 0)), np.empty((0, 2), dtype=np.int32))
-    assert scene_of(one, kit).meshes is scene_of(two, kit).meshes
-    assert scene_of(one, kit_of(part_type("box", box()))).meshes is not scene_of(one, kit).meshes
+    assert scene_of(kit_shape(kit, one)).meshes is scene_of(kit_shape(kit, two)).meshes
+    other = kit_of(part_type("box", box()))
+    assert scene_of(kit_shape(other, one)).meshes is not scene_of(kit_shape(kit, one)).meshes
 
 
 def test_parts_that_touch_lie_in_different_layers():

@@ -1,0 +1,45 @@
+"""A part of a shape: a mesh with a label and a colour, which stay with it through copies and symmetries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.programs.curves.mesh import QuadMesh
+from stages.shape.arrays import FloatArray
+from stages.shape.kit import PartMesh
+
+__all__ = ["Part", "joined"]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """label: what the part is, such as "leg"; color: sRGB, 0 to 255."""
+
+    label: str
+    mesh: QuadMesh
+    color: tuple[int, int, int]
+
+    def transformed(self, matrix: FloatArray) -> Part:
+        """The part moved by an affine matrix (4, 4)."""
+        return Part(self.label, self.mesh.transformed(matrix), self.color)
+
+    def deformed(self, function: Callable[[FloatArray], FloatArray]) -> Part:
+        """The part with its vertices (v, 3) moved by `function`, as `QuadMesh.deformed`."""
+        return Part(self.label, self.mesh.deformed(function), self.color)
+
+    def part_mesh(self) -> PartMesh:
+        """The part as triangles of one colour, named by its label."""
+        faces = self.mesh.triangles
+        colors = np.empty((len(faces), 3), dtype=np.uint8)
+        colors[:] = self.color
+        return PartMesh(self.label, self.mesh.vertices, faces, colors)
+
+
+def joined(parts: Iterable[Part], label: str | None = None) -> Part:
+    """One part of several, with the colour of the first, and its label where `label` is None."""
+    every = list(parts)
+    mesh = QuadMesh.joined(part.mesh for part in every)
+    return Part(every[0].label if label is None else label, mesh, every[0].color)

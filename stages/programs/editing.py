@@ -1,0 +1,61 @@
+"""Editing: groups of parameters copied from one shape to another, and the way between two shapes (geocode §4)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from stages.programs.parameters import Parameter, ParameterError, Value
+from stages.programs.program import Program
+from stages.programs.repair import repaired
+from stages.programs.schema import Values
+
+__all__ = ["interpolate", "mix"]
+
+
+def mix(program: Program, target: Values, source: Values, groups: Collection[str]) -> dict[str, Value]:
+    """`target` with the parameters of `groups` as they are in `source`, repaired to the constraints.
+
+    Repair moves what was not copied first, and what was copied only where there is no other way. Raises
+    ParameterError for a group that is not there.
+    """
+    for group in groups:
+        if group not in program.schema.groups:
+            raise ParameterError(f"there is no group {group!r}; groups are {', '.join(program.schema.groups)}")
+    copied = {each.name for each in program.parameters if each.group in groups}
+    mixed = {name: (source if name in copied else target)[name] for name in program.schema.by_name}
+    return _valid(program, mixed, copied)
+
+
+def interpolate(program: Program, first: Values, last: Values, share: float) -> dict[str, Value]:
+    """The shape at `share` (0 is `first`, 1 is `last`) of the way, repaired to the constraints.
+
+    Continuous parameters move linearly, others switch to the nearest of their values. What is visible in one of the
+    shapes only has the value that it has there.
+    """
+    start, shown_first = program.schema.settled(first)
+    end, shown_last = program.schema.settled(last)
+    between: dict[str, Value] = {}
+    for name, parameter in program.schema.by_name.items():
+        if (name in shown_first) != (name in shown_last):
+            between[name] = (start if name in shown_first else end)[name]
+        else:
+            between[name] = _between(parameter, float(start[name]), float(end[name]), share)
+    return _valid(program, between, ())
+
+
+def _between(parameter: Parameter, start: float, end: float, share: float) -> Value:
+    value = start + share * (end - start) if share < 1 else end
+    if parameter.kind == "continuous":
+        return parameter.checked(min(max(value, float(parameter.values[0])), float(parameter.values[-1])))
+    # Halfway between two values the second shape's side wins.
+    toward = range(len(parameter.values)) if start > end else range(len(parameter.values) - 1, -1, -1)
+    return parameter.values[min(toward, key=lambda index: abs(float(parameter.values[index]) - value))]
+
+
+def _valid(program: Program, values: Values, keep: Collection[str]) -> dict[str, Value]:
+    found = repaired(program, values, keep)
+    found = repaired(program, values) if found is None else found
+    if found is None:
+        broken = ", ".join(each.rule.text for each in program.broken(values))
+        raise ParameterError(f"{program.name}: no values near these keep {broken}")
+    return found

@@ -1,0 +1,71 @@
+"""Shapes of programs as files: parameters from JSON, shapes to GLB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import ConfigError
+from stages.programs.draws import Share
+from stages.programs.parameters import ParameterError, Value
+from stages.programs.program import Program, shape_of
+from stages.programs.sampling import Sampler
+from stages.programs.schema import Values
+from stages.views.palette import srgb_to_linear
+
+__all__ = ["named_values", "random_shapes", "shape_glb", "write_file"]
+
+
+def named_values(program: Program, name: str) -> dict[str, Value]:
+    """The values that a command line means: `base`, a whole number for the random shape of that seed, or a JSON file.
+
+    Raises ConfigError, which names the file and the parameter, for one that is not there or says no shape.
+    """
+    if name == "base":
+        return program.schema.settled(program.schema.base)[0]
+    if name.isdecimal():
+        return random_shapes(program, 1, int(name))[0]
+    try:
+        values = program.schema.values(Path(name).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{name}: {error.strerror}; give a JSON file of parameters, a seed, or base") from error
+    except (ParameterError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{name}: {error}") from error
+    broken = program.broken(values)
+    if broken:
+        raise ConfigError(f"{name}: a {program.name} needs {broken[0].rule.text}: {broken[0].sentence}")
+    return values
+
+
+def random_shapes(program: Program, count: int, seed: int) -> list[dict[str, Value]]:
+    """Values of `count` random valid shapes, no two alike."""
+    sampler = Sampler(program, Share(), between=False)
+    rng = np.random.default_rng(seed)
+    return [sampler.find(None, rng) for _ in range(count)]
+
+
+def shape_glb(program: Program, values: Values) -> bytes:
+    """The shape at `values` as GLB: a node a part, named by label and number, in its colour."""
+    import trimesh
+
+    shape = shape_of(program, values)
+    scene = trimesh.Scene()
+    for name, mesh in zip(shape.part_names, shape.meshes, strict=True):
+        color = np.append(srgb_to_linear(mesh.face_colors[0]), 1.0)
+        material = trimesh.visual.material.PBRMaterial(baseColorFactor=color, metallicFactor=0.0, roughnessFactor=0.7)
+        visual = trimesh.visual.TextureVisuals(material=material)
+        part = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, visual=visual)
+        scene.add_geometry(part, node_name=name, geom_name=name)
+    glb: bytes = scene.export(file_type="glb")
+    return glb
+
+
+def write_file(path: Path, content: bytes) -> Path:
+    """Write a file and the folders above it; `path`. Raises ConfigError where that cannot be."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise ConfigError(f"{path}: it cannot be written there: {error.strerror}") from None
+    return path

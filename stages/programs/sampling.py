@@ -1,0 +1,106 @@
+"""The sampling protocol (geocode §4): valid random shapes, each with one parameter that is seen and takes effect."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.errors import ShardFailed
+from stages.programs.draws import Share, draw
+from stages.programs.effect import has_effect
+from stages.programs.intersection import intersecting
+from stages.programs.parameters import Value
+from stages.programs.program import Program
+
+__all__ = ["Cell", "Sampler", "cells", "structure_digest"]
+
+MOST_TRIES = 2000
+"""So many draws of a shard's own are tried for one shape."""
+FEWEST_DRAWS, MOST_DRAWS = 32, 8192
+"""Draws at a time."""
+
+Cell = tuple[str, int]
+"""A parameter and the index of one of its values."""
+
+
+def cells(program: Program) -> list[Cell]:
+    """Every value of every parameter, in order."""
+    return [(each.name, index) for each in program.parameters for index in range(len(each.values))]
+
+
+def structure_digest(program: Program, values: dict[str, Value]) -> str:
+    """Hex sha256 of what is visible of the discrete and binary parameters: equal for shapes that differ by visible
+    continuous values alone."""
+    settled, visible = program.schema.settled(values)
+    seen = [
+        f"{name}={settled[name]}"
+        for name, each in program.schema.by_name.items()
+        if each.kind != "continuous" and name in visible
+    ]
+    return hashlib.sha256("\n".join([program.name, *seen]).encode()).hexdigest()
+
+
+@dataclass
+class Sampler:
+    """Finds shapes within one share, no two alike.
+
+    between: whether continuous parameters may have any value of their range.
+    refused: how many draws were refused, by cell's parameter (or `any`) and reason; tried: how many were looked at.
+    """
+
+    program: Program
+    share: Share
+    between: bool
+    refused: Counter[tuple[str, str]] = field(default_factory=Counter)
+    tried: int = 0
+    _known: set[str] = field(default_factory=set)
+
+    def find(self, cell: Cell | None, rng: np.random.Generator) -> dict[str, Value]:
+        """Settled values of a new shape that keeps every constraint, whose parts stay apart where they should, and in
+        which the parameter of `cell` has its value, is visible and takes effect.
+
+        Raises ShardFailed where none is found, with what the draws were refused for.
+        """
+        schema = self.program.schema
+        fixed = None if cell is None else (cell[0], float(schema.by_name[cell[0]].values[cell[1]]))
+        item = "any" if cell is None else cell[0]
+        before, first = self.refused.copy(), self.tried
+        count = int(np.clip(3 / self.share.size, FEWEST_DRAWS, MOST_DRAWS))
+        for _ in range(1 + round(MOST_TRIES / self.share.size / count)):
+            draws = draw(schema, count, rng, self.between, fixed)
+            for column in draws.owned(self.share).tolist():
+                self.tried += 1
+                if fixed is not None and not draws.visible[list(schema.by_name).index(item), column]:
+                    self.refused[item, "hidden"] += 1
+                    continue
+                values = schema.from_vector(draws.columns[:, column])
+                reason = self._refusal(values, cell)
+                if reason is None:
+                    return values
+                self.refused[item, reason] += 1
+        why = ", ".join(f"{count} {reason}" for (_, reason), count in sorted((self.refused - before).items()))
+        value = "" if fixed is None else f" with {item} = {fixed[1]:g}"
+        raise ShardFailed(
+            f"{self.program.name}: no shape{value} in {self.tried - first} tries ({why or 'none of this shard'}); "
+            "ask for fewer shapes or shards, or look at the program's constraints"
+        )
+
+    def _refusal(self, values: dict[str, Value], cell: Cell | None) -> str | None:
+        """Why `values` make no sample, or None; what is cheap to ask is asked first."""
+        broken = self.program.broken(values)
+        if broken:
+            return f"breaks {broken[0].name}"
+        text = self.program.schema.text(values)
+        if text in self._known:
+            return "alike"
+        parts = self.program.parts(values)
+        if cell is not None and not has_effect(self.program, values, cell[0], parts):
+            return "no effect"
+        met = intersecting(self.program, parts)
+        if met is not None:
+            return f"{met[0]} meets {met[1]}"
+        self._known.add(text)
+        return None

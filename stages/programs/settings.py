@@ -1,0 +1,61 @@
+"""The `programs` section of a config."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from pipeline.config import StrictModel
+
+__all__ = ["EachValueConfig", "ProgramSplitConfig", "ProgramsConfig", "SweepConfig"]
+
+
+class EachValueConfig(StrictModel):
+    """How many shapes have each value of each parameter fixed, all others being random (geocode §4)."""
+
+    train: int = Field(30, ge=1, description="Shapes of each value in the training split.")
+    val: int = Field(3, ge=1, description="Shapes of each value in the validation split.")
+    test: int = Field(3, ge=1, description="Shapes of each value in the test split.")
+
+
+class SweepConfig(StrictModel):
+    """A plain random sweep: how many shapes, and how they are shared out."""
+
+    samples: int = Field(10_000, ge=3, description="Shapes in all.")
+    val: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the validation split.")
+    test: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the test split.")
+
+
+class ProgramSplitConfig(StrictModel):
+    """How the samples are shared out."""
+
+    shards: int = Field(8, ge=1, description="Fewest shards of a split.")
+    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
+
+
+class ProgramsConfig(StrictModel):
+    """Shapes from a program: a function from parameters to parts."""
+
+    program: str = Field(
+        "",
+        description="Name of the program, such as chair, or the module that holds one of your own, with dots, such as "
+        "furniture.bench; empty for a dataset that is made of exemplars.",
+    )
+    mode: Literal["each_value", "sweep"] = Field(
+        "each_value",
+        description="What is sampled: every value of every parameter a number of times, that parameter being visible "
+        "and effective; or random shapes, with values of continuous parameters anywhere in their range.",
+    )
+    each_value: EachValueConfig = Field(
+        default_factory=EachValueConfig,
+        description="Shapes of each value, for mode each_value. No two shapes are alike; structures recur in splits.",
+    )
+    sweep: SweepConfig = Field(
+        default_factory=SweepConfig,
+        description="Shapes of a sweep, for mode sweep. Shapes that are alike up to their continuous parameters stand "
+        "in one split.",
+    )
+    splits: ProgramSplitConfig = Field(
+        default_factory=ProgramSplitConfig, description="How the samples are shared out."
+    )

@@ -1,0 +1,28 @@
+"""The kits among the inputs of a shard."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from pipeline.stage import Task
+from stages.shape.kit import Kit
+from stages.shape.kit_files import load_kit
+
+__all__ = ["input_kit", "input_kits"]
+
+
+def input_kits(task: Task) -> dict[str, Kit]:
+    """The kits among the inputs of a shard, by name."""
+    names = [each.partition("/")[2] for each in task.shard.inputs if each.startswith("exemplars/")]
+    return {name: input_kit(task, name) for name in names}
+
+
+def input_kit(task: Task, name: str) -> Kit:
+    """One kit among the inputs of a shard; read once for each process."""
+    return _load(task.input("exemplars", f"{name}.json"), task.input("exemplars", f"{name}.tar"))
+
+
+@lru_cache(maxsize=32)
+def _load(text: Path, arrays: Path) -> Kit:
+    return load_kit(text, arrays)

@@ -1,0 +1,116 @@
+"""Datasets of programs go the whole way, like those of kits; a config makes shapes in exactly one way."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.shards import bytes_array
+from stages.package.verify_files import shard_samples
+from stages.package.verify_text import text_faults
+
+STAGES = ("exemplars", "variations", "programs", "strings", "points", "sketches", "package")
+STOOLS = {
+    "programs": {
+        "program": "tests.stages.programs.stool",
+        "each_value": {"train": 1, "val": 1, "test": 1},
+        "splits": {"shards": 2},
+    },
+    "points": {"uniform": 128},
+    "sketches": {"size": 64, "backend": "raycast", "views": [{"name": "front"}]},
+    "package": {"previewed": 4},
+}
+KITS = {"exemplars": {"kits": [{"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]}]}}
+
+
+def run(command: str, *arguments: str) -> tuple[int, str]:
+    done = subprocess.run([sys.executable, "-m", "pipeline", command, *arguments], capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def config_of(folder: Path, sections: dict[str, object]) -> tuple[str, ...]:
+    path = folder / "toy.yaml"
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "license": "MIT", **sections}))
+    return "--config", str(path), "--out", str(folder / "out")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[str, ...]]:
+    folder = tmp_path_factory.mktemp("stools")
+    arguments = config_of(folder, STOOLS)
+    for stage in STAGES:
+        code, printed = run("run", stage, *arguments)
+        assert code == 0, printed
+    return folder / "out", arguments
+
+
+def samples_of(out: Path) -> dict[str, dict[str, bytes]]:
+    paths = sorted((out / "toy" / "data").rglob("*.tar"))
+    return {key: members for path in paths for key, _, members in shard_samples(path)}
+
+
+def test_samples_of_a_program_have_the_members_and_fields_of_all_samples(made: tuple[Path, tuple[str, ...]]) -> None:
+    samples = samples_of(made[0])
+    manifest = json.loads((made[0] / "toy" / "manifest.json").read_text())
+    assert len(samples) == manifest["samples"] == 3 * (8 + 8 + 2 + 6)
+    for key, members in samples.items():
+        record = json.loads(members["json"])
+        assert (record["key"], record["producer"]) == (key, "programs")
+        assert record["text"] == members["txt"].decode()
+        assert set(json.loads(record["text"])) <= {"height", "scale x", "has_rail", "rail_height"}
+        labels = bytes_array(members["labels.npy"])
+        parts = np.array([part["type"] for part in record["parts"]])
+        assert (parts[bytes_array(members["instances.npy"])] == labels).all()
+        assert {part["label"] for part in record["parts"]} <= {"seat", "leg", "rail"}
+
+
+def test_a_dataset_of_a_program_is_verified_and_has_no_corpus(made: tuple[Path, tuple[str, ...]]) -> None:
+    code, printed = run("verify", *made[1])
+    assert code == 0, printed
+    assert "geometry" in printed
+    assert not (made[0] / "toy-corpus").exists()
+
+
+def test_the_card_explains_every_parameter(made: tuple[Path, tuple[str, ...]]) -> None:
+    card = (made[0] / "toy" / "README.md").read_text()
+    assert "Height of the seat." in card
+    assert "A rail above the seat would hang in the air." in card
+
+
+def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tuple[str, ...]]) -> None:
+    samples = list(samples_of(made[0]).values())
+    assert text_faults(samples[0]) == []
+    other = next(each for each in samples if each["txt"] != samples[0]["txt"])
+    assert text_faults({**samples[0], "glb": other["glb"]})
+    assert text_faults({**samples[0], "txt": other["txt"]}) == ["its txt and its json hold different texts"]
+
+
+def test_a_row_of_the_index_finds_its_sample(made: tuple[Path, tuple[str, ...]]) -> None:
+    import pyarrow.parquet
+
+    row = pyarrow.parquet.read_table(made[0] / "toy-index" / "toy.parquet").to_pylist()[-1]
+    with (made[0] / "toy" / row["shard"]).open("rb") as shard:
+        shard.seek(row["offset"])
+        tar = tarfile.open(fileobj=io.BytesIO(shard.read(row["bytes"])))
+    assert {name.partition(".")[0] for name in tar.getnames()} == {row["key"]}
+
+
+def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
+    code, printed = run("run", "exemplars", *config_of(tmp_path, {}))
+    assert code == 2
+    assert "a dataset needs one of exemplars.kits, programs.program" in printed
+    assert "this has none" in printed
+
+
+def test_a_config_that_makes_shapes_in_two_ways_is_refused(tmp_path: Path) -> None:
+    code, printed = run("run", "exemplars", *config_of(tmp_path, {**STOOLS, **KITS}))
+    assert code == 2
+    assert "this has exemplars.kits and programs.program" in printed

@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stages.programs.editing import interpolate, mix
+from stages.programs.parameters import ParameterError, Value
+from stages.programs.program import Constraint
+from stages.programs.rules import Rule
+from tests.stages.programs.rack import PROGRAM as RACK
+from tests.stages.programs.stool import PROGRAM
+
+BASE = PROGRAM.schema.base
+
+valid_values = (
+    st.fixed_dictionaries({each.name: st.sampled_from(each.values) for each in PROGRAM.parameters})
+    .map(lambda values: PROGRAM.schema.settled(values)[0])
+    .filter(lambda values: not PROGRAM.broken(values))
+)
+
+
+class TestMix:
+    @given(valid_values, valid_values)
+    def test_a_copied_group_is_as_in_the_source_and_the_shape_is_valid(
+        self, target: dict[str, Value], source: dict[str, Value]
+    ) -> None:
+        mixed = mix(PROGRAM, target, source, ["seat"])
+        assert not PROGRAM.broken(mixed)
+        assert (mixed["height"], mixed["scale x"]) == (source["height"], source["scale x"])
+        assert mixed["has_rail"] == target["has_rail"]
+
+    @given(valid_values)
+    def test_mixing_a_shape_with_itself_changes_nothing(self, values: dict[str, Value]) -> None:
+        assert mix(PROGRAM, values, values, ["rail"]) == values
+
+    def test_what_is_not_copied_makes_room(self) -> None:
+        source = {"height": 0.3, "scale x": 1.1, "has_rail": False, "rail_height": 0.3}
+        mixed = mix(PROGRAM, {**BASE, "rail_height": 0.5}, source, ["seat"])
+        assert mixed == {"height": 0.3, "scale x": 1.1, "has_rail": True, "rail_height": 0.3}
+
+    def test_what_is_copied_moves_only_where_nothing_else_can(self) -> None:
+        # The whole constraint lies inside the copied group, whose source came from elsewhere.
+        tight = replace(PROGRAM, constraints=(Constraint("wide", Rule("height < 0.5"), "."),))
+        assert mix(tight, {**BASE, "height": 0.4}, {**BASE, "height": 0.9}, ["seat"])["height"] == 0.4
+
+    def test_a_group_that_is_not_there_is_named_with_those_that_are(self) -> None:
+        with pytest.raises(ParameterError, match="there is no group 'legs'; groups are seat, rail"):
+            mix(PROGRAM, BASE, BASE, ["legs"])
+
+    def test_no_way_to_keep_the_constraints_is_said(self) -> None:
+        never = replace(PROGRAM, constraints=(Constraint("never", Rule("height < 0"), "."),))
+        with pytest.raises(ParameterError, match="stool: no values near these keep height < 0"):
+            mix(never, BASE, BASE, ["seat"])
+
+
+class TestInterpolate:
+    @given(valid_values, valid_values, st.floats(0, 1))
+    def test_every_step_is_valid_and_the_ends_are_the_shapes(
+        self, first: dict[str, Value], last: dict[str, Value], share: float
+    ) -> None:
+        text = PROGRAM.schema.text
+        assert text(interpolate(PROGRAM, first, last, 0.0)) == text(first)
+        assert text(interpolate(PROGRAM, first, last, 1.0)) == text(last)
+        assert not PROGRAM.broken(interpolate(PROGRAM, first, last, share))
+
+    def test_continuous_parameters_move_linearly(self) -> None:
+        between = interpolate(PROGRAM, {**BASE, "height": 0.4}, {**BASE, "height": 0.8}, 0.25)
+        assert between["height"] == pytest.approx(0.5)
+
+    def test_discrete_parameters_take_the_nearest_value(self) -> None:
+        first, last = ({**RACK.schema.base, "boards": boards} for boards in (2, 6))
+        steps = [interpolate(RACK, first, last, share)["boards"] for share in (0, 0.1, 0.2, 0.4, 0.6, 0.9, 1)]
+        assert steps == [2, 2, 3, 4, 4, 6, 6]
+        assert interpolate(RACK, first, last, 0.125)["boards"] == 3
+        assert interpolate(RACK, last, first, 0.125)["boards"] == 5
+
+    def test_what_is_seen_in_one_shape_only_has_the_value_it_has_there(self) -> None:
+        bare, railed = {**BASE, "has_rail": False}, {**BASE, "rail_height": 0.5}
+        for share, expected in ((0.2, 0.3), (0.6, 0.5), (1.0, 0.5)):
+            assert interpolate(PROGRAM, bare, railed, share)["rail_height"] == expected
+            assert interpolate(PROGRAM, bare, railed, share)["has_rail"] == (share > 0.5)

@@ -1,0 +1,106 @@
+"""What every program promises: valid wherever its constraints hold, nothing floats, every value can be told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from stages.programs.curves import Part, mesh_faults
+from stages.programs.draws import Share
+from stages.programs.effect import same_geometry
+from stages.programs.intersection import meshes_meet
+from stages.programs.program import Program, find_program, program_names
+from stages.programs.sampling import Sampler, cells
+
+TOYS = ("tests.stages.programs.stool", "tests.stages.programs.rack")
+NAMES = (*program_names(), *TOYS)
+
+JOINED = 0.01
+"""Parts nearer than this share of the shape's diagonal hang together."""
+
+FOLDED = "folded over themselves"
+"""Where a rail turns tighter than its profile is wide, quads fold: no beauty, but neither a hole nor inside out."""
+
+
+def pieces(parts: Sequence[Part]) -> int:
+    """In how many pieces a shape falls."""
+    corners = np.array([part.mesh.bounds for part in parts])
+    distance = JOINED * float(np.linalg.norm(corners[:, 1].max(axis=0) - corners[:, 0].min(axis=0)))
+    piece = list(range(len(parts)))
+    for i, first in enumerate(parts):
+        for j in range(i):
+            if piece[i] != piece[j] and meshes_meet(first.mesh, parts[j].mesh, distance):
+                piece = [piece[i] if each == piece[j] else each for each in piece]
+    return len(set(piece))
+
+
+def random_values(program: Program, count: int, between: bool) -> list[dict[str, float]]:
+    """Random values that keep the constraints and the parts apart."""
+    sampler = Sampler(program, Share(), between)
+    rng = np.random.default_rng(11)
+    return [sampler.find(None, rng) for _ in range(count)]
+
+
+def check(program: Program, values: dict[str, float]) -> None:
+    text = program.schema.text(values)
+    parts = program.parts(values)
+    faults = [f"{part.label}: {fault}" for part in parts for fault in mesh_faults(part.mesh)]
+    holes = [fault for fault in faults if not fault.endswith(FOLDED)]
+    assert not holes, f"{text}: {holes}"
+    assert {part.label for part in parts} <= set(program.labels), text
+    assert pieces(parts) == 1, f"{text} falls into {pieces(parts)} pieces"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_program_is_called_as_its_file_and_its_base_is_a_shape(name: str) -> None:
+    program = find_program(name)
+    assert program.name == name.rpartition(".")[2]
+    check(program, program.schema.settled(program.schema.base)[0])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_random_shapes_are_closed_and_in_one_piece(name: str) -> None:
+    program = find_program(name)
+    for values in random_values(program, 40, between=False):
+        check(program, values)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", program_names())
+def test_two_thousand_random_shapes_are_closed_and_in_one_piece(name: str) -> None:
+    program = find_program(name)
+    for between in (False, True):
+        for values in random_values(program, 1000, between):
+            check(program, values)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_value_of_every_parameter_can_be_told_from_its_neighbours(name: str) -> None:
+    program = find_program(name)
+    sampler, rng = Sampler(program, Share(), between=False), np.random.default_rng(12)
+    for cell in cells(program):
+        sampler.find(cell, rng)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_shape_depends_on_its_values_alone(name: str) -> None:
+    program = find_program(name)
+    schema = program.schema
+    shapes = random_values(program, 5, between=True)
+    first = [program.parts(values) for values in shapes]
+    for values, parts in zip(shapes, first, strict=True):
+        again = program.parts(schema.values(schema.text(values)))
+        assert same_geometry(parts, again)
+        for part, other in zip(parts, again, strict=True):
+            np.testing.assert_array_equal(part.mesh.vertices, other.mesh.vertices)
+            np.testing.assert_array_equal(part.mesh.quads, other.mesh.quads)
+
+
+def test_parts_further_apart_than_a_hundredth_are_pieces() -> None:
+    stool = find_program(TOYS[0])
+    seat, leg, other, rail = stool.parts(stool.schema.base)
+    assert pieces([seat, leg, other, rail]) == 1
+    assert pieces([seat, rail]) == 2
+    assert pieces([leg, other]) == 2

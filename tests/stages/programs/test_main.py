@@ -1,0 +1,100 @@
+"""The command line: what it writes, and what it says of mistakes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from stages.programs.__main__ import main
+from stages.programs.program import shape_of
+from stages.programs.sheets import CELL, reveal
+from stages.views.portrait import PAPER
+from tests.stages.programs.stool import PROGRAM
+
+BLOCK, STOOL = "tests.stages.programs.block", "tests.stages.programs.stool"
+
+
+def written(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_a_mix_is_written_with_its_sources_and_a_sheet(tmp_path: Path) -> None:
+    assert main(["mix", STOOL, "1", "base", "--group", "rail", "--out", str(tmp_path)]) == 0
+    names = ("target", "source", "mixed")
+    assert written(tmp_path) == {f"{name}.{kind}" for name in names for kind in ("glb", "json")} | {"sheet.png"}
+    target, source, mixed = (PROGRAM.schema.values((tmp_path / f"{name}.json").read_text()) for name in names)
+    assert source == PROGRAM.schema.base
+    assert mixed["rail_height"] == source["rail_height"]
+    assert mixed["scale x"] == target["scale x"]
+
+
+def test_a_glb_has_the_parts_of_the_shape_by_name_in_their_places(tmp_path: Path) -> None:
+    assert main(["make", STOOL, "base", "--out", str(tmp_path)]) == 0
+    scene = trimesh.load_scene(tmp_path / "base.glb")
+    shape = shape_of(PROGRAM, PROGRAM.schema.base)
+    assert set(scene.graph.nodes_geometry) == {"seat.000", "leg.000", "leg.001", "rail.000"}
+    for name, mesh in zip(shape.part_names, shape.meshes, strict=True):
+        np.testing.assert_allclose(scene.geometry[name].bounds, mesh.bounds, atol=1e-6)
+        assert len(scene.geometry[name].faces) == len(mesh.faces)
+
+
+def test_steps_lead_from_one_shape_to_the_other(tmp_path: Path) -> None:
+    ends = [tmp_path / "a.json", tmp_path / "b.json"]
+    for path, height in zip(ends, (0.4, 0.8), strict=True):
+        path.write_text(PROGRAM.schema.text({**PROGRAM.schema.base, "height": height}))
+    out = tmp_path / "steps"
+    assert main(["interpolate", STOOL, *map(str, ends), "--steps", "3", "--out", str(out)]) == 0
+    heights = [json.loads((out / f"step-{number:02d}.json").read_text())["height"] for number in range(3)]
+    assert heights == pytest.approx([0.4, 0.6, 0.8])
+
+
+def test_inspect_prints_the_table_and_draws_a_row_a_parameter(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", BLOCK, "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "| `height` | continuous | 1 to 2 (3 values) |" in printed
+    sheet = np.asarray(Image.open(tmp_path / "block.png")).astype(int)
+    # The third and last picture of the second row: the highest block fills the frame, and nothing stands beside it.
+    assert sheet.shape[1] > 3 * CELL
+    inked = np.abs(sheet - PAPER).sum(axis=2) > 150
+    assert inked[-CELL:, 2 * CELL : 3 * CELL].any()
+    assert not inked[-CELL:, 3 * CELL + 100 :].any()
+
+
+def test_random_shapes_of_one_seed_are_the_same_sheet(tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        assert main(["sheet", BLOCK, "--count", "2", "--seed", "4", "--picture", str(tmp_path / name)]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["make", "chiar", "base"], "there is no program 'chiar'"),
+        (["make", STOOL, "nowhere.json"], "nowhere.json: No such file or directory; give a JSON file"),
+        (["make", STOOL, "{folder}/high.json"], "high.json: parameter height: 9 is out of range; it may be 0.3 to 1.0"),
+        (["make", STOOL, "{folder}/hung.json"], "hung.json: a stool needs height >= rail_height: A rail above"),
+        (["mix", STOOL, "base", "base", "--group", "legs"], "there is no group 'legs'; groups are seat, rail"),
+    ],
+)
+def test_mistakes_are_named_with_the_mend(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "high.json").write_text('{"height": 9}')
+    hung = '{"height": 0.3, "scale x": 0.5, "has_rail": true, "rail_height": 0.6}'
+    (tmp_path / "hung.json").write_text(hung)
+    asked = [each.replace("{folder}", str(tmp_path)) for each in arguments]
+    assert main([*asked, "--out", str(tmp_path / "out")]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_hidden_parameter_is_revealed_by_the_fewest_changes() -> None:
+    assert reveal(PROGRAM, PROGRAM.parameters[0]) == PROGRAM.schema.base
+    assert reveal(PROGRAM, PROGRAM.parameters[3]) == PROGRAM.schema.base

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import ConfigError
+from stages.programs.curves import Part, box
+from stages.programs.parameters import ParameterError
+from stages.programs.program import Constraint, find_program, shape_of, shape_of_text
+from stages.programs.rules import Rule
+from tests.stages.programs.stool import PROGRAM
+
+STOOL = "tests.stages.programs.stool"
+
+
+def test_shape_has_a_mesh_a_part_at_identity_poses_labelled_by_name() -> None:
+    shape = shape_of(PROGRAM, PROGRAM.schema.base)
+    assert [mesh.name for mesh in shape.meshes] == ["seat", "leg", "leg", "rail"]
+    assert shape.label_of.tolist() == [0, 1, 1, 2]
+    assert shape.assembly.types.tolist() == [0, 1, 2, 3]
+    assert shape.up == "y"
+    np.testing.assert_array_equal(shape.assembly.poses, np.tile(np.eye(4), (4, 1, 1)))
+
+
+def test_hidden_parameters_have_no_say() -> None:
+    bare = {**PROGRAM.schema.base, "has_rail": False}
+    for height in (0.1, 0.6):
+        for part, other in zip(PROGRAM.parts(bare), PROGRAM.parts({**bare, "rail_height": height}), strict=True):
+            np.testing.assert_array_equal(part.mesh.vertices, other.mesh.vertices)
+
+
+def test_shape_comes_back_from_its_text() -> None:
+    values = PROGRAM.schema.complete({"height": 0.77, "rail_height": 0.2})
+    there, back = shape_of(PROGRAM, values), shape_of_text(STOOL, PROGRAM.schema.text(values))
+    for mesh, other in zip(there.meshes, back.meshes, strict=True):
+        np.testing.assert_array_equal(mesh.vertices, other.vertices)
+    with pytest.raises(ParameterError, match="height: 5 is out of range"):
+        shape_of_text(STOOL, '{"height":5}')
+
+
+def test_a_constraint_binds_only_while_all_it_speaks_of_is_visible() -> None:
+    low = {**PROGRAM.schema.base, "height": 0.3, "rail_height": 0.6}
+    assert [each.name for each in PROGRAM.broken(low)] == ["rail_above_seat"]
+    assert not PROGRAM.broken({**low, "has_rail": False})
+    assert not PROGRAM.broken({**low, "rail_height": 0.3})
+
+
+def test_values_at_which_a_program_fails_are_named() -> None:
+    flat = replace(PROGRAM, build=lambda values: [Part("seat", box((values["height"] - 0.3, 1, 1)), (9, 9, 9))])
+    with pytest.raises(ValueError, match=r'program stool fails at {"height":0\.3,.*: three sizes'):
+        flat.parts({**PROGRAM.schema.base, "height": 0.3})
+
+
+def test_a_program_that_speaks_of_what_is_not_there_is_refused() -> None:
+    with pytest.raises(ValueError, match="constraint wide speaks of width"):
+        replace(PROGRAM, constraints=(Constraint("wide", Rule("width > 1"), "."),))
+    with pytest.raises(ValueError, match="'lid' shall stay apart; labels are seat, leg, rail"):
+        replace(PROGRAM, apart=(("seat", "lid"),))
+
+
+def test_a_program_is_found_by_its_module_and_a_missing_one_is_named() -> None:
+    assert find_program(STOOL).name == "stool"
+    with pytest.raises(ConfigError, match="there is no program 'stoool'"):
+        find_program("stoool")
+    with pytest.raises(ConfigError, match=r"no\.such"):
+        find_program("no.such")
+    with pytest.raises(ConfigError, match=r"must hold PROGRAM = Program"):
+        find_program("stages.programs.rules")

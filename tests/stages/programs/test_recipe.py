@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stages.programs.recipe import recipe_markdown
+from stages.programs.rules import Rule
+from tests.stages.programs.stool import PROGRAM
+
+
+def test_recipe_tells_every_parameter_constraint_and_label() -> None:
+    assert (
+        recipe_markdown(PROGRAM)
+        == """\
+### Program `stool`
+
+A stool of boxes, with or without a rail between its legs. 4 parameters with 24 values in all; 25 classes where a \
+hidden parameter counts as one more.
+
+#### Seat
+
+| parameter | kind | values | base | visible | what it does |
+|---|---|---|---|---|---|
+| `height` | continuous | 0.3 to 1 (8 values) | 0.6 | always | Height of the seat. |
+| `scale x` | continuous | 0.4 to 1.1 (8 values) | 0.5 | always | Width of the seat. |
+
+#### Rail
+
+| parameter | kind | values | base | visible | what it does |
+|---|---|---|---|---|---|
+| `has_rail` | binary | no or yes | yes | always | Whether a rail joins the legs. |
+| `rail_height` | continuous | 0.1 to 0.6 (6 values) | 0.3 | `has_rail` | Height of the rail. |
+
+A shape is valid when
+
+- `height >= rail_height`: A rail above the seat would hang in the air.
+
+Parts that never meet: `seat` and `rail`.
+
+Part labels: `seat`, `leg`, `rail`.
+"""
+    )
+
+
+def test_a_bar_in_a_sentence_does_not_end_its_column() -> None:
+    barred = replace(PROGRAM.parameters[0], sentence="Low | high.")
+    assert r"| Low \| high. |" in recipe_markdown(replace(PROGRAM, parameters=(barred, *PROGRAM.parameters[1:])))
+
+
+def test_a_program_without_constraints_says_nothing_of_them() -> None:
+    free = recipe_markdown(replace(PROGRAM, constraints=(), apart=()))
+    assert "valid when" not in free
+    assert "never meet" not in free
+    assert Rule("has_rail").text in free

@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import ShardFailed
+from stages.programs.curves import box, ellipsoid
+from stages.programs.draws import Share, draw
+from stages.programs.effect import has_effect, same_geometry
+from stages.programs.intersection import meshes_meet
+from stages.programs.program import Constraint, Program
+from stages.programs.repair import repaired
+from stages.programs.rules import Rule
+from stages.programs.sampling import Sampler, cells, structure_digest
+from tests.stages.programs.block import PROGRAM as BLOCK
+from tests.stages.programs.stool import PROGRAM
+
+SCHEMA = PROGRAM.schema
+BASE = SCHEMA.base
+
+
+class TestDraws:
+    def test_every_value_of_every_parameter_is_as_likely(self) -> None:
+        draws = draw(SCHEMA, 20_000, np.random.default_rng(1), between=False)
+        for parameter, row in zip(PROGRAM.parameters[:3], draws.columns, strict=False):
+            found, counts = np.unique(row, return_counts=True)
+            np.testing.assert_array_equal(found, np.array(parameter.values, dtype=float))
+            assert np.abs(counts * len(found) / 20_000 - 1).max() < 0.1
+
+    def test_continuous_values_between_those_listed_fill_the_range(self) -> None:
+        draws = draw(SCHEMA, 5000, np.random.default_rng(1), between=True)
+        height, _, rail, _ = draws.columns
+        assert len(np.unique(height)) > 2000
+        assert height.min() >= 0.3
+        assert height.max() <= 1.0
+        assert set(rail.tolist()) == {0.0, 1.0}
+
+    def test_a_fixed_value_stands_in_every_draw(self) -> None:
+        draws = draw(SCHEMA, 50, np.random.default_rng(1), between=False, fixed=("scale x", 0.5))
+        assert set(draws.columns[1].tolist()) == {0.5}
+
+    def test_shares_that_make_up_all_own_each_shape_once(self) -> None:
+        draws = draw(SCHEMA, 3000, np.random.default_rng(2), between=False)
+        cuts = [0.0, 0.1, 0.35, 0.9, 1.0]
+        owned = [draws.owned(Share(shapes=each)) for each in itertools.pairwise(cuts)]
+        np.testing.assert_array_equal(np.sort(np.concatenate(owned)), np.arange(3000))
+        texts = [{SCHEMA.text(SCHEMA.from_vector(draws.columns[:, k])) for k in each} for each in owned]
+        assert sum(map(len, texts)) == len(set().union(*texts))
+
+    def test_shares_are_as_large_as_they_say(self) -> None:
+        draws = draw(SCHEMA, 50_000, np.random.default_rng(3), between=True)
+        share = Share(shapes=(0.2, 0.5))
+        assert len(draws.owned(share)) / 50_000 == pytest.approx(share.size, abs=0.01)
+
+    def test_shapes_of_one_structure_stand_in_one_share_of_structures(self) -> None:
+        draws = draw(SCHEMA, 500, np.random.default_rng(4), between=True)
+        for share in (Share(structures=(0.0, 0.5)), Share(structures=(0.5, 1.0))):
+            owned = draws.owned(share)
+            rails = set(draws.columns[2, owned].tolist())
+            assert len(owned) == sum(each in rails for each in draws.columns[2].tolist())
+
+
+class TestRepair:
+    def test_the_nearest_values_that_keep_the_constraints(self) -> None:
+        broken = {**BASE, "height": 0.4, "rail_height": 0.5}
+        assert repaired(PROGRAM, broken, {"height"}) == {**broken, "rail_height": 0.4}
+        assert repaired(PROGRAM, broken, {"rail_height"}) == {**broken, "height": 0.5}
+        assert repaired(PROGRAM, broken, {"height", "rail_height"}) is None
+
+    def test_valid_values_stay_as_they_are(self) -> None:
+        assert repaired(PROGRAM, BASE) == BASE
+
+    def test_several_constraints_at_once(self) -> None:
+        low = Constraint("low", Rule("height + rail_height <= 0.7"), ".")
+        program = replace(PROGRAM, constraints=(*PROGRAM.constraints, low))
+        found = repaired(program, {**BASE, "height": 0.5, "rail_height": 0.6})
+        assert found is not None
+        assert not program.broken(found)
+
+
+class TestEffect:
+    def test_a_parameter_takes_effect_where_its_neighbours_look_different(self) -> None:
+        assert all(has_effect(PROGRAM, BASE, name, PROGRAM.parts(BASE)) for name in SCHEMA.by_name)
+
+    def test_a_saturated_parameter_takes_no_effect(self) -> None:
+        stiff = replace(PROGRAM, build=lambda values: PROGRAM.build({**values, "height": max(values["height"], 0.6)}))
+        for height, expected in ((0.3, False), (0.5, False), (0.6, False), (0.7, True)):
+            values = {**BASE, "height": height}
+            assert has_effect(stiff, values, "height", stiff.parts(values)) == expected
+
+    def test_values_that_constraints_forbid_are_passed_over(self) -> None:
+        # Under a seat at 0.4 the rail cannot rise, so only its lower neighbour is asked.
+        deaf = replace(PROGRAM, build=lambda values: PROGRAM.build({**values, "rail_height": 0.2}))
+        values = {**BASE, "height": 0.4, "rail_height": 0.4}
+        assert has_effect(PROGRAM, values, "rail_height", PROGRAM.parts(values))
+        assert not has_effect(deaf, values, "rail_height", deaf.parts(values))
+
+    def test_what_comes_into_view_makes_room_for_the_change(self) -> None:
+        low_seat = SCHEMA.settled({**BASE, "height": 0.3, "has_rail": False})[0]
+        high_rail = replace(PROGRAM, parameters=(*PROGRAM.parameters[:3], replace(PROGRAM.parameters[3], base=0.6)))
+        assert high_rail.broken({**low_seat, "has_rail": True, "rail_height": 0.6})
+        assert has_effect(high_rail, high_rail.schema.settled(low_seat)[0], "has_rail", high_rail.parts(low_seat))
+
+    def test_geometry_is_the_same_only_part_by_part(self) -> None:
+        parts = PROGRAM.parts(BASE)
+        assert same_geometry(parts, PROGRAM.parts(dict(BASE)))
+        assert not same_geometry(parts, parts[:-1])
+        assert not same_geometry(parts, [*parts[:-1], replace(parts[-1], label="leg")])
+        assert not same_geometry(parts, PROGRAM.parts({**BASE, "scale x": 0.5001}))
+
+
+class TestIntersection:
+    @pytest.mark.parametrize(("gap", "met"), [(-0.2, True), (0.01, False), (3.0, False)])
+    def test_boxes_side_by_side(self, gap: float, met: bool) -> None:
+        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2))) == met
+        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2)), distance=0.02) == (gap < 0.02)
+
+    def test_a_part_inside_another_meets_it_without_touching_its_surface(self) -> None:
+        ball, crumb = ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2))
+        assert meshes_meet(ball, crumb)
+        assert meshes_meet(crumb, ball)
+
+    def test_a_part_in_the_corner_of_a_box_around_another_does_not_meet_it(self) -> None:
+        assert not meshes_meet(ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2), (0.85, 0.85, 0.85)))
+
+
+class TestSampler:
+    def sampler(self, program: Program = PROGRAM, between: bool = False) -> Sampler:
+        return Sampler(program, Share(), between)
+
+    def test_there_is_a_cell_for_every_value(self) -> None:
+        assert len(cells(PROGRAM)) == 8 + 8 + 2 + 6
+        assert cells(PROGRAM)[8:10] == [("scale x", 0), ("scale x", 1)]
+
+    @pytest.mark.parametrize("cell", cells(PROGRAM), ids=str)
+    def test_a_found_shape_has_the_value_shown_valid_and_effective(self, cell: tuple[str, int]) -> None:
+        name, index = cell
+        sampler = self.sampler()
+        rng = np.random.default_rng(5)
+        texts = set()
+        for _ in range(6):
+            values = sampler.find(cell, rng)
+            assert values[name] == SCHEMA.by_name[name].values[index]
+            assert name in SCHEMA.settled(values)[1]
+            assert not PROGRAM.broken(values)
+            assert has_effect(PROGRAM, values, name, PROGRAM.parts(values))
+            # The rail is half as thick again as it may be under the seat.
+            assert not values["has_rail"] or values["height"] > values["rail_height"] + 0.05
+            texts.add(SCHEMA.text(values))
+        assert len(texts) == 6
+
+    def test_reasons_of_refusal_are_counted_by_parameter(self) -> None:
+        sampler = self.sampler()
+        rng = np.random.default_rng(6)
+        for _ in range(20):
+            sampler.find(("rail_height", 4), rng)
+        assert {name for name, _ in sampler.refused} == {"rail_height"}
+        assert {reason for _, reason in sampler.refused} >= {"hidden", "breaks rail_above_seat", "seat meets rail"}
+        assert sampler.tried == 20 + sum(sampler.refused.values())
+
+    def test_a_value_that_no_shape_can_have_is_named_with_the_reasons(self) -> None:
+        never = replace(PROGRAM, constraints=(Constraint("never", Rule("height < 0"), "."),))
+        with pytest.raises(
+            ShardFailed, match=r"stool: no shape with height = 0\.4 in 2\d+ tries \(2\d+ breaks never\)"
+        ):
+            self.sampler(never).find(("height", 1), np.random.default_rng(1))
+
+    def test_a_finite_program_ends_when_all_its_shapes_are_found(self) -> None:
+        sampler = self.sampler(BLOCK)
+        rng = np.random.default_rng(1)
+        found = {BLOCK.schema.text(sampler.find(None, rng)) for _ in range(6)}
+        assert len(found) == 6
+        with pytest.raises(ShardFailed, match="alike"):
+            sampler.find(None, rng)
+
+    def test_structure_is_what_is_visible_and_not_continuous(self) -> None:
+        bare = {**BASE, "has_rail": False}
+        assert structure_digest(PROGRAM, BASE) == structure_digest(PROGRAM, {**BASE, "height": 0.9})
+        assert structure_digest(PROGRAM, BASE) != structure_digest(PROGRAM, bare)
+        assert structure_digest(PROGRAM, BASE) != structure_digest(replace(PROGRAM, name="bench"), BASE)

@@ -1,0 +1,145 @@
+"""The stage in the real mill: counts, splits, no two alike, the same bytes with any number of workers."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import yaml
+
+from stages.programs.effect import has_effect
+from stages.programs.program import find_program, shape_of_text
+from stages.programs.sampling import structure_digest
+from stages.shape.sample import Sample, read_samples
+from tests.stages.programs.stool import PROGRAM as STOOL_PROGRAM
+
+STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
+EACH_VALUE = {"program": STOOL, "each_value": {"train": 2, "val": 1, "test": 1}, "splits": {"shards": 2}}
+SWEEP = {
+    "program": RACK,
+    "mode": "sweep",
+    "sweep": {"samples": 200, "val": 0.2, "test": 0.15},
+    "splits": {"shards": 1, "samples_per_shard": 60},
+}
+
+
+def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[int, str, Path]:
+    """Run the stage; its exit code, what it printed and its folder."""
+    path = folder / "toy.yaml"
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section}))
+    out = folder / f"out-{workers}"
+    command = [sys.executable, "-m", "pipeline", "run", "programs", "--config", str(path), "--out", str(out)]
+    done = subprocess.run([*command, "--workers", str(workers)], capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr, out / ".work" / "toy" / "programs"
+
+
+def shards_of(folder: Path) -> dict[str, list[Sample]]:
+    return {path.stem: list(read_samples(path)) for path in sorted(folder.glob("toy-*.tar"))}
+
+
+def digests(folder: Path) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.glob("toy-*.tar"))}
+
+
+@pytest.fixture(scope="module")
+def stools(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, Path]:
+    folder = tmp_path_factory.mktemp("stools")
+    code, printed, made = make(folder, EACH_VALUE)
+    assert code == 0, printed
+    return folder, printed, made
+
+
+@pytest.fixture(scope="module")
+def racks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    code, printed, made = make(tmp_path_factory.mktemp("racks"), SWEEP)
+    assert code == 0, printed
+    return made
+
+
+def test_every_value_is_fixed_in_as_many_shapes_of_each_split_as_asked(stools: tuple[Path, str, Path]) -> None:
+    counts: Counter[tuple[str, str, int]] = Counter()
+    for shard, samples in shards_of(stools[2]).items():
+        for sample in samples:
+            assert sample.split == shard.split("-")[1]
+            counts[sample.split, sample.lineage["parameter"], sample.lineage["class"]] += 1
+    cells = [(each.name, index) for each in STOOL_PROGRAM.parameters for index in range(len(each.values))]
+    wanted = {("train", *cell): 2 for cell in cells} | {
+        (split, *cell): 1 for cell in cells for split in ("val", "test")
+    }
+    assert counts == wanted
+
+
+def test_the_fixed_value_is_visible_and_takes_effect(stools: tuple[Path, str, Path]) -> None:
+    schema = STOOL_PROGRAM.schema
+    for samples in shards_of(stools[2]).values():
+        for sample in samples:
+            values, name = schema.values(sample.text), sample.lineage["parameter"]
+            assert name in json.loads(sample.text)
+            assert schema.classes(values)[list(schema.by_name).index(name)] == sample.lineage["class"]
+            assert has_effect(STOOL_PROGRAM, values, name, STOOL_PROGRAM.parts(values))
+            assert not STOOL_PROGRAM.broken(values)
+
+
+@pytest.mark.parametrize("made", ["stools", "racks"])
+def test_no_two_shapes_are_alike_and_keys_differ(made: str, request: pytest.FixtureRequest) -> None:
+    fixture = request.getfixturevalue(made)
+    samples = [each for shard in shards_of(fixture[2] if made == "stools" else fixture).values() for each in shard]
+    assert len({each.text for each in samples}) == len(samples)
+    assert sorted(each.key for each in samples) == [f"{made[:-1]}-{number:06d}" for number in range(len(samples))]
+
+
+def test_a_sample_is_its_parameters(stools: tuple[Path, str, Path]) -> None:
+    sample = shards_of(stools[2])["toy-train-000000"][0]
+    assert (sample.producer, sample.kit) == ("programs", STOOL)
+    assert len(sample.assembly) == 0
+    values = STOOL_PROGRAM.schema.values(sample.text)
+    assert sample.graph == structure_digest(STOOL_PROGRAM, values)
+    assert len(shape_of_text(sample.kit, sample.text)) == len(STOOL_PROGRAM.parts(values))
+
+
+def test_any_number_of_workers_makes_the_same_bytes(stools: tuple[Path, str, Path]) -> None:
+    code, printed, made = make(stools[0], EACH_VALUE, workers=2)
+    assert code == 0, printed
+    assert digests(made) == digests(stools[2])
+    assert len(digests(made)) == 6
+
+
+def test_refusals_are_counted_by_reason_and_told(stools: tuple[Path, str, Path]) -> None:
+    assert "96 shapes of" in stools[1]
+    assert "% hidden" in stools[1]
+    assert "% seat meets rail" in stools[1]
+    written = [path.read_text() for path in sorted((stools[2] / "rejects").glob("*.jsonl"))]
+    rejects = [json.loads(line) for line in "".join(written).splitlines()]
+    assert rejects
+    assert {each["item"] for each in rejects} <= set(STOOL_PROGRAM.schema.by_name)
+
+
+def test_a_sweep_has_as_many_shapes_as_asked_in_splits_by_structure(racks: Path) -> None:
+    shards = shards_of(racks)
+    splits: dict[str, list[Sample]] = {}
+    for name, samples in shards.items():
+        assert len(samples) <= 60
+        splits.setdefault(name.split("-")[1], []).extend(samples)
+    assert {split: len(samples) for split, samples in splits.items()} == {"train": 130, "val": 40, "test": 30}
+    structures = {split: {each.graph for each in samples} for split, samples in splits.items()}
+    assert len(set().union(*structures.values())) == sum(map(len, structures.values()))
+    listed = set(find_program(RACK).schema.by_name["width"].values)
+    widths = {json.loads(each.text)["width"] for each in splits["train"]}
+    assert len(widths - listed) > 100
+
+
+def test_a_dataset_without_a_program_has_no_shards(tmp_path: Path) -> None:
+    code, printed, made = make(tmp_path, {})
+    assert code == 0, printed
+    assert not shards_of(made)
+
+
+def test_a_program_that_is_not_there_is_named(tmp_path: Path) -> None:
+    code, printed, _ = make(tmp_path, {"program": "chiar"})
+    assert code == 2
+    assert "there is no program 'chiar'" in printed
