@@ -197,7 +197,7 @@ class Search:
             return DUPLICATE
         if any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
-        outcome = self._ask_until_known(validate)
+        outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
         return self._variant(a, b, int(refinement_key(ws, False)), int(refinement_key(ws, True)))
@@ -215,10 +215,10 @@ class Search:
     def _cell(self, features: Float32Array) -> Cell:
         return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)
 
-    def _ask_until_known(self, kernel: Callable[..., int]) -> int:
-        """Run a kernel, and again after answering the contacts that it did not know."""
+    def _validate(self) -> int:
+        """Compute the shape graph anew, and again after answering the contacts that were not known."""
         while True:
-            outcome = kernel(self.tables, self.answers.table, self._ws)
+            outcome: int = validate(self.tables, self.answers.table, self._ws)
             if outcome != Outcome.UNKNOWN:
                 return outcome
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
