@@ -32,10 +32,7 @@ from stages.variations.settings import SearchConfig, VariationsConfig
 
 __all__ = ["Finds", "configured", "explore"]
 
-CONFIGS = (
-    *("castle", "dungeon", "spacebase-hall", "ring-segments", "ball-track", "racetrack", "bridge", "temple"),
-    "crossvault",
-)
+CONFIGS = ("castle", "dungeon", "spacebase-hall", "ring-segments", "ball-track", "racetrack", "bridge", "temple")
 SLICE = 2000
 WARM_UP = 300
 HEADER = (
