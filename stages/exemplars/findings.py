@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from stages.exemplars.read import Model
 from stages.shape.arrays import IntArray
 from stages.shape.contact import ContactTest
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
-from stages.shape.neighbourhoods import enumerate_admitted
 from stages.shape.pose import pose_vectors, relative_poses
 
 __all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "ways_together"]
@@ -29,8 +27,6 @@ SMALL = 12
 """Shapes of at most so many parts have no hubs: there, to touch a third of all parts is nothing."""
 LOOSER = (2.0, 5.0, 10.0, 20.0, 50.0)
 """Multiples of the contact tolerance that are tried for shapes in pieces."""
-LISTED = 500_000
-"""A grammar that admits more neighbourhoods than this is too loose to be searched with."""
 NAMED = 5
 """So many parts are named in a sentence."""
 
@@ -83,11 +79,6 @@ def refusals(
                 f"{model.path}: shares no part type with the other shapes of its kit, so nothing can be exchanged; "
                 "make it a kit of its own, or raise `congruence_tolerance` if the parts are meant to be alike"
             )
-    if sum(1 for _ in islice(enumerate_admitted(kit.grammar), LISTED + 1)) > LISTED:
-        yield (
-            f"kit {kit.name}: `grammar: {kit.grammar.strictness}` admits more than {LISTED:,} neighbourhoods, for some "
-            "parts touch very many others; take a stricter `grammar`, or leave such parts out with `hubs`"
-        )
 
 
 def kit_warnings(kit: Kit) -> Iterator[str]:

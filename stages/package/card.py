@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW
+from stages.variations.measures import measure_table
 
 __all__ = ["card", "citation", "member_text", "size_category"]
 
@@ -75,6 +76,7 @@ def card(
     sources: Mapping[str, str],
     search: Sequence[str],
     rejects: Mapping[str, int],
+    measures: Mapping[str, Mapping[str, Any]],
     recipes: Sequence[str],
 ) -> str:
     """The card's text.
@@ -82,7 +84,7 @@ def card(
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
     of the package's shards; rows: those of the index; producer: the stage that made the samples; sources: the kits or
     programs by name, with what there is to say of them in short; search: how each search ended, in words; rejects:
-    refused items by reason; recipes: a section of Markdown for each program.
+    refused items by reason; measures: of the variants of each kit; recipes: a section of Markdown for each program.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
@@ -106,6 +108,7 @@ def card(
         _split_table(splits, shards),
         _source_table(sources, rows),
         SPLITS[producer],
+        *(["## How different they are", measure_table(measures)] if measures else []),
         "## A sample",
         _member_table([str(member) for member in shards[0]["members"]]),
         "All coordinates are in the units of the kit or program and upright: y points up, in the mesh, the points and "

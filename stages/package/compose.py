@@ -25,8 +25,8 @@ def compose_dataset(task: Task) -> Outcome:
     """Write card, Croissant, manifest, checksums and index.
 
     The shard's params hold `facts`, `producer` (the stage that made the samples), `sections` (the whole config),
-    `shards` (summaries of the package's shards), `search` and `rejects` (what the card says of the search), `preview`
-    (the shard with the picture) and `package` (the version of this stage).
+    `shards` (summaries of the package's shards), `search`, `rejects` and `measures` (what the card says of the search
+    and its finds), `preview` (the shard with the picture) and `package` (the version of this stage).
     """
     params = task.shard.params
     producer = params["producer"]
@@ -44,10 +44,11 @@ def compose_dataset(task: Task) -> Outcome:
     members = {member: member_text(member) for member in shards[0]["members"]}
     files = {
         CARD: card(
-            facts, shards, rows, producer, sources, params["search"], params["rejects"], _recipes(producer, sources)
+            *(facts, shards, rows, producer, sources, params["search"], params["rejects"], params["measures"]),
+            _recipes(producer, sources),
         ).encode(),
         CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
-        MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["package"])),
+        MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["measures"], params["package"])),
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))

@@ -17,7 +17,7 @@ from stages.package.settings import PackageConfig
 
 __all__ = ["STAGE"]
 
-VERSION = 2
+VERSION = 3
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
@@ -53,6 +53,7 @@ def plan(plan: Plan) -> list[Shard]:
         "shards": filled,
         "search": _search_endings(plan),
         "rejects": _rejects(plan, producer),
+        "measures": _measures(plan),
         "preview": PICTURE,
         "package": VERSION,
     }
@@ -116,6 +117,13 @@ def _rejects(plan: Plan, producer: str) -> dict[str, int]:
     for shard in plan.shards(producer):
         counts.update(plan.rejects(producer, shard))
     return dict(sorted(counts.items()))
+
+
+def _measures(plan: Plan) -> dict[str, Any]:
+    """What the variants of each kit are worth, where they are variants."""
+    assignment = f"{plan.config.name}-assignment"
+    summary = plan.summary("variations", assignment) if assignment in plan.shards("variations") else None
+    return dict(summary["kits"]) if summary is not None else {}
 
 
 def _facts(plan: Plan) -> dict[str, Any]:

@@ -13,12 +13,12 @@ Hub types stand outside: a hub may have any neighbours, and hubs do not count am
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import combinations, pairwise
+from collections.abc import Mapping
+from itertools import combinations
 
 from stages.shape.kit import Grammar, Multiset, Strictness
 
-__all__ = ["STRICTNESS", "admits", "enumerate_admitted"]
+__all__ = ["STRICTNESS", "admits"]
 
 STRICTNESS: tuple[Strictness, ...] = ("multiset", "count_and_set", "count_and_pairs")
 """The levels, the strictest first."""
@@ -39,57 +39,6 @@ def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
         return False
     around, pairs = _together(observed)
     return types <= around and all(pair in pairs for pair in combinations(sorted(types), 2))
-
-
-def enumerate_admitted(grammar: Grammar) -> Iterator[tuple[int, Multiset]]:
-    """Every type that is no hub, with every neighbourhood that it may have without hubs, each once.
-
-    There may be very many: a reader stops where it has seen enough.
-    """
-    for part_type, observed in grammar.neighbourhoods.items():
-        if part_type not in grammar.hubs:
-            for multiset in _admitted(observed, grammar.strictness):
-                yield part_type, multiset
-
-
-def _admitted(observed: Mapping[Multiset, int], strictness: Strictness) -> Iterator[Multiset]:
-    if strictness == "multiset":
-        yield from observed
-        return
-    sizes = sorted({_size(each) for each in observed})
-    if strictness == "count_and_set":
-        shapes: Iterator[tuple[int, tuple[int, ...]]] = iter(
-            sorted({(_size(each), tuple(other for other, _ in each)) for each in observed})
-        )
-    else:
-        shapes = ((total, types) for types in _cliques(*_together(observed), sizes[-1]) for total in sizes)
-    for total, types in shapes:
-        for counts in _compositions(total, len(types)):
-            yield tuple(zip(types, counts, strict=True))
-
-
-def _cliques(types: set[int], pairs: set[tuple[int, int]], most: int) -> Iterator[tuple[int, ...]]:
-    """Every set of at most `most` types, in ascending order, of which each two are among `pairs`; the empty one too."""
-    waiting: list[tuple[int, ...]] = [()]
-    while waiting:
-        clique = waiting.pop()
-        yield clique
-        if len(clique) < most:
-            waiting.extend(
-                (*clique, other)
-                for other in sorted(types)
-                if (not clique or other > clique[-1]) and all((each, other) in pairs for each in clique)
-            )
-
-
-def _compositions(total: int, terms: int) -> Iterator[tuple[int, ...]]:
-    """Every way to write `total` as a sum of so many whole numbers above 0, in order."""
-    if terms == 0 or total == 0:
-        yield from [()] if terms == total else []
-        return
-    for bars in combinations(range(1, total), terms - 1):
-        edges = (0, *bars, total)
-        yield tuple(high - low for low, high in pairwise(edges))
 
 
 def _together(observed: Mapping[Multiset, int]) -> tuple[set[int], set[tuple[int, int]]]:

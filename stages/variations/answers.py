@@ -9,7 +9,8 @@ from stages.shape.contact import ContactTest
 from stages.shape.docking import DockingTable, symmetric_images
 from stages.shape.kit import Kit
 from stages.shape.penetration import PenetrationTest, depth_bound
-from stages.variations.kernels import FORBIDDEN, LABELS, NONE, Answers, Workspace, hash_key, quantise
+from stages.variations.layout import FORBIDDEN, LABELS, NONE, Answers, Workspace
+from stages.variations.lookup import hash_key, quantise
 from stages.variations.tables import QUANTUM
 
 __all__ = ["ContactAnswers"]

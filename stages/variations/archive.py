@@ -1,21 +1,23 @@
 """The archive: a grid over the features of variants, with counts of its cells and of the type histograms.
 
-It says which parents are rare, and which variants the pool has enough of (quality-diversity search).
+It says which parents are rare, and which variants add to what is there (quality-diversity search).
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 
 from stages.shape.arrays import Float32Array
 from stages.variations.features import AXES, Axis
 
-__all__ = ["Archive", "Cell", "cell_of"]
+__all__ = ["Archive", "Cell", "Place", "cell_of"]
 
 Cell = tuple[int, ...]
+
+Place = tuple[int, int]
+"""Where a variant stands: the numbers of its cell and of its histogram, in the order in which they were first seen."""
 
 _SHARES = ("mixture", "blend", "distance")
 
@@ -40,18 +42,37 @@ class Archive:
 
     def __init__(self, quota: int) -> None:
         self.quota = quota
-        self.cells: Counter[Cell] = Counter()
-        self.histograms: Counter[int] = Counter()
+        self._cells, self._histograms = _Tally(), _Tally()
 
-    def add(self, cell: Cell, histogram: int) -> None:
-        """Count one variant, `histogram` being a hash of its type histogram."""
-        self.cells[cell] += 1
-        self.histograms[histogram] += 1
+    def add(self, cell: Cell, histogram: int) -> Place:
+        """Count one variant, `histogram` being a hash of its type histogram, and say where it stands."""
+        return self._cells.add(cell), self._histograms.add(histogram)
 
-    def crowd(self, cell: Cell, histogram: int) -> int:
-        """How common such variants are; the rarest have the least."""
-        return self.cells[cell] * self.histograms[histogram]
+    def crowds(self, places: np.ndarray) -> np.ndarray:
+        """How common the variants at some places, int (k, 2), are, int64 (k,); the rarest have the least."""
+        crowds: np.ndarray = self._cells.counts[places[:, 0]] * self._histograms.counts[places[:, 1]]
+        return crowds
+
+    def has_histogram(self, histogram: int) -> bool:
+        """Whether a variant with this histogram was counted."""
+        return histogram in self._histograms.numbers
 
     def is_full(self, cell: Cell, histogram: int) -> bool:
         """Whether the archive has enough of such variants: the histogram is known and the cell has its quota."""
-        return histogram in self.histograms and self.cells[cell] >= self.quota
+        number = self._cells.numbers.get(cell)
+        return self.has_histogram(histogram) and number is not None and self._cells.counts[number] >= self.quota
+
+
+class _Tally:
+    """Things by the number under which they were first seen, and how often each was."""
+
+    def __init__(self) -> None:
+        self.numbers: dict[Hashable, int] = {}
+        self.counts = np.zeros(1024, dtype=np.int64)
+
+    def add(self, thing: Hashable) -> int:
+        number = self.numbers.setdefault(thing, len(self.numbers))
+        if number == len(self.counts):
+            self.counts = np.concatenate([self.counts, np.zeros_like(self.counts)])
+        self.counts[number] += 1
+        return number

@@ -11,7 +11,7 @@ from stages.shape.contact import world_boxes
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 from stages.shape.pose import invert, pose_vectors
 from stages.variations.answers import ContactAnswers
-from stages.variations.kernels import FORBIDDEN, NONE
+from stages.variations.layout import FORBIDDEN, NONE
 
 __all__ = ["Backdrop"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.pose import rigid_fit
-from stages.variations.kernels import BOUNDARY, UPRIGHT, KitTables, Outcome, ShapeTables, Workspace
+from stages.variations.layout import BOUNDARY, UPRIGHT, KitTables, Outcome, ShapeTables, Workspace
 
 __all__ = ["match_centroids"]
 

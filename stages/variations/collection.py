@@ -17,8 +17,10 @@ from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.variations.answers import ContactAnswers
 from stages.variations.backdrop import Backdrop
-from stages.variations.measures import pool_measures
+from stages.variations.measures import SAMPLE, edit_measures, pool_measures
+from stages.variations.meeting import meeting
 from stages.variations.pool import FoundVariants, PoolIndex
+from stages.variations.rounds import last_pool
 from stages.variations.selection import select
 from stages.variations.settings import VariationsConfig
 
@@ -29,7 +31,10 @@ def assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
     """The shard that shares out the variants, once the search of every kit has ended."""
     kits = [kit.name for kit in plan.config.section(ExemplarsConfig).kits]
     inputs = (*(f"exemplars/{kit}" for kit in kits), *(f"variations/{each.name}" for each in search))
-    return Shard(f"{plan.config.name}-assignment", {"job": "assignment", "kits": kits}, inputs)
+    ends = {kit: last_pool(plan, kit) for kit in kits}
+    searched = {kit: {"curve": end["curve"], "crossings": end["crossings"]} for kit, end in ends.items()}
+    params = {"job": "assignment", "kits": kits, "searched": searched}
+    return Shard(f"{plan.config.name}-assignment", params, inputs)
 
 
 def collection_shards_of(plan: Plan, assignment: Shard) -> list[Shard]:
@@ -63,9 +68,19 @@ def run_assignment(task: Task) -> Outcome:
     for number, name in enumerate(task.shard.params["kits"]):
         kit = input_kit(task, name)
         pool = PoolIndex.of(task, name, len(kit.types))
-        chosen = select(kit, pool.counts, pool.features, config.per_kit, config.selection, task.rng("selection", name))
+        rng = task.rng("selection", name)
+        chosen = select(kit, pool.counts, pool.features, config.per_kit, config.selection, rng)
         taken = pool.counts[chosen], pool.features[chosen], pool.digests[chosen]
-        measures[name] = {"pool": len(pool), "variants": len(chosen), **pool_measures(*taken, config.search.novelty)}
+        sample = rng.permutation(chosen)[:SAMPLE].tolist()
+        measures[name] = {
+            "pool": len(pool),
+            "variants": len(chosen),
+            **pool_measures(*taken, config.search.novelty),
+            "edits": edit_measures(kit, [found.assembly(at)[0] for found, at in pool.variants(task, sample)]),
+            **task.shard.params["searched"][name],
+            "strictness": kit.grammar.strictness,
+            "meeting": meeting(kit),
+        }
         for place, variant in enumerate(chosen.tolist()):
             lane, index = pool.rows[variant].tolist()
             groups.setdefault((number, bytes(pool.digests[variant, 0])), []).append(len(rows))

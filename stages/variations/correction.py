@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.shape.docking import DockingTable
 from stages.shape.pose import invert
-from stages.variations.kernels import EDGES, PARTS, Workspace
+from stages.variations.layout import EDGES, PARTS, Workspace
 
 __all__ = ["correct_orientations"]
 

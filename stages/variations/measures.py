@@ -7,13 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from stages.shape.kit import Assembly, Kit
 from stages.variations.archive import cell_of
+from stages.variations.edit_distance import edit_bounds
 from stages.variations.features import AXES, MIXED
+from stages.variations.meeting import meeting_words
 from stages.variations.settings import NoveltyConfig
 
-__all__ = ["described", "growth", "pool_measures"]
+__all__ = ["SAMPLE", "described", "edit_measures", "growth", "measure_table", "pool_measures"]
 
 QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
+SAMPLE = 24
+"""So many of the chosen variants are compared with the exemplars part by part."""
 
 
 def pool_measures(
@@ -43,6 +48,16 @@ def pool_measures(
     }
 
 
+def edit_measures(kit: Kit, sample: Sequence[Assembly]) -> dict[str, Any]:
+    """How many edits of the shape graph lie between each of some variants and its nearest exemplar, as JSON: bounds
+    from below and above, `low` and `high`, means over the sample."""
+    bounds = [
+        np.min([edit_bounds(each, exemplar.assembly) for exemplar in kit.exemplars], axis=0).tolist() for each in sample
+    ]
+    low, high = np.mean(bounds, axis=0).round(1).tolist() if bounds else (0.0, 0.0)
+    return {"sample": len(sample), "low": low, "high": high}
+
+
 def _share(holds: np.ndarray) -> float:
     return round(float(holds.mean()), 4) if len(holds) else 0.0
 
@@ -50,13 +65,48 @@ def _share(holds: np.ndarray) -> float:
 def described(measures: Mapping[str, Any]) -> str:
     """The measures of the variants chosen from a pool, in words."""
     low, _, median, _, high = measures["parts"] or [0] * 5
+    edits, met = measures["edits"], _met(measures)
     return (
         f"chosen {measures['variants']:,} of {measures['pool']:,}: {measures['graphs']:,} distinct graphs, "
         f"{measures['histograms']:,} distinct histograms in {measures['cells']:,} cells; "
         f"{measures['mixed']:.0%} mix material of the exemplars, {measures['blended']:.0%} "
         f"their neighbourhoods; mean distance E to the nearest {measures['distance']:.2f}; "
-        f"{low:.0f} to {high:.0f} parts, median {median:.0f}"
+        f"{edits['low']:.0f} to {edits['high']:.0f} edits from the nearest on a sample; "
+        f"{low:.0f} to {high:.0f} parts, median {median:.0f}" + (f"; {met}" if met else "")
     )
+
+
+def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
+    """The measures of the variants chosen of each kit as Markdown: a table, and how each search went."""
+    lines = [
+        "| kit | found | chosen | graphs | histograms | cells | mixed | blended | E | edits | parts |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- | --- |",
+    ]
+    for kit, each in measures.items():
+        edits, sizes = each["edits"], " / ".join(f"{size:.0f}" for size in each["parts"][1:4])
+        lines.append(
+            f"| {kit} | {each['pool']:,} | {each['variants']:,} | {each['graphs']:,} | {each['histograms']:,} | "
+            f"{each['cells']:,} | {each['mixed']:.0%} | {each['blended']:.0%} | {each['distance']:.2f} | "
+            f"{edits['low']:.0f} to {edits['high']:.0f} | {sizes} |"
+        )
+    lines += [
+        "",
+        "Graphs, histograms: distinct ones, of types of parts. Cells: filled ones of the archive of sizes, cycles, "
+        "mixture and distance. Mixed: with at least a tenth of material of other exemplars than the main one. Blended: "
+        "with neighbourhoods that different exemplars alone show. E: mean histogram distance to the nearest exemplar, "
+        "0 to 1. Edits: bounds of the mean number of edits of the shape graph to the nearest exemplar, on a sample. "
+        "Parts: a tenth, half and nine tenths have at most so many.",
+        "",
+    ]
+    lines += [f"- {kit}: histograms found: {growth(each['curve'])}" for kit, each in measures.items()]
+    lines += [f"- {kit}: {words}" for kit, each in measures.items() if (words := _met(each))]
+    return "\n".join(lines)
+
+
+def _met(measures: Mapping[str, Any]) -> str:
+    if not measures["meeting"]:
+        return ""
+    return meeting_words(measures["meeting"], measures["strictness"], measures["crossings"])
 
 
 def growth(curve: Sequence[Sequence[int]]) -> str:

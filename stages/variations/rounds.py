@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,7 +21,7 @@ from stages.variations.answers import ContactAnswers
 from stages.variations.archive import cell_of
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
-from stages.variations.search import FULL, Search
+from stages.variations.search import SPARE, Search
 from stages.variations.settings import VariationsConfig
 
 __all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
@@ -38,17 +39,16 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     config = plan.config.section(VariationsConfig)
     shards: list[Shard] = []
     found: list[str] = []
-    quota = config.search.novelty.quota
-    state: Mapping[str, Any] = {"found": 0, "tries": 0, "idle": 0, "quota": quota, "curve": []}
+    state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], "crossings": {}}
     target = math.ceil(config.selection.oversample * config.per_kit)
     for number in range(config.search.rounds):
         name = f"{kit}-r{number:03d}"
-        wanted = max(FEWEST, -(-(target - state["found"]) * 11 // (10 * config.search.lanes)))
+        wanted = max(FEWEST, -(-(target - state["telling"]) * 11 // (10 * config.search.lanes)))
         wanted = min(wanted, max(ROUND_FIND, target // (ROUND_SHARE * config.search.lanes)))
         lanes = [
             Shard(
                 f"{name}-lane{lane:02d}",
-                {"job": "lane", "kit": kit, "wanted": wanted, "quota": state["quota"]},
+                {"job": "lane", "kit": kit, "wanted": wanted},
                 (f"exemplars/{kit}", *found),
             )
             for lane in range(config.search.lanes)
@@ -63,9 +63,10 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
             "job": "pool",
             "kit": kit,
             "tried": sum(each["tries"] for each in done),
-            "full": sum(each["full"] for each in done),
+            "spares": sum(each["spares"] for each in done),
+            "crossed": _added(*(each["crossings"] for each in done)),
             "last": number == config.search.rounds - 1,
-            **{key: state[key] for key in ("tries", "idle", "quota", "curve")},
+            **{key: state[key] for key in ("telling", "tries", "idle", "curve", "crossings")},
         }
         pool = Shard(f"{name}-pool", params, (f"exemplars/{kit}", *found))
         shards.append(pool)
@@ -93,32 +94,31 @@ def run_lane(task: Task) -> Outcome:
     search = Search(_answers(kit, task), config)
     rng = task.rng("tries")
     pool = PoolIndex.of(task, kit.name, len(kit.types))
-    search.archive.quota = task.shard.params["quota"]
-    crowds = _archive(pool, search)
-    chosen = _parents(rng, crowds, config.parents, config.novelty.guided)
-    for found, index in pool.variants(task, chosen):
-        assembly, labels = found.assembly(index)
-        search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, found.origins_of(index), labels))
+    places = _archive(pool, search)
+    chosen = _parents(rng, search.archive.crowds(places), config.parents, config.novelty.guided)
+    for place, (found, index) in zip(places[chosen].tolist(), pool.variants(task, chosen), strict=True):
+        (assembly, labels), origins = found.assembly(index), found.origins_of(index)
+        search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, origins, (place[0], place[1]), labels))
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
     write_variants(task, variants)
     for reason, count in sorted(search.rejects.items()):
         task.reject(task.shard.name, reason, count=count)
     crossings = dict(sorted(search.crossings.items()))
-    summary = {"found": len(variants), "tries": tries, "full": search.rejects[FULL], "crossings": crossings}
+    summary = {"found": len(variants), "tries": tries, "spares": search.spares, "crossings": crossings}
     return Outcome(0, summary)
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:
-    """Tell a search what the pool holds; how crowded the place of each of its variants is, int64 (k,)."""
+    """Tell a search what the pool holds; where each of its variants stands in the archive, int64 (k, 2)."""
     novelty = search.config.novelty
     places = []
     for counts, features, keys in zip(pool.counts, pool.features, pool.keys, strict=True):
         types = np.repeat(np.arange(len(counts)), counts)
         search.seen.add(search.key(types, *keys.tolist()))
-        places.append((cell_of(features, novelty.axes, novelty.resolution), search.histogram(types)))
-        search.archive.add(*places[-1])
-    return np.array([search.archive.crowd(*place) for place in places], dtype=np.int64)
+        cell = cell_of(features, novelty.axes, novelty.resolution)
+        places.append(search.archive.add(cell, search.histogram(types)))
+    return np.array(places, dtype=np.int64).reshape(-1, 2)
 
 
 def _parents(rng: np.random.Generator, crowds: np.ndarray, most: int, guided: bool) -> list[int]:
@@ -155,9 +155,10 @@ def run_pool(task: Task) -> Outcome:
     measures = pool_measures(counts, features, np.concatenate([before.digests, new["digests"]]), config.search.novelty)
     total = len(counts)
     tries = params["tries"] + params["tried"]
-    idle = 0 if kept or params["full"] else params["idle"] + params["tried"]
+    idle = 0 if kept else params["idle"] + params["tried"]
+    telling = params["telling"] + max(len(kept) - params["spares"], 0)
     target = math.ceil(config.selection.oversample * config.per_kit)
-    ended = total >= target or idle >= config.search.patience or params["last"]
+    ended = telling >= target or total >= SPARE * target or idle >= config.search.patience or params["last"]
     return Outcome(
         0,
         {
@@ -165,13 +166,21 @@ def run_pool(task: Task) -> Outcome:
             "found": total,
             "tries": tries,
             "idle": idle,
-            "quota": params["quota"] * (2 if len(kept) < params["full"] else 1),
+            "telling": telling,
             **measures,
             "curve": [*params["curve"], [tries, total, measures["histograms"]]],
+            "crossings": _added(params["crossings"], params["crossed"]),
             "ended": ended,
             "why": _why(kit, config, total, tries, idle) if ended else "",
         },
     )
+
+
+def _added(*counts: Mapping[str, int]) -> dict[str, int]:
+    total: Counter[str] = Counter()
+    for each in counts:
+        total.update(each)
+    return dict(sorted(total.items()))
 
 
 def _why(kit: Kit, config: VariationsConfig, found: int, tries: int, idle: int) -> str:

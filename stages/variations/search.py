@@ -9,30 +9,28 @@ from typing import Any
 
 import numpy as np
 
-from stages.shape.arrays import Float32Array, FloatArray, IntArray
+from stages.shape.arrays import Float32Array, IntArray
 from stages.shape.kit import Assembly
-from stages.variations import kernels
 from stages.variations.answers import ContactAnswers
-from stages.variations.archive import Archive, Cell, cell_of
+from stages.variations.archive import Archive, Cell, Place, cell_of
+from stages.variations.attempt import attempt, complete, cut_piece
 from stages.variations.centroids import match_centroids
+from stages.variations.checks import validate
 from stages.variations.correction import correct_orientations
-from stages.variations.features import MIXED, FeatureTest, material_shares
-from stages.variations.kernels import (
-    BOUNDARY,
-    EDGES,
-    GROWN,
-    JOINTS,
-    PARTS,
-    PIECE,
-    PLANES,
-    UNKNOWNS,
-    Outcome,
-    ShapeTables,
-)
+from stages.variations.features import FeatureTest, material_shares
+from stages.variations.joins import join
+from stages.variations.layout import BOUNDARY, EDGES, PARTS, UNKNOWNS, Outcome
+from stages.variations.matches import lies_in
+from stages.variations.parents import Parent, Parents
+from stages.variations.refinement import refinement_key
 from stages.variations.settings import SearchConfig
+from stages.variations.steering import BATCH, Choice, Steering
 from stages.variations.tables import kit_tables, shape_tables, workspace
 
-__all__ = ["Parent", "Search", "Variant"]
+__all__ = ["SPARE", "Search", "Variant"]
+
+SPARE = 4
+"""A search ends at so many times the variants that it looks for, if few of them add to the archive."""
 
 REASONS = {
     Outcome.WHOLE: "cut took the whole shape",
@@ -49,34 +47,12 @@ REASONS = {
 DUPLICATE = "duplicate"
 SUBASSEMBLY = "nothing but a piece of an exemplar"
 NEW = "new variant"
-FULL = "cell of the archive is full"
 
-WAYS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
-"""Ways of cutting, and whether the piece must be large."""
 KNOWN_GAIN = 0.2
 """What a new variant of a known histogram counts beside one of a new histogram."""
-SMALL, NEARLY_ALL = 0.2, 0.8
-"""A piece with a share of parts between these is a large cut, one that can change a shape as a whole."""
-RECUTS = 4
-"""Cuts made at most until one is large."""
-
-
-@dataclass(frozen=True)
-class Parent:
-    """A shape that pieces are cut from and docked to; `name` is an exemplar's name or a variant's place in the pool.
-
-    origins: int8 (n,), the exemplar that each part came from; shares: float64 (exemplars,) of them; cell and
-    histogram: its place in the archive.
-    """
-
-    name: str
-    assembly: Assembly
-    labels: IntArray
-    tables: ShapeTables
-    origins: np.ndarray
-    shares: FloatArray
-    cell: Cell
-    histogram: int
+EARLY = {REASONS[each] for each in (Outcome.WHOLE, Outcome.NO_SUCH_PART, Outcome.NO_MATCH)}
+LATE_WORK = 3.0
+"""What a try costs that comes as far as being joined, beside one that finds no match."""
 
 
 @dataclass(frozen=True)
@@ -111,182 +87,120 @@ class Search:
         self.tables = kit_tables(kit, config.upright)
         self._ws = workspace(max(self.largest, *sizes))
         self.archive = Archive(config.novelty.quota)
+        self.steering = Steering(config)
         self._features = FeatureTest(kit)
-        self.exemplars = [
-            self.parent(each.name, each.assembly, np.full(len(each.assembly), number, dtype=np.int8))
-            for number, each in enumerate(kit.exemplars)
-        ]
-        self.families: list[list[Parent]] = [[] for _ in range(len(self.exemplars) + 1)]
-        self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.exemplars}
-        for each in self.exemplars:
-            self.archive.add(each.cell, each.histogram)
-        self._cuts = np.zeros(len(WAYS))
-        self._gains = np.zeros(len(WAYS))
+        self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
+        self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.parents.exemplars}
+        self.spares = 0
         self.rejects: Counter[str] = Counter()
         self.crossings: Counter[str] = Counter()
 
-    def parent(self, name: str, assembly: Assembly, origins: np.ndarray, labels: IntArray | None = None) -> Parent:
-        """A shape made ready for cutting and docking."""
+    def _exemplar(self, number: int) -> Parent:
+        exemplar = self.kit.exemplars[number]
+        assembly, origins = exemplar.assembly, np.full(len(exemplar.assembly), number, dtype=np.int8)
+        shares = material_shares(origins, len(self.kit.exemplars))
+        features = self._features.features(assembly, shares, self._features.marks(assembly))
+        place = self.archive.add(self._cell(features), self.histogram(assembly.types))
+        return self.parent(exemplar.name, assembly, origins, place)
+
+    def parent(
+        self, name: str, assembly: Assembly, origins: np.ndarray, place: Place, labels: IntArray | None = None
+    ) -> Parent:
+        """A shape made ready for cutting and docking; `place` is where it stands in the archive."""
         if labels is None:
             labels = self.answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
         shares = material_shares(origins, len(self.kit.exemplars))
-        cell = self._cell(self._features.features(assembly, shares, self._features.marks(assembly)))
         tables = shape_tables(assembly, labels, len(self.kit.types))
-        return Parent(name, assembly, labels, tables, origins, shares, cell, self.histogram(assembly.types))
+        return Parent(name, assembly, labels, tables, origins, shares, place)
 
     def keys_of(self, parent: Parent) -> tuple[int, int]:
         """The two refinement keys of a shape."""
         self._load(parent)
-        graph, docked = kernels.refinement_keys(self._ws)
-        return int(graph), int(docked)
+        return int(refinement_key(self._ws, False)), int(refinement_key(self._ws, True))
 
     def run(
         self, rng: np.random.Generator, tries: int, wanted: int, name: str, progress: Callable[[int], None]
     ) -> tuple[list[Variant], int]:
-        """Try until `wanted` new variants are found or `tries` are used up; the variants and the number of tries.
+        """Try until `wanted` new variants are found that add to the archive, or SPARE times as many of any kind, or
+        `tries` are used up; the variants and the number of tries.
 
-        New variants become parents at once; in lineages they are called `<name>-<number>`. `progress` is told how
-        many there are.
+        New variants that add to the archive become parents at once; in lineages they are called `<name>-<number>`.
+        `progress` is told how many there are.
         """
         found: list[Variant] = []
-        for number in range(tries):
-            guided = self.config.novelty.guided and rng.random() >= self.config.novelty.plain_share
-            a = self._pick(rng, guided)
-            b = self._partner(rng, a, guided)
-            way = self._way(rng, guided)
-            self._cuts[way] += 1
-            variant = self._attempt(rng, a, b, way)
-            if not (a.shares * b.shares).any():
-                self.crossings[variant if isinstance(variant, str) else NEW] += 1
-            if isinstance(variant, str):
-                self.rejects[variant] += 1
-                continue
-            found.append(variant)
-            self.seen.add(self.key(variant.assembly.types, variant.graph, variant.docked))
-            self._gains[way] += KNOWN_GAIN if variant.histogram in self.archive.histograms else 1.0
-            self.archive.add(variant.cell, variant.histogram)
-            parent = self.parent(f"{name}-{len(found) - 1}", variant.assembly, variant.origins, variant.labels)
-            self.adopt(rng, parent)
-            progress(len(found))
-            if len(found) >= wanted:
-                return found, number + 1
-        return found, tries
+        telling, number = 0, 0
+        while number < tries and telling < wanted and len(found) < SPARE * wanted:
+            batch = self.steering.plan(rng, self.parents, self.archive, min(BATCH, tries - number))
+            for choice in batch:
+                number += 1
+                variant = self._attempt(rng, choice)
+                if not (choice.a.shares * choice.b.shares).any():
+                    self.crossings[variant if isinstance(variant, str) else NEW] += 1
+                if isinstance(variant, str):
+                    self.rejects[variant] += 1
+                    self.steering.learn(choice, 0.0, 1.0 if variant in EARLY else LATE_WORK)
+                    continue
+                found.append(variant)
+                if self._keep(rng, variant, choice, f"{name}-{len(found) - 1}"):
+                    telling += 1
+                    progress(telling)
+                if telling >= wanted or len(found) >= SPARE * wanted:
+                    break
+        return found, number
+
+    def _keep(self, rng: np.random.Generator, variant: Variant, choice: Choice, name: str) -> bool:
+        """Count a find, and make it a parent where it adds to the archive; whether it does."""
+        self.seen.add(self.key(variant.assembly.types, variant.graph, variant.docked))
+        spare = self.archive.is_full(variant.cell, variant.histogram)
+        gain = KNOWN_GAIN if self.archive.has_histogram(variant.histogram) else 1.0
+        self.steering.learn(choice, 0.0 if spare else gain, LATE_WORK)
+        place = self.archive.add(variant.cell, variant.histogram)
+        if spare and self.config.novelty.guided:
+            self.spares += 1
+            return False
+        self.adopt(rng, self.parent(name, variant.assembly, variant.origins, place, variant.labels))
+        return True
 
     def adopt(self, rng: np.random.Generator, parent: Parent) -> None:
-        """Add a parent; where there are as many as the config allows, the most crowded of some of the largest family
-        makes room."""
-        if sum(len(family) for family in self.families) >= self.config.parents:
-            largest = max(self.families, key=len)
-            places = self._draw(rng, len(largest), self.config.novelty.rivals)
-            leaves = max(places, key=lambda place: self._crowd(largest[place]))
-            largest[leaves] = largest[-1]
-            largest.pop()
-        mixed = 1.0 - parent.shares.max() >= MIXED
-        self.families[len(self.exemplars) if mixed else int(parent.shares.argmax())].append(parent)
+        """Add a parent."""
+        self.parents.adopt(rng, parent, self.archive)
 
-    def _pick(self, rng: np.random.Generator, guided: bool) -> Parent:
-        """A parent: an exemplar; or an earlier variant of any family, or of all together, most often a rare one."""
-        novelty = self.config.novelty
-        counts = [len(family) for family in self.families]
-        total = sum(counts)
-        if not total or rng.random() < self.config.exemplar_share:
-            return self.exemplars[int(rng.random() * len(self.exemplars))]
-        if guided and rng.random() < novelty.family_share:
-            number = int(rng.random() * (len(counts) if counts[-1] else len(counts) - 1))
-            if not counts[number]:
-                return self.exemplars[number]
-            first, total = sum(counts[:number]), counts[number]
-        else:
-            first = 0
-        if not guided:
-            return self._member(int(rng.random() * total))
-        rivals = [self._member(first + place) for place in self._draw(rng, total, novelty.rivals)]
-        # The first to come, where the common wait long: of two, one twice as crowded has half the chance.
-        waits = rng.exponential(size=len(rivals)).tolist()
-        return min(zip(waits, rivals, strict=True), key=lambda each: each[0] * self._crowd(each[1]))[1]
-
-    def _member(self, place: int) -> Parent:
-        """The earlier variant at a place, counted through all families."""
-        for family in self.families:
-            if place < len(family):
-                return family[place]
-            place -= len(family)
-        raise IndexError(place)
-
-    def _partner(self, rng: np.random.Generator, a: Parent, guided: bool) -> Parent:
-        """The second parent: any; or of some the one whose parts come from other exemplars, or from the same."""
-        novelty = self.config.novelty
-        if not guided or len(self.exemplars) == 1:
-            return self._pick(rng, guided)
-        crossing = rng.random() < novelty.cross_share * self._hope()
-        if not crossing and rng.random() < 0.5:
-            return self._pick(rng, guided)
-        rivals = [self._pick(rng, guided) for _ in range(3)]
-        rivals.append(self.exemplars[int(rng.random() * len(self.exemplars))])
-        common = [float(np.minimum(each.shares, a.shares).sum()) * (1 if crossing else -1) for each in rivals]
-        return min(zip(common, rivals, strict=True), key=lambda each: (each[0], self._crowd(each[1])))[1]
-
-    def _hope(self) -> float:
-        """How much of its share of tries crossing gets: all of it at first, less the longer nothing comes of it."""
-        won = self.crossings[NEW]
-        return max(0.2, (1 + won) / (1 + won + self.crossings.total() / 200))
-
-    def _crowd(self, parent: Parent) -> int:
-        return self.archive.crowd(parent.cell, parent.histogram)
-
-    @staticmethod
-    def _draw(rng: np.random.Generator, among: int, count: int) -> list[int]:
-        return [int(each * among) for each in rng.random(count)]
-
-    def _way(self, rng: np.random.Generator, guided: bool) -> int:
-        """The way of the next cut, an index into WAYS."""
-        if not guided:
-            return 0 if rng.random() < self.config.growth_share else 1
-        if rng.random() < self.config.novelty.learnt_share:
-            odds = np.cumsum((self._gains + 1) / (self._cuts + 100))
-            return int(np.searchsorted(odds, rng.random() * odds[-1], side="right").clip(0, len(WAYS) - 1))
-        return 0 if rng.random() < self.config.growth_share else 1 + int(rng.random() * (len(WAYS) - 1))
-
-    def _cut(self, rng: np.random.Generator, a: Parent, b: Parent, way: int) -> int:
-        """Cut a piece out of A; where it must be large it is cut anew while it is small or nearly everything."""
-        how, large = WAYS[way]
-        parts = len(a.assembly)
-        for _ in range(RECUTS if large else 1):
-            outcome: int = kernels.cut(rng, a.tables, b.tables, self._ws, how)
-            if outcome == Outcome.OK and SMALL * parts <= self._ws.counts[PIECE] <= NEARLY_ALL * parts:
-                break
-        return outcome
-
-    def _attempt(self, rng: np.random.Generator, a: Parent, b: Parent, way: int) -> Variant | str:
+    def _attempt(self, rng: np.random.Generator, choice: Choice) -> Variant | str:
         """One try: a new variant, or the reason why there is none."""
-        ws, kit = self._ws, self.tables
-        outcome = self._cut(rng, a, b, way)
-        if outcome == Outcome.OK:
-            if self.config.matching == "pose":
-                outcome = kernels.match_poses(rng, kit, a.tables, b.tables, a is b, ws)
-            else:
+        a, b, ws, kit = choice.a, choice.b, self._ws, self.tables
+        with_labels = self.config.duplicates == "docking"
+        limits = self.smallest, self.largest
+        known = self.answers.table
+        if self.config.matching == "pose":
+            outcome, key = attempt(
+                rng, kit, a.tables, b.tables, a is b, known, ws, choice.way, choice.large, *limits, with_labels
+            )
+        else:
+            outcome, key = cut_piece(rng, a.tables, b.tables, ws, choice.way, choice.large), 0
+            if outcome == Outcome.OK:
                 outcome = match_centroids(rng, kit, a.tables, b.tables, ws)
-        if outcome == Outcome.OK:
-            outcome = kernels.join(rng, kit, a.tables, b.tables, ws, self.smallest, self.largest)
-            corrected = self.config.matching == "pose" or outcome != Outcome.OK
-            if not corrected and not correct_orientations(self.answers.dockings, ws):
-                return "orientation cannot be corrected"
-        if outcome == Outcome.OK:
-            outcome = self._ask_until_known(kernels.connect)
+            if outcome == Outcome.OK:
+                outcome = join(rng, kit, a.tables, b.tables, ws, *limits)
+            if outcome == Outcome.OK:
+                if not correct_orientations(self.answers.dockings, ws):
+                    return "orientation cannot be corrected"
+                outcome, key = complete(kit, known, ws, with_labels)
+        while outcome == Outcome.UNKNOWN:
+            if not self.answers.answer_unknown(ws, int(ws.counts[UNKNOWNS])):
+                outcome = Outcome.CLASH
+            else:
+                outcome, key = complete(kit, self.answers.table, ws, with_labels)
         if outcome != Outcome.OK:
             return REASONS[outcome]
-        graph, docked = kernels.refinement_keys(ws)
-        if self.key(ws.types[: ws.counts[PARTS]], int(graph), int(docked)) in self.seen:
+        types = ws.types[: ws.counts[PARTS]]
+        if (self.histogram(types) if self.config.duplicates == "histogram" else int(key)) in self.seen:
             return DUPLICATE
-        if any(kernels.lies_in(kit, ws, each.tables) for each in self.exemplars):
+        if any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
-        outcome = self._ask_until_known(kernels.validate)
+        outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
-        variant = self._variant(a, b, int(graph), int(docked))
-        if self.config.novelty.guided and self.archive.is_full(variant.cell, variant.histogram):
-            return FULL
-        return variant
+        return self._variant(a, b, int(refinement_key(ws, False)), int(refinement_key(ws, True)))
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""
@@ -301,10 +215,10 @@ class Search:
     def _cell(self, features: Float32Array) -> Cell:
         return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)
 
-    def _ask_until_known(self, kernel: Callable[..., int]) -> int:
-        """Run a kernel, and again after answering the contacts that it did not know."""
+    def _validate(self) -> int:
+        """Compute the shape graph anew, and again after answering the contacts that were not known."""
         while True:
-            outcome = kernel(self.tables, self.answers.table, self._ws)
+            outcome: int = validate(self.tables, self.answers.table, self._ws)
             if outcome != Outcome.UNKNOWN:
                 return outcome
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
@@ -335,7 +249,7 @@ class Search:
         # A part whose neighbourhood tells its exemplar is of that one, whichever copy of it a piece brought along.
         marks = self._features.marks(assembly)
         origins = np.where(marks >= 0, marks, origins)
-        features = self._features.features(assembly, material_shares(origins, len(self.exemplars)), marks)
+        features = self._features.features(assembly, material_shares(origins, len(self.kit.exemplars)), marks)
         return Variant(
             assembly,
             labels.astype(np.int32),

@@ -32,37 +32,15 @@ class NoveltyConfig(StrictModel):
     quota: int = Field(
         8,
         ge=1,
-        description="Variants of a cell after which one with a known histogram is refused; doubled whenever a round "
-        "brings too little that is new.",
+        description="Variants of a cell after which one more of a known histogram is spare: it goes into the pool, but "
+        "the search neither counts it nor builds on it.",
     )
-    plain_share: float = Field(
-        0.35,
-        ge=0,
+    explore: float = Field(
+        0.2,
+        ge=0.01,
         le=1,
-        description="Share of tries with plain random parents and cuts all the same, so that nothing is out of reach.",
-    )
-    rivals: int = Field(
-        6, ge=1, le=100, description="Variants drawn for each parent, of which a rare one is likeliest to be taken."
-    )
-    family_share: float = Field(
-        0.3,
-        ge=0,
-        le=1,
-        description="Share of parents drawn family by family: the offspring of each exemplar, and those that mix them.",
-    )
-    cross_share: float = Field(
-        0.5,
-        ge=0,
-        le=1,
-        description="Share of tries whose second parent is the one of most other ancestry; it falls to a "
-        "fifth of that while no such try succeeds.",
-    )
-    learnt_share: float = Field(
-        0.6,
-        ge=0,
-        le=0.9,
-        description="Share of tries that cut in the way which has found most so far: growing, planes, planes that cut "
-        "off a large piece, or ending at parts of types which both parents have; the rest try every way.",
+        description="Share of tries spread alike over all ways to draw parents (at random, rare ones, by family, of "
+        "other ancestry) and to cut; the others go to those ways that find most new histograms for their work.",
     )
 
 
@@ -111,7 +89,11 @@ class SelectionConfig(StrictModel):
     """How the dataset is chosen from the pool of found variants."""
 
     oversample: float = Field(
-        3.0, ge=1, le=100, description="Variants that the search looks for, as a multiple of those wanted."
+        3.0,
+        ge=1,
+        le=100,
+        description="Variants that the search looks for, as a multiple of those wanted; those that add nothing "
+        "to the archive come on top, up to four times as many in all.",
     )
     spread: int = Field(
         10_000,

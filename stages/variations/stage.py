@@ -60,7 +60,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 STAGE = Stage(
     name="variations",
-    version=2,
+    version=3,
     config=VariationsConfig,
     inputs=("exemplars",),
     plan=plan,

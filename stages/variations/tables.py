@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import IntArray
-from stages.shape.kit import Assembly, Kit
-from stages.shape.neighbourhoods import enumerate_admitted
-from stages.variations.kernels import KitTables, ShapeTables, Workspace
+from stages.shape.kit import Assembly, Grammar, Kit
+from stages.shape.neighbourhoods import STRICTNESS
+from stages.variations.layout import KitTables, Rules, ShapeTables, Workspace
 
 __all__ = ["QUANTUM", "kit_tables", "shape_tables", "workspace"]
 
@@ -16,28 +16,71 @@ QUANTUM = 1 / 64
 
 
 def kit_tables(kit: Kit, upright: bool) -> KitTables:
-    """The kit for the kernels, with every neighbourhood that its grammar admits.
+    """The kit for the kernels.
 
     With `upright` a docking motion may turn a piece about the vertical only.
     """
     bounds = np.stack([each.bounds for each in kit.types])
     weights = np.random.Generator(np.random.PCG64(len(kit.types))).integers(1, 2**63, len(kit.types), dtype=np.uint64)
-    allowed = []
-    weight_of = weights.tolist()
-    for part_type, multiset in enumerate_admitted(kit.grammar):
-        total = _mix(weight_of[part_type])
-        for other, count in multiset:
-            total += weight_of[other] * count
-        allowed.append(total % 2**64)
     return KitTables(
         symmetry_starts=np.cumsum([0, *(len(each.symmetries) for each in kit.types)]),
         symmetries=np.concatenate([each.symmetries[:, :3, :3] for each in kit.types]),
         boxes=np.ascontiguousarray(np.stack([bounds.mean(axis=1), (bounds[:, 1] - bounds[:, 0]) / 2], axis=1)),
         reach=np.array([each.diagonal / 2 for each in kit.types]),
         weights=weights,
-        allowed=np.unique(np.array(allowed, dtype=np.uint64)),
+        rules=_rules(kit.grammar, weights),
         limits=np.array([kit.pose_tolerance, kit.contact_tolerance, kit.contact_tolerance * QUANTUM]),
         up={"y": 1, "z": 2}[kit.up] if upright else -1,
+    )
+
+
+def _rules(grammar: Grammar, weights: np.ndarray) -> Rules:
+    """The neighbourhoods that `grammar` admits, for the kernels; weights: uint64 (types,) of the types."""
+    types = len(weights)
+    observed = {part_type: list(each) for part_type, each in grammar.neighbourhoods.items()}
+    sizes = {(part_type, sum(count for _, count in each)) for part_type, seen in observed.items() for each in seen}
+    has_size = np.zeros((types, 1 + max(size for _, size in sizes)), dtype=np.bool_)
+    has_size[tuple(np.array(sorted(sizes)).T)] = True
+    set_weights = np.random.Generator(np.random.PCG64(types + 1)).integers(1, 2**63, types, dtype=np.uint64)
+    sets, known = set(), []
+    local = np.full((types, types), -1, dtype=np.int32)
+    squares = np.zeros(types + 1, dtype=np.int64)
+    for part_type, seen in observed.items():
+        around = sorted({other for each in seen for other, _ in each})
+        local[part_type, around] = np.arange(len(around))
+        squares[part_type + 1] = len(around) ** 2
+        for each in seen:
+            size = sum(count for _, count in each)
+            key = _mix((part_type * 0x9E3779B97F4A7C15 + size) % 2**64)
+            sets.add((key + sum(int(set_weights[other]) for other, _ in each)) % 2**64)
+            total = _mix(int(weights[part_type])) + sum(int(weights[other]) * count for other, count in each)
+            known.append(total % 2**64)
+    starts = squares.cumsum()
+    pairs = np.zeros(starts[-1], dtype=np.bool_)
+    for part_type, seen in observed.items():
+        side = round(float(squares[part_type + 1]) ** 0.5)
+        for each in seen:
+            rows = local[part_type, [other for other, _ in each]]
+            pairs[starts[part_type] + (rows[:, None] * side + rows[None, :]).ravel()] = True
+    # Every observed neighbourhood is admitted at every level.
+    room = 1 << max(16, (4 * len(known)).bit_length())
+    keys, verdicts = np.zeros(room, dtype=np.uint64), np.zeros(room, dtype=np.int64)
+    for key in known:
+        slot = key % room
+        while keys[slot] != 0:
+            slot = (slot + 1) % room
+        keys[slot], verdicts[slot] = key, 1
+    return Rules(
+        level=STRICTNESS.index(grammar.strictness),
+        keys=keys,
+        verdicts=verdicts,
+        filled=np.array([len(known)]),
+        sizes=has_size,
+        set_weights=set_weights,
+        sets=np.array(sorted(sets), dtype=np.uint64),
+        local=local,
+        pair_starts=starts[:-1].copy(),
+        pairs=pairs,
     )
 
 

@@ -14,8 +14,10 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import ContactConfig, KitConfig
 from stages.shape.contact import overlapping_boxes, world_boxes
 from stages.shape.kit import Assembly, Kit
-from stages.variations import kernels
 from stages.variations.answers import ContactAnswers
+from stages.variations.checks import validate
+from stages.variations.joins import place_boxes
+from stages.variations.layout import TRY, Outcome
 from stages.variations.search import Search
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.bench.measure import Measure, rate
@@ -92,7 +94,7 @@ def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -
                     fcl.distance(bodies[i], bodies[j], fcl.DistanceRequest(), fcl.DistanceResult())
         return len(cases)
 
-    parents = [line.parent("bench", each, np.zeros(len(each), dtype=np.int8)) for each in assemblies]
+    parents = [line.parent("bench", each, np.zeros(len(each), dtype=np.int8), (0, 0)) for each in assemblies]
     ws, tables = line._ws, line.tables
 
     def ours() -> int:
@@ -100,11 +102,11 @@ def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -
             n, shape = len(parent.assembly), parent.tables
             line._load(parent)
             ws.turns[:n], ws.places[:n] = shape.turns, shape.places
-            kernels._place_boxes(tables.boxes, ws.types, ws.turns, ws.places, n, ws.boxes)
-            ws.counts[kernels.TRY] += 1
+            place_boxes(tables.boxes, ws.types, ws.turns, ws.places, n, ws.boxes)
+            ws.counts[TRY] += 1
             i, j = parent.assembly.edges.T
-            ws.stamp[i, j] = ws.stamp[j, i] = ws.counts[kernels.TRY]
-            assert kernels.validate(tables, line.answers.table, ws) == kernels.Outcome.OK
+            ws.stamp[i, j] = ws.stamp[j, i] = ws.counts[TRY]
+            assert validate(tables, line.answers.table, ws) == Outcome.OK
         return len(parents)
 
     parts = int(np.mean([len(each) for each in assemblies]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from stages.package.stage import STAGE as PACKAGE
 from stages.points.stage import STAGE as POINTS
 from stages.shape.contact import ContactTest
 from stages.shape.kit import Kit
-from stages.shape.neighbourhoods import STRICTNESS, admits, enumerate_admitted
 from stages.sketches.stage import STAGE as SKETCHES
 from stages.strings.stage import STAGE as STRINGS
 from stages.variations.answers import ContactAnswers
@@ -61,17 +59,3 @@ def test_a_real_exemplar_gets_its_hubs_back(
     assert (len(whole), len(whole.edges)) == (parts, contacts)
     anew = ContactTest(kit.types, kit.contact_tolerance).contacts(whole.types, whole.poses)
     np.testing.assert_array_equal(whole.edges, anew)
-
-
-@needs_models
-@pytest.mark.parametrize("model", ["a06_racetrack", "a13_dungeon_junction", "a22_ring_segment_10"])
-def test_levels_of_strictness_nest_on_real_kits(model: str) -> None:
-    kit = kit_of(KitConfig(name="real", shapes=(EXEMPLARS / model / "model.glb",)))
-    inner: set[object] = set()
-    for strictness in STRICTNESS:
-        grammar = replace(kit.grammar, strictness=strictness)
-        listed = list(enumerate_admitted(grammar))
-        assert inner <= set(listed)
-        assert len(set(listed)) == len(listed)
-        assert all(admits(grammar, part_type, multiset) for part_type, multiset in listed)
-        inner = set(listed)

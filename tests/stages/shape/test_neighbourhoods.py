@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stages.shape.kit import Grammar, Multiset, Strictness
-from stages.shape.neighbourhoods import STRICTNESS, admits, enumerate_admitted
+from stages.shape.neighbourhoods import STRICTNESS, admits
 
 A, B, C, D = range(4)
 
@@ -69,14 +69,12 @@ observations = st.sets(
 
 
 @given(observations)
-def test_levels_nest_and_the_listed_neighbourhoods_are_the_admitted_ones(observed: set[Multiset]) -> None:
+def test_levels_nest(observed: set[Multiset]) -> None:
     inner = set(observed)
     for strictness in STRICTNESS:
         rules = grammar(*sorted(observed), strictness=strictness)
         admitted = language(rules)
-        listed = [each for part_type, each in enumerate_admitted(rules) if part_type == A]
         assert inner <= admitted
-        assert sorted(listed) == sorted(admitted), "each once, and no other"
         inner = admitted
 
 
@@ -85,10 +83,3 @@ def test_hubs_may_have_any_neighbours_and_do_not_count_as_neighbours() -> None:
     assert admits(rules, A, multiset(B, C, D, D))
     assert not admits(rules, A, multiset(B, D))
     assert admits(rules, D, multiset(A, A, B))
-    assert list(enumerate_admitted(rules)) == [(A, multiset(B, C))]
-
-
-def test_listing_stops_where_its_reader_stops() -> None:
-    many = Grammar({A: {tuple((each, 1) for each in range(30)): 1}}, (), {}, "count_and_pairs")
-    listed = enumerate_admitted(many)
-    assert len({next(listed) for _ in range(1000)}) == 1000

@@ -14,7 +14,7 @@ from tests.stages.variations.toy import ROAD, kit_of, pose, ring
 def loaded() -> Search:
     """A search whose workspace holds the ring of its first exemplar."""
     line = Search(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])), SearchConfig())
-    shape = line.exemplars[0]
+    shape = line.parents.exemplars[0]
     line._load(shape)
     ws, n = line._ws, len(shape.assembly)
     ws.turns[:n], ws.places[:n] = shape.assembly.poses[:, :3, :3], shape.assembly.poses[:, :3, 3]
@@ -23,13 +23,13 @@ def loaded() -> Search:
 
 def test_a_part_turned_round_is_turned_back() -> None:
     line = loaded()
-    ws, before = line._ws, line.exemplars[0].assembly.poses
+    ws, before = line._ws, line.parents.exemplars[0].assembly.poses
     for part in range(8):
         ws.turns[part] = before[part, :3, :3] @ pose(0, 0, 0, 2)[:3, :3]
         assert correct_orientations(line.answers.dockings, ws)
         assert np.allclose(ws.turns[part], before[part, :3, :3], atol=1e-6)
-    labels = line.exemplars[0].labels
-    edges = line.exemplars[0].assembly.edges
+    labels = line.parents.exemplars[0].labels
+    edges = line.parents.exemplars[0].assembly.edges
     assert np.array_equal(ws.label[edges[:, 0], edges[:, 1]], labels[:, 0])
 
 

@@ -7,9 +7,12 @@ import pytest
 
 from stages.shape.canonical import graph_digest
 from stages.shape.kit import Assembly
-from stages.variations import kernels
 from stages.variations.answers import ContactAnswers
-from stages.variations.kernels import BOUNDARY, EDGES, FORBIDDEN, LABELS, NONE, PARTS, UNKNOWNS, Outcome
+from stages.variations.checks import connect
+from stages.variations.cuts import cut
+from stages.variations.joins import join
+from stages.variations.layout import BOUNDARY, EDGES, FORBIDDEN, LABELS, NONE, PARTS, UNKNOWNS, Outcome
+from stages.variations.lookup import ask, hash_key, quantise
 from stages.variations.search import Search
 from stages.variations.settings import SearchConfig
 from stages.variations.tables import shape_tables
@@ -23,11 +26,11 @@ def chains() -> Search:
 
 def test_a_cut_is_connected_and_its_boundary_are_the_parts_with_a_neighbour_outside() -> None:
     line = Search(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])), SearchConfig())
-    shape = line.exemplars[1].tables
+    shape = line.parents.exemplars[1].tables
     ws, rng = line._ws, np.random.default_rng(0)
     sizes = set()
     for number in range(300):
-        outcome = kernels.cut(rng, shape, shape, ws, number % 3)
+        outcome = cut(rng, shape, shape, ws, number % 3)
         inside = ws.inside[: len(shape.types)]
         sizes.add(int(inside.sum()))
         boundary = set(ws.boundary[: ws.counts[BOUNDARY]].tolist())
@@ -66,12 +69,12 @@ def test_contact_answers_do_not_depend_on_what_was_asked_before(chains: Search) 
             ws.unknown[0] = 0, 1
             fresh.answer_unknown(ws, 1)
             quanta = np.empty(12, dtype=np.int64)
-            kernels.quantise(
+            quantise(
                 ws.turns[0], ws.places[0], ws.turns[1], ws.places[1], kit.types[link].diagonal / 2,
                 kit.contact_tolerance / 64, quanta,
             )  # fmt: skip
-            key = np.uint64(kernels.hash_key(link, link, quanta))
-            given[name] = int(kernels._ask(fresh.table.keys, fresh.table.values, key))
+            key = np.uint64(hash_key(link, link, quanta))
+            given[name] = int(ask(fresh.table.keys, fresh.table.values, key))
         answers.append([given[name] for name in cases])
     assert answers[0] == answers[1]
     for (_, _, expected), answer in zip(cases.values(), answers[0], strict=True):
@@ -81,7 +84,7 @@ def test_contact_answers_do_not_depend_on_what_was_asked_before(chains: Search) 
 
 
 def test_refinement_keys_do_not_depend_on_the_order_of_parts(chains: Search) -> None:
-    shape = chains.exemplars[1]
+    shape = chains.parents.exemplars[1]
     graph, docked = chains.keys_of(shape)
     rng = np.random.default_rng(1)
     for _ in range(5):
@@ -91,12 +94,12 @@ def test_refinement_keys_do_not_depend_on_the_order_of_parts(chains: Search) -> 
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
         shuffled = Assembly(shape.assembly.types[order], shape.assembly.poses[order], edges)
         assert graph_digest(shuffled.types, edges) == graph_digest(shape.assembly.types, shape.assembly.edges)
-        assert chains.keys_of(chains.parent("shuffled", shuffled, shape.origins[order])) == (graph, docked)
+        assert chains.keys_of(chains.parent("shuffled", shuffled, shape.origins[order], shape.place)) == (graph, docked)
 
 
 def test_joining_a_chain_to_itself_moved_by_one_link_makes_it_one_longer(chains: Search) -> None:
     kit, tables, ws = chains.kit, chains.tables, chains._ws
-    shape = chains.exemplars[0].tables
+    shape = chains.parents.exemplars[0].tables
     links = [part for part in range(5) if kit.types[shape.types[part]].name == "link"]
     links.sort(key=lambda part: shape.places[part, 0])
     caps = [part for part in range(5) if part not in links]
@@ -107,8 +110,8 @@ def test_joining_a_chain_to_itself_moved_by_one_link_makes_it_one_longer(chains:
     ws.counts[BOUNDARY] = 1
     ws.boundary[0], ws.images[0] = links[1], links[2]
     ws.motion[:3], ws.motion[3] = np.eye(3), [1, 0, 0]
-    assert kernels.join(np.random.default_rng(0), tables, shape, shape, ws, 2, 20) == Outcome.OK
-    while kernels.connect(tables, chains.answers.table, ws) == Outcome.UNKNOWN:
+    assert join(np.random.default_rng(0), tables, shape, shape, ws, 2, 20) == Outcome.OK
+    while connect(tables, chains.answers.table, ws) == Outcome.UNKNOWN:
         assert chains.answers.answer_unknown(ws, int(ws.counts[UNKNOWNS]))
     # Left cap and two links from the piece, then the right cap, or the other way round the left cap and two links.
     assert ws.counts[PARTS] in (4, 5)
@@ -116,7 +119,7 @@ def test_joining_a_chain_to_itself_moved_by_one_link_makes_it_one_longer(chains:
 
 
 def test_shape_tables_hold_the_graph_in_both_directions(chains: Search) -> None:
-    parent = chains.exemplars[0]
+    parent = chains.parents.exemplars[0]
     tables = shape_tables(parent.assembly, parent.labels, len(chains.kit.types))
     neighbours = [
         tables.ends[tables.starts[part] : tables.starts[part + 1]].tolist() for part in range(len(parent.assembly))

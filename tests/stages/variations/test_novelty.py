@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.kit import Assembly
-from stages.variations import kernels
 from stages.variations.answers import ContactAnswers
 from stages.variations.archive import Archive, cell_of
 from stages.variations.features import AXES, FeatureTest, material_shares
-from stages.variations.kernels import EDGES, PARTS
-from stages.variations.search import FULL, SUBASSEMBLY, Search
+from stages.variations.layout import EDGES, PARTS
+from stages.variations.matches import lies_in
+from stages.variations.search import SPARE, SUBASSEMBLY, Search
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.stages.variations.test_search import search
 from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, pose, ring
@@ -75,23 +75,34 @@ def test_a_full_cell_takes_new_histograms_only() -> None:
     assert archive.is_full((1,), 7)
     assert not archive.is_full((1,), 8)
     assert not archive.is_full((2,), 7)
-    assert archive.crowd((1,), 7) == 4
+    assert archive.crowds(np.array([archive.add((1,), 7), archive.add((2,), 8)])).tolist() == [9, 1]
 
 
-def test_the_search_refuses_what_fills_a_full_cell() -> None:
+def test_what_adds_nothing_to_the_archive_is_kept_but_neither_counted_nor_built_on() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     novelty = NoveltyConfig(axes=("height",), quota=1)
     line, found = search(kit, tries=6000, smallest=1.0, largest=1.6, novelty=novelty)
-    histograms = [variant.histogram for variant in found]
-    # All rings are equally high, so there is one cell, and only new perimeters come in.
-    assert len(set(histograms)) == len(histograms) >= 6
-    assert line.rejects[FULL] > 0
+    known = {line.histogram(each.assembly.types) for each in line.parents.exemplars}
+    histograms = {variant.histogram for variant in found} - known
+    # All rings are equally high, so there is one cell, and only new perimeters tell anything.
+    assert len(histograms) >= 6
+    assert len(line.parents.variants) == len(histograms)
+    assert line.spares == len(found) - len(histograms) > 0
+
+
+def test_a_search_that_finds_nothing_telling_any_more_ends_all_the_same() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    config = SearchConfig(largest=4.0, novelty=NoveltyConfig(axes=("height",), quota=1))
+    line = Search(ContactAnswers(kit), config)
+    found, tries = line.run(np.random.default_rng(0), 100_000, 20, "test", lambda count: None)
+    assert tries < 100_000
+    assert len(found) == SPARE * 20 or len(line.parents.variants) == 20
 
 
 def test_a_piece_of_an_exemplar_is_told_from_a_new_shape() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     line = Search(ContactAnswers(kit), SearchConfig())
-    whole = line.exemplars[1]
+    whole = line.parents.exemplars[1]
     kept = np.arange(3, 9)
     moved = pose(3.0, 0.0, -2.0, 1) @ whole.assembly.poses[kept]
     piece = Assembly(whole.assembly.types[kept], moved, np.empty((0, 2), np.int32))
@@ -103,11 +114,11 @@ def test_a_piece_of_an_exemplar_is_told_from_a_new_shape() -> None:
         ws.counts[PARTS], ws.counts[EDGES] = len(assembly), 0
 
     put(piece)
-    assert kernels.lies_in(line.tables, ws, whole.tables)
-    assert not kernels.lies_in(line.tables, ws, line.exemplars[0].tables)
+    assert lies_in(line.tables, ws, whole.tables)
+    assert not lies_in(line.tables, ws, line.parents.exemplars[0].tables)
     moved[2, 0, 3] += 0.2
     put(piece)
-    assert not kernels.lies_in(line.tables, ws, whole.tables)
+    assert not lies_in(line.tables, ws, whole.tables)
 
 
 def test_no_variant_is_a_piece_of_an_exemplar() -> None:
@@ -117,10 +128,10 @@ def test_no_variant_is_a_piece_of_an_exemplar() -> None:
     line, found = search(kit, tries=3000, smallest=0.3)
     assert found
     for variant in found:
-        line._load(line.parent("variant", variant.assembly, variant.origins, variant.labels))
+        line._load(line.parent("variant", variant.assembly, variant.origins, (0, 0), variant.labels))
         ws, n = line._ws, len(variant.assembly)
         ws.turns[:n], ws.places[:n] = variant.assembly.poses[:, :3, :3], variant.assembly.poses[:, :3, 3]
-        assert not any(kernels.lies_in(line.tables, ws, each.tables) for each in line.exemplars)
+        assert not any(lies_in(line.tables, ws, each.tables) for each in line.parents.exemplars)
     assert line.rejects[SUBASSEMBLY] > 0
 
 
@@ -149,4 +160,4 @@ def test_no_more_parents_are_held_than_the_config_allows() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     line, found = search(kit, tries=2000, largest=3.0, parents=5)
     assert len(found) > 5
-    assert sum(len(family) for family in line.families) == 5
+    assert len(line.parents.variants) == 5

@@ -51,7 +51,7 @@ def test_search_finds_every_chain_within_the_size_limits(matching: str) -> None:
 
 def test_search_finds_every_rectangle_within_the_size_limits() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=60_000, smallest=1.0, largest=1.6)
+    _, found = search(kit, tries=120_000, smallest=1.0, largest=1.6)
     rectangles = {
         tuple(sorted((width, depth))): 4 + 2 * (width + depth) for width in range(1, 10) for depth in range(1, 10)
     }

@@ -1,0 +1,99 @@
+"""A contact sheet of each kit of a collection: the variants that differ most, and some at random.
+
+python -m stages.variations.sheet --config configs/castle.yaml [--out datasets]
+
+Reads the finished variations from the work folder and writes `OUT/sheets/<dataset>-<kit>.png`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.config import load_config
+from pipeline.places import Places, write_whole
+from pipeline.randomness import decision_rng
+from pipeline.registry import find_stages
+from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.kit import Assembly, Exemplar, Kit
+from stages.shape.kit_files import load_kit
+from stages.shape.sample import Sample, read_samples
+from stages.shape.shape import kit_shape, upright
+from stages.views.camera import Camera
+from stages.views.portrait import portrait
+from stages.views.probe import backend_for
+from stages.views.scene import scene_of
+from stages.views.sheet import Cell, Section, contact_sheet, picture_png
+
+__all__ = ["kit_variants_sheet", "main"]
+
+SHOWN = 24
+COLUMNS = 8
+CELL = 232
+CAMERA = Camera(azimuth=-40.0, elevation=25.0)
+
+
+def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], rng: np.random.Generator) -> bytes:
+    """The sheet of one kit as PNG. `samples` are its variants in the order in which they were chosen, which is that
+    of how much each differs from the exemplars and from those before it."""
+    rest = rng.permutation(np.arange(min(SHOWN, len(samples)), len(samples)))[:SHOWN]
+    drawn = [samples[place] for place in sorted(rest.tolist())]
+    parts = [
+        ("Exemplars", [(_whole(each), each.name) for each in kit.exemplars], "what goes in"),
+        ("Most different", [(each.assembly, each.key) for each in samples[:SHOWN]], "chosen first"),
+        (
+            "At random",
+            [(each.assembly, each.key) for each in drawn],
+            "of the rest",
+        ),
+    ]
+    backend = backend_for("auto")
+
+    def cell(assembly: Assembly, name: str) -> Cell:
+        picture = portrait(scene_of(upright(kit_shape(kit, assembly))), CAMERA, (CELL, CELL), backend=backend)
+        return Cell(picture, f"{name}, {len(assembly)} parts")
+
+    sections = []
+    for title, shown, note in parts:
+        cells = [cell(assembly, name) for assembly, name in shown]
+        rows = [cells[start : start + COLUMNS] for start in range(0, len(cells), COLUMNS)]
+        sections.append(Section(title, rows, note))
+    title = f"{kit.name}: {len(samples):,} variants"
+    return picture_png(contact_sheet([each for each in sections if each.rows], title, CELL))
+
+
+def _whole(exemplar: Exemplar) -> Assembly:
+    """An exemplar with its backdrop, whose contacts no picture shows."""
+    front, behind = exemplar.assembly, exemplar.backdrop
+    types, poses = np.concatenate([front.types, behind.types]), np.concatenate([front.poses, behind.poses])
+    return Assembly(types, poses, front.edges)
+
+
+def main() -> None:
+    """Draw the sheet of each kit of a config whose variations are made."""
+    parser = argparse.ArgumentParser(prog="python -m stages.variations.sheet", description="Draw contact sheets.")
+    parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"))
+    parser.add_argument("--out", type=Path, default=Path("datasets"), help="the output folder of the run")
+    asked = parser.parse_args()
+    config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
+    places = Places(asked.out, config.name)
+    shards = sorted(places.stage("variations").root.glob(f"{config.name}-*-*.tar"))
+    if not shards:
+        parser.error(f"{places.work} holds no variations; make them with: make variations CONFIG={asked.config}")
+    samples = sorted((each for shard in shards for each in read_samples(shard)), key=lambda each: each.key)
+    folder = asked.out / "sheets"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in [each.name for each in config.section(ExemplarsConfig).kits]:
+        stem = places.stage("exemplars").root / name
+        kit = load_kit(stem.with_suffix(".json"), stem.with_suffix(".tar"))
+        own = [each for each in samples if each.kit == name]
+        path = folder / f"{config.name}-{name}.png"
+        write_whole(path, kit_variants_sheet(kit, own, decision_rng(config.seed, "sheet", name)))
+        print(path)
+
+
+if __name__ == "__main__":
+    main()

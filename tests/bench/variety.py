@@ -1,0 +1,128 @@
+"""What the search finds in a given CPU time: led by its archive beside plain random, for every config of real models.
+
+python -m tests.bench.variety [--seconds 120] [--workers 2] [--grammar multiset] [CONFIG...]
+
+CPU seconds of each worker are counted, not those of the clock, so a busy machine changes little. Workers do not
+exchange what they find, as the lanes of a real search do after each round. Prints one Markdown table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from pipeline.config import load_config
+from pipeline.registry import find_stages
+from stages.exemplars.build import build_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.kit import Kit
+from stages.variations.answers import ContactAnswers
+from stages.variations.features import AXES, MIXED
+from stages.variations.search import Search
+from stages.variations.settings import SearchConfig, VariationsConfig
+
+__all__ = ["Finds", "configured", "explore"]
+
+CONFIGS = ("castle", "dungeon", "spacebase-hall", "ring-segments", "ball-track", "racetrack", "bridge", "temple")
+SLICE = 2000
+WARM_UP = 300
+HEADER = (
+    "| kit | search | tries | variants | a CPU s | graphs | histograms | at quarters | mixed | blended | E | MB |\n"
+    "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|"
+)
+
+
+@dataclass
+class Finds:
+    """What searches have found. keys: graph and histogram of each variant; features: float32 (9,) of each; curve:
+    numbers of variants after each quarter of the time; megabytes: the most memory that a process held."""
+
+    tries: int = 0
+    keys: list[tuple[int, int]] = field(default_factory=list)
+    features: list[np.ndarray] = field(default_factory=list)
+    curve: list[int] = field(default_factory=list)
+    crossings: Counter[str] = field(default_factory=Counter)
+    megabytes: float = 0.0
+
+
+def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig]:
+    """The first kit of `configs/<name>.yaml`, with another strictness if asked, and how it is searched."""
+    sections = {name: stage.config for name, stage in find_stages().items()}
+    config = load_config(Path(f"configs/{name}.yaml"), sections)
+    kit_config = config.section(ExemplarsConfig).kits[0]
+    if grammar is not None:
+        kit_config = kit_config.model_copy(update={"grammar": grammar})
+    kit, _ = build_kit(kit_config, [read_model(shape, kit_config.parts) for shape in kit_config.shapes])
+    return kit, config.section(VariationsConfig).search
+
+
+def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int) -> Finds:
+    """One worker's search of so many CPU seconds, after a warm-up that is not counted."""
+    Search(ContactAnswers(kit), config).run(np.random.default_rng(seed), WARM_UP, 10**9, "warm", lambda count: None)
+    line, rng, finds = Search(ContactAnswers(kit), config), np.random.default_rng(seed), Finds()
+    start = time.process_time()
+    for quarter in range(1, 5):
+        while time.process_time() - start < seconds * quarter / 4:
+            found, tries = line.run(rng, SLICE, 10**9, f"w{seed}", lambda count: None)
+            finds.tries += tries
+            finds.keys += [(each.graph, each.histogram) for each in found]
+            finds.features += [each.features for each in found]
+        finds.curve.append(len(finds.keys))
+    finds.crossings = line.crossings
+    finds.megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return finds
+
+
+def _row(name: str, guided: bool, workers: Sequence[Finds], seconds: float) -> str:
+    keys = [key for each in workers for key in each.keys]
+    features = np.array([each for worker in workers for each in worker.features]).reshape(-1, len(AXES))
+    graphs, histograms = len({graph for graph, _ in keys}), len({histogram for _, histogram in keys})
+    quarters = [len({key[1] for each in workers for key in each.keys[: each.curve[at]]}) for at in range(4)]
+    mixed = np.mean(features[:, AXES.index("mixture")] >= MIXED) if keys else 0.0
+    blended = np.mean(features[:, AXES.index("blend")] > 0) if keys else 0.0
+    distance = features[:, AXES.index("distance")].mean() if keys else 0.0
+    return (
+        f"| {name} | {'novelty' if guided else 'random'} | {sum(each.tries for each in workers):,} | {len(keys):,} | "
+        f"{len(keys) / seconds / len(workers):,.0f} | {graphs:,} | {histograms:,} | "
+        f"{' '.join(f'{each:,}' for each in quarters)} | {mixed:.0%} | {blended:.0%} | {distance:.2f} | "
+        f"{max(each.megabytes for each in workers):,.0f} |"
+    )
+
+
+def main() -> None:
+    """Search every kit twice and print the table, and for kits of several exemplars why their crossings fail."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.variety", description="What the search finds.")
+    parser.add_argument("configs", nargs="*", help=f"names in configs/; all of {', '.join(CONFIGS)} if none is named")
+    parser.add_argument("--seconds", type=float, default=120.0, help="CPU seconds of each worker")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--grammar", choices=("multiset", "count_and_set", "count_and_pairs"))
+    asked = parser.parse_args()
+    print(HEADER, flush=True)
+    notes: list[str] = []
+    for name in asked.configs or CONFIGS:
+        kit, config = configured(name, asked.grammar)
+        for guided in (False, True):
+            novelty = config.novelty.model_copy(update={"guided": guided})
+            led = config.model_copy(update={"novelty": novelty})
+            jobs = [delayed(explore)(kit, led, asked.seconds, seed) for seed in range(asked.workers)]
+            workers: list[Finds] = Parallel(n_jobs=asked.workers)(jobs)
+            print(_row(name, guided, workers, asked.seconds), flush=True)
+        if len(kit.exemplars) > 1:
+            crossings = sum((each.crossings for each in workers), Counter[str]()).most_common()
+            notes.append(
+                f"{name}: tries across exemplars: " + ", ".join(f"{count:,} {why}" for why, count in crossings)
+            )
+    print("\n" + "\n".join(notes))
+
+
+if __name__ == "__main__":
+    main()
