@@ -6,14 +6,17 @@ from collections import Counter
 
 import numpy as np
 
+from pipeline.stage import Task
 from stages.shape.arrays import FloatArray
 from stages.shape.contact import world_boxes
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
+from stages.shape.kit_input import input_kit
 from stages.shape.pose import invert, pose_vectors
 from stages.variations.answers import ContactAnswers
 from stages.variations.layout import FORBIDDEN, NONE
+from stages.variations.settings import VariationsConfig
 
-__all__ = ["Backdrop"]
+__all__ = ["Backdrop", "backdrop_of"]
 
 FIT_SHARE = 0.75
 """A hub fits where it has at least this share of the neighbours that one of its type had in an exemplar."""
@@ -130,6 +133,18 @@ class Backdrop:
             if answer != NONE:
                 touched.append(part)
         return touched
+
+
+_known: dict[tuple[str, bool], Backdrop] = {}
+
+
+def backdrop_of(task: Task, kit: str) -> Backdrop:
+    """The backdrop of a kit, kept from shard to shard of one worker: what it remembers never changes a result."""
+    upright = task.config.section(VariationsConfig).search.upright
+    made_from = str(task.input("exemplars", f"{kit}.tar")), upright
+    if made_from not in _known:
+        _known[made_from] = Backdrop(ContactAnswers(input_kit(task, kit)), upright)
+    return _known[made_from]
 
 
 def _has_most(kit: Kit, hub: int, around: np.ndarray) -> bool:

@@ -15,8 +15,7 @@ from stages.shape.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
-from stages.variations.answers import ContactAnswers
-from stages.variations.backdrop import Backdrop
+from stages.variations.backdrop import Backdrop, backdrop_of
 from stages.variations.measures import SAMPLE, edit_measures, pool_measures
 from stages.variations.meeting import meeting
 from stages.variations.pool import FoundVariants, PoolIndex
@@ -119,22 +118,10 @@ def run_collection(task: Task) -> Outcome:
         for kit, lane, index, place in mine[:, :4].tolist():
             if lane not in found:
                 found[lane] = FoundVariants.of(task, lanes[lane])
-            write_sample(writer, _sample(_backdrop(task, kits[kit]), place, split, found[lane], index))
+            write_sample(writer, _sample(backdrop_of(task, kits[kit]), place, split, found[lane], index))
             counts[kits[kit]] += 1
     summary: dict[str, Any] = {"split": split, "samples": len(mine), "kits": dict(sorted(counts.items()))}
     return Outcome(len(mine), summary)
-
-
-_known_backdrops: dict[tuple[str, bool], Backdrop] = {}
-
-
-def _backdrop(task: Task, kit: str) -> Backdrop:
-    """The backdrop of a kit, kept from shard to shard of one worker: what it remembers never changes a result."""
-    upright = task.config.section(VariationsConfig).search.upright
-    made_from = str(task.input("exemplars", f"{kit}.tar")), upright
-    if made_from not in _known_backdrops:
-        _known_backdrops[made_from] = Backdrop(ContactAnswers(input_kit(task, kit)), upright)
-    return _known_backdrops[made_from]
 
 
 def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, index: int) -> Sample:

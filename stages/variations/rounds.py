@@ -9,19 +9,23 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from pipeline.stage import Outcome, Plan, Shard, Task
+from stages.physics.judge import unmet
+from stages.physics.settings import Requirements
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
+from stages.shape.shape import kit_shape
 from stages.variations.answers import ContactAnswers
 from stages.variations.archive import cell_of
+from stages.variations.backdrop import backdrop_of
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
-from stages.variations.search import SPARE, Search
+from stages.variations.search import SPARE, Search, Variant
 from stages.variations.settings import VariationsConfig
 
 __all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
@@ -89,7 +93,8 @@ def last_pool(plan: Plan, kit: str) -> dict[str, Any]:
 
 def run_lane(task: Task) -> Outcome:
     """One lane of one round."""
-    config = task.config.section(VariationsConfig).search
+    section = task.config.section(VariationsConfig)
+    config = section.search
     kit = input_kit(task, task.shard.params["kit"])
     search = Search(_answers(kit, task), config)
     rng = task.rng("tries")
@@ -101,12 +106,27 @@ def run_lane(task: Task) -> Outcome:
         search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, origins, (place[0], place[1]), labels))
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
-    write_variants(task, variants)
+    kept = _required(task, kit, section.require, variants)
+    write_variants(task, kept)
     for reason, count in sorted(search.rejects.items()):
         task.reject(task.shard.name, reason, count=count)
     crossings = dict(sorted(search.crossings.items()))
-    summary = {"found": len(variants), "tries": tries, "spares": search.spares, "crossings": crossings}
+    summary = {"found": len(kept), "tries": tries, "spares": search.spares, "crossings": crossings}
     return Outcome(0, summary)
+
+
+def _required(task: Task, kit: Kit, require: Requirements, variants: Sequence[Variant]) -> Sequence[Variant]:
+    """The variants that are, with their backdrop, physically what the config requires; the others are refused."""
+    if not require.rooted and not require.stable:
+        return variants
+    backdrop, kept = backdrop_of(task, kit.name), []
+    for variant in variants:
+        weak = unmet(require, kit_shape(kit, backdrop.fit(variant.assembly)))
+        if weak is None:
+            kept.append(variant)
+        else:
+            task.reject(task.shard.name, weak)
+    return kept
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:

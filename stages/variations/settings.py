@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.physics.settings import Requirements
 from stages.variations.features import Axis
 
 __all__ = ["NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]
@@ -118,5 +119,9 @@ class VariationsConfig(StrictModel):
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
     selection: SelectionConfig = Field(
         default_factory=SelectionConfig, description="How the dataset is chosen from what was found."
+    )
+    require: Requirements = Field(
+        default_factory=Requirements,
+        description="What every variant must be physically, its backdrop included; others are refused and counted.",
     )
     splits: SplitConfig = Field(default_factory=SplitConfig, description="How the samples are shared out.")

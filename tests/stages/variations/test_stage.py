@@ -90,3 +90,32 @@ def test_two_workers_make_the_same_bytes(made: tuple[Path, str]) -> None:
         return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(root.glob("*.*"))}
 
     assert digests("one") == digests("two")
+
+
+def test_only_towers_that_bear_the_required_push_are_kept(tmp_path: Path) -> None:
+    upright = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    towers = [[(name, upright @ at) for name, at in chain(links)] for links in (3, 5)]
+    paths = [write_model(tmp_path / f"tower{k}.glb", CHAIN, tower) for k, tower in enumerate(towers)]
+    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 0.1, "rounds": 20}
+    config = {
+        "name": "toy",
+        "seed": 5,
+        "exemplars": {"kits": [{"name": "tower", "shapes": paths, "parts": "nodes"}]},
+        # a tower of n links is n + 1 high and one wide: it tips at a push of 1 / (n + 1) of its weight
+        "variations": {"per_kit": 50, "search": search, "require": {"stable": True, "physics": {"push": 0.135}}},
+    }
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    printed = ""
+    for stage in ("exemplars", "variations"):
+        command = [sys.executable, "-m", "pipeline", "run", stage, "--config", str(tmp_path / "toy.yaml")]
+        done = subprocess.run(
+            [*command, "--out", str(tmp_path / "out"), "--workers", "1"], capture_output=True, text=True
+        )
+        printed += done.stdout + done.stderr
+        assert done.returncode == 0, printed
+    links = {
+        len(sample) - 2 for shard in collection(tmp_path, "out") for sample in (s.assembly for s in read_samples(shard))
+    }
+    assert max(links) == 6
+    records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
+    assert "not stable" in records
