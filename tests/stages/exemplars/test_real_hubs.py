@@ -8,24 +8,18 @@ import numpy as np
 import pytest
 
 from pipeline.config import Config, load_config
+from pipeline.registry import find_stages
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
-from stages.exemplars.stage import STAGE as EXEMPLARS_STAGE
-from stages.package.stage import STAGE as PACKAGE
-from stages.points.stage import STAGE as POINTS
 from stages.shape.contact import ContactTest
 from stages.shape.kit import Kit
-from stages.sketches.stage import STAGE as SKETCHES
-from stages.strings.stage import STAGE as STRINGS
 from stages.variations.answers import ContactAnswers
 from stages.variations.backdrop import Backdrop
-from stages.variations.stage import STAGE as VARIATIONS
 
 ROOT = Path(__file__).resolve().parents[3]
 EXEMPLARS = ROOT.parent / "shared" / "exemplars"
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
-STAGES = (EXEMPLARS_STAGE, VARIATIONS, STRINGS, POINTS, SKETCHES, PACKAGE)
 
 needs_models = pytest.mark.skipif(
     not EXEMPLARS.is_dir(), reason="the public exemplars lie beside the project; they are not here"
@@ -34,14 +28,19 @@ needs_models = pytest.mark.skipif(
 
 def loaded(path: Path, monkeypatch: pytest.MonkeyPatch) -> Config:
     monkeypatch.chdir(ROOT)
-    return load_config(path, {stage.name: stage.config for stage in STAGES})
+    stages = find_stages()
+    config = load_config(path, {name: stage.config for name, stage in stages.items()})
+    for stage in stages.values():
+        stage.check(config)
+    return config
 
 
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
 def test_every_config_that_comes_with_the_project_is_valid(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if "../shared" in path.read_text() and not EXEMPLARS.is_dir():
         pytest.skip("its models lie beside the project; they are not here")
-    assert loaded(path, monkeypatch).name == (path.stem if path.stem != "default" else "shapemill-default")
+    own = {"default": "shapemill-default", "shapeassembly": "furniture-programs"}
+    assert loaded(path, monkeypatch).name == own.get(path.stem, path.stem)
 
 
 def kit_of(config: KitConfig) -> Kit:

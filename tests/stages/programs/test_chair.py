@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,11 @@ def random_chairs(count: int, seed: int) -> list[dict[str, Value]]:
     return found[:count]
 
 
+def meshes_of(values: Mapping[str, Value]) -> list[PartMesh]:
+    """The triangles of the parts of a chair."""
+    return [part.part_mesh() for part in PROGRAM.parts(values)]
+
+
 def loose_parts(parts: list[PartMesh]) -> list[str]:
     """The names of parts to which no way leads from the first over parts that touch or meet."""
     from stages.shape.triangles import build_tree, first_contact
@@ -50,7 +56,7 @@ def loose_parts(parts: list[PartMesh]) -> list[str]:
 
 
 def check_whole(values: dict[str, Value]) -> None:
-    parts = list(PROGRAM.parts(values))
+    parts = meshes_of(values)
     # Surfaces are looked at one by one; all at once is faster than mesh by mesh.
     meshes = [QuadMesh(part.vertices, np.column_stack([part.faces, part.faces[:, 2]])) for part in parts]
     assert mesh_faults(QuadMesh.joined(meshes)) == [], values
@@ -134,7 +140,7 @@ def test_extreme_chairs_are_whole() -> None:
 
 def test_a_chair_is_made_alike_each_time() -> None:
     for values in random_chairs(10, seed=2):
-        for one, other in zip(PROGRAM.parts(values), PROGRAM.parts(dict(values)), strict=True):
+        for one, other in zip(meshes_of(values), meshes_of(dict(values)), strict=True):
             assert one.name == other.name
             assert one.vertices.tobytes() == other.vertices.tobytes()
             assert one.faces.tobytes() == other.faces.tobytes()
@@ -144,7 +150,7 @@ def test_a_rounder_seat_brings_legs_and_back_together() -> None:
     """geocode §3.2: an edit of the seat's appearance goes on to legs and back."""
     reach = []
     for shape in (0.0, 0.5, 1.0):
-        parts = PROGRAM.parts({**PROGRAM.schema.base, "seat_shape": shape})
+        parts = meshes_of({**PROGRAM.schema.base, "seat_shape": shape})
         reach.append(
             [max(p.bounds[1][0] for p in parts if p.name == name) for name in ("leg", "back post", "top rail")]
         )
@@ -153,6 +159,6 @@ def test_a_rounder_seat_brings_legs_and_back_together() -> None:
 
 def test_arms_leave_room_for_the_cushion() -> None:
     for values in random_chairs(200, seed=9):
-        parts = PROGRAM.parts({**values, "handles_state": 1, "pillow_state": 2})
+        parts = meshes_of({**values, "handles_state": 1, "pillow_state": 2})
         cushion = next(part for part in parts if part.name == "cushion")
         assert min(p.vertices[:, 1].min() for p in parts if p.name == "arm") > cushion.vertices[:, 1].max()

@@ -133,12 +133,6 @@ def test_a_sweep_has_as_many_shapes_as_asked_in_splits_by_structure(racks: Path)
     assert len(widths - listed) > 100
 
 
-def test_a_dataset_without_a_program_has_no_shards(tmp_path: Path) -> None:
-    code, printed, made = make(tmp_path, {})
-    assert code == 0, printed
-    assert not shards_of(made)
-
-
 def test_a_program_that_is_not_there_is_named(tmp_path: Path) -> None:
     code, printed, _ = make(tmp_path, {"program": "chiar"})
     assert code == 2
