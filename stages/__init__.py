@@ -1,4 +1,4 @@
-"""The way of the data: one folder a stage, in the order exemplars, variations, strings, points, sketches, package."""
+"""The way of the data: what makes shapes (exemplars, variations, programs, shapeassembly), then what is made of them."""
 
 from __future__ import annotations
 
