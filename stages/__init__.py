@@ -1,4 +1,4 @@
-"""The way of the data: what makes shapes (exemplars, variations, programs, shapeassembly), then what is made of them."""
+"""The way of the data: what makes shapes (exemplars, variations, programs, shapeassembly), then what is made of it."""
 
 from __future__ import annotations
 
