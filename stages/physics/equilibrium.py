@@ -87,7 +87,12 @@ def load_limits(
 
 
 def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float) -> Limits:
-    """Small programmes by HiGHS, large ones by the interior point method for bodies, each by the other if it fails."""
+    """One body by the simplex method on its six equations, small programmes by HiGHS, large ones by the interior point
+    method for bodies; each by another if it fails."""
+    if len(load) == 1:
+        found = _by_tableau(wrenches, bodies, load, growing, cap)
+        if found is not None:
+            return found
     if len(wrenches) * len(growing) <= SMALL:
         found = _by_highs(wrenches, bodies, load, growing, cap)
         if found is not None:
@@ -100,6 +105,20 @@ def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing:
             return Limits(np.full(len(growing), -1.0), motions)
         factors[index], motions[index] = found.factors[0], found.motions[0]
     return Limits(factors, motions)
+
+
+def _by_tableau(
+    wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
+) -> Limits | None:
+    """All loads on one body, which nothing but the ground bears. None where the method fails."""
+    from stages.physics.tableau import grow_loads
+
+    edges = np.where((bodies >= 0)[:, :, None], wrenches, 0.0).sum(axis=1).T
+    try:
+        factors, multipliers = grow_loads(edges, load[0], growing[:, 0], cap)
+    except ArithmeticError:
+        return None
+    return Limits(factors, multipliers[:, None])
 
 
 def _by_highs(

@@ -18,6 +18,7 @@ from stages.physics.equilibrium import load_limits
 from stages.physics.polygons import convex_hull, inside_margin
 from stages.physics.settings import PhysicsConfig
 from stages.physics.solids import Placed
+from stages.physics.tableau import TIE
 from stages.shape.arrays import FloatArray, IntArray
 
 __all__ = ["Stability", "components", "stability", "standing_points", "tipping_angle"]
@@ -121,7 +122,7 @@ def stability(
     if not stands:
         empty = np.zeros_like(gravity)
         limits = load_limits(scaled, centres / size, empty, gravity[None], config.friction, pull, azimuth, 2.0)
-    worst = int(np.argmin(limits.factors))
+    worst = int(np.flatnonzero(limits.factors <= limits.factors.min() + TIE)[0])
     margin = float(limits.factors[worst]) if stands else -1.0
     gives = not stands or margin < CAP * (1 - 1e-9)
     return Stability(

@@ -61,7 +61,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 STAGE = Stage(
     name="validity",
-    version=1,
+    version=2,
     config=PhysicsConfig,
     inputs=("exemplars", *PRODUCERS),
     plan=plan,

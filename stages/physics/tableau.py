@@ -1,0 +1,160 @@
+"""Linear programmes of one rigid body: six equations, so the simplex method on a dense tableau answers in microseconds
+what a general solver answers in milliseconds."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+
+__all__ = ["TIE", "grow_loads"]
+
+FEASIBLE = 1e-7
+"""What may be left over of an equation that holds."""
+TIE = 1e-6
+"""Of loads that grow equally far the first tells what gives way."""
+ZERO = 1e-9
+"""Smaller rates are rounding: none is divided by."""
+GREEDY = 100
+"""Pivots by the greatest gain; then by the first, which never goes in circles (Bland's rule)."""
+PATIENCE = 2_000
+NO_END = -2.0
+
+
+def grow_loads(edges: FloatArray, load: FloatArray, growing: FloatArray, cap: float) -> tuple[FloatArray, FloatArray]:
+    """The greatest factor, at most `cap`, of each load with which edges @ x + factor * growing = load, for an x >= 0.
+
+    edges: float64 (rows, c), what a unit of each force does; load: float64 (rows,); growing: float64 (loads, rows).
+    Gives the factors, float64 (loads,), all -1 where there is no x even for factor 0, and the multipliers of the
+    equations, float64 (loads, rows), 0 where the cap was reached. Of many multipliers those of the first of the loads
+    that grow least are the least of all: they are the same however the equations are turned.
+
+    Raises ArithmeticError where the method finds no end, or its answer does not solve the equations.
+    """
+    rows, count = edges.shape
+    sign = np.where(load < 0, -1.0, 1.0)
+    # columns: the forces, a slack for each equation (the inverse of the basis stands there), the factor, the values
+    table = np.zeros((rows, count + rows + 2))
+    table[:, :count] = edges * sign[:, None]
+    table[:, count : count + rows] = np.eye(rows)
+    table[:, -1] = load * sign
+    basis = count + np.arange(rows)
+    left = _empty_slacks(table, basis, count)
+    if left == NO_END:
+        raise ArithmeticError("no end to the search for an equilibrium")
+    if left > FEASIBLE:
+        return np.full(len(growing), -1.0), np.zeros_like(growing)
+    table[basis >= count, -1] = 0.0
+    factors, multipliers = np.empty(len(growing)), np.zeros_like(growing)
+    for index, each in enumerate(growing):
+        grown, final = table.copy(), basis.copy()
+        grown[:, -2] = grown[:, count : count + rows] @ (each * sign)
+        reached = _grow(grown, final, count, cap)
+        own = final < count
+        row = np.flatnonzero(final == count + rows)
+        factor = float(grown[row[0], -1]) if len(row) else 0.0
+        borne = edges[:, final[own]] @ grown[own, -1] + factor * each
+        if reached == NO_END or np.abs(borne - load).max() > 10 * FEASIBLE or grown[own, -1].min(initial=0) < -FEASIBLE:
+            raise ArithmeticError("no end to the growth of a load")
+        factors[index] = reached
+        if reached < cap:
+            multipliers[index] = grown[row[0], count : count + rows] * sign
+    worst = int(np.flatnonzero(factors <= factors.min() + TIE)[0])
+    if factors[worst] < cap:
+        multipliers[worst] = _least(edges, load, growing[worst], factors[worst], multipliers[worst])
+    return factors, multipliers
+
+
+def _least(edges: FloatArray, load: FloatArray, growing: FloatArray, factor: float, found: FloatArray) -> FloatArray:
+    """The multipliers y of least length with edges.T @ y >= 0, growing @ y >= 1, load @ y <= factor (least distance
+    programming, Lawson and Hanson 1974, chapter 23); those that were found where that fails."""
+    from scipy.optimize import nnls
+
+    inner = np.vstack([edges.T, growing, -load])
+    bounds = np.concatenate([np.zeros(edges.shape[1]), [1.0, -factor - FEASIBLE]])
+    try:
+        forces, _ = nnls(np.vstack([inner.T, bounds]), np.concatenate([np.zeros(len(load)), [1.0]]))
+    except RuntimeError:
+        return found
+    gap = 1.0 - bounds @ forces
+    least: FloatArray = inner.T @ forces / gap if gap > 0 else found
+    return least if (inner @ least >= bounds - 10 * FEASIBLE).all() else found
+
+
+@numba.njit(cache=True)
+def _pivot(table, basis, row, column):
+    """The variable `column` enters the basis at `row`."""
+    table[row] /= table[row, column]
+    for other in range(len(table)):
+        if other != row and table[other, column] != 0.0:
+            table[other] -= table[other, column] * table[row]
+    basis[row] = column
+
+
+@numba.njit(cache=True)
+def _leaving(table, basis, count, column, fixed):
+    """The row whose variable first comes to nothing as that of `column` grows, -1 for none; of equals that of the first
+    variable. `fixed`: whether slacks are nothing and must stay so."""
+    found, least = -1, np.inf
+    for row in range(len(table)):
+        rate = table[row, column]
+        slack = fixed and count <= basis[row] < count + len(table)
+        if rate > ZERO or (slack and rate < -ZERO):
+            ratio = 0.0 if slack else max(table[row, -1], 0.0) / rate
+            if ratio < least - ZERO or (ratio <= least + ZERO and basis[row] < basis[found]):
+                found, least = row, min(ratio, least)
+    return found
+
+
+@numba.njit(cache=True)
+def _entering(rates, greedy):
+    """The column of the greatest rate, or of the first above rounding, -1 for none."""
+    found, most = -1, ZERO
+    for column in range(len(rates)):
+        if rates[column] > most:
+            found, most = column, rates[column]
+            if not greedy:
+                break
+    return found
+
+
+@numba.njit(cache=True)
+def _empty_slacks(table, basis, count):
+    """Pivots until the slacks are as little as they can be; what is left of them."""
+    for step in range(PATIENCE):
+        rates = np.zeros(count)
+        left = 0.0
+        for row in range(len(table)):
+            if basis[row] >= count:
+                left += table[row, -1]
+                rates += table[row, :count]
+        column = _entering(rates, step < GREEDY)
+        if column < 0 or left <= 0.0:
+            return left
+        row = _leaving(table, basis, count, column, False)
+        if row < 0:
+            break
+        _pivot(table, basis, row, column)
+    return NO_END
+
+
+@numba.njit(cache=True)
+def _grow(table, basis, count, cap):
+    """Pivots from a basis that bears the steady load until the factor is as great as it can be, or the cap."""
+    factor = count + len(table)
+    row = _leaving(table, basis, count, factor, True)
+    if row < 0:
+        return cap
+    _pivot(table, basis, row, factor)
+    for step in range(PATIENCE):
+        if table[row, -1] >= cap:
+            return cap
+        column = _entering(-table[row, :count], step < GREEDY)
+        if column < 0:
+            return max(table[row, -1], 0.0)
+        leaving = _leaving(table, basis, count, column, True)
+        if leaving < 0:
+            return cap
+        _pivot(table, basis, leaving, column)
+    return NO_END
