@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,7 +36,9 @@ PAD = 0.02
 """Height of the strip left above and below what a row shows, as a share of the pictures' height."""
 CHOSEN_FROM = 512
 """At most so many shapes, evenly spread over the samples, are looked at to choose those that are shown."""
-CAMERA = Camera(azimuth=-40.0, elevation=25.0)
+ABOVE = Camera(azimuth=-40.0, elevation=25.0)
+BELOW = replace(ABOVE, elevation=-ABOVE.elevation)
+"""Where the first sketch looks from below, as at a ceiling lamp, so does the sheet."""
 
 
 def draw_preview(task: Task) -> Outcome:
@@ -45,6 +48,7 @@ def draw_preview(task: Task) -> Outcome:
     """
     config, sketches = task.config.section(PackageConfig), task.config.section(SketchesConfig)
     backend = backend_for(sketches.backend)
+    camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
     collection, shards = Collection(task), task.shard.params["shards"]
     made = {stage: _members(task, stage, shards) for stage in ("points", "sketches")}
     samples = [each for shard in shards for each in collection.samples(shard)]
@@ -53,8 +57,8 @@ def draw_preview(task: Task) -> Outcome:
     shown = varied([(each, collection.shape(each)) for each in whole], config.previewed)
     columns = [sample.key for sample, _ in shown[:COLUMNS]]
     clouds = {key: {name: bytes_array(made["points"][key][name]) for name in _CLOUD} for key in columns}
-    variants = [Cell(_picture(shape, backend), _size(shape)) for _, shape in shown]
-    points = [Cell(_cloud_picture(clouds[key])) for key in columns]
+    variants = [Cell(_picture(shape, camera, backend), _size(shape)) for _, shape in shown]
+    points = [Cell(_cloud_picture(clouds[key], camera)) for key in columns]
     drawings = [Cell(_decoded(made["sketches"][key]["sketch0.png"])) for key in columns]
     count = len(clouds[columns[0]]["points.npy"])
     exemplars = [Section("Exemplars", _rows(_exemplars(list(collection.kits.values()), backend)), "what goes in")]
@@ -100,7 +104,7 @@ def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[st
 def _exemplars(kits: Sequence[Kit], backend: Backend) -> list[Cell]:
     """Exemplars of all kits; where they leave room in their row, the commonest part types of the kits as well."""
     exemplars = [(each.name, kit_shape(kit, each.assembly)) for kit in kits for each in kit.exemplars][:EXEMPLARS]
-    cells = [Cell(_picture(shape, backend), f"{name}, {_size(shape)}") for name, shape in exemplars]
+    cells = [Cell(_picture(shape, ABOVE, backend), f"{name}, {_size(shape)}") for name, shape in exemplars]
     room = -len(cells) % COLUMNS
     return [*cells, *_part_types(kits, room, backend)]
 
@@ -114,17 +118,17 @@ def _part_types(kits: Sequence[Kit], count: int, backend: Backend) -> list[Cell]
             exemplar = next(each.assembly for each in kit.exemplars if index in each.assembly.types)
             pose = exemplar.poses[exemplar.types == index][:1]
             alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
-            cells.append(Cell(_picture(kit_shape(kit, alone), backend), f"part {kit.types[index].name}"))
+            cells.append(Cell(_picture(kit_shape(kit, alone), ABOVE, backend), f"part {kit.types[index].name}"))
     return cells[:count]
 
 
-def _picture(shape: Shape, backend: Backend) -> ByteArray:
-    return portrait(scene_of(upright(shape)), CAMERA, (CELL, CELL), backend=backend)
+def _picture(shape: Shape, camera: Camera, backend: Backend) -> ByteArray:
+    return portrait(scene_of(upright(shape)), camera, (CELL, CELL), backend=backend)
 
 
-def _cloud_picture(cloud: Mapping[str, np.ndarray]) -> ByteArray:
+def _cloud_picture(cloud: Mapping[str, np.ndarray], camera: Camera) -> ByteArray:
     return points_portrait(
-        cloud["points.npy"].astype(np.float64), cloud["labels.npy"].astype(np.int32), CAMERA, (CELL, CELL), "y"
+        cloud["points.npy"].astype(np.float64), cloud["labels.npy"].astype(np.int32), camera, (CELL, CELL), "y"
     )
 
 

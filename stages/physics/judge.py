@@ -9,16 +9,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stages.physics.contacts import Touch
+from stages.physics.contacts import Patches, Touch
 from stages.physics.settings import PhysicsConfig, Requirements
 from stages.physics.solids import Placed, Solids
-from stages.physics.stability import components, stability, standing_points, tipping_angle
+from stages.physics.stability import Stability, components, stability, standing_points, tipping_angle
 from stages.physics.structure import ground_share, mirror_score
 from stages.shape.arrays import IntArray
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 
 __all__ = ["Judge", "Validity", "judge_of", "judge_shape", "physical_fields", "unmet"]
+
+ROUNDING = 1e-4
+"""Degrees."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,15 @@ class Judge:
         placed = self._placed(assembly)
         return not _floating(placed, self._connected(placed, assembly), self.config).any()
 
+    def stable(self, assembly: Assembly) -> bool:
+        """Whether the shape stands and bears the pushes, as `validity` says, and nothing more: what tips over as a
+        whole is seen at once, however its parts hold together. Raises ValueError as `validity` does."""
+        placed = self._placed(assembly)
+        standing = self._standing(placed)
+        if tipping_angle(placed, standing) < -ROUNDING:
+            return False
+        return self._stability(placed, self._connected(placed, assembly), standing).stable
+
     def contacts(self, assembly: Assembly) -> IntArray:
         """The pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order: those that the
         assembly has, and those at most `config.touching` apart."""
@@ -73,11 +85,9 @@ class Judge:
         placed = self._placed(assembly)
         connected = self._connected(placed, assembly)
         floating = _floating(placed, connected, config)
-        volumes, depths = self._touch.overlaps(placed, connected)
-        every = np.arange(len(placed))
-        standing = standing_points(placed, every, config.connected * placed.diagonal)
-        deep = connected[depths > config.touching * placed.diagonal]
-        found = stability(placed, self._touch, connected, deep, standing, config)
+        volumes, _ = self._touch.overlaps(placed, connected)
+        standing = self._standing(placed)
+        found = self._stability(placed, connected, standing)
         whole = self._solids.volumes[placed.types].sum()
         return Validity(
             rooted=not floating.any(),
@@ -95,6 +105,16 @@ class Judge:
 
     def _placed(self, assembly: Assembly) -> Placed:
         return Placed.of(self._meshes, self._solids, assembly, self._up)
+
+    def _standing(self, placed: Placed) -> Patches:
+        return standing_points(placed, np.arange(len(placed)), self.config.connected * placed.diagonal)
+
+    def _stability(self, placed: Placed, connected: IntArray, standing: Patches) -> Stability:
+        deep = connected[:0]
+        if self.config.joints == "dry":
+            _, depths = self._touch.overlaps(placed, connected)
+            deep = connected[depths > self.config.touching * placed.diagonal]
+        return stability(placed, self._touch, connected, deep, standing, self.config)
 
     def _connected(self, placed: Placed, assembly: Assembly) -> np.ndarray:
         return self._touch.connected(placed, self.config.connected * placed.diagonal, assembly.edges)
@@ -126,15 +146,14 @@ def unmet(requirements: Requirements, shape: Shape) -> str | None:
     if not requirements.rooted and not requirements.stable:
         return None
     judge = judge_of(shape.meshes, shape.up, requirements.physics)
-    if not requirements.stable:
-        return None if judge.rooted(shape.assembly) else "not rooted"
     try:
-        validity = judge.validity(shape.assembly)
+        if requirements.rooted and not judge.rooted(shape.assembly):
+            return "not rooted"
+        if requirements.stable and not judge.stable(shape.assembly):
+            return "not stable"
     except ValueError:
         return "no body to judge"
-    if requirements.rooted and not validity.rooted:
-        return "not rooted"
-    return None if validity.stable else "not stable"
+    return None
 
 
 def _floating(placed: Placed, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:

@@ -16,7 +16,6 @@ import numpy as np
 
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.physics.judge import unmet
-from stages.physics.settings import Requirements
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.shape import kit_shape
@@ -26,7 +25,7 @@ from stages.variations.backdrop import backdrop_of
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search import SPARE, Search, Variant
-from stages.variations.settings import VariationsConfig
+from stages.variations.settings import VariantRequirements, VariationsConfig
 
 __all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
 
@@ -115,13 +114,15 @@ def run_lane(task: Task) -> Outcome:
     return Outcome(0, summary)
 
 
-def _required(task: Task, kit: Kit, require: Requirements, variants: Sequence[Variant]) -> Sequence[Variant]:
-    """The variants that are, with their backdrop, physically what the config requires; the others are refused."""
-    if not require.rooted and not require.stable:
+def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequence[Variant]) -> Sequence[Variant]:
+    """The variants that are, with their backdrop, what the config requires; the others are refused."""
+    if not (require.rooted or require.stable or require.hubs):
         return variants
     backdrop, kept = backdrop_of(task, kit.name), []
     for variant in variants:
-        weak = unmet(require, kit_shape(kit, backdrop.fit(variant.assembly)))
+        whole = backdrop.fit(variant.assembly)
+        fitted = len(whole) - len(variant.assembly)
+        weak = unmet(require, kit_shape(kit, whole)) if fitted >= require.hubs else "no backdrop"
         if weak is None:
             kept.append(variant)
         else:

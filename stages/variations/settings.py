@@ -112,6 +112,17 @@ class SplitConfig(StrictModel):
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 
+class VariantRequirements(Requirements):
+    """What a variant must be, its backdrop included, so that it is kept; what is not named is not required."""
+
+    hubs: int = Field(
+        0,
+        ge=0,
+        description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
+        "no bridge.",
+    )
+
+
 class VariationsConfig(StrictModel):
     """The variations of each kit."""
 
@@ -120,8 +131,8 @@ class VariationsConfig(StrictModel):
     selection: SelectionConfig = Field(
         default_factory=SelectionConfig, description="How the dataset is chosen from what was found."
     )
-    require: Requirements = Field(
-        default_factory=Requirements,
+    require: VariantRequirements = Field(
+        default_factory=VariantRequirements,
         description="What every variant must be physically, its backdrop included; others are refused and counted.",
     )
     splits: SplitConfig = Field(default_factory=SplitConfig, description="How the samples are shared out.")

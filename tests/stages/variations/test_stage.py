@@ -14,7 +14,7 @@ import yaml
 
 from stages.shape.canonical import graph_digest
 from stages.shape.sample import read_samples
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, ring
+from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
 
 
 def write_model(path: Path, meshes: dict[str, trimesh.Trimesh], shape: list[Placed]) -> str:
@@ -119,3 +119,27 @@ def test_only_towers_that_bear_the_required_push_are_kept(tmp_path: Path) -> Non
     assert max(links) == 6
     records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
     assert "not stable" in records
+
+
+def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: Path) -> None:
+    meshes = {**CHAIN, "plate": trimesh.creation.box((4.5, 0.1, 3.0))}
+    plate: Placed = ("plate", pose(1, -0.55, 0))  # under both caps of a chain of three links, and of no other
+    paths = [
+        write_model(tmp_path / "three.glb", meshes, [*chain(3), plate]),
+        write_model(tmp_path / "five.glb", meshes, chain(5)),
+    ]
+    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 0.1, "rounds": 20}
+    kit = {"name": "chain", "shapes": paths, "parts": "nodes", "hubs": {"types": ["plate"], "keep": "backdrop"}}
+    config = {
+        "name": "toy",
+        "seed": 5,
+        "exemplars": {"kits": [kit]},
+        "variations": {"per_kit": 50, "search": search, "require": {"hubs": 1}},
+    }
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    for stage in ("exemplars", "variations"):
+        command = [sys.executable, "-m", "pipeline", "run", stage, "--config", str(tmp_path / "toy.yaml")]
+        done = subprocess.run([*command, "--out", str(tmp_path / "out")], capture_output=True, text=True)
+    assert "the search found no variant of any kit" in done.stdout + done.stderr
+    records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
+    assert "no backdrop" in records
