@@ -17,7 +17,7 @@ from stages.package.settings import PackageConfig
 
 __all__ = ["STAGE"]
 
-VERSION = 3
+VERSION = 4
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
