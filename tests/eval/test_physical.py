@@ -31,11 +31,13 @@ def corners(*heights: float) -> FloatArray:
 
 
 def test_table_has_a_row_for_each_name_with_its_shares() -> None:
-    table = physical_table([("b", STANDS), ("a", FLOATS), ("b", FLOATS)], PhysicsConfig(), ["chair"])
+    post = solid(box(0.1, 0.1, 2, at=(0, 0, 1)))  # tips at a push of a twentieth of its weight
+    table = physical_table([("b", STANDS), ("a", FLOATS), ("b", FLOATS), ("c", post)], PhysicsConfig(), ["chair"])
     rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
-    assert list(rows) == ["b", "a", "chair, published"]
+    assert list(rows) == ["b", "a", "c", "chair, published"]
     assert (rows["b"]["shapes"], rows["b"]["parts"]) == (2, 2)
     assert (rows["b"]["rooted %"], rows["b"]["stable %"], rows["b"]["dry stable %"]) == (50, 50, 50)
+    assert [(rows[name]["stable %"], rows[name]["firm %"]) for name in "bc"] == [(50, 50), (100, 0)]
     assert (rows["a"]["floating"], rows["a"]["pieces"]) == (1, 2)
     assert (rows["chair, published"]["rooted %"], rows["chair, published"]["stable %"]) == (100.0, 88.0)
 
