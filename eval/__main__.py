@@ -1,6 +1,6 @@
 """`make eval`: prints a table about a dataset or about files, and keeps it as Markdown, CSV and LaTeX.
 
-python -m eval physical [--config YAML] [--out FOLDER] [--most N] [--up y|z] [FILE...]
+python -m eval physical [--config YAML] [--out FOLDER] [--most N] [--dry N] [--up y|z] [FILE...]
 
 FILE is a model (GLB, OBJ, ...) or an `.npz` of boxes; without any, the finished dataset of the config is measured. The
 table is written to `OUT/<dataset>-eval/physical.md`, `.csv` and `.tex`; of files it is only printed.
@@ -26,11 +26,14 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"), help="the dataset's YAML")
     parser.add_argument("--out", type=Path, default=Path("datasets"), help="folder that datasets are made in")
     parser.add_argument("--most", type=int, default=200, help="so many shapes of a dataset are measured at most")
+    parser.add_argument("--dry", type=int, default=50, help="so many of a kind at most are judged as dry blocks, too")
     parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that points up in the files")
     parser.add_argument("files", nargs="*", type=Path, help="models or boxes instead of the dataset")
     asked = parser.parse_args(arguments)
     if asked.most < 1:
         parser.error("--most must be at least 1")
+    if asked.dry < 0:
+        parser.error("--dry must not be negative")
     # Solvers of small systems on a busy machine: threads that wait for each other take a hundred times as long.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pipeline.errors import ConfigError
@@ -62,10 +65,11 @@ def _physical(asked: argparse.Namespace) -> int:
         published = [
             name for name in PUBLISHED if any(name in path.stem and path.suffix == ".npz" for path in asked.files)
         ]
-        print(physical_table(of_files(), PhysicsConfig(), published).markdown(), end="")
+        print(physical_table(of_files(), PhysicsConfig(), published, asked.dry).markdown(), end="")
         return 0
     config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
-    table = physical_table(dataset_shapes(asked.out / config.name, asked.most), PhysicsConfig())
+    shapes = dataset_shapes(asked.out / config.name, asked.most)
+    table = physical_table(shapes, config.section(PhysicsConfig), dry=asked.dry)
     folder = asked.out / f"{config.name}-eval"
     folder.mkdir(parents=True, exist_ok=True)
     for suffix, text in (("md", table.markdown()), ("csv", table.csv()), ("tex", table.latex())):

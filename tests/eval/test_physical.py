@@ -30,6 +30,15 @@ def corners(*heights: float) -> FloatArray:
     return box_corners(centres, np.tile(np.eye(3), (count, 1, 1)), np.full((count, 3), 0.5))
 
 
+def test_so_many_shapes_are_judged_dry_as_are_asked_for() -> None:
+    shapes = [("towers", STANDS), ("towers", FLOATS), ("towers", FLOATS)]
+    for most, share in ((None, 100 / 3), (1, 100.0), (2, 50.0), (0, "")):
+        table = physical_table(shapes, PhysicsConfig(), dry=most)
+        found = dict(zip(table.columns, table.rows[0], strict=True))
+        assert found["stable %"] == pytest.approx(100 / 3)
+        assert found["dry stable %"] == (pytest.approx(share) if share else share)
+
+
 def test_table_has_a_row_for_each_name_with_its_shares() -> None:
     post = solid(box(0.1, 0.1, 2, at=(0, 0, 1)))  # tips at a push of a twentieth of its weight
     table = physical_table([("b", STANDS), ("a", FLOATS), ("b", FLOATS), ("c", post)], PhysicsConfig(), ["chair"])
