@@ -26,7 +26,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"), help="the dataset's YAML")
     parser.add_argument("--out", type=Path, default=Path("datasets"), help="folder that datasets are made in")
     parser.add_argument("--most", type=int, default=200, help="so many shapes of a dataset are measured at most")
-    parser.add_argument("--dry", type=int, default=50, help="so many of a kind at most are judged as dry blocks, too")
+    parser.add_argument("--dry", type=int, default=10, help="so many of a kind at most are judged as dry blocks, too")
     parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that points up in the files")
     parser.add_argument("files", nargs="*", type=Path, help="models or boxes instead of the dataset")
     asked = parser.parse_args(arguments)
