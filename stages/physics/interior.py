@@ -84,8 +84,11 @@ class _Point:
 
     @classmethod
     def first(cls, forces: int, bounds: FloatArray, rows: int) -> _Point:
+        """Where the search begins: the forces share the weight of the bodies, for ten thousands of forces of the order
+        of 1 are so far from equilibrium that there is no way back."""
         ones = np.ones(len(bounds))
-        return cls(np.ones(forces), np.ones(forces), bounds / 2, bounds / 2, ones, ones, np.zeros(rows))
+        x = np.full(forces, min(rows / (6 * forces), 1.0))
+        return cls(x, np.ones(forces), bounds / 2, bounds / 2, ones, ones, np.zeros(rows))
 
     def gap(self) -> float:
         return float(self.x @ self.z + self.f @ self.zf + self.s @ self.zs)

@@ -61,7 +61,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 STAGE = Stage(
     name="validity",
-    version=2,
+    version=3,
     config=PhysicsConfig,
     inputs=("exemplars", *PRODUCERS),
     plan=plan,
