@@ -18,7 +18,7 @@ from stages.shape.arrays import FloatArray
 __all__ = ["solve_interior"]
 
 ROUNDS = 100
-EXACT = 1e-6
+EXACT = 1e-5
 """Largest residual of any equation at the end; forces and loads are to be of the order of 1."""
 GAP = 1e-4
 """Largest gap of the costs at the end."""
