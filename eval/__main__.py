@@ -65,11 +65,11 @@ def _physical(asked: argparse.Namespace) -> int:
         published = [
             name for name in PUBLISHED if any(name in path.stem and path.suffix == ".npz" for path in asked.files)
         ]
-        print(physical_table(of_files(), PhysicsConfig(), published, asked.dry).markdown(), end="")
+        print(physical_table(of_files(), PhysicsConfig(), asked.dry, published).markdown(), end="")
         return 0
     config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
     shapes = dataset_shapes(asked.out / config.name, asked.most)
-    table = physical_table(shapes, config.section(PhysicsConfig), dry=asked.dry)
+    table = physical_table(shapes, config.section(PhysicsConfig), asked.dry)
     folder = asked.out / f"{config.name}-eval"
     folder.mkdir(parents=True, exist_ok=True)
     for suffix, text in (("md", table.markdown()), ("csv", table.csv()), ("tex", table.latex())):

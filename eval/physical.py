@@ -11,7 +11,7 @@ from stages.physics.judge import Judge, Validity
 from stages.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
 
-__all__ = ["PUBLISHED", "judge_all", "physical_table"]
+__all__ = ["FIRM", "PUBLISHED", "judge_all", "physical_table"]
 
 COLUMNS = (
     "shapes of",
@@ -57,7 +57,7 @@ def judge_all(shapes: Sequence[Shape], config: PhysicsConfig) -> list[Validity]:
 
 
 def physical_table(
-    named: Iterable[tuple[str, Shape]], config: PhysicsConfig, published: Sequence[str] = (), dry: int | None = None
+    named: Iterable[tuple[str, Shape]], config: PhysicsConfig, dry: int, published: Sequence[str] = ()
 ) -> Table:
     """One row for each name among the shapes, in order, and one for each category of `published`.
 
@@ -73,8 +73,8 @@ def physical_table(
     return Table("Physical validity", COLUMNS, tuple(rows), NOTES)
 
 
-def _row(name: str, shapes: list[Shape], config: PhysicsConfig, most_dry: int | None) -> tuple[Cell, ...]:
-    tried = shapes if most_dry is None else shapes[:: -(-len(shapes) // most_dry)] if most_dry else []
+def _row(name: str, shapes: list[Shape], config: PhysicsConfig, most_dry: int) -> tuple[Cell, ...]:
+    tried = shapes[:: -(-len(shapes) // max(most_dry, 1))][:most_dry]
     rigid = judge_all(shapes, config.model_copy(update={"joints": "rigid"}))
     dry = judge_all(tried, config.model_copy(update={"joints": "dry"}))
     return (

@@ -14,14 +14,14 @@ from stages.physics.settings import PhysicsConfig, Requirements
 from stages.physics.solids import Placed, Solids
 from stages.physics.stability import Stability, components, stability, standing_points, tipping_angle
 from stages.physics.structure import ground_share, mirror_score
-from stages.shape.arrays import IntArray
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 
 __all__ = ["Judge", "Validity", "judge_of", "judge_shape", "physical_fields", "unmet"]
 
 ROUNDING = 1e-4
-"""Degrees."""
+"""Degrees by which a shape that just stands may seem to be beyond tipping."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,21 @@ class Judge:
         placed = self._placed(assembly)
         return not _floating(placed, self._connected(placed, assembly), self.config).any()
 
-    def stable(self, assembly: Assembly) -> bool:
-        """Whether the shape stands and bears the pushes, as `validity` says, and nothing more: what tips over as a
-        whole is seen at once, however its parts hold together. Raises ValueError as `validity` does."""
+    def unmet(self, assembly: Assembly, requirements: Requirements) -> str | None:
+        """The first of the requirements that is not met, None if all are. What tips over as a whole is seen before
+        anything is asked about its parts. Raises ValueError as `validity` does."""
         placed = self._placed(assembly)
         standing = self._standing(placed)
-        if tipping_angle(placed, standing) < -ROUNDING:
-            return False
-        return self._stability(placed, self._connected(placed, assembly), standing).stable
+        if requirements.stable and tipping_angle(placed, standing) < -ROUNDING:
+            return "not stable"
+        connected = self._connected(placed, assembly)
+        if requirements.rooted and _floating(placed, connected, self.config).any():
+            return "not rooted"
+        if not requirements.stable:
+            return None
+        dry = self.config.joints == "dry"
+        depths = self._touch.overlaps(placed, connected)[1] if dry else np.zeros(len(connected))
+        return None if self._stability(placed, connected, depths, standing).stable else "not stable"
 
     def contacts(self, assembly: Assembly) -> IntArray:
         """The pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order: those that the
@@ -85,9 +92,9 @@ class Judge:
         placed = self._placed(assembly)
         connected = self._connected(placed, assembly)
         floating = _floating(placed, connected, config)
-        volumes, _ = self._touch.overlaps(placed, connected)
+        volumes, depths = self._touch.overlaps(placed, connected)
         standing = self._standing(placed)
-        found = self._stability(placed, connected, standing)
+        found = self._stability(placed, connected, depths, standing)
         whole = self._solids.volumes[placed.types].sum()
         return Validity(
             rooted=not floating.any(),
@@ -109,11 +116,9 @@ class Judge:
     def _standing(self, placed: Placed) -> Patches:
         return standing_points(placed, np.arange(len(placed)), self.config.connected * placed.diagonal)
 
-    def _stability(self, placed: Placed, connected: IntArray, standing: Patches) -> Stability:
-        deep = connected[:0]
-        if self.config.joints == "dry":
-            _, depths = self._touch.overlaps(placed, connected)
-            deep = connected[depths > self.config.touching * placed.diagonal]
+    def _stability(self, placed: Placed, connected: IntArray, depths: FloatArray, standing: Patches) -> Stability:
+        """`depths`: how deep the connected pairs reach into each other; of no matter where joints are rigid."""
+        deep = connected[depths > self.config.touching * placed.diagonal]
         return stability(placed, self._touch, connected, deep, standing, self.config)
 
     def _connected(self, placed: Placed, assembly: Assembly) -> np.ndarray:
@@ -145,15 +150,10 @@ def unmet(requirements: Requirements, shape: Shape) -> str | None:
     """
     if not requirements.rooted and not requirements.stable:
         return None
-    judge = judge_of(shape.meshes, shape.up, requirements.physics)
     try:
-        if requirements.rooted and not judge.rooted(shape.assembly):
-            return "not rooted"
-        if requirements.stable and not judge.stable(shape.assembly):
-            return "not stable"
+        return judge_of(shape.meshes, shape.up, requirements.physics).unmet(shape.assembly, requirements)
     except ValueError:
         return "no body to judge"
-    return None
 
 
 def _floating(placed: Placed, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:

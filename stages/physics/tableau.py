@@ -1,5 +1,5 @@
-"""Linear programmes of one rigid body: six equations, so the simplex method on a dense tableau answers in microseconds
-what a general solver answers in milliseconds."""
+"""Linear programmes of one rigid body: six equations, so the simplex method on a dense tableau answers ten of
+them in a millisecond, which takes a general solver tens of milliseconds."""
 
 from __future__ import annotations
 

@@ -8,7 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from pipeline.config import Config
+from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.exemplars.settings import ExemplarsConfig
 from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
 from stages.variations.measures import described, growth
 from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
@@ -58,6 +61,18 @@ def report(plan: Plan) -> Sequence[str]:
     return lines
 
 
+def check(config: Config) -> None:
+    """Raises ConfigError where hubs are required that a kit does not put back: nothing would ever be kept."""
+    if not config.section(VariationsConfig).require.hubs:
+        return
+    for kit in config.section(ExemplarsConfig).kits:
+        if kit.hubs.types == "none" or kit.hubs.keep != "backdrop":
+            raise ConfigError(
+                f"{config.path}: variations.require.hubs asks for hubs, and kit {kit.name} puts none back; "
+                "set its hubs.types and hubs.keep: backdrop, or do not require them"
+            )
+
+
 STAGE = Stage(
     name="variations",
     version=3,
@@ -72,4 +87,5 @@ STAGE = Stage(
         * len(plan.shards("exemplars"))
     ),
     report=report,
+    check=check,
 )

@@ -32,16 +32,16 @@ def corners(*heights: float) -> FloatArray:
 
 def test_so_many_shapes_are_judged_dry_as_are_asked_for() -> None:
     shapes = [("towers", STANDS), ("towers", FLOATS), ("towers", FLOATS)]
-    for most, share in ((None, 100 / 3), (1, 100.0), (2, 50.0), (0, "")):
-        table = physical_table(shapes, PhysicsConfig(), dry=most)
+    for most, share in ((9, pytest.approx(100 / 3)), (1, 100), (2, 50), (0, "")):
+        table = physical_table(shapes, PhysicsConfig(), most)
         found = dict(zip(table.columns, table.rows[0], strict=True))
         assert found["stable %"] == pytest.approx(100 / 3)
-        assert found["dry stable %"] == (pytest.approx(share) if share else share)
+        assert found["dry stable %"] == share
 
 
 def test_table_has_a_row_for_each_name_with_its_shares() -> None:
     post = solid(box(0.1, 0.1, 2, at=(0, 0, 1)))  # tips at a push of a twentieth of its weight
-    table = physical_table([("b", STANDS), ("a", FLOATS), ("b", FLOATS), ("c", post)], PhysicsConfig(), ["chair"])
+    table = physical_table([("b", STANDS), ("a", FLOATS), ("b", FLOATS), ("c", post)], PhysicsConfig(), 9, ["chair"])
     rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
     assert list(rows) == ["b", "a", "c", "chair, published"]
     assert (rows["b"]["shapes"], rows["b"]["parts"]) == (2, 2)

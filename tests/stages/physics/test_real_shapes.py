@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from eval.physical import PUBLISHED, judge_all
+from eval.physical import FIRM, PUBLISHED, judge_all
 from eval.shapes import box_shapes, model_shapes
 from stages.physics.judge import Validity
 from stages.physics.settings import PhysicsConfig
@@ -32,6 +32,14 @@ def test_masonry_that_stands_is_found_to_stand(name: str) -> None:
     assert found.components == 1
 
 
+@pytest.mark.slow
+def test_dense_walls_with_tens_of_thousands_of_contact_forces_are_found_to_stand() -> None:
+    ((_, shape),) = model_shapes(SHARED / "exemplars" / "a11_spacebase_storage" / "model.glb", "y")
+    found = judge_all([shape], MASONRY)[0]
+    assert found.stable
+    assert found.margin == pytest.approx(0.052, abs=0.001)
+
+
 @pytest.mark.parametrize("category", sorted(PUBLISHED))
 def test_furniture_is_rooted_and_as_often_stable_as_in_simulation(category: str) -> None:
     shapes = [shape for _, shape in box_shapes(SHARED / "shapeassembly" / f"truth_{category}.npz", "y")]
@@ -39,3 +47,4 @@ def test_furniture_is_rooted_and_as_often_stable_as_in_simulation(category: str)
     assert len(found) == 60
     assert all(each.rooted for each in found)
     assert 100 * sum(each.stable for each in found) / 60 == pytest.approx(SIMULATED[category], abs=5)
+    assert 100 * sum(each.margin >= FIRM for each in found) / 60 == pytest.approx(PUBLISHED[category][1], abs=5)

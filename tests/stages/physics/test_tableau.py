@@ -40,7 +40,7 @@ def test_a_table_tips_over_its_nearest_side_and_slides_at_the_friction() -> None
     factors, motions = grow_loads(on_the_ground(corners), LOAD, pushes((1, 0), (0, 1), (0, -1)), 1.0)
     assert factors == pytest.approx([0.3, 0.7, 0.7])
     # it tips about the feet that are pushed towards: no force at a foot can do work that way but upward
-    assert (motions[0] @ on_the_ground(corners) * np.sign(motions[0][0]) >= -1e-9).all()
+    assert (motions[0] @ on_the_ground(corners) >= -1e-9).all()
 
 
 def test_a_plank_on_its_edge_bears_no_push_and_a_point_bears_none_at_all() -> None:
@@ -76,6 +76,6 @@ def test_factors_are_those_of_a_general_solver(seed: int, count: int, flat: bool
     assert factors == pytest.approx([by_highs(edges, LOAD, each, 1.0) for each in growing], abs=2e-6)
     for factor, multiplier, each in zip(factors, multipliers, growing, strict=True):
         if 0 <= factor < 1:  # the certificate: a way to move in which no force does harm and the load works
-            assert (multiplier @ edges <= 1e-6).all() or (multiplier @ edges >= -1e-6).all()
-            assert abs(multiplier @ each) == pytest.approx(1.0, abs=1e-6)
-            assert abs(multiplier @ LOAD) == pytest.approx(factor, abs=1e-5)
+            assert (multiplier @ edges >= -1e-6).all()
+            assert multiplier @ each == pytest.approx(1.0, abs=1e-6)
+            assert multiplier @ LOAD == pytest.approx(factor, abs=1e-5)

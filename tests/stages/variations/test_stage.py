@@ -143,3 +143,18 @@ def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: P
     assert "the search found no variant of any kit" in done.stdout + done.stderr
     records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
     assert "no backdrop" in records
+
+
+def test_hubs_that_no_kit_puts_back_cannot_be_required(tmp_path: Path) -> None:
+    model = write_model(tmp_path / "three.glb", CHAIN, chain(3))
+    config = {
+        "name": "toy",
+        "exemplars": {"kits": [{"name": "chain", "shapes": [model]}]},
+        "variations": {"require": {"hubs": 1}},
+    }
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    command = [sys.executable, "-m", "pipeline", "run", "exemplars", "--config", str(tmp_path / "toy.yaml")]
+    done = subprocess.run([*command, "--out", str(tmp_path / "out")], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "kit chain puts none back" in done.stdout + done.stderr
+    assert not (tmp_path / "out").exists()
