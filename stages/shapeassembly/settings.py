@@ -9,20 +9,15 @@ from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config import StrictModel
 from stages.physics.settings import Requirements
-from stages.shapeassembly.extraction.settings import Gates, HierarchyFiles
+from stages.shapeassembly.extraction.settings import Gates, HierarchyFiles, NamedFiles
 from stages.shapeassembly.sources import existing_programs
 
 __all__ = ["ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig"]
 
 
-class ProgramFiles(StrictModel):
+class ProgramFiles(NamedFiles):
     """Programs of one kind of shape."""
 
-    name: str = Field(
-        pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
-        max_length=64,
-        description="What the shapes are, such as chair; the keys of the samples begin with it.",
-    )
     path: Annotated[Path, AfterValidator(existing_programs)] = Field(
         description="A folder of .txt files, or a tar archive (also .tar.gz, .tar.xz), one program a file."
     )

@@ -11,7 +11,7 @@ from pipeline.config import StrictModel
 from stages.shapeassembly.extraction.files import HierarchyKind, HierarchySource
 from stages.shapeassembly.extraction.rules import RULES, Rules
 
-__all__ = ["Category", "Gates", "HierarchyFiles"]
+__all__ = ["Category", "Gates", "HierarchyFiles", "NamedFiles"]
 
 Category = Literal["any", "chair", "table", "storage"]
 
@@ -22,14 +22,19 @@ def _existing(path: Path) -> Path:
     return path
 
 
-class HierarchyFiles(StrictModel):
-    """Part hierarchies of one kind of shape."""
+class NamedFiles(StrictModel):
+    """Files of one kind of shape."""
 
     name: str = Field(
         pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
         max_length=64,
         description="What the shapes are, such as chair; the keys of the samples begin with it.",
     )
+
+
+class HierarchyFiles(NamedFiles):
+    """Part hierarchies of one kind of shape."""
+
     path: Annotated[Path, AfterValidator(_existing)] = Field(
         description="A folder, searched with all below it, or one file."
     )
