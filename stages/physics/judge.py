@@ -68,13 +68,13 @@ class Judge:
         """The first of the requirements that is not met, None if all are. What tips over as a whole is seen before
         anything is asked about its parts. Raises ValueError as `validity` does."""
         placed = self._placed(assembly)
-        standing = self._standing(placed)
-        if requirements.stable and tipping_angle(placed, standing) < -ROUNDING:
+        standing = self._standing(placed) if requirements.stable else None
+        if standing is not None and tipping_angle(placed, standing) < -ROUNDING:
             return "not stable"
         connected = self._connected(placed, assembly)
         if requirements.rooted and _floating(placed, connected, self.config).any():
             return "not rooted"
-        if not requirements.stable:
+        if standing is None:
             return None
         dry = self.config.joints == "dry"
         depths = self._touch.overlaps(placed, connected)[1] if dry else np.zeros(len(connected))
