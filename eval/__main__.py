@@ -52,7 +52,7 @@ def _physical(asked: argparse.Namespace) -> int:
     from pipeline.errors import ConfigError
     from pipeline.places import write_whole
     from pipeline.registry import find_stages
-    from stages.physics.settings import PhysicsConfig
+    from stages.shape.physics.settings import PhysicsConfig
     from stages.shape.shape import Shape
 
     def of_files() -> Iterator[tuple[str, Shape]]:

@@ -7,8 +7,8 @@ from statistics import fmean, median
 
 from eval.shapes import shared_meshes
 from eval.table import Cell, Table
-from stages.physics.judge import Judge, Validity
-from stages.physics.settings import PhysicsConfig
+from stages.shape.physics.judge import Judge, Validity
+from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
 
 __all__ = ["FIRM", "PUBLISHED", "judge_all", "physical_table"]

@@ -73,7 +73,7 @@ def box_shape(corners: FloatArray, up: str) -> Shape:
 
     Raises ConfigError for corners that are not those of a box.
     """
-    from stages.physics.boxes import recognise_boxes
+    from stages.shape.physics.boxes import recognise_boxes
 
     found, centres, axes, halves = recognise_boxes(corners)
     spans = np.linalg.svd(corners - corners.mean(axis=1, keepdims=True), compute_uv=False)

@@ -144,7 +144,7 @@ def _import(module: str) -> Finding:
 
 def _draw(backend: str) -> Finding:
     start = time.perf_counter()
-    code, said = _try([sys.executable, "-m", "stages.views.probe", backend])
+    code, said = _try([sys.executable, "-m", "stages.shape.views.probe", backend])
     if code == 0:
         return Finding(f"draw: {backend}", "ok", f"a triangle in {time.perf_counter() - start:.1f} s")
     if backend == _LAST_BACKEND:

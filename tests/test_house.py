@@ -12,13 +12,10 @@ ROOT = Path(__file__).resolve().parents[1]
 
 DATA_WAY = [
     "shape",
-    "physics",
-    "views",
     "exemplars",
     "variations",
     "programs",
     "shapeassembly",
-    "collection",
     "validity",
     "strings",
     "points",

@@ -10,14 +10,14 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.findings import kit_warnings, pieces, refusals
+from stages.exemplars.formats.scene import unique_name
 from stages.exemplars.grammar import observe
 from stages.exemplars.hubs import chosen_hubs, set_hubs_aside, with_touching
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.read import Model
-from stages.exemplars.scene import unique_name
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
-from stages.shape.contact import ContactTest
+from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import NOTHING, ContactKind, Exemplar, Kit
 
 __all__ = ["KitReport", "Observation", "build_kit", "observe_models"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.pose import rotation_angle
+from stages.shape.geometry.pose import rotation_angle
 
 __all__ = ["Surface", "congruences", "surface"]
 
@@ -33,7 +33,7 @@ class Surface:
 
 def surface(vertices: FloatArray, faces: IntArray) -> Surface:
     """The mesh `vertices` (v, 3), `faces` (f, 3) made ready for `congruences`."""
-    from stages.shape.triangles import build_tree
+    from stages.shape.geometry.triangles import build_tree
 
     corners = vertices[faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
@@ -82,7 +82,7 @@ def congruences(source: Surface, target: Surface, tolerance: float, reflections:
 
 
 def _maps_onto(source: Surface, target: Surface, rotation: FloatArray, slack: float) -> bool:
-    from stages.shape.triangles import points_on_surface
+    from stages.shape.geometry.triangles import points_on_surface
 
     step = max(len(source.vertices) // QUICK_CHECK, 1)
     for probes, onto, turn in (

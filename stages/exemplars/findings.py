@@ -11,9 +11,9 @@ import numpy as np
 from stages.exemplars.congruence import congruences, surface
 from stages.exemplars.read import Model
 from stages.shape.arrays import IntArray
-from stages.shape.contact import ContactTest
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.pose import pose_vectors, relative_poses
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
-from stages.shape.pose import pose_vectors, relative_poses
 
 __all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "ways_together"]
 

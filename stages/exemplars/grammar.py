@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.contact import ContactTest, overlapping_boxes, world_boxes
-from stages.shape.docking import DockingTable, symmetric_images
+from stages.shape.geometry.contact import ContactTest, overlapping_boxes, world_boxes
+from stages.shape.geometry.docking import DockingTable, symmetric_images
+from stages.shape.geometry.penetration import PenetrationTest
+from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType
-from stages.shape.penetration import PenetrationTest
-from stages.shape.pose import invert, pose_vectors
 
 __all__ = ["observe", "observe_dockings", "observe_neighbourhoods"]
 

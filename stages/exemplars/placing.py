@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.exemplars.scene import Placement, Surface, unique_name
+from stages.exemplars.formats.scene import Placement, Surface, unique_name
 from stages.shape.arrays import FloatArray
 
 __all__ = ["bake", "centre", "distance_from_origin"]

@@ -7,10 +7,10 @@ import numpy as np
 from stages.shape.arrays import ByteArray
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.shape.shape import kit_shape
-from stages.views.camera import Camera
-from stages.views.portrait import portrait
-from stages.views.scene import scene_of
-from stages.views.sheet import Cell, Section, contact_sheet, picture_png
+from stages.shape.views.camera import Camera
+from stages.shape.views.portrait import portrait
+from stages.shape.views.scene import scene_of
+from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
 __all__ = ["kit_sheet"]
 

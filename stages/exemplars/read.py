@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.dae import read_dae
-from stages.exemplars.enclosure import Enclosure
-from stages.exemplars.gltf import read_gltf
-from stages.exemplars.off import read_off
+from stages.exemplars.formats.dae import read_dae
+from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.gltf import read_gltf
+from stages.exemplars.formats.off import read_off
+from stages.exemplars.formats.ply import read_ply
+from stages.exemplars.formats.scene import Placement, Scene, Surface, unique_name
+from stages.exemplars.formats.stl import read_stl
+from stages.exemplars.formats.wavefront import read_wavefront
 from stages.exemplars.placing import bake, centre, distance_from_origin
-from stages.exemplars.ply import read_ply
-from stages.exemplars.scene import Placement, Scene, Surface, unique_name
 from stages.exemplars.segment import Segmentation, count_parts, pick, segment
-from stages.exemplars.stl import read_stl
-from stages.exemplars.wavefront import read_wavefront
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 __all__ = ["FORMATS", "Model", "RawPart", "read_model"]

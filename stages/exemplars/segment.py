@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from stages.exemplars.components import connected_faces
-from stages.exemplars.scene import Placement, Scene, Surface, unique_name
+from stages.exemplars.formats.scene import Placement, Scene, Surface, unique_name
 
 __all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
 

@@ -2,7 +2,8 @@
 
 python -m stages.exemplars.strictness [--picture datasets/exemplars/strictness.png]
 
-The example is judged by `stages.shape.neighbourhoods` itself, so the picture cannot say what the code does not do.
+The example is judged by `stages.shape.graphs.neighbourhoods` itself, so the picture cannot say what the code does
+not do.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.places import write_whole
+from stages.shape.graphs.neighbourhoods import STRICTNESS, admits
 from stages.shape.kit import Grammar, Multiset, Strictness
-from stages.shape.neighbourhoods import STRICTNESS, admits
 
 __all__ = ["main", "newly_admitted"]
 

@@ -12,11 +12,11 @@ from typing import Any, BinaryIO, cast
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes, read_shard
 from pipeline.stage import Outcome, Task
-from stages.collection.shapes import Collection
-from stages.collection.shards import KIT_PRODUCER
 from stages.package.glb import glb_bytes
 from stages.package.layout import shard_path
 from stages.package.record import describe_sample, rounded
+from stages.shape.collection.shapes import Collection
+from stages.shape.collection.shards import KIT_PRODUCER
 from stages.shape.sample import Sample
 from stages.sketches.settings import SketchesConfig
 

@@ -10,19 +10,19 @@ import numpy as np
 
 from pipeline.shards import bytes_array, read_shard
 from pipeline.stage import Outcome, Task
-from stages.collection.shapes import Collection
 from stages.package.settings import PackageConfig
 from stages.shape.arrays import ByteArray
+from stages.shape.collection.shapes import Collection
 from stages.shape.kit import Assembly, Kit
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, upright
+from stages.shape.views.buffers import Backend
+from stages.shape.views.camera import Camera
+from stages.shape.views.portrait import points_portrait, portrait
+from stages.shape.views.probe import backend_for
+from stages.shape.views.scene import scene_of
+from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.sketches.settings import SketchesConfig
-from stages.views.buffers import Backend
-from stages.views.camera import Camera
-from stages.views.portrait import points_portrait, portrait
-from stages.views.probe import backend_for
-from stages.views.scene import scene_of
-from stages.views.sheet import Cell, Section, contact_sheet, picture_png
 
 __all__ = ["draw_preview", "varied"]
 

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.collection.shards import PRODUCERS, check_producers, collection_shards, planned_producer
 from stages.package.compose import compose_dataset
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import config_sections
 from stages.package.merge import merge_shard, merged_stages
 from stages.package.preview import draw_preview
 from stages.package.settings import PackageConfig
+from stages.shape.collection.shards import PRODUCERS, check_producers, collection_shards, planned_producer
 
 __all__ = ["STAGE"]
 

@@ -20,9 +20,9 @@ import numpy as np
 from pipeline.places import Places
 from pipeline.randomness import decision_rng
 from pipeline.yaml_text import read_yaml
-from stages.collection.shards import KIT_PRODUCER
 from stages.package.layout import MANIFEST
 from stages.package.verify_files import FileFindings, check_files, shard_samples
+from stages.shape.collection.shards import KIT_PRODUCER
 from stages.shape.kit import Kit
 from stages.shape.kit_files import load_kit
 

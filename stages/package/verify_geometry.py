@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.contact import ContactTest, overlapping_boxes
+from stages.shape.geometry.contact import ContactTest, overlapping_boxes
+from stages.shape.geometry.penetration import PenetrationTest, depth_bound
+from stages.shape.geometry.pose import invert
+from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
-from stages.shape.neighbourhoods import admits
-from stages.shape.penetration import PenetrationTest, depth_bound
-from stages.shape.pose import invert
 
 __all__ = ["geometry_faults"]
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stages.collection.shapes import text_shape
 from stages.points.frame import shape_bounds
-from stages.shape.pose import transform_points
+from stages.shape.collection.shapes import text_shape
+from stages.shape.geometry.pose import transform_points
 
 __all__ = ["text_faults"]
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.contact import world_boxes
-from stages.shape.pose import transform_points
+from stages.shape.geometry.contact import world_boxes
+from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
 __all__ = ["Normalization", "normalization", "shape_bounds"]

@@ -10,11 +10,11 @@ from pydantic import Field, model_validator
 from pipeline.config import StrictModel
 from pipeline.shards import ShardWriter, array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.collection.shapes import Collection
-from stages.collection.shards import PRODUCERS, collection_shards
 from stages.points.cloud import sample_cloud
 from stages.points.frame import Normalization, normalization
 from stages.points.surface import SurfacePoints
+from stages.shape.collection.shapes import Collection
+from stages.shape.collection.shards import PRODUCERS, collection_shards
 
 __all__ = ["STAGE", "PointsConfig"]
 

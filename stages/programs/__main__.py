@@ -19,7 +19,7 @@ from stages.programs.program import Program, find_program
 from stages.programs.recipe import recipe_markdown
 from stages.programs.schema import Values
 from stages.programs.sheets import parameter_sheet, row_sheet
-from stages.views.sheet import picture_png
+from stages.shape.views.sheet import picture_png
 
 __all__ = ["main"]
 

@@ -12,7 +12,7 @@ from stages.programs.parameters import ParameterError, Value
 from stages.programs.program import Program, shape_of
 from stages.programs.sampling import Sampler
 from stages.programs.schema import Values
-from stages.views.palette import srgb_to_linear
+from stages.shape.views.palette import srgb_to_linear
 
 __all__ = ["named_values", "random_shapes", "shape_glb", "write_file"]
 

@@ -48,7 +48,7 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Program:
-    """One program. `PROGRAM = Program(...)` stands in a file of its own, `stages/programs/<name>.py`.
+    """One program. `PROGRAM = Program(...)` stands in a file of its own, `stages/programs/library/<name>.py`.
 
     name: the file's name; sentence: what it makes.
     labels: the part labels, in a fixed order; every part that `build` returns has one of them.
@@ -122,8 +122,8 @@ def shape_of_text(program: str, text: str) -> Shape:
 
 
 def program_names() -> tuple[str, ...]:
-    """The programs in this folder: every file that says PROGRAM at the start of a line. None is imported."""
-    folder = Path(__file__).parent
+    """The programs of the library: every file that says PROGRAM at the start of a line. None is imported."""
+    folder = Path(__file__).parent / "library"
     return tuple(path.stem for path in sorted(folder.glob("*.py")) if re.search(r"(?m)^PROGRAM\b", path.read_text()))
 
 
@@ -151,7 +151,7 @@ def program_source(name: str) -> Path:
 def _module(name: str) -> str:
     names = program_names()
     if name in names:
-        return f"{__package__}.{name}"
+        return f"{__package__}.library.{name}"
     if "." in name:
         return name
     close = nearest(name, names)

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.errors import ShardFailed
-from stages.physics.judge import unmet
-from stages.physics.settings import Requirements
 from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect
 from stages.programs.intersection import intersecting
 from stages.programs.parameters import Value
 from stages.programs.program import Program, shape_of_parts
+from stages.shape.physics.judge import unmet
+from stages.shape.physics.settings import Requirements
 
 __all__ = ["Cell", "Sampler", "cells", "structure_digest"]
 

@@ -11,10 +11,10 @@ from stages.programs.recipe import parameter_range, value_text
 from stages.programs.repair import repaired
 from stages.programs.schema import Values
 from stages.shape.arrays import ByteArray
-from stages.views.camera import Camera
-from stages.views.portrait import portrait
-from stages.views.scene import scene_of
-from stages.views.sheet import Cell, Section, contact_sheet
+from stages.shape.views.camera import Camera
+from stages.shape.views.portrait import portrait
+from stages.shape.views.scene import scene_of
+from stages.shape.views.sheet import Cell, Section, contact_sheet
 
 __all__ = ["parameter_sheet", "reveal", "row_sheet", "shape_picture"]
 

@@ -28,7 +28,7 @@ __all__ = [
 ContactKind = Literal["point", "line", "face"]
 
 Strictness = Literal["multiset", "count_and_set", "count_and_pairs"]
-"""How near to what was observed a neighbourhood must be; `stages.shape.neighbourhoods` says what each admits."""
+"""How near to what was observed a neighbourhood must be; `stages.shape.graphs.neighbourhoods` says what each admits."""
 
 Multiset = tuple[tuple[int, int], ...]
 """Neighbour counts of a part: `(type index, count)` pairs in ascending order of type index."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
-from stages.shape.docking import DockingTable
+from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 
 __all__ = ["describe_kit", "load_kit", "write_kit"]

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config import StrictModel
-from stages.physics.settings import Requirements
+from stages.shape.physics.settings import Requirements
 from stages.shapeassembly.extraction.settings import Gates, HierarchyFiles, NamedFiles
 from stages.shapeassembly.sources import existing_programs
 

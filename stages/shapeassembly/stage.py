@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.physics.judge import unmet
+from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.shapeassembly.checks import overflow, violations

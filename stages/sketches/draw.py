@@ -6,10 +6,10 @@ import numpy as np
 
 from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray
+from stages.shape.views.buffers import Backend, visible_triangles
+from stages.shape.views.camera import Camera
+from stages.shape.views.scene import Scene
 from stages.sketches.settings import SketchView, StrokeOptions
-from stages.views.buffers import Backend, visible_triangles
-from stages.views.camera import Camera
-from stages.views.scene import Scene
 
 __all__ = ["draw_sketch", "jittered_camera"]
 
@@ -34,8 +34,8 @@ def draw_sketch(
 
     Raises ShardFailed where nothing is seen or nothing would be drawn: a blank drawing is never a sample.
     """
-    from stages.views.ink import ink_strokes
-    from stages.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
+    from stages.shape.views.ink import ink_strokes
+    from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
 
     seen = visible_triangles(scene, camera, (size * supersample, size * supersample), backend)
     strokes = find_strokes(seen, options.crease_angle, options.step * supersample, options.shortest * supersample)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.collection.shapes import Collection
-from stages.collection.shards import PRODUCERS, collection_shards
+from stages.shape.collection.shapes import Collection
+from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.sample import Sample
+from stages.shape.views.buffers import Backend
+from stages.shape.views.probe import backend_for
+from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment, png_bytes
 from stages.sketches.settings import SketchesConfig
-from stages.views.buffers import Backend
-from stages.views.probe import backend_for
-from stages.views.scene import Scene, scene_of
 
 __all__ = ["STAGE", "SketchesConfig"]
 

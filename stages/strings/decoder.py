@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from stages.shape.arrays import IntArray, TypeArray
-from stages.shape.canonical import graph_digest
+from stages.shape.graphs.canonical import graph_digest
 from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import StringError, Token, TokenKind, number_value, split_tokens
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stages.shape.arrays import IntArray, TypeArray
-from stages.shape.canonical import canonical_order
+from stages.shape.graphs.canonical import canonical_order
 from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import number_text
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
+from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Grammar
-from stages.shape.neighbourhoods import admits
 from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
 from stages.strings.tokens import StringError

@@ -9,9 +9,9 @@ import numpy as np
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.collection.shapes import Collection
-from stages.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards, producer_of
-from stages.shape.canonical import graph_digest
+from stages.shape.collection.shapes import Collection
+from stages.shape.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards, producer_of
+from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.collection.shapes import Collection
-from stages.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards
-from stages.physics.judge import judge_of, physical_fields
-from stages.physics.settings import PhysicsConfig
+from stages.shape.collection.shapes import Collection
+from stages.shape.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards
+from stages.shape.physics.judge import judge_of, physical_fields
+from stages.shape.physics.settings import PhysicsConfig
 
 __all__ = ["STAGE"]
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from pipeline.stage import Task
 from stages.shape.arrays import FloatArray
-from stages.shape.contact import world_boxes
+from stages.shape.geometry.contact import world_boxes
+from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 from stages.shape.kit_input import input_kit
-from stages.shape.pose import invert, pose_vectors
-from stages.variations.answers import ContactAnswers
-from stages.variations.layout import FORBIDDEN, NONE
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.kernels.layout import FORBIDDEN, NONE
 from stages.variations.settings import VariationsConfig
 
 __all__ = ["Backdrop", "backdrop_of"]

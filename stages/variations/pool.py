@@ -25,10 +25,10 @@ import numpy as np
 from pipeline.shards import array_bytes, json_bytes
 from pipeline.stage import Task
 from stages.shape.arrays import IntArray
-from stages.shape.canonical import docking_digest, graph_digest
+from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.shape.kit import Assembly
+from stages.variations.exchange.search import Variant
 from stages.variations.features import AXES
-from stages.variations.search import Variant
 
 __all__ = ["FoundVariants", "PoolIndex", "write_kept", "write_variants"]
 

@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 
 from pipeline.stage import Outcome, Plan, Shard, Task
-from stages.physics.judge import unmet
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
+from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
-from stages.variations.answers import ContactAnswers
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import backdrop_of
+from stages.variations.exchange.search import SPARE, Search, Variant
+from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
-from stages.variations.search import SPARE, Search, Variant
 from stages.variations.settings import VariantRequirements, VariationsConfig
 
 __all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
-from stages.physics.settings import Requirements
+from stages.shape.physics.settings import Requirements
 from stages.variations.features import Axis
 
 __all__ = ["NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]

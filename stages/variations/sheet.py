@@ -22,11 +22,11 @@ from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import Sample, read_samples
 from stages.shape.shape import kit_shape, upright
-from stages.views.camera import Camera
-from stages.views.portrait import portrait
-from stages.views.probe import backend_for
-from stages.views.scene import scene_of
-from stages.views.sheet import Cell, Section, contact_sheet, picture_png
+from stages.shape.views.camera import Camera
+from stages.shape.views.portrait import portrait
+from stages.shape.views.probe import backend_for
+from stages.shape.views.scene import scene_of
+from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
 __all__ = ["kit_variants_sheet", "main"]
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from eval.shapes import BOX_FACES, box_shape
-from stages.physics.boxes import box_corners
-from stages.physics.judge import Judge
-from stages.physics.settings import PhysicsConfig
 from stages.shape.arrays import FloatArray
+from stages.shape.physics.boxes import box_corners
+from stages.shape.physics.judge import Judge
+from stages.shape.physics.settings import PhysicsConfig
 from tests.bench.measure import Measure, rate
 
 AUTHORS_ROOTED, AUTHORS_STABLE = 1 / 0.024, 1 / 0.52

@@ -9,14 +9,14 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
 from stages.shape.shape import kit_shape
+from stages.shape.views.buffers import Backend, render_buffers
+from stages.shape.views.camera import Camera
+from stages.shape.views.opengl import load_pyrender
+from stages.shape.views.probe import probe
+from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.draw import draw_sketch
 from stages.sketches.image import png_bytes
 from stages.sketches.settings import StrokeOptions
-from stages.views.buffers import Backend, render_buffers
-from stages.views.camera import Camera
-from stages.views.opengl import load_pyrender
-from stages.views.probe import probe
-from stages.views.scene import Scene, scene_of
 from tests.bench.measure import Measure, rate
 
 __all__ = ["bench"]

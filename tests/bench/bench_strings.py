@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stages.shape.canonical import docking_digest, graph_digest
+from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.encoder import canonical_string, encode

@@ -12,13 +12,13 @@ import numpy as np
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ContactConfig, KitConfig
-from stages.shape.contact import overlapping_boxes, world_boxes
+from stages.shape.geometry.contact import overlapping_boxes, world_boxes
 from stages.shape.kit import Assembly, Kit
-from stages.variations.answers import ContactAnswers
-from stages.variations.checks import validate
-from stages.variations.joins import place_boxes
-from stages.variations.layout import TRY, Outcome
-from stages.variations.search import Search
+from stages.variations.exchange.checks import validate
+from stages.variations.exchange.joins import place_boxes
+from stages.variations.exchange.search import Search
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.kernels.layout import TRY, Outcome
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.bench.measure import Measure, rate
 

@@ -25,9 +25,9 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.kit import Kit
-from stages.variations.answers import ContactAnswers
+from stages.variations.exchange.search import Search
 from stages.variations.features import AXES, MIXED
-from stages.variations.search import Search
+from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import SearchConfig, VariationsConfig
 
 __all__ = ["Finds", "configured", "explore"]

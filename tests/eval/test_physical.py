@@ -13,11 +13,11 @@ from eval.__main__ import main
 from eval.physical import physical_table
 from eval.shapes import box_shape, shared_meshes
 from eval.table import Table
-from stages.physics.boxes import box_corners
-from stages.physics.settings import PhysicsConfig
 from stages.shape.arrays import FloatArray
-from tests.stages.physics.structures import solid
-from tests.stages.shape.bodies import box
+from stages.shape.physics.boxes import box_corners
+from stages.shape.physics.settings import PhysicsConfig
+from tests.stages.shape.geometry.bodies import box
+from tests.stages.shape.physics.structures import solid
 
 STANDS = solid(box(), box(at=(0, 0, 1)))
 FLOATS = solid(box(), box(at=(0, 0, 3)))

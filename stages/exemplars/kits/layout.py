@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stages.exemplars.colors import linear_from_srgb
+from stages.exemplars.formats.colors import linear_from_srgb
 from stages.exemplars.kits.solid import Solid, rotation
 from stages.shape.arrays import FloatArray
 

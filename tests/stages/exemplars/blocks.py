@@ -12,7 +12,7 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import Model, RawPart
 from stages.exemplars.settings import KitConfig
 from stages.shape.kit import Kit
-from tests.stages.shape.bodies import Body, box, placed
+from tests.stages.shape.geometry.bodies import Body, box, placed
 
 __all__ = ["CUBE", "SLAB", "block_config", "block_kit", "model", "raw_part", "ring"]
 

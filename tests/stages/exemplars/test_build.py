@@ -10,12 +10,12 @@ from stages.exemplars.build import build_kit, observe_models
 from stages.exemplars.findings import hubs, mirror_twins, pieces, ways_together
 from stages.exemplars.read import Model, read_model
 from stages.exemplars.settings import ContactConfig
+from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly
-from stages.shape.pose import transform_points
 from tests.stages.exemplars.blocks import CUBE, SLAB, block_config, block_kit, model, raw_part, ring
 from tests.stages.exemplars.model_files import BOX_FACES, Glb
 from tests.stages.exemplars.model_files import box as file_box
-from tests.stages.shape.bodies import box, joined, placed, random_rotation
+from tests.stages.shape.geometry.bodies import box, joined, placed, random_rotation
 
 SCREW = joined(box(), box(at=(1, 0, 0)), box(at=(1, 1, 0)), box(at=(1, 1, 1)))
 MIRROR_SCREW = SCREW[0] * [1, 1, -1], np.ascontiguousarray(SCREW[1][:, ::-1])

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from stages.exemplars.congruence import congruences, surface
 from stages.shape.arrays import FloatArray
-from stages.shape.pose import transform_points
-from tests.stages.shape.bodies import Body, box, hull, joined, placed, prism, random_rotation, sheet, sphere
+from stages.shape.geometry.pose import transform_points
+from tests.stages.shape.geometry.bodies import Body, box, hull, joined, placed, prism, random_rotation, sheet, sphere
 
 TOLERANCE = 1e-3
 TETRAHEDRON: Body = (

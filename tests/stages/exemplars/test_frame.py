@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stages.exemplars.frame import extremal_frame
-from tests.stages.shape.bodies import box, hull, placed, prism, random_rotation, sphere
+from tests.stages.shape.geometry.bodies import box, hull, placed, prism, random_rotation, sphere
 
 
 def is_pose(frame: np.ndarray) -> bool:

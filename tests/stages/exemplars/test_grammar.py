@@ -6,11 +6,11 @@ import pytest
 from stages.exemplars.grammar import observe, observe_dockings, observe_neighbourhoods
 from stages.exemplars.settings import ContactConfig
 from stages.shape.arrays import FloatArray
-from stages.shape.contact import ContactTest
-from stages.shape.docking import DockingTable
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, PartType
 from tests.stages.exemplars.blocks import CUBE, SLAB, block_kit, model, ring
-from tests.stages.shape.bodies import box, hull, part, placed, random_rotation
+from tests.stages.shape.geometry.bodies import box, hull, part, placed, random_rotation
 
 FACES = ContactConfig(kinds=("face",))
 

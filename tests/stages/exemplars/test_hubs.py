@@ -12,8 +12,8 @@ from pipeline.errors import ConfigError
 from stages.exemplars.build import observe_models
 from stages.exemplars.read import Model
 from stages.exemplars.settings import HubConfig
+from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit_files import load_kit, write_kit
-from stages.shape.neighbourhoods import STRICTNESS
 from tests.stages.variations.toy import CHAIN, Placed, box, chain, config_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}

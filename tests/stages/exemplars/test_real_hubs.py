@@ -12,10 +12,10 @@ from pipeline.registry import find_stages
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
-from stages.shape.contact import ContactTest
+from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
-from stages.variations.answers import ContactAnswers
 from stages.variations.backdrop import Backdrop
+from stages.variations.kernels.answers import ContactAnswers
 
 ROOT = Path(__file__).resolve().parents[3]
 EXEMPLARS = ROOT.parent / "shared" / "exemplars"

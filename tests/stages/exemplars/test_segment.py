@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
 from stages.exemplars.components import connected_faces
+from stages.exemplars.formats.scene import Placement, Scene, Surface
 from stages.exemplars.read import read_model
-from stages.exemplars.scene import Placement, Scene, Surface
 from stages.exemplars.segment import count_parts, pick, segment
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, signed_volume, write_obj
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stages.exemplars.strictness import DOOR, FLOOR, REFUSED, SEEN, WALL, newly_admitted
-from stages.shape.neighbourhoods import STRICTNESS
+from stages.shape.graphs.neighbourhoods import STRICTNESS
 
 
 def test_every_level_shows_what_it_adds_and_no_level_what_is_refused() -> None:

@@ -19,7 +19,7 @@ from pipeline.places import Places, file_digest
 from pipeline.run import run_stage
 from pipeline.shards import bytes_array, read_shard
 from stages.package.verify_files import empty_values
-from stages.shape.pose import invert, transform_points
+from stages.shape.geometry.pose import invert, transform_points
 from tests.stages.package.toy import (
     REFUSED,
     SPLITS,

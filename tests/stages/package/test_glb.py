@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from stages.package.glb import glb_bytes, linear_colors
+from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, PartType
-from stages.shape.pose import transform_points
 from stages.shape.shape import Shape, kit_shape
 from tests.stages.package.toy import BOX, BOX_FACES, chain, toy_kit
 

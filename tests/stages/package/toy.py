@@ -15,18 +15,18 @@ from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.collection.shards import collection_shards
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
-from stages.physics.settings import PhysicsConfig
 from stages.points.stage import STAGE as POINTS
 from stages.points.stage import PointsConfig
+from stages.shape.collection.shards import collection_shards
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
+from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, read_samples, write_sample
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.validity.stage import STAGE as VALIDITY
-from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
 
 BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 BOX_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))

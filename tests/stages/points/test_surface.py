@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from stages.points.surface import sample_shape, sample_surface, surface_table
+from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import Assembly, PartType
-from stages.shape.pose import invert, transform_points
 from stages.shape.shape import Shape
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]])

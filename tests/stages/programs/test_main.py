@@ -13,7 +13,7 @@ from PIL import Image
 from stages.programs.__main__ import main
 from stages.programs.program import shape_of
 from stages.programs.sheets import CELL, reveal
-from stages.views.portrait import PAPER
+from stages.shape.views.portrait import PAPER
 from tests.stages.programs.stool import PROGRAM
 
 BLOCK, STOOL = "tests.stages.programs.block", "tests.stages.programs.stool"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.physics.judge import judge_shape
-from stages.physics.settings import PhysicsConfig, Requirements
 from stages.programs.draws import Share
 from stages.programs.program import find_program, shape_of
 from stages.programs.sampling import Sampler
+from stages.shape.physics.judge import judge_shape
+from stages.shape.physics.settings import PhysicsConfig, Requirements
 
 OVERHANG = find_program("tests.stages.programs.overhang")
 

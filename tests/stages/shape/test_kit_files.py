@@ -10,7 +10,7 @@ from stages.exemplars.settings import ContactConfig
 from stages.shape.kit import Kit
 from stages.shape.kit_files import describe_kit, load_kit, write_kit
 from tests.stages.exemplars.blocks import CUBE, SLAB, block_kit, model, ring
-from tests.stages.shape.bodies import box
+from tests.stages.shape.geometry.bodies import box
 
 INSIDE = {"case": (box(4, 4, 4), (0, 0, 2.5)), "kernel": (CUBE, (0, 0, 2.5)), "foot": (CUBE, (0, 0, 0))}
 

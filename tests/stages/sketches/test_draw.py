@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ShardFailed
+from stages.shape.views.camera import Camera
+from stages.shape.views.probe import probe
+from stages.shape.views.scene import mesh_scene
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.settings import SketchesConfig, SketchView, StrokeOptions
-from stages.views.camera import Camera
-from stages.views.probe import probe
-from stages.views.scene import mesh_scene
-from tests.stages.views.solids import boxes_scene, exemplar_scene
+from tests.stages.shape.views.solids import boxes_scene, exemplar_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 CORNER = Camera(30.0, 25.0)

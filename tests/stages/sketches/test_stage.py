@@ -18,8 +18,8 @@ from stages.shape.sample import Sample, write_sample
 from stages.sketches.image import png_array
 from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
 from stages.sketches.stage import STAGE
-from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
-from tests.stages.views.solids import box, cylinder, kit_of, part_type, posed
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.views.solids import box, cylinder, kit_of, part_type, posed
 
 SHARDS = {"toys-train-000000": ("train", 3), "toys-val-000000": ("val", 2)}
 

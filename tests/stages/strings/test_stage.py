@@ -17,7 +17,7 @@ from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from pipeline.survey import Survey
 from pipeline.task import Job, make_shard
-from stages.shape.canonical import graph_digest
+from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
@@ -26,7 +26,7 @@ from stages.strings.decoder import decode
 from stages.strings.settings import StringsConfig
 from stages.strings.stage import STAGE
 from stages.strings.statistics import measure_string
-from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
 from tests.stages.strings.graphs import arrays
 
 KITS = {"castle": ("tower", "gate", "wall"), "chain": tuple(f"link {index}" for index in range(53))}

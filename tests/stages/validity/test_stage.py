@@ -14,14 +14,14 @@ from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.physics.settings import PhysicsConfig
 from stages.programs.program import find_program
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
+from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, write_sample
 from stages.validity.stage import STAGE
-from tests.stages.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
-from tests.stages.views.solids import box, kit_of, part_type, posed
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.views.solids import box, kit_of, part_type, posed
 
 STOOL = "tests.stages.programs.stool"
 

@@ -17,8 +17,8 @@ from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar import check
 from stages.strings.tokens import StringError
-from stages.variations.answers import ContactAnswers
 from stages.variations.backdrop import Backdrop
+from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 import yaml
 
-from stages.shape.canonical import graph_digest
+from stages.shape.graphs.canonical import graph_digest
 from stages.shape.sample import read_samples
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
 

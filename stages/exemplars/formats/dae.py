@@ -1,0 +1,173 @@
+"""COLLADA through pycollada: the node tree in file order, meshes shared by its instances.
+
+trimesh's reader is not used here: it names parts by meshes and not by nodes, and copies the mesh for each instance.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import ConfigError
+from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
+from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.polygons import triangulate
+from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface, type_label
+from stages.shape.arrays import ByteArray, FloatArray, IntArray
+
+__all__ = ["read_dae"]
+
+_DEEPEST = 200
+
+
+def read_dae(path: Path, enclosure: Enclosure) -> Scene:
+    """The scene of a `.dae` file; placements stand in depth-first order of its node tree.
+
+    Everything that one node places is one surface. Coordinates are the file's own, whatever its unit and up axis.
+    Raises ConfigError for a file that is no COLLADA, declares XML entities, or names images outside its folder.
+    """
+    import collada
+
+    content = path.read_bytes()
+    if b"<!ENTITY" in content or b"<!DOCTYPE" in content:
+        raise ConfigError(f"{path}: declares XML entities, which are not read; export it again as plain COLLADA")
+    try:
+        document = collada.Collada(io.BytesIO(content), ignore=[collada.common.DaeError])
+        return _Reader(path, enclosure, document).scene()
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, SyntaxError, collada.common.DaeError) as error:
+        raise ConfigError(f"{path}: not a whole COLLADA file ({error}); copy or export it again") from error
+
+
+class _Reader:
+    def __init__(self, path: Path, enclosure: Enclosure, document: Any) -> None:
+        self.path = path
+        self.enclosure = enclosure
+        self.document = document
+        self.warnings: list[str] = []
+        self.images: dict[str, ByteArray | None] = {}
+
+    def scene(self) -> Scene:
+        surfaces: list[Surface] = []
+        placements: list[Placement] = []
+        place_of: dict[tuple[Any, ...], int] = {}
+        for each in self.document.images:
+            self.enclosure.check(each.path, f"image {each.id!r}", encoded=True)
+        for error in self.document.errors:
+            self.warnings.append(f"left out: {error}")
+        roots = [] if self.document.scene is None else self.document.scene.nodes
+        for node, pose, geometries in self.walk(roots, np.eye(4), 0):
+            key = tuple(
+                (each.geometry.id, *((bound.symbol, getattr(bound.target, "id", None)) for bound in each.materials))
+                for each in geometries
+            )
+            if key not in place_of:
+                place_of[key] = len(surfaces)
+                surfaces.append(self.surface(geometries))
+            name = getattr(node, "name", None) or node.id or surfaces[place_of[key]].name
+            placements.append(Placement(name, type_label(name), place_of[key], pose))
+        return Scene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
+
+    def walk(self, nodes: Any, parent: FloatArray, depth: int) -> Iterator[tuple[Any, FloatArray, list[Any]]]:
+        """Nodes that place geometry, with their world matrix and what they place."""
+        from collada.scene import ControllerNode, GeometryNode, Node
+
+        if depth > _DEEPEST:
+            raise ConfigError(f"{self.path}: its nodes nest deeper than {_DEEPEST}; one may contain itself")
+        for node in nodes:
+            if not isinstance(node, Node):
+                continue
+            pose = parent @ np.asarray(node.matrix, dtype=np.float64)
+            if any(isinstance(child, ControllerNode) for child in node.children):
+                self.warnings.append(f"node {node.id!r} has a skin or a morph and is left out")
+            geometries = [child for child in node.children if isinstance(child, GeometryNode)]
+            if geometries:
+                yield node, pose, geometries
+            yield from self.walk(node.children, pose, depth + 1)
+
+    def surface(self, geometries: list[Any]) -> Surface:
+        names: list[str] = []
+        vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int32)]
+        colors, paint = [np.empty((0, 3), np.uint8)], [np.empty((0, 3), np.uint8)]
+        material = [np.empty(0, np.int32)]
+        painted = False
+        offset = 0
+        for placed in geometries:
+            bound = {each.symbol: each.target for each in placed.materials}
+            for primitive in placed.geometry.primitives:
+                corners = self.corners(primitive)
+                if corners is None:
+                    continue
+                points, triangles = np.asarray(primitive.vertex, dtype=np.float64), corners[0]
+                target = bound.get(primitive.material)
+                name = getattr(target, "name", None) or getattr(target, "id", None) or primitive.material
+                if name is not None and name not in names:
+                    names.append(name)
+                own_colors, own_paint = self.face_colors(primitive, target, corners[1])
+                vertices.append(points)
+                faces.append(triangles + np.int32(offset))
+                colors.append(own_colors)
+                paint.append(own_colors if own_paint is None else own_paint)
+                painted |= own_paint is not None
+                material.append(np.full(len(triangles), -1 if name is None else names.index(name), dtype=np.int32))
+                offset += len(points)
+        return Surface(
+            name=geometries[0].geometry.name or geometries[0].geometry.id,
+            vertices=np.concatenate(vertices),
+            faces=np.concatenate(faces),
+            face_colors=np.concatenate(colors),
+            materials=tuple(names),
+            face_material=np.concatenate(material),
+            paint=np.concatenate(paint) if painted else None,
+        )
+
+    def corners(self, primitive: Any) -> tuple[IntArray, IntArray] | None:
+        """Faces as vertex indices and as rows of the primitive's index table; None for lines and empty primitives."""
+        from collada.polylist import Polylist
+        from collada.triangleset import TriangleSet
+
+        if primitive.vertex is None:
+            return None
+        if isinstance(primitive, TriangleSet):
+            rows = np.arange(3 * len(primitive.index), dtype=np.int32).reshape(-1, 3)
+        elif isinstance(primitive, Polylist):
+            rows = triangulate(primitive.vertex, primitive.vertex_index, primitive.vcounts)[0]
+        else:
+            self.warnings.append("lines are left out")
+            return None
+        return np.asarray(primitive.vertex_index).ravel()[rows].astype(np.int32), rows
+
+    def face_colors(self, primitive: Any, material: Any, rows: IntArray) -> tuple[ByteArray, ByteArray | None]:
+        colors = np.tile(np.array(GREY, np.uint8), (len(rows), 1))
+        paint = None
+        if primitive.sources.get("COLOR"):
+            offset, *_, source = primitive.sources["COLOR"][0]
+            index = np.asarray(primitive.index).reshape(-1, primitive.nindices)[:, offset]
+            vertex_colors = color_bytes(unit_colors(source.data[index]))
+            paint = face_paint(vertex_colors, rows)
+            colors = np.rint(vertex_colors[rows].mean(axis=1)).astype(np.uint8)
+        diffuse = getattr(getattr(material, "effect", None), "diffuse", None)
+        if isinstance(diffuse, tuple):
+            if paint is None:
+                colors[:] = color_bytes(np.array(diffuse[:3], dtype=np.float64))
+        elif diffuse is not None and len(primitive.texcoordset):
+            image = self.image(diffuse.sampler.surface.image.path)
+            if image is not None:
+                uv = np.asarray(primitive.texcoordset[0], dtype=np.float64)[:, :2]
+                index = np.asarray(primitive.texcoord_indexset[0]).ravel()
+                colors = sample_texture(image, uv[index], rows)
+        return colors, paint
+
+    def image(self, name: str) -> ByteArray | None:
+        if name not in self.images:
+            self.images[name] = None
+            try:
+                self.images[name] = decode_image(self.enclosure.read(name, "image", encoded=True))
+            except FileNotFoundError:
+                self.warnings.append(f"texture {name!r} is not there; its faces are grey")
+            except OSError as error:
+                self.warnings.append(f"texture {name!r} cannot be read: {error}")
+        return self.images[name]

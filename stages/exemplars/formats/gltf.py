@@ -1,0 +1,244 @@
+"""glTF 2.0 and GLB, read from the specification: the node tree in file order, one surface for each mesh.
+
+trimesh's reader is not used here: it takes sparse accessors for zeros and normalised integers for their raw values,
+breaks a node with several materials into parts with random names, and loses whatever hangs below a camera.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import ConfigError
+from stages.exemplars.formats.colors import (
+    decode_image,
+    face_paint,
+    linear_from_srgb,
+    sample_texture,
+    srgb_from_linear,
+    unit_colors,
+)
+from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.gltf_file import COMPRESSED, GltfFile
+from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface, type_label
+from stages.shape.arrays import ByteArray, FloatArray, IntArray
+
+__all__ = ["read_gltf"]
+
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+
+
+def read_gltf(path: Path, enclosure: Enclosure) -> Scene:
+    """The scene of a `.glb` or `.gltf` file; placements stand in depth-first order of its node tree.
+
+    Several primitives of a mesh are one surface. Skins, morph targets, cameras, lights and animations are left out.
+    Raises ConfigError for a file that is cut off, malformed, or compressed beyond what is read here.
+    """
+    try:
+        return _Reader(GltfFile(path, enclosure)).scene()
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, MemoryError) as error:
+        raise ConfigError(
+            f"{path}: malformed glTF ({type(error).__name__}: {error}); check it with a glTF validator and export it "
+            "again"
+        ) from error
+
+
+class _Reader:
+    def __init__(self, file: GltfFile) -> None:
+        self.file = file
+        self.header = file.header
+        self.warnings: list[str] = []
+        self.images: dict[int, ByteArray | None] = {}
+
+    def scene(self) -> Scene:
+        nodes = list(self.walk())
+        used = sorted({self.header["nodes"][index]["mesh"] for index, _ in nodes})
+        surfaces = [self.surface(index) for index in used]
+        place_of = {mesh: place for place, mesh in enumerate(used)}
+        placements = []
+        for index, pose in nodes:
+            node = self.header["nodes"][index]
+            mesh_name = self.header["meshes"][node["mesh"]].get("name")
+            name = node.get("name") or mesh_name or f"node{index}"
+            if "skin" in node:
+                self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken as it stands")
+            label = type_label(name) if type_label(name) != name else mesh_name or node.get("name")
+            placements.append(Placement(name, label, place_of[node["mesh"]], pose))
+        return Scene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
+
+    def walk(self) -> Iterator[tuple[int, FloatArray]]:
+        """Index and world matrix of each node with a mesh, depth first, children in file order."""
+        nodes = self.header.get("nodes", [])
+        scenes = self.header.get("scenes", [])
+        if len(scenes) > 1:
+            self.warnings.append(f"the file has {len(scenes)} scenes; only scene {self.header.get('scene', 0)} is read")
+        if scenes:
+            roots = scenes[self.header.get("scene", 0)].get("nodes", [])
+        else:
+            children = {child for node in nodes for child in node.get("children", [])}
+            roots = [index for index in range(len(nodes)) if index not in children]
+        stack = [(root, np.eye(4)) for root in reversed(roots)]
+        seen: set[int] = set()
+        while stack:
+            index, parent = stack.pop()
+            if index in seen:
+                raise ValueError(f"node {index} hangs from two places of the node tree")
+            seen.add(index)
+            node = nodes[index]
+            pose = parent @ _local_matrix(node)
+            if not np.isfinite(pose).all():
+                raise ConfigError(
+                    f"{self.file.path}: node {node.get('name', index)!r} has a transform that is not finite"
+                )
+            if "EXT_mesh_gpu_instancing" in node.get("extensions", {}):
+                raise ConfigError(
+                    f"{self.file.path}: node {node.get('name', index)!r} is instanced on the GPU "
+                    "(EXT_mesh_gpu_instancing), which is not read; export it again with one node for each instance"
+                )
+            if "mesh" in node:
+                yield index, pose
+            stack.extend((child, pose) for child in reversed(node.get("children", [])))
+
+    def surface(self, index: int) -> Surface:
+        mesh = self.header["meshes"][index]
+        name = mesh.get("name") or f"mesh{index}"
+        materials = self.header.get("materials", [])
+        vertices, faces, colors, material, paint = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], [], [], []
+        painted = False
+        offset = 0
+        for number, primitive in enumerate(mesh["primitives"]):
+            element = f"mesh {name!r}, primitive {number}"
+            if primitive.get("targets"):
+                self.warnings.append(f"mesh {name!r} has morph targets; they are left out")
+            triangles = self.triangles(primitive, element)
+            if triangles is None:
+                continue
+            own_vertices, own_faces = triangles
+            linear, own_paint = self.face_colors(primitive, own_faces, element)
+            colors.append(srgb_from_linear(linear))
+            paint.append(colors[-1] if own_paint is None else own_paint)
+            painted |= own_paint is not None
+            material.append(np.full(len(own_faces), primitive.get("material", -1), dtype=np.int32))
+            vertices.append(own_vertices)
+            faces.append(own_faces + np.int32(offset))
+            offset += len(own_vertices)
+        return Surface(
+            name=name,
+            vertices=np.concatenate(vertices),
+            faces=np.concatenate(faces),
+            face_colors=np.concatenate(colors) if colors else np.empty((0, 3), np.uint8),
+            materials=tuple(each.get("name") or f"material{place}" for place, each in enumerate(materials)),
+            face_material=np.concatenate(material) if material else np.empty(0, np.int32),
+            paint=np.concatenate(paint) if painted else None,
+        )
+
+    def triangles(self, primitive: dict[str, Any], element: str) -> tuple[FloatArray, IntArray] | None:
+        """Vertices and faces of a primitive; None for points, lines and primitives without vertices."""
+        mode = primitive.get("mode", _TRIANGLES)
+        if mode not in (_TRIANGLES, _STRIP, _FAN):
+            self.warnings.append(f"{element} is made of {'points' if mode == 0 else 'lines'} and is left out")
+            return None
+        attributes = primitive["attributes"]
+        if "POSITION" not in attributes:
+            return None
+        if "KHR_draco_mesh_compression" in primitive.get("extensions", {}) and not self.file.is_stored(
+            attributes["POSITION"]
+        ):
+            raise ConfigError(f"{self.file.path}: {element} is compressed with Draco, which is not read; {COMPRESSED}")
+        vertices = self.file.accessor(attributes["POSITION"], element).astype(np.float64)
+        if "indices" in primitive:
+            corners = self.file.accessor(primitive["indices"], element).astype(np.int64).ravel()
+        else:
+            corners = np.arange(len(vertices))
+        if len(corners) and corners.max() >= len(vertices):
+            raise ValueError(f"{element} has a face on vertex {corners.max()} of {len(vertices)}")
+        if mode == _TRIANGLES:
+            faces = corners[: len(corners) // 3 * 3].reshape(-1, 3)
+        else:
+            faces = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+            if mode == _STRIP:
+                faces[1::2] = faces[1::2, ::-1]
+            else:
+                faces[:, 0] = corners[0]
+        return vertices, faces.astype(np.int32)
+
+    def face_colors(
+        self, primitive: dict[str, Any], faces: IntArray, element: str
+    ) -> tuple[FloatArray, ByteArray | None]:
+        """Linear colours (f, 3) of the faces of a primitive, and its vertex colours as face paint, if it has any."""
+        attributes = primitive["attributes"]
+        paint = None
+        if "material" in primitive:
+            linear = self.material_colors(self.header["materials"][primitive["material"]], attributes, faces, element)
+        elif "COLOR_0" in attributes:
+            linear = np.ones((len(faces), 3))
+        else:
+            linear = np.tile(linear_from_srgb(np.array(GREY, np.uint8)), (len(faces), 1))
+        if "COLOR_0" in attributes:
+            vertex_colors = unit_colors(self.file.accessor(attributes["COLOR_0"], element))
+            linear = linear * vertex_colors[faces].mean(axis=1)
+            paint = face_paint(srgb_from_linear(vertex_colors), faces)
+        return linear, paint
+
+    def material_colors(
+        self, material: dict[str, Any], attributes: dict[str, int], faces: IntArray, element: str
+    ) -> FloatArray:
+        surface = material.get("pbrMetallicRoughness", {})
+        factor, texture = surface.get("baseColorFactor"), surface.get("baseColorTexture")
+        glossy = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+        if glossy is not None:
+            factor, texture = glossy.get("diffuseFactor"), glossy.get("diffuseTexture")
+        linear = np.tile(np.array(factor or (1.0, 1.0, 1.0, 1.0), dtype=np.float64)[:3], (len(faces), 1))
+        if texture is None:
+            return linear
+        placing = texture.get("extensions", {}).get("KHR_texture_transform", {})
+        coordinates = f"TEXCOORD_{placing.get('texCoord', texture.get('texCoord', 0))}"
+        image = self.image(self.header["textures"][texture["index"]])
+        if image is None or coordinates not in attributes:
+            return linear
+        uv = self.file.accessor(attributes[coordinates], element).astype(np.float64)
+        turn = placing.get("rotation", 0.0)
+        spin = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        uv = uv * placing.get("scale", (1.0, 1.0)) @ spin.T + placing.get("offset", (0.0, 0.0))
+        uv[:, 1] = 1.0 - uv[:, 1]
+        return linear * linear_from_srgb(sample_texture(image, uv, faces))
+
+    def image(self, texture: dict[str, Any]) -> ByteArray | None:
+        """The pixels behind a texture, decoded once; None, with a warning, where there is no readable image."""
+        sources = [each.get("source") for each in texture.get("extensions", {}).values()] + [texture.get("source")]
+        index = next((each for each in sources if each is not None), None)
+        if index is None:
+            return None
+        if index not in self.images:
+            image = self.header["images"][index]
+            try:
+                if "bufferView" in image:
+                    content = self.file.view(image["bufferView"], f"image {index}")[0]
+                else:
+                    content = self.file.enclosure.read(image["uri"], f"image {index}", encoded=True)
+                self.images[index] = decode_image(content)
+            except OSError as error:
+                self.images[index] = None
+                self.warnings.append(f"image {index} ({image.get('uri', 'embedded')[:80]}) cannot be read: {error}")
+        return self.images[index]
+
+
+def _local_matrix(node: dict[str, Any]) -> FloatArray:
+    """Transform of a node in its parent, float64 (4, 4): its matrix, or translation @ rotation @ scale."""
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64) / (
+        np.linalg.norm(node.get("rotation", (0, 0, 0, 1))) or 1.0
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] *= np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
+    matrix[:3, 3] = node.get("translation", (0, 0, 0))
+    return matrix

@@ -1,0 +1,137 @@
+"""The container of glTF: JSON header, buffers, views and accessors as arrays."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import ConfigError
+from stages.exemplars.formats.enclosure import Enclosure
+
+__all__ = ["COMPRESSED", "GltfFile"]
+
+COMPRESSED = "export it again without compression"
+
+_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+
+
+class GltfFile:
+    """A `.glb` or `.gltf` file, its buffers read when they are first needed.
+
+    Raises ConfigError for a file that is cut off or names files outside its folder, and the exceptions of indexing
+    and conversion (KeyError, IndexError, TypeError, ValueError) where the header contradicts itself.
+    """
+
+    def __init__(self, path: Path, enclosure: Enclosure) -> None:
+        self.path = path
+        self.enclosure = enclosure
+        self.header, self.chunk = _container(path)
+        self.buffers: dict[int, bytes] = {}
+        version = str(self.header.get("asset", {}).get("version", ""))
+        if not version.startswith("2."):
+            raise ConfigError(f"{path}: glTF version {version or 'unknown'}; only 2.x is read, export it again as 2.0")
+        for kind in ("buffer", "image"):
+            for index, each in enumerate(self.header.get(f"{kind}s", [])):
+                if "uri" in each:
+                    enclosure.check(each["uri"], f"{kind} {index}", encoded=True)
+
+    def is_stored(self, accessor: int) -> bool:
+        stored: dict[str, Any] = self.header["accessors"][accessor]
+        return "bufferView" in stored or "sparse" in stored
+
+    def accessor(self, index: int, element: str) -> np.ndarray:
+        """The values of an accessor (count, width), sparse ones filled in, normalised ones as float64."""
+        accessor = self.header["accessors"][index]
+        width, dtype = _WIDTHS[accessor["type"]], np.dtype(_COMPONENTS[accessor["componentType"]])
+        values = np.zeros((accessor["count"], width), dtype)
+        if "bufferView" in accessor:
+            values = self.packed(accessor["bufferView"], accessor.get("byteOffset", 0), values.shape, dtype, element)
+        if sparse := accessor.get("sparse"):
+            at, new = sparse["indices"], sparse["values"]
+            where = self.packed(
+                at["bufferView"],
+                at.get("byteOffset", 0),
+                (sparse["count"], 1),
+                _COMPONENTS[at["componentType"]],
+                element,
+            )
+            values[where[:, 0]] = self.packed(
+                new["bufferView"], new.get("byteOffset", 0), (sparse["count"], width), dtype, element
+            )
+        if accessor.get("normalized") and dtype.kind in "iu":
+            return np.maximum(values / np.iinfo(dtype).max, -1.0)
+        return values
+
+    def packed(self, view: int, offset: int, shape: tuple[int, int], dtype: Any, element: str) -> np.ndarray:
+        content, stride = self.view(view, element)
+        row = shape[1] * np.dtype(dtype).itemsize
+        if offset < 0 or shape[0] < 0 or (shape[0] and offset + (shape[0] - 1) * (stride or row) + row > len(content)):
+            raise ValueError(f"{element} needs more bytes than bufferView {view} has")
+        return np.ndarray(shape, dtype, content, offset, (stride or row, np.dtype(dtype).itemsize)).copy()
+
+    def view(self, index: int, element: str) -> tuple[bytes, int]:
+        """Bytes and stride (0 for none) of a buffer view."""
+        view = self.header["bufferViews"][index]
+        buffer = self.buffer(view["buffer"], element, "EXT_meshopt_compression" in view.get("extensions", {}))
+        start, length = view.get("byteOffset", 0), view["byteLength"]
+        if start < 0 or length < 0 or start + length > len(buffer):
+            raise ConfigError(
+                f"{self.path}: cut off: {element} reads bytes {start} to {start + length} of buffer {view['buffer']}, "
+                f"which has {len(buffer)}; copy or export the file again"
+            )
+        return buffer[start : start + length], view.get("byteStride", 0)
+
+    def buffer(self, index: int, element: str, compressed: bool) -> bytes:
+        if index not in self.buffers:
+            uri = self.header["buffers"][index].get("uri")
+            if uri is not None:
+                try:
+                    self.buffers[index] = self.enclosure.read(uri, f"buffer {index}", encoded=True)
+                except FileNotFoundError:
+                    raise ConfigError(
+                        f"{self.path}: buffer {index} is the file {uri!r}, which is not there; put it beside the model"
+                    ) from None
+            elif index == 0 and self.chunk is not None:
+                self.buffers[index] = self.chunk
+            elif compressed:
+                raise ConfigError(f"{self.path}: {element} is compressed with meshopt, which is not read; {COMPRESSED}")
+            else:
+                raise ConfigError(f"{self.path}: buffer {index} has no content; export the file again")
+        return self.buffers[index]
+
+
+def _container(path: Path) -> tuple[dict[str, Any], bytes | None]:
+    """The JSON header and the binary chunk of a file."""
+    content = path.read_bytes()
+    chunk = None
+    if content[:4] == b"glTF":
+        if len(content) < 20 or len(content) < struct.unpack_from("<I", content, 8)[0]:
+            said = struct.unpack_from("<I", content, 8)[0] if len(content) >= 12 else "more"
+            raise ConfigError(
+                f"{path}: truncated GLB: its header says {said} bytes, the file has {len(content)}; "
+                "copy or export it again"
+            )
+        version, _, length = struct.unpack_from("<III", content, 4)
+        if version != 2:
+            raise ConfigError(f"{path}: GLB container version {version}; only 2 is read, export it again as glTF 2.0")
+        text, rest = content[20 : 20 + length], 20 + length
+        if len(text) < length:
+            raise ConfigError(f"{path}: truncated GLB: its JSON chunk is cut off; copy or export it again")
+        if rest + 8 <= len(content):
+            size, kind = struct.unpack_from("<I4s", content, rest)
+            if kind == b"BIN\0":
+                chunk = content[rest + 8 : rest + 8 + size]
+    else:
+        text = content
+    try:
+        header = json.loads(text)
+    except ValueError as error:
+        raise ConfigError(f"{path}: not a glTF file: its JSON is broken ({error}); export it again") from None
+    if not isinstance(header, dict):
+        raise ConfigError(f"{path}: not a glTF file: its JSON is no object; export it again")
+    return header, chunk

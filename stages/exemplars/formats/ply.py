@@ -1,0 +1,250 @@
+"""PLY, ASCII and binary: polygons of any size, face and vertex colours, one texture.
+
+trimesh's reader is not used here: it refuses binary files that mix polygons of several sizes, and puts face colours
+on the wrong triangles where it splits polygons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import ConfigError
+from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
+from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.polygons import triangulate
+from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface
+from stages.shape.arrays import ByteArray, FloatArray
+
+__all__ = ["read_ply"]
+
+_TYPES = {
+    "char": "i1",
+    "uchar": "u1",
+    "short": "i2",
+    "ushort": "u2",
+    "int": "i4",
+    "uint": "u4",
+    "float": "f4",
+    "double": "f8",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "int64": "i8",
+    "uint64": "u8",
+    "float32": "f4",
+    "float64": "f8",
+}
+_ENCODINGS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+@dataclass(frozen=True)
+class _Property:
+    name: str
+    dtype: str
+    length: str | None  # type of the length in front of a list; None for a single value
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[_Property]
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Values of one property, item after item, and for lists how many each item has."""
+
+    values: np.ndarray
+    lengths: np.ndarray | None = None
+
+
+def read_ply(path: Path, enclosure: Enclosure) -> Scene:
+    """The one surface of a `.ply` file. Raises ConfigError for a file that is cut off or malformed."""
+    content = path.read_bytes()
+    try:
+        elements, order, texture, start = _header(content)
+        columns = _ascii(content[start:], elements) if order == "" else _binary(content[start:], elements, order)
+        vertex, face = columns.get("vertex", {}), columns.get("face", {})
+        vertices = np.stack([vertex[axis].values for axis in "xyz"], axis=1).astype(np.float64)
+        corners = face.get("vertex_indices") or face.get("vertex_index")
+        if corners is None or corners.lengths is None:
+            corners = _Column(np.empty(0, np.int64), np.empty(0, np.int64))
+        places = corners.values.astype(np.int64)
+        if len(places) and (places.min() < 0 or places.max() >= len(vertices)):
+            raise ValueError(f"a face on vertex {places.max()} of {len(vertices)}")
+    except (KeyError, ValueError, IndexError, TypeError) as error:
+        raise ConfigError(
+            f"{path}: not a whole PLY file ({str(error) or type(error).__name__}); copy or export it again"
+        ) from None
+    assert corners.lengths is not None
+    triangles, polygon = triangulate(vertices, places, corners.lengths)
+    faces = places[triangles].astype(np.int32)
+    warnings: list[str] = []
+    paint: ByteArray | None = None
+    face_colors: ByteArray = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
+    of_faces, of_vertices = _colors(face), _colors(vertex)
+    if of_faces is not None:
+        face_colors = paint = of_faces[polygon]
+    elif of_vertices is not None:
+        paint = face_paint(of_vertices, faces)
+        face_colors = np.rint(of_vertices[faces].mean(axis=1)).astype(np.uint8)
+    elif texture is not None:
+        face_colors = _textured(texture, enclosure, vertex, face, triangles, faces, face_colors, warnings)
+    surface = Surface(path.stem, vertices, faces, face_colors, paint=paint)
+    return Scene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),), tuple(warnings))
+
+
+def _header(content: bytes) -> tuple[list[_Element], str, str | None, int]:
+    """Elements, byte order (empty for ASCII), texture file, and where the header ends."""
+    end = content.find(b"end_header")
+    if not content.startswith(b"ply") or end < 0:
+        raise ValueError("no PLY header")
+    start = content.index(b"\n", end) + 1
+    elements: list[_Element] = []
+    order, texture = None, None
+    for line in content[:end].decode("utf-8", errors="replace").splitlines():
+        words = line.split()
+        if words[:1] == ["format"]:
+            order = _ENCODINGS[words[1]]
+        elif words[:2] == ["comment", "TextureFile"]:
+            texture = line.split(maxsplit=2)[2].strip()
+        elif words[:1] == ["element"]:
+            elements.append(_Element(words[1], int(words[2]), []))
+        elif words[:2] == ["property", "list"]:
+            elements[-1].properties.append(_Property(words[4], _TYPES[words[3]], _TYPES[words[2]]))
+        elif words[:1] == ["property"]:
+            elements[-1].properties.append(_Property(words[2], _TYPES[words[1]], None))
+    if order is None:
+        raise ValueError("no format line")
+    return elements, order, texture, start
+
+
+def _binary(body: bytes, elements: list[_Element], order: str) -> dict[str, dict[str, _Column]]:
+    columns: dict[str, dict[str, _Column]] = {}
+    offset = 0
+    for element in elements:
+        fixed = _fixed_rows(body, offset, element, order)
+        if fixed is not None:
+            columns[element.name], offset = fixed
+            continue
+        gathered: list[list[np.ndarray]] = [[] for _ in element.properties]
+        for _ in range(element.count):
+            for each, values in zip(element.properties, gathered, strict=True):
+                size = 1
+                if each.length is not None:
+                    size = int(np.frombuffer(body, order + each.length, 1, offset)[0])
+                    offset += np.dtype(each.length).itemsize
+                if size < 0:
+                    raise ValueError(f"a list of {size} values")
+                values.append(np.frombuffer(body, order + each.dtype, size, offset))
+                offset += size * np.dtype(each.dtype).itemsize
+        columns[element.name] = {
+            each.name: _Column(
+                np.concatenate(values) if values else np.empty(0, each.dtype),
+                None if each.length is None else np.array([len(value) for value in values], dtype=np.int64),
+            )
+            for each, values in zip(element.properties, gathered, strict=True)
+        }
+    return columns
+
+
+def _fixed_rows(body: bytes, offset: int, element: _Element, order: str) -> tuple[dict[str, _Column], int] | None:
+    """The columns of an element whose lists are all as long as in its first item, read at once; else None."""
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    at, lengths = offset, {}
+    for each in element.properties:
+        if each.length is not None:
+            size = int(np.frombuffer(body, order + each.length, 1, at)[0]) if element.count else 0
+            lengths[each.name] = size
+            fields.append((f"{each.name} length", order + each.length))
+            fields.append((each.name, order + each.dtype, (size,)))
+            at += np.dtype(each.length).itemsize + size * np.dtype(each.dtype).itemsize
+        else:
+            fields.append((each.name, order + each.dtype))
+            at += np.dtype(each.dtype).itemsize
+    dtype = np.dtype(fields)
+    if offset + element.count * dtype.itemsize > len(body):
+        if lengths:
+            return None
+        raise ValueError(f"element {element.name} is cut off")
+    rows = np.frombuffer(body, dtype, element.count, offset)
+    if any((rows[f"{name} length"] != size).any() for name, size in lengths.items()):
+        return None
+    columns = {
+        each.name: _Column(
+            rows[each.name].ravel(),
+            None if each.length is None else np.full(element.count, lengths[each.name], dtype=np.int64),
+        )
+        for each in element.properties
+    }
+    return columns, offset + element.count * dtype.itemsize
+
+
+def _ascii(body: bytes, elements: list[_Element]) -> dict[str, dict[str, _Column]]:
+    words = body.split()
+    columns: dict[str, dict[str, _Column]] = {}
+    at = 0
+    for element in elements:
+        gathered: list[list[bytes]] = [[] for _ in element.properties]
+        lengths: list[list[int]] = [[] for _ in element.properties]
+        for _ in range(element.count):
+            for number, each in enumerate(element.properties):
+                size = 1
+                if each.length is not None:
+                    size = int(words[at])
+                    at += 1
+                if at + size > len(words):
+                    raise ValueError(f"element {element.name} is cut off")
+                gathered[number].extend(words[at : at + size])
+                lengths[number].append(size)
+                at += size
+        columns[element.name] = {
+            each.name: _Column(
+                np.array(gathered[number], dtype=np.float64).astype(each.dtype if each.dtype[0] != "f" else "f8"),
+                None if each.length is None else np.array(lengths[number], dtype=np.int64),
+            )
+            for number, each in enumerate(element.properties)
+        }
+    return columns
+
+
+def _colors(columns: dict[str, _Column]) -> ByteArray | None:
+    if not {"red", "green", "blue"} <= columns.keys():
+        return None
+    return color_bytes(unit_colors(np.stack([columns[name].values for name in ("red", "green", "blue")], axis=1)))
+
+
+def _textured(
+    texture: str,
+    enclosure: Enclosure,
+    vertex: dict[str, _Column],
+    face: dict[str, _Column],
+    triangles: np.ndarray,
+    faces: np.ndarray,
+    plain: ByteArray,
+    warnings: list[str],
+) -> ByteArray:
+    """Face colours from the texture, by the coordinates of face corners or of vertices; `plain` without them."""
+    uv: FloatArray | None = None
+    corners = faces
+    for names in (("texture_u", "texture_v"), ("s", "t"), ("u", "v")):
+        if set(names) <= vertex.keys():
+            uv = np.stack([vertex[name].values for name in names], axis=1).astype(np.float64)
+    if "texcoord" in face and len(face["texcoord"].values) >= 2 * (triangles.max(initial=-1) + 1):
+        uv, corners = face["texcoord"].values.reshape(-1, 2).astype(np.float64), triangles
+    try:
+        image = decode_image(enclosure.read(texture, "TextureFile"))
+    except FileNotFoundError:
+        warnings.append(f"texture {texture!r} is not there; its faces are grey")
+        return plain
+    except OSError as error:
+        warnings.append(f"texture {texture!r} cannot be read: {error}")
+        return plain
+    return plain if uv is None else sample_texture(image, uv, corners)

@@ -1,0 +1,117 @@
+"""The case of a cabinet: boards, shelves, the top with its crown, and what it stands on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.programs.curves import (
+    Part,
+    QuadMesh,
+    Style,
+    extrude,
+    line,
+    loft_rings,
+    rectangle,
+    square_circle,
+    sweep,
+    symmetric,
+)
+from stages.programs.library.cabinet_plan import Plan, block
+
+__all__ = ["base_parts", "case_parts", "shelf_parts", "top_parts"]
+
+OAK, SHADE, DARK = (205, 172, 128), (184, 150, 106), (84, 66, 54)
+
+SUNK = 0.004
+"""How far boards reach into each other."""
+
+
+def case_parts(plan: Plan) -> list[Part]:
+    """Sides, bottom, dividers and back; what lies between the sides stands back a hair from their front edges."""
+    top, inner = plan.ceiling + SUNK, plan.half - plan.board
+    side = block((-plan.half, plan.floor, plan.back), (-inner, top, plan.front))
+    floor = block((-inner - SUNK, plan.floor, plan.back), (inner + SUNK, plan.floor + plan.board, plan.front - 0.001))
+    parts = [*symmetric([Part("side", side, OAK)], "x"), Part("bottom", floor, OAK)]
+    behind = plan.back
+    if plan.values["has_back"]:
+        behind = plan.back + 0.008
+        panel = block((-inner - SUNK, plan.floor + plan.board - SUNK, plan.back), (inner + SUNK, top, behind))
+        parts.append(Part("back", panel, SHADE))
+    for column in plan.columns[1:]:
+        right, bottom = column.low
+        low = (right - plan.board, bottom - SUNK, behind - SUNK * bool(plan.values["has_back"]))
+        parts.append(Part("divider", block(low, (right, top, plan.front - 0.001)), OAK))
+    return parts
+
+
+def shelf_parts(plan: Plan) -> list[Part]:
+    """The shelves of the open columns."""
+    shelves = []
+    count = plan.values["shelf_count"]
+    thick = min(plan.board, 0.024)
+    for column, bare in zip(plan.columns, plan.is_open, strict=True):
+        for place in range(count if bare else 0):
+            level = column.low[1] + (column.size[1] * (place + 1)) / (count + 1)
+            low = (column.low[0] - SUNK, level - thick / 2.0, plan.back + 0.004)
+            high = (column.high[0] + SUNK, level + thick / 2.0, plan.front - 0.012)
+            shelves.append(Part("shelf", block(low, high), SHADE))
+    return shelves
+
+
+def top_parts(plan: Plan) -> list[Part]:
+    """The top, flush with the wall behind, and the crown under it."""
+    values = plan.values
+    thick, flare = values["top_thickness"], 0.7 * plan.crown
+    out = values["top_overhang"] + flare
+    depth = plan.face + out - plan.back
+    bevel = 0.45 * thick * values["edge_roundness"]
+    outline = rectangle(2.0 * (plan.half + out), depth).moved(0.0, (plan.face + out + plan.back) / 2.0)
+    mesh = extrude(outline, thick, base=values["height"] - thick, bevel=bevel, steps=3)
+    parts = [Part("top", mesh, OAK)]
+    if plan.crown:
+        parts.append(Part("crown", _crown(plan, flare), OAK))
+    return parts
+
+
+def _crown(plan: Plan, flare: float) -> QuadMesh:
+    """A cove between two fillets, flaring to the front and to both sides."""
+    turn = np.linspace(0.0, np.pi / 2.0, 6)
+    out = np.concatenate([[0.0], 0.12 + 0.68 * (1.0 - np.cos(turn)), [1.0, 1.0]]) * flare
+    rise = np.concatenate([[0.0], 0.08 + 0.72 * np.sin(turn), [0.86, 1.05]]) * plan.crown
+    # From the top down, counter-clockwise in the plane of x and z.
+    out, rise = out[::-1], rise[::-1]
+    rings = np.empty((len(out), 4, 3))
+    rings[:, [0, 3], 0], rings[:, [1, 2], 0] = (plan.half + out)[:, None], -(plan.half + out)[:, None]
+    rings[..., 1] = (plan.ceiling + rise)[:, None]
+    rings[:, :2, 2], rings[:, 2:, 2] = (plan.face + out)[:, None], plan.back
+    return loft_rings(rings)
+
+
+def base_parts(plan: Plan) -> list[Part]:
+    """A plinth, legs or runners."""
+    kind = plan.values["base_kind"]
+    inset = 0.1 * plan.values["base_inset"]
+    top = plan.floor + min(SUNK, plan.board / 3.0)
+    if kind == 0:
+        low, high = (0.005 + inset - plan.half, 0.0, plan.back), (plan.half - 0.005 - inset, top, plan.front - inset)
+        return [Part("plinth", block(low, high), DARK)]
+    thick = 0.06 if kind == 1 else 0.03
+    x, z = plan.half - thick / 2.0 - 0.006 - inset, plan.front - thick / 2.0 - 0.006 - 0.6 * inset
+    if kind == 2:
+        return symmetric([Part("runner", _runner(x, z, thick, top), DARK)], "x")
+    section = square_circle(plan.values["leg_roundness"], thick)
+    style = Style.taper(1.0 - 0.6 * plan.values["leg_taper"], 1.0)
+    # A wide cabinet has a pair of legs in its middle, too.
+    sides = [(x, z), (x, -z), (-x, z), (-x, -z), *([(0.0, z), (0.0, -z)] if plan.half > 0.9 else [])]
+    return [
+        Part("leg", sweep(line((across, 0.0, along), (across, top, along)), section, style), DARK)
+        for across, along in sides
+    ]
+
+
+def _runner(x: float, z: float, thick: float, top: float) -> QuadMesh:
+    """A flat bar on the ground with a post at each end."""
+    half = thick / 2.0
+    ground = block((x - half, 0.0, -z - half), (x + half, min(0.5 * top, thick), z + half))
+    posts = [block((x - half, 0.001, each - half), (x + half, top, each + half)) for each in (-z, z)]
+    return QuadMesh.joined([ground, *posts])

@@ -1,0 +1,98 @@
+"""The program of tables (geocode §3.2): a top on four legs with rails, on a turned pedestal, or on a tent of legs."""
+
+from __future__ import annotations
+
+from stages.programs.curves import Part
+from stages.programs.library.table_legs import leg_parts
+from stages.programs.library.table_pedestal import pedestal_parts
+from stages.programs.library.table_plan import OAK, Plan, upright
+from stages.programs.parameters import binary, continuous, discrete
+from stages.programs.program import Constraint, Program
+from stages.programs.rules import Rule
+from stages.programs.schema import Values
+
+__all__ = ["PROGRAM", "build"]
+
+
+def build(values: Values) -> list[Part]:
+    """The parts of the table at `values`."""
+    plan = Plan(values)
+    centers = (plan.height - plan.edge[:, 1:]) * [0.0, 1.0, 0.0]
+    top = Part("top", upright(plan.outline, centers, 1.0 - plan.edge[:, :1] / plan.half), OAK)
+    return [top, *(pedestal_parts(plan) if values["is_monoleg"] else leg_parts(plan))]
+
+
+LEGS = "(is_monoleg and is_monoleg_tent) or (not is_monoleg)"
+FOUR = "not is_monoleg"
+SUPPORT_X = "(not is_monoleg) and is_std_legs_support_x"
+SUPPORT_Y = "(not is_monoleg) and is_std_legs_support_y"
+TENT = "is_monoleg and is_monoleg_tent"
+BEZIER = "is_monoleg and (not is_monoleg_tent or monoleg_tent_pct < 0.4)"
+
+PARAMETERS = (
+    continuous("table_top_scale_x", 0.6, 2.6, 12, 2.6, "top", "Width of the top; 1 is 0.6 metres."),
+    continuous("table_top_scale_y", 0.6, 2.6, 12, 2.6, "top", "Depth of the top; 1 is 0.6 metres."),
+    continuous("table_top_height", 0, 1, 8, 0, "top", "Height of the table, from a low one to a counter."),
+    continuous("table_top_shape", 0, 1, 11, 1, "top", "The top from above, from square to round."),
+    continuous("table_top_thickness", 0, 1, 6, 0, "top", "Thickness of the top."),
+    discrete("table_top_profile_state", 0, 3, 2, "top", "Edge: straight, a bullnose, cut away below, or an ogee."),
+    continuous(
+        "table_top_profile_strength", 0, 1, 6, 0, "top", "How deep the edge is cut.", "table_top_profile_state > 0"
+    ),
+    continuous("legs_shape_1", 0, 1, 3, 1, "leg_shape", "Thickness of the legs at the ground.", LEGS),
+    continuous("legs_shape_2", 0, 1, 3, 1, "leg_shape", "Thickness of the legs halfway down.", LEGS),
+    continuous("legs_bevel", 0, 1, 3, 0, "leg_shape", "Section of the legs, from square to round.", LEGS),
+    continuous("std_legs_bottom_offset_y", 0, 1, 6, 1, "legs", "How far out the feet stand.", FOUR),
+    continuous("std_legs_mid_offset_y", 0, 1, 6, 0, "legs", "How far the legs bend inwards halfway down.", FOUR),
+    continuous("std_legs_top_offset_x", 0, 1, 6, 0.27, "legs", "How far from the short sides legs begin.", FOUR),
+    continuous("std_legs_top_offset_y", 0, 1, 6, 0, "legs", "How far from the long sides legs begin.", FOUR),
+    continuous("std_legs_rotation", 0, 1, 6, 0, "legs", "Turns legs from splaying front and back to sideways.", FOUR),
+    binary("is_std_legs_support_x", True, "support_x", "Whether rails join left and right legs.", FOUR),
+    continuous("std_legs_support_x_height", 0, 1, 6, 0.72, "support_x", "Height of these rails.", SUPPORT_X),
+    continuous("std_legs_support_x_curvature", 0, 1, 6, 0, "support_x", "How high they arch.", SUPPORT_X),
+    continuous("std_legs_support_x_profile_width", 0, 1, 5, 1, "support_x", "How thick they are.", SUPPORT_X),
+    continuous("std_legs_support_x_profile_height", 0, 1, 5, 0.27, "support_x", "How tall they are.", SUPPORT_X),
+    binary("is_std_legs_support_y", True, "support_y", "Whether rails join front and back legs.", FOUR),
+    continuous("std_legs_support_y_height", 0, 1, 6, 0.36, "support_y", "Height of these rails.", SUPPORT_Y),
+    continuous("std_legs_support_y_curvature", 0, 1, 6, 0, "support_y", "How high they arch.", SUPPORT_Y),
+    continuous("std_legs_support_y_profile_width", 0, 1, 5, 1, "support_y", "How thick they are.", SUPPORT_Y),
+    continuous("std_legs_support_y_profile_height", 0, 1, 5, 1, "support_y", "How tall they are.", SUPPORT_Y),
+    binary("is_monoleg", False, "foot", "Whether the table stands on one foot in its middle."),
+    binary("is_monoleg_tent", True, "foot", "Whether that foot is a column on a tent of legs.", "is_monoleg"),
+    continuous("monoleg_tent_pct", 0.2, 0.8, 7, 0.665, "foot", "Height of the tent, as a share of the foot's.", TENT),
+    continuous("monoleg_tent_base_radius", 0, 1, 11, 0, "foot", "How far the legs of the tent reach.", TENT),
+    discrete("monoleg_tent_count", 3, 8, 5, "foot", "Number of legs of the tent.", TENT),
+    continuous(
+        "monoleg_bezier_start_x_offset", 0, 1, 6, 0.5273, "pedestal", "Radius of the pedestal at its top.", BEZIER
+    ),
+    continuous(
+        "monoleg_bezier_start_handle_x_offset", 0, 1, 6, 1, "pedestal", "Radius that its upper part turns to.", BEZIER
+    ),
+    continuous(
+        "monoleg_bezier_start_handle_z_pct", 0, 1, 6, 0.46, "pedestal", "How far down its upper part reaches.", BEZIER
+    ),
+    continuous(
+        "monoleg_bezier_end_x_offset", 0.2, 1, 5, 0.25, "pedestal", "Radius of the pedestal at the ground.", BEZIER
+    ),
+    continuous(
+        "monoleg_bezier_end_handle_x_offset", 0, 1, 6, 0.11, "pedestal", "Radius that its lower part turns to.", BEZIER
+    ),
+    continuous(
+        "monoleg_bezier_end_handle_z_pct", 0, 1, 6, 0.21, "pedestal", "How far down its lower part begins.", BEZIER
+    ),
+)
+
+PROGRAM = Program(
+    name="table",
+    sentence="A table on four legs, on a pedestal or on a tent of legs.",
+    parameters=PARAMETERS,
+    labels=("top", "leg", "support", "pedestal", "column", "plate", "hub", "glide"),
+    build=build,
+    constraints=(
+        Constraint(
+            "foot_below_neck",
+            Rule("monoleg_bezier_end_x_offset >= monoleg_bezier_start_x_offset"),
+            "A pedestal that is narrower at the ground than at its top would topple.",
+        ),
+    ),
+)

@@ -1,0 +1,101 @@
+"""Four legs under a table, and the rails between them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.programs.curves import Part, Profile, QuadMesh, loft_rings, rounded_rectangle, square_circle, symmetric
+from stages.programs.library.table_plan import WALNUT, Plan, upright
+from stages.shape.arrays import FloatArray
+
+__all__ = ["leg_parts", "leg_width"]
+
+RINGS = 9
+"""Rings of a leg."""
+
+SPANS = 12
+"""Pieces of an arched rail."""
+
+
+def leg_width(plan: Plan, share: FloatArray) -> FloatArray:
+    """Relative width of a leg at shares (n,) of the way from its top down to its foot."""
+    foot = 0.45 + 0.55 * plan.values["legs_shape_1"]
+    waist = (0.6 + 0.4 * plan.values["legs_shape_2"]) * (1.0 + foot) / 2.0
+    width: FloatArray = (1.0 - share) * (1.0 - 2.0 * share) + 4.0 * share * (1.0 - share) * waist
+    width += share * (2.0 * share - 1.0) * foot
+    return width
+
+
+def leg_parts(plan: Plan) -> list[Part]:
+    """The four legs and, where there are, the rails along x and along z."""
+    frame = _Frame(plan)
+    share = np.linspace(0.0, 1.0, RINGS)
+    heights = plan.under * (1.0 - share)
+    centers = np.column_stack([frame.at(heights), heights])[:, [0, 2, 1]]
+    tip = centers[:1] * [1.0, 0.0, 1.0] + [0.0, plan.sunk, 0.0]
+    width = leg_width(plan, share)
+    mesh = upright(frame.section.points, np.concatenate([tip, centers]), np.concatenate([width[:1], width]))
+    parts = symmetric(symmetric([Part("leg", mesh, WALNUT)], "x"), "z")
+    if plan.values["is_std_legs_support_x"]:
+        parts += symmetric([_rail(plan, frame, "x", 0)], "z")
+    if plan.values["is_std_legs_support_y"]:
+        parts += symmetric([_rail(plan, frame, "y", 1)], "x")
+    return parts
+
+
+class _Frame:
+    """Where the leg at +x and +z runs, and its section."""
+
+    def __init__(self, plan: Plan) -> None:
+        values = plan.values
+        angle = 90.0 * values["std_legs_rotation"]
+        self.section = square_circle(values["legs_bevel"], 0.94 * plan.stick, 1.14 * plan.stick).turned(-angle)
+        self.plan = plan
+        sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+        self.way = np.array([sine, cosine])
+        extent = self.section.size / 2.0
+        offset = np.array([values["std_legs_top_offset_x"], values["std_legs_top_offset_y"]])
+        self.top = (plan.corner - extent) * (1.0 - 0.5 * offset)
+        # How far the leg may go inwards before it comes near the middle, and outwards before it trips people.
+        safe = np.maximum(self.way, 1e-9)
+        room = float(((self.top - 1.2 * extent) / safe).min())
+        beyond = float(((plan.half - extent - self.top) / safe).min()) + 0.12 * plan.under
+        inmost, outmost = min(0.45 * room, 0.4 * plan.under), min(beyond, 0.4 * plan.under)
+        self.foot = (inmost + outmost) * values["std_legs_bottom_offset_y"] - inmost
+        self.waist = min(0.28 * plan.under, 0.65 * room + 0.5 * self.foot) * values["std_legs_mid_offset_y"]
+
+    def at(self, heights: FloatArray) -> FloatArray:
+        """The leg's middle at `heights`, any shape (...), as x and z, (..., 2)."""
+        down = 1.0 - heights / self.plan.under
+        out = self.foot * down - 4.0 * self.waist * down * (1.0 - down)
+        place: FloatArray = self.top + out[..., None] * self.way
+        return place
+
+
+def _rail(plan: Plan, frame: _Frame, name: str, axis: int) -> Part:
+    """The rail along x (axis 0) at +z, or along z (axis 1) at +x. Its ends lie in the middle of the legs at every
+    height, so that it leans with them; it may arch, and its highest place lets it carry the top."""
+    values, prefix = plan.values, f"std_legs_support_{name}"
+    tall = (0.05 + 0.12 * values[f"{prefix}_profile_height"]) * plan.under
+    lowest, highest = 0.1 * plan.under + tall / 2.0, plan.under + 0.3 * plan.thickness - tall / 2.0
+    level = lowest + (highest - lowest) * values[f"{prefix}_height"]
+    span = float(frame.at(np.array(level))[axis])
+    arch = min(0.75 * (level - tall / 2.0 - 0.03 * plan.under), 0.25 * plan.under, 0.5 * span)
+    arch *= values[f"{prefix}_curvature"]
+    thinnest = float(leg_width(plan, np.linspace(0.0, 1.0, RINGS)).min())
+    wide = (0.3 + 0.55 * values[f"{prefix}_profile_width"]) * 0.85 * thinnest * plan.stick
+    profile = rounded_rectangle(wide, tall, 0.15 * min(wide, tall), steps=1)
+    return Part("support", _between_legs(frame, profile, axis, level, arch), WALNUT)
+
+
+def _between_legs(frame: _Frame, profile: Profile, axis: int, level: float, arch: float) -> QuadMesh:
+    """The rail at `level`, its ends lower by `arch`."""
+    along = np.linspace(-1.0, 1.0, SPANS + 1 if arch > 1e-9 else 2)
+    across, rise = profile.points.T
+    ends = frame.at(level - arch + rise)
+    rings = np.empty((len(along), len(profile), 3))
+    rings[..., 1] = rise + (level - arch * along * along)[:, None]
+    rings[..., 0 if axis == 0 else 2] = along[:, None] * ends[:, axis]
+    rings[..., 2 if axis == 0 else 0] = ends[:, 1 - axis] + across
+    # Seen from +x, z runs to the left; seen from +z, x runs to the right.
+    return loft_rings(rings[:, ::-1] if axis == 0 else rings)

@@ -1,0 +1,119 @@
+"""The one contact test: do two posed parts touch, and in a point, along a line or over a face?
+
+Two parts are in contact when their triangle meshes intersect or come within the contact tolerance of each other
+(strings §3, with a tolerance for meshes that meet face to face). Exemplars, variations and eval all ask this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.pose import relative_poses, transform_points
+from stages.shape.kit import ContactKind, PartMesh
+
+__all__ = ["ContactTest", "overlapping_boxes", "world_boxes"]
+
+POINT_SHARE = 0.05
+"""A contact shorter than this share of the smaller part's diagonal is a point."""
+LINE_SHARE = 0.01
+"""A contact narrower than this share of the smaller part's diagonal is a line."""
+LINE_TOLERANCES = 4.0
+"""A contact narrower than this many tolerances is a line, however small the parts are."""
+
+Mesh = tuple[FloatArray, FloatArray, np.ndarray]
+
+
+class ContactTest:
+    """Contact of posed parts of given types.
+
+    `tolerance` is the largest distance in contact, in the units of the parts.
+    """
+
+    def __init__(self, types: Sequence[PartMesh], tolerance: float) -> None:
+        self.types = tuple(types)
+        self.tolerance = tolerance
+        self._meshes: dict[int, Mesh] = {}
+
+    @cached_property
+    def diagonals(self) -> FloatArray:
+        """Diagonal of each type, float64 (types,)."""
+        return np.array([each.diagonal for each in self.types])
+
+    def mesh(self, index: int) -> Mesh:
+        """The box tree of a type (stages.shape.geometry.triangles), built at first use."""
+        from stages.shape.geometry.triangles import build_tree
+
+        if index not in self._meshes:
+            self._meshes[index] = build_tree(self.types[index].vertices, self.types[index].faces)
+        return self._meshes[index]
+
+    def touches(self, a: int, b: int, pose: FloatArray, tolerance: float | None = None) -> bool:
+        """Whether a part of type `b` at `pose` (4, 4), in coordinates of a part of type `a`, touches that part."""
+        from stages.shape.geometry.triangles import first_contact
+
+        return first_contact(self.mesh(a), self.mesh(b), pose, self.tolerance if tolerance is None else tolerance)
+
+    def kind(self, a: int, b: int, pose: FloatArray) -> ContactKind | None:
+        """What the contact is, judged by the extent of the touching area itself; None where there is no contact.
+
+        The touching area is the union, over all pairs of triangles within tolerance, of the share of one triangle
+        that lies near the other. Its extents along its own principal axes decide, so the answer does not depend
+        on how the parts stand in the world.
+        """
+        from stages.shape.geometry.triangles import contact_patches, near_pairs
+
+        pairs = near_pairs(self.mesh(a), self.mesh(b), pose, self.tolerance)
+        if len(pairs) == 0:
+            return None
+        points, areas, crossing = contact_patches(self.mesh(a)[0], self.mesh(b)[0], pairs, pose, self.tolerance)
+        if len(points) < 3:
+            return "point"
+        centred = points - points.mean(axis=0)
+        _, axes = np.linalg.eigh(centred.T @ centred)
+        length, width, _ = np.sort(np.ptp(centred @ axes, axis=0))[::-1]
+        smaller = min(self.diagonals[a], self.diagonals[b])
+        if length < POINT_SHARE * smaller:
+            return "point"
+        narrow = max(LINE_SHARE * smaller, LINE_TOLERANCES * self.tolerance)
+        if width < narrow:
+            return "line"
+        # Two or more lines side by side are wide too: a face has area of its own, or the parts pass into each other.
+        if not crossing.any() and areas.sum() / length < LINE_TOLERANCES * self.tolerance:
+            return "line"
+        return "face"
+
+    def contacts(self, types: np.ndarray, poses: FloatArray) -> IntArray:
+        """The contacts of an assembly: int32 (m, 2), i < j, in lexicographic order."""
+        boxes = world_boxes(self.types, types, poses)
+        pairs = overlapping_boxes(boxes, self.tolerance)
+        moved = relative_poses(poses, pairs)
+        touching = [
+            self.touches(int(types[i]), int(types[j]), pose) for (i, j), pose in zip(pairs.tolist(), moved, strict=True)
+        ]
+        return pairs[np.array(touching, dtype=bool)] if len(pairs) else pairs
+
+
+def world_boxes(part_types: Sequence[PartMesh], types: np.ndarray, poses: FloatArray) -> FloatArray:
+    """The tight axis-aligned boxes of posed parts, float64 (n, 2, 3)."""
+    boxes = np.empty((len(types), 2, 3))
+    for index, (part_type, pose) in enumerate(zip(types, poses, strict=True)):
+        moved = transform_points(pose, part_types[part_type].vertices)
+        boxes[index] = moved.min(axis=0), moved.max(axis=0)
+    return boxes
+
+
+def overlapping_boxes(boxes: FloatArray, tolerance: float) -> IntArray:
+    """Pairs i < j of boxes (n, 2, 3) at most `tolerance` apart in every axis, int32 (m, 2) in lexicographic order."""
+    order = np.argsort(boxes[:, 0, 0], kind="stable")
+    low, high = boxes[order, 0], boxes[order, 1] + tolerance
+    ends = np.searchsorted(low[:, 0], high[:, 0], side="right")
+    counts = np.maximum(ends - np.arange(len(order)) - 1, 0)
+    first = np.repeat(np.arange(len(order)), counts)
+    second = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + first + 1
+    hit = np.all((low[second, 1:] <= high[first, 1:]) & (low[first, 1:] <= high[second, 1:]), axis=1)
+    pairs = np.sort(np.stack([order[first[hit]], order[second[hit]]], axis=1), axis=1)
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int32)

@@ -1,0 +1,1 @@
+"""Shape graphs: canonical form, colour refinement, neighbourhoods."""

@@ -1,0 +1,177 @@
+"""Canonical graphs: one order of the nodes, and one digest, for all drawings of the same coloured graph.
+
+Colour refinement tells most nodes of a shape graph apart. Nauty orders those that it leaves alike, on the subgraph
+where they differ by more than names; so both answers are exact, and nearly always the second step has little to do.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.shape.arrays import IntArray, TypeArray
+
+__all__ = ["canonical_order", "docking_digest", "graph_digest"]
+
+Indices = npt.NDArray[np.int64]
+
+
+def graph_digest(types: TypeArray, edges: IntArray) -> str:
+    """Hex sha256 of a graph with coloured nodes: equal exactly for isomorphic graphs.
+
+    types: int16 (n,); edges: int32 (m, 2), each edge once, in either direction. Raises ValueError as
+    `canonical_order` does.
+    """
+    return _digest(types, edges, None)
+
+
+def docking_digest(types: TypeArray, edges: IntArray, labels: IntArray) -> str:
+    """Hex sha256 of a graph whose edges carry a label for each of their ends: equal exactly for isomorphic ones.
+
+    labels: int32 (m, 2), the label seen from `edges[:, 0]` and that seen from `edges[:, 1]` (docking configurations).
+    """
+    return _digest(types, edges, labels)
+
+
+def canonical_order(types: TypeArray, edges: IntArray, edge_labels: IntArray | None = None) -> Indices:
+    """The nodes in canonical order, int64 (n,): isomorphic graphs, put in this order, are equal.
+
+    types: int16 (n,), colours of the nodes; edges: int32 (m, 2), each edge once; edge_labels: int32 (m, 2), labels of
+    each edge as seen from its two ends. Nodes of lower type come first. Raises ValueError for an edge to a node that
+    is not there, from a node to itself, or that stands twice.
+    """
+    from stages.shape.graphs.refinement import refine
+
+    colors = np.ascontiguousarray(types, dtype=np.int64)
+    pairs = np.ascontiguousarray(edges, dtype=np.int64).reshape(-1, 2)
+    _check_simple(len(colors), pairs)
+    forward, backward, classes = _arc_classes(len(pairs), edge_labels)
+    order, start = refine(colors, pairs, forward, backward, classes)
+    if (start == np.arange(len(order))).all():
+        return np.asarray(order)
+    return _settle(order, start, pairs, forward, backward)
+
+
+def _digest(types: TypeArray, edges: IntArray, labels: IntArray | None) -> str:
+    order = canonical_order(types, edges, labels)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    ends = rank[np.asarray(edges).reshape(-1, 2)]
+    turned = ends[:, 0] > ends[:, 1]
+    ends.sort(axis=1)
+    rows = np.argsort(ends[:, 0] * len(order) + ends[:, 1])
+    content = hashlib.sha256(np.array([len(order), len(ends)], dtype="<i8").tobytes())
+    content.update(np.asarray(types)[order].astype("<i8").tobytes())
+    content.update(ends[rows].astype("<i8").tobytes())
+    if labels is not None:
+        seen = np.asarray(labels).reshape(-1, 2)
+        content.update(np.where(turned[:, None], seen[:, ::-1], seen)[rows].astype("<i8").tobytes())
+    return content.hexdigest()
+
+
+def _check_simple(n: int, pairs: Indices) -> None:
+    if not len(pairs):
+        return
+    if pairs.min() < 0 or pairs.max() >= n:
+        raise ValueError(
+            f"an edge names a node that is not there: {n} nodes, edges name {pairs.min()} to {pairs.max()}"
+        )
+    low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])
+    keys = np.sort(low * n + high)
+    if (low == high).any() or (keys[1:] == keys[:-1]).any():
+        raise ValueError("the graph is not simple: an edge stands twice, or leads from a node to itself")
+
+
+def _arc_classes(m: int, labels: IntArray | None) -> tuple[Indices, Indices, int]:
+    """Class of the arc along each edge, class of the arc against it, and how many classes there are."""
+    if labels is None:
+        none = np.zeros(m, dtype=np.int64)
+        return none, none, 1
+    seen = np.asarray(labels, dtype=np.int64).reshape(-1, 2)
+    if len(seen) != m:
+        raise ValueError(f"{len(seen)} rows of labels for {m} edges")
+    values, ranks = np.unique(seen, return_inverse=True)
+    near, far = ranks.reshape(-1, 2).T
+    kinds, numbers = np.unique(
+        np.concatenate([near, far]) * len(values) + np.concatenate([far, near]), return_inverse=True
+    )
+    return numbers[:m], numbers[m:], max(len(kinds), 1)
+
+
+def _settle(order: Indices, start: Indices, pairs: Indices, forward: Indices, backward: Indices) -> Indices:
+    """`order` with the nodes inside each cell in canonical order too.
+
+    Where a cell touches all of another cell alike, or none of it, that relation says nothing about which node is
+    which; so nauty sees only the relations that are neither, and only the nodes in them.
+    """
+    n = len(order)
+    cell = np.empty(n, dtype=np.int64)
+    cell[order] = start
+    size = np.bincount(start, minlength=n)
+    open_pairs = (size[cell[pairs[:, 0]]] > 1) & (size[cell[pairs[:, 1]]] > 1)
+    kept = pairs[open_pairs]
+    if not len(kept):
+        return order
+    along, against = forward[open_pairs], backward[open_pairs]
+    swap = cell[kept[:, 0]] > cell[kept[:, 1]]
+    ends = np.where(swap[:, None], kept[:, ::-1], kept)
+    low_to_high, high_to_low = np.where(swap, against, along), np.where(swap, along, against)
+    a, b = cell[ends[:, 0]], cell[ends[:, 1]]
+    _, relation, edges_of = np.unique(a * n + b, return_inverse=True, return_counts=True)
+    relation = relation.reshape(-1)
+    possible = np.where(a == b, size[a] * (size[a] - 1) // 2, size[a] * size[b])
+    same_kind = np.ones(len(edges_of), dtype=np.bool_)
+    sample = np.zeros(len(edges_of), dtype=np.int64)
+    sample[relation] = low_to_high
+    differs = (low_to_high != sample[relation]) | ((a == b) & (high_to_low != low_to_high))
+    same_kind[relation[differs]] = False
+    telling = ~(same_kind[relation] & (edges_of[relation] == possible))
+    if not telling.any():
+        return order
+    plain = same_kind[relation[telling]]
+    return _nauty(order, start, ends[telling], plain, low_to_high[telling], high_to_low[telling])
+
+
+def _nauty(
+    order: Indices, start: Indices, edges: Indices, plain: npt.NDArray[np.bool_], along: Indices, against: Indices
+) -> Indices:
+    """`order` with the nodes of `edges` in nauty's canonical order inside their cells.
+
+    Edges that are not `plain` carry classes, `along` and `against`: they get nodes of their own, coloured by them.
+    """
+    import pynauty
+
+    active = np.zeros(len(order), dtype=np.bool_)
+    active[edges] = True
+    positions = np.flatnonzero(active[order])
+    nodes = order[positions]
+    number = np.empty(len(order), dtype=np.int64)
+    number[nodes] = np.arange(len(nodes))
+    cuts = np.flatnonzero(np.diff(start[positions])) + 1
+    coloring: list[set[int]] = [set(each.tolist()) for each in np.split(np.arange(len(nodes)), cuts)]
+    adjacency: dict[int, list[int]] = {}
+    total = len(nodes)
+    middles: dict[int, set[int]] = {}
+    rows = zip(number[edges].tolist(), plain.tolist(), along.tolist(), against.tolist(), strict=True)
+    for (i, j), is_plain, there, back in rows:
+        if is_plain:
+            adjacency.setdefault(i, []).append(j)
+        elif there == back:
+            adjacency[total] = [i, j]
+            middles.setdefault(there, set()).add(total)
+            total += 1
+        else:
+            adjacency[total] = [i, total + 1]
+            adjacency[total + 1] = [j]
+            middles.setdefault(there, set()).add(total)
+            middles.setdefault(back, set()).add(total + 1)
+            total += 2
+    coloring += [middles[each] for each in sorted(middles)]
+    graph: Any = pynauty.Graph(total, adjacency_dict=adjacency, vertex_coloring=coloring)
+    canonical = np.array(pynauty.canon_label(graph)[: len(nodes)], dtype=np.int64)
+    settled = order.copy()
+    settled[positions] = nodes[canonical]
+    return settled

@@ -1,0 +1,204 @@
+"""Which parts are connected, how deep they reach into each other, and the patches on which they press."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.contact import overlapping_boxes
+from stages.shape.geometry.pose import relative_poses
+from stages.shape.kit import PartMesh
+from stages.shape.physics.solids import Placed, Solids
+
+__all__ = ["Patches", "Touch"]
+
+STEP = 1e-6
+"""Poses are asked about on a grid of this share of the smaller part's diagonal, so that answers can be kept."""
+KEPT = 100_000
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Points at which bodies press on each other.
+
+    first, second: int (q,), the bodies of each point, `second` is -1 for the ground; patch: int (q,), which points
+    belong to one joint; points: float64 (q, 3); normals: float64 (q, 3), unit, from the second body to the first.
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    patch: np.ndarray
+    points: FloatArray
+    normals: FloatArray
+
+
+class Touch:
+    """Answers about pairs of posed parts with given meshes; what recurs is looked up."""
+
+    def __init__(self, meshes: Sequence[PartMesh], solids: Solids) -> None:
+        self.meshes = tuple(meshes)
+        self.solids = solids
+        self._trees: dict[int, Any] = {}
+        self._answers: dict[tuple[Any, ...], Any] = {}
+
+    def connected(self, placed: Placed, distance: float, known: IntArray) -> IntArray:
+        """Pairs of parts that overlap or are at most `distance` apart, int32 (m, 2), i < j in lexicographic order.
+
+        `known`: pairs of which that is known. A part that lies wholly inside another is connected to it.
+        """
+        from stages.shape.physics.boxes import boxes_within
+
+        pairs = overlapping_boxes(placed.spans, distance)
+        if not len(pairs):
+            return pairs
+        found = _listed(pairs, known, len(placed))
+        plain = _both_boxes(placed, pairs)
+        asked = plain & ~found
+        found[asked] = boxes_within(placed.centres, placed.axes, placed.halves, pairs[asked], distance)
+        asked = ~plain & ~found
+        found[asked] = [self._near(placed, i, j, distance) for i, j in pairs[asked].tolist()]
+        return pairs[found]
+
+    def overlaps(self, placed: Placed, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Volume that the parts of each pair share and how deep they reach into each other, float64 (m,) each.
+
+        Exact for two boxes; on lines through the parts otherwise; 0 where a mesh is open.
+        """
+        from stages.shape.physics.boxes import overlap_volumes, separations
+
+        volumes, depths = np.zeros(len(pairs)), np.zeros(len(pairs))
+        plain = _both_boxes(placed, pairs)
+        depths[plain] = np.maximum(-separations(placed.centres, placed.axes, placed.halves, pairs[plain]), 0.0)
+        volumes[plain] = overlap_volumes(placed.centres, placed.axes, placed.halves, pairs[plain])
+        for row in np.flatnonzero(~plain).tolist():
+            volumes[row], depths[row] = self._overlap(placed, *pairs[row].tolist())
+        return volumes, depths
+
+    def patches(self, placed: Placed, pairs: IntArray, tolerance: float) -> tuple[Patches, BoolArray]:
+        """The patches between the parts of `pairs`, and which pairs are interlocked, bool (m,): near each other with
+        no face or edge of one on a face of the other."""
+        from stages.shape.physics.boxes import box_contacts
+
+        plain = np.flatnonzero(_both_boxes(placed, pairs))
+        rows, points, normals = box_contacts(placed.centres, placed.axes, placed.halves, pairs[plain], tolerance)
+        found = [(plain[rows], points, normals)]
+        locked = np.zeros(len(pairs), dtype=bool)
+        for row in np.setdiff1d(np.arange(len(pairs)), plain).tolist():
+            i, j = pairs[row].tolist()
+            near, points, normals = self._patch(placed, i, j, tolerance)
+            locked[row] = near and not len(points)
+            rotation, offset = placed.poses[i, :3, :3], placed.poses[i, :3, 3]
+            found.append((np.full(len(points), row), points @ rotation.T + offset, -normals @ rotation.T))
+        patch = np.concatenate([rows for rows, _, _ in found])
+        order = np.argsort(patch, kind="stable")
+        patch = patch[order]
+        return (
+            Patches(
+                first=pairs[patch, 0].astype(np.int64),
+                second=pairs[patch, 1].astype(np.int64),
+                patch=patch,
+                points=np.concatenate([points for _, points, _ in found])[order],
+                normals=np.concatenate([normals for _, _, normals in found])[order],
+            ),
+            locked,
+        )
+
+    def _tree(self, mesh: int) -> Any:
+        from stages.shape.geometry.triangles import build_tree
+
+        if mesh not in self._trees:
+            self._trees[mesh] = build_tree(self.meshes[mesh].vertices, self.meshes[mesh].faces)
+        return self._trees[mesh]
+
+    def _question(self, placed: Placed, i: int, j: int) -> tuple[int, int, FloatArray, bytes]:
+        """Meshes, the pose of part j in coordinates of part i on a grid, and what to remember it by."""
+        a, b = int(placed.types[i]), int(placed.types[j])
+        pose = relative_poses(placed.poses, np.array([[i, j]]))[0]
+        step = STEP * min(self.meshes[a].diagonal, self.meshes[b].diagonal)
+        pose[:3, 3] = np.round(pose[:3, 3] / step) * step + 0.0
+        pose[:3, :3] = np.round(pose[:3, :3] / STEP) * STEP + 0.0
+        return a, b, pose, pose.tobytes()
+
+    def _remember(self, question: tuple[Any, ...], answer: Any) -> Any:
+        if len(self._answers) >= KEPT:
+            self._answers.clear()
+        self._answers[question] = answer
+        return answer
+
+    def _near(self, placed: Placed, i: int, j: int, distance: float) -> bool:
+        from stages.shape.geometry.triangles import first_contact
+
+        a, b, pose, key = self._question(placed, i, j)
+        question = ("near", a, b, key, distance)
+        if question in self._answers:
+            return bool(self._answers[question])
+        near = first_contact(self._tree(a), self._tree(b), pose, distance)
+        if not near:
+            inner = (placed.spans[i] - placed.spans[j]) * [[1], [-1]]
+            near = bool((inner >= 0).all() or (inner <= 0).all()) and self._overlap(placed, i, j)[0] > 0
+        return bool(self._remember(question, near))
+
+    def _overlap(self, placed: Placed, i: int, j: int) -> tuple[float, float]:
+        from stages.shape.physics.patches import overlap
+
+        a, b, pose, key = self._question(placed, i, j)
+        if not (self.solids.closed[a] and self.solids.closed[b]):
+            return 0.0, 0.0
+        question = ("overlap", a, b, key)
+        if question in self._answers:
+            found: tuple[float, float] = self._answers[question]
+            return found
+        moved = self.meshes[b].vertices @ pose[:3, :3].T + pose[:3, 3]
+        low = np.maximum(self.meshes[a].bounds[0], moved.min(axis=0))
+        high = np.minimum(self.meshes[a].bounds[1], moved.max(axis=0))
+        answer = (0.0, 0.0)
+        if (high > low).all():
+            answer = overlap(self._tree(a)[0], self._tree(b)[0], pose, low, high)
+        remembered: tuple[float, float] = self._remember(question, answer)
+        return remembered
+
+    def _patch(self, placed: Placed, i: int, j: int, tolerance: float) -> tuple[bool, FloatArray, FloatArray]:
+        """Whether the parts are within `tolerance`, corners of the patches between them, and normals out of part i;
+        in its coordinates."""
+        from stages.shape.geometry.pose import invert
+        from stages.shape.geometry.triangles import near_pairs
+        from stages.shape.physics.patches import facing_polygons, flat_hulls, touching_edges
+
+        a, b, pose, key = self._question(placed, i, j)
+        question = ("patch", a, b, key, tolerance)
+        if question in self._answers:
+            found: tuple[bool, FloatArray, FloatArray] = self._answers[question]
+            return found
+        pairs = near_pairs(self._tree(a), self._tree(b), pose, tolerance)
+        corners_a, corners_b = self._tree(a)[0], self._tree(b)[0]
+        closed = bool(self.solids.closed[a] and self.solids.closed[b])
+        points, normals = facing_polygons(corners_a, corners_b, pairs, pose, tolerance, closed)
+        if not closed:
+            # A surface without an inside has no outside: the normal leads from one part to the other.
+            way = pose[:3, :3] @ self.solids.centroids[b] + pose[:3, 3] - self.solids.centroids[a]
+            normals = normals * np.where(normals @ way < 0, -1.0, 1.0)[:, None]
+        if not len(points) and len(pairs):
+            points, normals = touching_edges(corners_a, corners_b, pairs, pose, tolerance)
+            back = invert(pose)
+            other, outward = touching_edges(corners_b, corners_a, pairs[:, ::-1].copy(), back, tolerance)
+            points = np.concatenate([points, other @ pose[:3, :3].T + pose[:3, 3]])
+            normals = np.concatenate([normals, -outward @ pose[:3, :3].T])
+        answer = (len(pairs) > 0, *flat_hulls(points, normals, tolerance))
+        remembered: tuple[bool, FloatArray, FloatArray] = self._remember(question, answer)
+        return remembered
+
+
+def _both_boxes(placed: Placed, pairs: IntArray) -> BoolArray:
+    return placed.boxes[pairs[:, 0]] & placed.boxes[pairs[:, 1]]
+
+
+def _listed(pairs: IntArray, known: IntArray, count: int) -> BoolArray:
+    """Which of `pairs` are among the pairs `known`, bool (m,)."""
+    listed: BoolArray = np.isin(
+        pairs[:, 0] * np.int64(count) + pairs[:, 1], known[:, 0] * np.int64(count) + known[:, 1]
+    )
+    return listed

@@ -1,0 +1,215 @@
+"""Equilibrium of rigid bodies that press and rub on each other, as linear programmes.
+
+Each contact point bears any force in its friction cone, cut down to a pyramid inside it, so what is found to stand
+does so with the round cone too: between the directions friction counts up to 8 % too weak in joints, where it is exact
+along the slope and across it, and up to 1 % on the ground. A glued joint bears pull up to a limit: then the cone
+begins that far behind. Bodies are rigid and joints do not crush, so this is limit analysis: what falls by it falls by
+a mechanism of rigid bodies, which the dual solution tells. Because joints do not open as they slide (no dilatancy),
+limit analysis may call a shape stable that could slide; a simulation also moves, so it sees shapes settle elsewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.physics.contacts import Patches
+
+__all__ = ["Limits", "load_limits"]
+
+DIRECTIONS = 8
+"""Sides of the friction pyramid of a joint."""
+GROUND_DIRECTIONS = 24
+"""Sides of the friction pyramid on the ground, where slopes tell nothing of the way in which things slide."""
+SMALL = 4_000
+"""Programmes of together so many columns are given to HiGHS."""
+PATIENCE = 20_000
+"""Iterations after which HiGHS gives up."""
+LIGHTEST = 1e-8
+"""Bodies lighter than this share of the heaviest count as that heavy where equations are scaled."""
+STEADY = 100.0
+"""Worth of the steady load beside that of a growing one."""
+BORNE = 1e-5
+"""A load is borne if this share of it is not left over."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How far loads can grow.
+
+    factors: float64 (loads,), the greatest factor up to the cap at which there is equilibrium, all -1 where there is
+    none even at 0, or none that a solver finds; motions: float64 (loads, n, 6), how each body begins to move,
+    displacement of its centre and turn, when the load grows beyond that; 0 where the cap was reached.
+    """
+
+    factors: FloatArray
+    motions: FloatArray
+
+
+def load_limits(
+    patches: Patches,
+    centres: FloatArray,
+    steady: FloatArray,
+    growing: FloatArray,
+    friction: float,
+    pull: FloatArray,
+    azimuth: float,
+    cap: float = 1.0,
+) -> Limits:
+    """The greatest factor, at most `cap`, by which each of the loads `growing` can be borne beside the `steady` load.
+
+    centres: float64 (n, 3), where the torques on each body are about; steady: float64 (n, 6), force and torque on each
+    body; growing: float64 (loads, n, 6); pull: float64 (q,), the pull that each contact point bears; azimuth: radians,
+    where the friction directions on level ground are counted from.
+    """
+    ground = patches.second < 0
+    parts = [
+        _wrenches(patches.first[own], patches.second[own], patches.points[own], centres, forces)
+        for own, forces in (
+            (ground, _cone(patches.normals[ground], friction, azimuth, GROUND_DIRECTIONS)),
+            (~ground, _cone(patches.normals[~ground], friction, azimuth, DIRECTIONS)),
+        )
+    ]
+    wrenches, bodies = (np.concatenate(each) for each in zip(*parts, strict=True))
+    # Equations in weights of each body and forces in weights of the lighter of two, so that solvers see light bodies.
+    weights = np.linalg.norm(growing[:, :, :3], axis=2).max(axis=0)
+    weights = np.maximum(weights, LIGHTEST * weights.max())
+    wrenches = (
+        wrenches
+        / weights[bodies][:, :, None]
+        * np.where(bodies < 0, np.inf, weights[bodies]).min(axis=1)[:, None, None]
+    )
+    load = -(steady + _glue(patches, centres, pull)) / weights[:, None]
+    limits = _solved(wrenches, bodies, load, growing / weights[:, None], cap)
+    return Limits(limits.factors, limits.motions / weights[:, None])
+
+
+def _solved(wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float) -> Limits:
+    """One body by the simplex method on its six equations, small programmes by HiGHS, large ones by the interior point
+    method for bodies; each by another if it fails."""
+    if len(load) == 1:
+        found = _by_tableau(wrenches, bodies, load, growing, cap)
+        if found is not None:
+            return found
+    if len(wrenches) * len(growing) <= SMALL:
+        found = _by_highs(wrenches, bodies, load, growing, cap)
+        if found is not None:
+            return found
+    factors, motions = np.full(len(growing), -1.0), np.zeros_like(growing)
+    for index in range(len(growing)):
+        one = growing[index : index + 1]
+        found = _by_interior_point(wrenches, bodies, load, one, cap) or _by_highs(wrenches, bodies, load, one, cap)
+        if found is None or found.factors[0] < 0:
+            return Limits(np.full(len(growing), -1.0), motions)
+        factors[index], motions[index] = found.factors[0], found.motions[0]
+    return Limits(factors, motions)
+
+
+def _by_tableau(
+    wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
+) -> Limits | None:
+    """All loads on one body, which nothing but the ground bears. None where the method fails."""
+    from stages.shape.physics.tableau import grow_loads
+
+    edges = np.where((bodies >= 0)[:, :, None], wrenches, 0.0).sum(axis=1).T
+    try:
+        factors, multipliers = grow_loads(edges, load[0], growing[:, 0], cap)
+    except ArithmeticError:
+        return None
+    return Limits(factors, multipliers[:, None])
+
+
+def _by_highs(
+    wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
+) -> Limits | None:
+    """All loads as one programme of independent blocks: a call costs more than a small programme. None where HiGHS
+    finds no answer."""
+    from scipy import sparse
+    from scipy.optimize import linprog
+
+    loads, count = growing.shape[:2]
+    columns, rows = len(wrenches), 6 * count
+    own = np.flatnonzero(bodies.ravel() >= 0)
+    row = 6 * bodies.ravel()[own, None] + np.arange(6)
+    column = np.broadcast_to((own // 2)[:, None], row.shape)
+    values = wrenches.reshape(-1, 6)[own]
+    matrix = sparse.csc_matrix((values.ravel(), (row.ravel(), column.ravel())), shape=(rows, columns))
+    factor = sparse.block_diag([each.reshape(-1, 1) for each in growing], format="csc")
+    system = sparse.hstack([sparse.kron(sparse.eye(loads), matrix, format="csc"), factor], format="csc")
+    costs = np.concatenate([np.zeros(loads * columns), -np.ones(loads)])
+    bounds = np.column_stack([np.zeros(len(costs)), np.full(len(costs), np.inf)])
+    bounds[-loads:, 1] = cap
+    solved = linprog(
+        costs,
+        A_eq=system,
+        b_eq=np.tile(load.ravel(), loads),
+        bounds=bounds,
+        method="highs",
+        options={"maxiter": PATIENCE},
+    )
+    if solved.status == 2:  # no equilibrium at factor 0, which is the same for all
+        return Limits(np.full(loads, -1.0), np.zeros_like(growing))
+    if solved.status != 0:
+        return None
+    return Limits(solved.x[-loads:], -solved.eqlin.marginals.reshape(growing.shape))
+
+
+def _by_interior_point(
+    wrenches: FloatArray, bodies: np.ndarray, load: FloatArray, growing: FloatArray, cap: float
+) -> Limits | None:
+    """One load. The steady load has a factor of its own, at most 1, that counts far more than the growing one: so
+    there always is a solution, and the steady load is borne where that factor is 1. None where the method fails."""
+    from stages.shape.physics.interior import solve_interior
+
+    loads = np.stack([-load.ravel(), growing.ravel()])
+    try:
+        found, dual = solve_interior(
+            wrenches, bodies, len(load), loads, np.array([1.0, cap]), np.array([-STEADY, -1.0])
+        )
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+    borne = found[0] >= 1 - BORNE
+    return Limits(np.array([found[1] if borne else -1.0]), -dual.reshape(growing.shape))
+
+
+def _cone(normals: FloatArray, friction: float, azimuth: float, directions: int) -> FloatArray:
+    """The edges of the friction pyramid of each contact, float64 (q, directions, 3).
+
+    The first direction is level and one at a right angle the steepest, so that friction is exact on a slope; where
+    the contact itself is level they are counted from `azimuth`. Both turn with the shape about the vertical.
+    """
+    level = np.stack([-normals[:, 1], normals[:, 0], np.zeros(len(normals))], axis=1)
+    lengths = np.linalg.norm(level, axis=1)
+    flat = lengths < 1e-6
+    level[~flat] /= lengths[~flat, None]
+    level[flat] = [np.cos(azimuth), np.sin(azimuth), 0.0]
+    level[flat] -= (level[flat] * normals[flat]).sum(axis=1)[:, None] * normals[flat]
+    steep = np.cross(normals, level)
+    angles = 2 * np.pi * np.arange(directions) / directions
+    rubbing = np.cos(angles)[None, :, None] * level[:, None] + np.sin(angles)[None, :, None] * steep[:, None]
+    edges: FloatArray = normals[:, None] + friction * rubbing
+    return edges
+
+
+def _wrenches(
+    first: np.ndarray, second: np.ndarray, points: FloatArray, centres: FloatArray, forces: FloatArray
+) -> tuple[FloatArray, np.ndarray]:
+    """What each edge of each cone does to its two bodies, float64 (c, 2, 6), and the bodies, int64 (c, 2)."""
+    bodies = np.stack([first, second], axis=1).astype(np.int64)
+    arms = points[:, None] - centres[bodies]
+    both = np.array([1.0, -1.0])[:, None] * forces[:, :, None]
+    wrenches = np.concatenate([both, np.cross(arms[:, None], both)], axis=3)
+    return wrenches.reshape(-1, 2, 6), np.repeat(bodies, forces.shape[1], axis=0)
+
+
+def _glue(patches: Patches, centres: FloatArray, pull: FloatArray) -> FloatArray:
+    """The load on each body, float64 (n, 6), of the pull of all glue at its limit."""
+    load = np.zeros((len(centres), 6))
+    for bodies, sign in ((patches.first, -1.0), (patches.second, 1.0)):
+        own = bodies >= 0
+        force = sign * pull[own, None] * patches.normals[own]
+        arms = patches.points[own] - centres[bodies[own]]
+        np.add.at(load, bodies[own], np.concatenate([force, np.cross(arms, force)], axis=1))
+    return load

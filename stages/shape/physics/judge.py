@@ -1,0 +1,164 @@
+"""The physical validity of a shape: everything that is judged, as one answer, as fields of a record, as a filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.physics.contacts import Patches, Touch
+from stages.shape.physics.settings import PhysicsConfig, Requirements
+from stages.shape.physics.solids import Placed, Solids
+from stages.shape.physics.stability import Stability, components, stability, standing_points, tipping_angle
+from stages.shape.physics.structure import ground_share, mirror_score
+from stages.shape.shape import Shape
+
+__all__ = ["Judge", "Validity", "judge_of", "judge_shape", "physical_fields", "unmet"]
+
+ROUNDING = 1e-4
+"""Degrees by which a shape that just stands may seem to be beyond tipping."""
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What is known of a shape's physics. Nothing changes when the shape is turned about the vertical or scaled.
+
+    rooted: whether every part is connected to the ground (shapeassembly App. E); stable, margin: see
+    `stages.shape.physics.stability.Stability`; weakest: index of the part that gives way first, -1 if none;
+    tipping_degrees: how far the shape, were it rigid, can be tilted; components: pieces that hang together;
+    floating: parts that no chain of connected parts leads to the ground; penetration: volume that parts share, by
+    pairs, as a share of the volume of all parts; ground: area that it stands on, as a share of its outline from above;
+    symmetry: share of the weight that an upright mirror maps to its like; weighed: by volume, or by area where a part
+    is open.
+    """
+
+    rooted: bool
+    stable: bool
+    margin: float
+    weakest: int
+    tipping_degrees: float
+    components: int
+    floating: int
+    penetration: float
+    ground: float
+    symmetry: float
+    weighed: Literal["volume", "area"]
+
+
+class Judge:
+    """Judges assemblies of given meshes: one for each kit, whose answers about pairs recur, or one for each program."""
+
+    def __init__(self, meshes: Sequence[PartMesh], up: Literal["y", "z"], config: PhysicsConfig) -> None:
+        self.config = config
+        self._meshes, self._up = tuple(meshes), up
+        self._solids = Solids(self._meshes)
+        self._touch = Touch(self._meshes, self._solids)
+
+    def rooted(self, assembly: Assembly) -> bool:
+        """Whether every part is connected to the ground (shapeassembly App. E), and nothing more."""
+        placed = self._placed(assembly)
+        return not _floating(placed, self._connected(placed, assembly), self.config).any()
+
+    def unmet(self, assembly: Assembly, requirements: Requirements) -> str | None:
+        """The first of the requirements that is not met, None if all are. What tips over as a whole is seen before
+        anything is asked about its parts. Raises ValueError as `validity` does."""
+        placed = self._placed(assembly)
+        standing = self._standing(placed) if requirements.stable else None
+        if standing is not None and tipping_angle(placed, standing) < -ROUNDING:
+            return "not stable"
+        connected = self._connected(placed, assembly)
+        if requirements.rooted and _floating(placed, connected, self.config).any():
+            return "not rooted"
+        if standing is None:
+            return None
+        dry = self.config.joints == "dry"
+        depths = self._touch.overlaps(placed, connected)[1] if dry else np.zeros(len(connected))
+        return None if self._stability(placed, connected, depths, standing).stable else "not stable"
+
+    def contacts(self, assembly: Assembly) -> IntArray:
+        """The pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order: those that the
+        assembly has, and those at most `config.touching` apart."""
+        placed = self._placed(assembly)
+        return self._touch.connected(placed, self.config.touching * placed.diagonal, assembly.edges)
+
+    def validity(self, assembly: Assembly) -> Validity:
+        """Everything. Raises ValueError for a shape without parts, extent or weight."""
+        config = self.config
+        placed = self._placed(assembly)
+        connected = self._connected(placed, assembly)
+        floating = _floating(placed, connected, config)
+        volumes, depths = self._touch.overlaps(placed, connected)
+        standing = self._standing(placed)
+        found = self._stability(placed, connected, depths, standing)
+        whole = self._solids.volumes[placed.types].sum()
+        return Validity(
+            rooted=not floating.any(),
+            stable=found.stable,
+            margin=found.margin,
+            weakest=found.weakest,
+            tipping_degrees=tipping_angle(placed, standing),
+            components=int(components(len(placed), connected).max()) + 1,
+            floating=int(floating.sum()),
+            penetration=float(volumes.sum() / whole) if whole > 0 else 0.0,
+            ground=ground_share(placed, standing),
+            symmetry=mirror_score(placed),
+            weighed=placed.weighed,
+        )
+
+    def _placed(self, assembly: Assembly) -> Placed:
+        return Placed.of(self._meshes, self._solids, assembly, self._up)
+
+    def _standing(self, placed: Placed) -> Patches:
+        return standing_points(placed, np.arange(len(placed)), self.config.connected * placed.diagonal)
+
+    def _stability(self, placed: Placed, connected: IntArray, depths: FloatArray, standing: Patches) -> Stability:
+        """`depths`: how deep the connected pairs reach into each other; of no matter where joints are rigid."""
+        deep = connected[depths > self.config.touching * placed.diagonal]
+        return stability(placed, self._touch, connected, deep, standing, self.config)
+
+    def _connected(self, placed: Placed, assembly: Assembly) -> np.ndarray:
+        return self._touch.connected(placed, self.config.connected * placed.diagonal, assembly.edges)
+
+
+@lru_cache(maxsize=16)
+def judge_of(meshes: tuple[PartMesh, ...], up: Literal["y", "z"], config: PhysicsConfig) -> Judge:
+    """The judge of all shapes with these meshes, kept from shape to shape."""
+    return Judge(meshes, up, config)
+
+
+def judge_shape(shape: Shape, config: PhysicsConfig) -> Validity:
+    """The physical validity of one shape. Raises ValueError for a shape without parts, extent or weight."""
+    return Judge(shape.meshes, shape.up, config).validity(shape.assembly)
+
+
+def physical_fields(validity: Validity) -> dict[str, Any]:
+    """What a sample's record says under `physics`: rounded, so that the noise of last digits changes no bytes."""
+    return {
+        name: round(value, 6) + 0.0 if isinstance(value, float) else value for name, value in asdict(validity).items()
+    }
+
+
+def unmet(requirements: Requirements, shape: Shape) -> str | None:
+    """The reason, as it is counted among the rejects, why a shape is not kept; None if it is kept.
+
+    Where nothing is required nothing is computed. A shape without a body to judge meets no requirement.
+    """
+    if not requirements.rooted and not requirements.stable:
+        return None
+    try:
+        return judge_of(shape.meshes, shape.up, requirements.physics).unmet(shape.assembly, requirements)
+    except ValueError:
+        return "no body to judge"
+
+
+def _floating(placed: Placed, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:
+    """Which parts no chain of connected parts leads to the ground, bool (n,)."""
+    pieces = components(len(placed), connected)
+    low = placed.spans[:, 0, 2] <= config.connected * placed.diagonal
+    found: np.ndarray = ~np.isin(pieces, pieces[low])
+    return found

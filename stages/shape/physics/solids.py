@@ -1,0 +1,165 @@
+"""Parts as bodies: volume, area, centroid and, where a part is one, its box."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.physics.boxes import box_corners, recognise_boxes
+from stages.shape.physics.polygons import convex_hull
+
+__all__ = ["Placed", "Solids"]
+
+
+class Solids:
+    """What is known of each mesh by itself, in its own coordinates.
+
+    closed: bool (k,), whether the mesh has an inside: every edge is passed as often in one sense as in the other, and
+    the volume is not negative; volumes, areas: float64 (k,), the volume of an open mesh is 0; centroids: float64
+    (k, 3), of the volume where the mesh is closed, else of the surface; boxes: bool (k,), whether it is a box, and
+    centres, axes, halves of the boxes (stages.shape.physics.boxes).
+    """
+
+    def __init__(self, meshes: Sequence[PartMesh]) -> None:
+        count = len(meshes)
+        self.closed: BoolArray = np.ones(count, dtype=bool)
+        self.volumes, self.areas = np.zeros(count), np.zeros(count)
+        self.centroids = np.zeros((count, 3))
+        self.boxes: BoolArray = np.zeros(count, dtype=bool)
+        self.centres, self.axes, self.halves = np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))
+        self._boxes([index for index, mesh in enumerate(meshes) if mesh.vertices.shape == (8, 3)], meshes)
+        for index in np.flatnonzero(~self.boxes).tolist():
+            self._measure(index, meshes[index])
+
+    def _boxes(self, eights: list[int], meshes: Sequence[PartMesh]) -> None:
+        eights = [index for index in eights if len(meshes[index].faces) == 12]
+        if not eights:
+            return
+        found, centres, axes, halves = recognise_boxes(np.stack([meshes[index].vertices for index in eights]))
+        faces = np.stack([meshes[index].faces for index in eights])
+        corners = np.stack([meshes[index].vertices for index in eights])[np.arange(len(eights))[:, None, None], faces]
+        areas = np.linalg.norm(
+            np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]), axis=2
+        )
+        sides = 8 * (halves * np.roll(halves, 1, axis=1)).sum(axis=1)
+        # Twelve triangles with the area of the six sides are the sides: none is missing, none is there twice.
+        found &= np.abs(areas.sum(axis=1) / 2 - sides) <= 1e-4 * sides
+        for index, row in zip(eights, range(len(eights)), strict=True):
+            if found[row]:
+                self.boxes[index] = True
+                self.centres[index], self.axes[index], self.halves[index] = centres[row], axes[row], halves[row]
+                self.centroids[index] = centres[row]
+                self.volumes[index], self.areas[index] = 8 * halves[row].prod(), sides[row]
+
+    def _measure(self, index: int, mesh: PartMesh) -> None:
+        corners = mesh.vertices[mesh.faces]
+        origin = mesh.vertices.mean(axis=0)
+        a, b, c = (corners[:, k] - origin for k in range(3))
+        doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        cones = np.einsum("fc,fc->f", a, np.cross(b, c)) / 6
+        self.areas[index] = doubled.sum() / 2
+        if _has_inside(mesh.faces) and cones.sum() > 1e-9 * mesh.diagonal**3:
+            self.volumes[index] = cones.sum()
+            self.centroids[index] = origin + ((a + b + c) / 4 * cones[:, None]).sum(axis=0) / cones.sum()
+        else:
+            self.closed[index] = False
+            self.centroids[index] = mesh.centroid
+
+
+def _breadth(points: Sequence[FloatArray]) -> float:
+    """The greatest distance of two of the points, seen from above."""
+    flat = np.concatenate(points)[:, :2]
+    hull = flat[convex_hull(flat)]
+    return float(np.linalg.norm(hull[:, None] - hull[None], axis=2).max())
+
+
+def _has_inside(faces: IntArray) -> bool:
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    size = int(faces.max()) + 1
+    forth, back = np.sort(edges[:, 0] * size + edges[:, 1]), np.sort(edges[:, 1] * size + edges[:, 0])
+    return bool(np.array_equal(forth, back))
+
+
+@dataclass(frozen=True)
+class Placed:
+    """The parts of one assembly as bodies in a world whose third axis points up, the ground at height 0.
+
+    types: the mesh of each part; poses: float64 (n, 4, 4); spans: float64 (n, 2, 3), their upright boxes;
+    points: for each part its vertices, float64 (v, 3); diagonal: of the height and the greatest
+    breadth, which is that of the box around a shape whose outline from above is a rectangle, and which no turn about
+    the vertical changes;
+    weights: float64 (n,), they sum to 1; weighed: whether by volume or, where a part is open, all by area;
+    centroids: float64 (n, 3); boxes: bool (n,); centres, axes, halves: of the parts that are boxes.
+    """
+
+    types: np.ndarray
+    poses: FloatArray
+    spans: FloatArray
+    points: tuple[FloatArray, ...]
+    diagonal: float
+    weights: FloatArray
+    weighed: Literal["volume", "area"]
+    centroids: FloatArray
+    boxes: BoolArray
+    centres: FloatArray
+    axes: FloatArray
+    halves: FloatArray
+
+    @classmethod
+    def of(cls, meshes: Sequence[PartMesh], solids: Solids, assembly: Assembly, up: Literal["y", "z"]) -> Placed:
+        """The bodies of `assembly`. Raises ValueError for a shape without parts or without extent."""
+        types = assembly.types.astype(np.int64)
+        if not len(types):
+            raise ValueError("a shape without parts has no statics")
+        # y up: x, y, z become x, -z, y, a rotation.
+        turn = np.eye(3) if up == "z" else np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+        poses = assembly.poses.copy()
+        poses[:, :3, :3] = turn @ assembly.poses[:, :3, :3]
+        poses[:, :3, 3] = assembly.poses[:, :3, 3] @ turn.T
+        rotations = poses[:, :3, :3]
+        boxes = solids.boxes[types]
+        centres = np.einsum("nij,nj->ni", rotations, solids.centres[types]) + poses[:, :3, 3]
+        axes = np.einsum("nij,nkj->nki", rotations, solids.axes[types])
+        halves = solids.halves[types]
+        corners = box_corners(centres, axes, halves)
+        points = [
+            corners[part] if boxes[part] else meshes[types[part]].vertices @ rotations[part].T + poses[part, :3, 3]
+            for part in range(len(types))
+        ]
+        spans = np.array([[each.min(axis=0), each.max(axis=0)] for each in points])
+        low, high = spans[:, 0].min(axis=0), spans[:, 1].max(axis=0)
+        if not np.isfinite(spans).all():
+            part = int(np.argmin(np.isfinite(spans).all(axis=(1, 2))))
+            raise ValueError(f"part {part} stands nowhere: its vertices or its pose hold no finite numbers")
+        diagonal = float(np.hypot(high[2] - low[2], _breadth(points)))
+        if not diagonal > 0:
+            raise ValueError("a shape without extent has no statics")
+        drop = np.array([0.0, 0.0, low[2]])
+        poses[:, :3, 3] -= drop
+        closed = bool(solids.closed[types].all())
+        amounts = solids.volumes[types] if closed else solids.areas[types]
+        if not amounts.sum() > 0:
+            raise ValueError("a shape without volume and area has no weight")
+        centroids = np.einsum("nij,nj->ni", rotations, solids.centroids[types]) + poses[:, :3, 3]
+        return cls(
+            types=types,
+            poses=poses,
+            spans=spans - drop,
+            points=tuple(each - drop for each in points),
+            diagonal=diagonal,
+            weights=amounts / amounts.sum(),
+            weighed="volume" if closed else "area",
+            centroids=centroids,
+            boxes=boxes,
+            centres=centres - drop,
+            axes=axes,
+            halves=halves,
+        )
+
+    def __len__(self) -> int:
+        return len(self.types)

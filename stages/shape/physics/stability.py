@@ -1,0 +1,216 @@
+"""Does a shape stand, what does it bear, and what gives way first? (shapeassembly App. E, without a simulator)
+
+The paper drops every connected component, as a rigid body, into a physics engine, pushes it a little, and calls the
+shape unstable when a component's height changes. Here statics answers: a shape is stable if its bodies are in
+equilibrium under gravity alone, and under gravity with each of a fixed set of pushes. Nothing moves, so nothing
+settles: a chair that rocks on legs of unequal length within the ground tolerance stands here, and a shape that falls
+over onto another side and rests there at the same height does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.physics.contacts import Patches, Touch
+from stages.shape.physics.equilibrium import load_limits
+from stages.shape.physics.polygons import convex_hull, inside_margin
+from stages.shape.physics.settings import PhysicsConfig
+from stages.shape.physics.solids import Placed
+from stages.shape.physics.tableau import TIE
+
+__all__ = ["Stability", "components", "stability", "standing_points", "tipping_angle"]
+
+ARM = 0.25
+"""Lever arm of the twists, as a share of the diagonal: a twist of factor 1 is the part's weight at this arm."""
+PUSHES = 8
+CAP = 1.0
+"""Greatest push that is tried, in weights."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """stable: whether the shape stands and bears every push of the config's size.
+
+    margin: the greatest share of its weight, at most 1, by which it can be pushed in every one of the ways; -1 where
+    it does not even stand. weakest: the part that gives way first, -1 where nothing does up to a push of full weight.
+    """
+
+    stable: bool
+    margin: float
+    weakest: int
+
+
+def components(count: int, pairs: IntArray) -> np.ndarray:
+    """The component of each of `count` parts that `pairs` (m, 2) connect, int (count,), numbered by first part."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    labels = connected_components(graph, directed=False)[1]
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    found: np.ndarray = np.argsort(np.argsort(first))[inverse]
+    return found
+
+
+def standing_points(placed: Placed, body_of: np.ndarray, tolerance: float) -> Patches:
+    """Where bodies stand on the ground: for each body the hull of its points at most `tolerance` above the ground."""
+    low = placed.spans[:, 0, 2] <= tolerance
+    first, points = [], []
+    for body in np.unique(body_of[low]).tolist():
+        near = np.concatenate([placed.points[part] for part in np.flatnonzero(low & (body_of == body)).tolist()])
+        near = near[near[:, 2] <= tolerance]
+        corners = near[convex_hull(near[:, :2])]
+        first.append(np.full(len(corners), body))
+        points.append(corners)
+    if not first:
+        return _no_patches()
+    bodies = np.concatenate(first)
+    return Patches(
+        first=bodies,
+        second=np.full(len(bodies), -1),
+        patch=bodies,
+        points=np.concatenate(points),
+        normals=np.tile([0.0, 0.0, 1.0], (len(bodies), 1)),
+    )
+
+
+def tipping_angle(placed: Placed, standing: Patches) -> float:
+    """By how many degrees the whole shape, were it rigid, can be tilted before it tips over its support polygon, in
+    the direction in which it tips soonest; below zero, by how many it is beyond that already."""
+    centre = placed.weights @ placed.centroids
+    inside = inside_margin(standing.points[:, :2], centre[:2])
+    return float(np.degrees(np.arctan2(inside, max(centre[2], 1e-12 * placed.diagonal))))
+
+
+def stability(
+    placed: Placed, touch: Touch, connected: IntArray, deep: IntArray, standing: Patches, config: PhysicsConfig
+) -> Stability:
+    """Whether the shape stands, its margin, and its weakest part.
+
+    connected: pairs of parts within the config's `connected`; deep: those of them that reach deeper into each other
+    than `touching`; standing: where parts stand on the ground, the bodies being the parts.
+    """
+    count = len(placed)
+    tolerance = config.touching * placed.diagonal
+    pieces = components(count, connected)
+    between, pull = _no_patches(), np.empty(0)
+    if config.joints == "dry":
+        pieces, between = _dry_joints(placed, touch, connected, deep, tolerance)
+        # A joint's pull is shared by its points.
+        shares = np.bincount(between.patch, minlength=1)[between.patch]
+        pull = config.tension / np.maximum(shares, 1)
+    grounded = _reach(pieces, between, standing)
+    if not grounded.all():
+        return Stability(False, -1.0, int(np.argmin(grounded)))
+    ground = _hulls_of(standing, pieces)
+    patches = _joined(ground, between)
+    pull = np.concatenate([np.zeros(len(ground.points)), pull])
+    weights: FloatArray = np.bincount(pieces, placed.weights).astype(float)
+    moments = np.stack([np.bincount(pieces, placed.weights * placed.centroids[:, k]) for k in range(3)], axis=1)
+    centres = moments / np.maximum(weights, 1e-300)[:, None]
+    size = placed.diagonal
+    scaled = Patches(patches.first, patches.second, patches.patch, patches.points / size, patches.normals)
+    azimuth = _azimuth(placed)
+    gravity = np.zeros((len(weights), 6))
+    gravity[:, 2] = -weights
+    loads = _pushes(weights, azimuth, bool(pull.any()))
+    limits = load_limits(scaled, centres / size, gravity, loads, config.friction, pull, azimuth, CAP)
+    stands = bool((limits.factors >= 0).all())
+    if not stands:
+        empty = np.zeros_like(gravity)
+        limits = load_limits(scaled, centres / size, empty, gravity[None], config.friction, pull, azimuth, 2.0)
+    worst = int(np.flatnonzero(limits.factors <= limits.factors.min() + TIE)[0])
+    margin = float(limits.factors[worst]) if stands else -1.0
+    gives = not stands or margin < CAP * (1 - 1e-9)
+    return Stability(
+        stable=stands and margin >= config.push * (1 - 1e-6),
+        margin=margin,
+        weakest=_fastest(placed, pieces, centres, limits.motions[worst]) if gives else -1,
+    )
+
+
+def _dry_joints(
+    placed: Placed, touch: Touch, connected: IntArray, deep: IntArray, tolerance: float
+) -> tuple[np.ndarray, Patches]:
+    """The bodies that parts which reach into each other make, and the patches between bodies."""
+    shallow = connected[~_among(connected, deep)]
+    patches, locked = touch.patches(placed, shallow, tolerance)
+    pieces = components(len(placed), np.concatenate([deep, shallow[locked]]))
+    first, second = pieces[patches.first], pieces[patches.second]
+    apart = first != second
+    return pieces, Patches(
+        first[apart], second[apart], patches.patch[apart], patches.points[apart], patches.normals[apart]
+    )
+
+
+def _among(pairs: IntArray, some: IntArray) -> np.ndarray:
+    listed = {tuple(pair) for pair in some.tolist()}
+    return np.array([tuple(pair) in listed for pair in pairs.tolist()], dtype=bool)
+
+
+def _reach(pieces: np.ndarray, between: Patches, standing: Patches) -> np.ndarray:
+    """For each part whether its body rests on the ground, by way of other bodies or not, bool (n,)."""
+    links = np.stack([between.first, between.second], axis=1).astype(np.int32)
+    groups = components(int(pieces.max()) + 1, links)
+    found: np.ndarray = np.isin(groups[pieces], groups[pieces[standing.first]])
+    return found
+
+
+def _hulls_of(standing: Patches, pieces: np.ndarray) -> Patches:
+    """The points on the ground of parts, as hulls of the points of bodies."""
+    bodies = pieces[standing.first]
+    kept = []
+    for body in np.unique(bodies).tolist():
+        own = np.flatnonzero(bodies == body)
+        kept.append(own[convex_hull(standing.points[own, :2])])
+    rows = np.concatenate(kept)
+    return Patches(bodies[rows], standing.second[rows], bodies[rows], standing.points[rows], standing.normals[rows])
+
+
+def _azimuth(placed: Placed) -> float:
+    """A direction that turns with the shape about the vertical: to its point furthest from the vertical through the
+    centre of mass, and among equals the first. The pushes look alike in a mirror along it."""
+    centre = (placed.weights @ placed.centroids)[:2]
+    ways = np.concatenate(placed.points)[:, :2] - centre
+    reach = (ways**2).sum(axis=1)
+    way = ways[np.flatnonzero(reach >= reach.max() * (1 - 1e-9))[0]]
+    return float(np.arctan2(way[1], way[0]))
+
+
+def _pushes(weights: FloatArray, azimuth: float, glued: bool) -> FloatArray:
+    """The loads that a stable shape bears a little of, float64 (loads, n, 6), lengths in diagonals: each part pushed by
+    its weight in eight level directions and twisted by it both ways about the vertical. Where joints bear pull only so
+    far also up and down: without glue that is less or more gravity, which changes nothing."""
+    angles = azimuth + 2 * np.pi * np.arange(PUSHES) / PUSHES
+    level = np.stack([np.cos(angles), np.sin(angles), np.zeros(PUSHES)], axis=1)
+    upright = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    pushed = np.concatenate([level, upright]) if glued else level
+    unit = np.zeros((len(pushed) + 2, 6))
+    unit[:-2, :3], unit[-2:, 3:] = pushed, ARM * upright
+    return unit[:, None] * weights[:, None]
+
+
+def _fastest(placed: Placed, pieces: np.ndarray, centres: FloatArray, motion: FloatArray) -> int:
+    """The part whose centroid moves most in a motion (n, 6), lengths in diagonals, of the bodies."""
+    arms = (placed.centroids - centres[pieces]) / placed.diagonal
+    moves = motion[pieces, :3] + np.cross(motion[pieces, 3:], arms)
+    lengths = np.linalg.norm(moves, axis=1)
+    return int(np.flatnonzero(lengths >= lengths.max() * (1 - 1e-6))[0])
+
+
+def _joined(one: Patches, other: Patches) -> Patches:
+    return Patches(
+        first=np.concatenate([one.first, other.first]),
+        second=np.concatenate([one.second, other.second]),
+        patch=np.concatenate([one.patch, other.patch]),
+        points=np.concatenate([one.points, other.points]),
+        normals=np.concatenate([one.normals, other.normals]),
+    )
+
+
+def _no_patches() -> Patches:
+    nothing = np.empty(0, dtype=np.int64)
+    return Patches(nothing, nothing, nothing, np.empty((0, 3)), np.empty((0, 3)))

@@ -1,0 +1,81 @@
+"""What a shape is like as a structure: overlap of its parts, its stand, its symmetry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.physics.contacts import Patches
+from stages.shape.physics.polygons import convex_hull
+from stages.shape.physics.solids import Placed
+
+__all__ = ["ground_share", "mirror_score"]
+
+ALIKE = 0.02
+"""Parts are mirror images where centroids and extents differ by at most this share of the shape's diagonal."""
+
+
+def ground_share(placed: Placed, standing: Patches) -> float:
+    """Area on which the shape stands, as a share of the area of its outline seen from above: the flat undersides of
+    its parts, each part's hull of what stands on the ground. 0 where it stands on points or lines."""
+    outline = np.concatenate(placed.points)[:, :2]
+    whole = _area(outline[convex_hull(outline)])
+    if whole <= 1e-12 * placed.diagonal**2:
+        return 0.0
+    parts = np.unique(standing.first).tolist()
+    return min(1.0, sum(_area(standing.points[standing.first == part, :2]) for part in parts) / whole)
+
+
+def _area(polygon: FloatArray) -> float:
+    following = np.roll(polygon, -1, axis=0)
+    return float(abs((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum()) / 2)
+
+
+def mirror_score(placed: Placed) -> float:
+    """The greatest share of the weight, over upright mirror planes through the centre of mass, of parts that the mirror
+    maps to a part alike: same place of the centroid, same extents, within ALIKE.
+
+    Any mirror that maps the shape to itself maps the part that is furthest out, weighed, to one of its kind, so it is
+    among the planes tried: between that part and each other, and through that part.
+    """
+    centre = placed.weights @ placed.centroids
+    places = placed.centroids - centre
+    spreads = _spreads(placed)
+    outmost = int(np.argmax(placed.weights * (places[:, :2] ** 2).sum(axis=1)))
+    ways = places[outmost, :2] - places[:, :2]
+    alike = np.abs(places[:, 2] - places[outmost, 2]) <= ALIKE * placed.diagonal
+    ways = ways[alike & (np.linalg.norm(ways, axis=1) > 1e-9 * placed.diagonal)]
+    own = places[outmost, :2]
+    if np.linalg.norm(own) <= ALIKE * placed.diagonal:
+        own = _long_axis(placed, places)
+    normals = np.concatenate([ways, [[-own[1], own[0]]], [own]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return max(_matched(placed, places, spreads, normal) for normal in normals)
+
+
+def _long_axis(placed: Placed, places: FloatArray) -> FloatArray:
+    """The level axis along which the points of the shape spread most."""
+    flat = np.concatenate(placed.points)[:, :2] - (placed.weights @ placed.centroids)[:2]
+    axis: FloatArray = np.linalg.eigh(flat.T @ flat)[1][:, 1]
+    return axis
+
+
+def _spreads(placed: Placed) -> FloatArray:
+    """How the corners of each part spread about their middle, float64 (n, 3, 3), as a root of second moments."""
+    found = np.empty((len(placed), 3, 3))
+    for part, points in enumerate(placed.points):
+        centred = points - points.mean(axis=0)
+        values, vectors = np.linalg.eigh(centred.T @ centred / len(points))
+        found[part] = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return found
+
+
+def _matched(placed: Placed, places: FloatArray, spreads: FloatArray, normal: FloatArray) -> float:
+    from scipy.spatial import cKDTree
+
+    mirror = np.eye(3)
+    mirror[:2, :2] -= 2 * np.outer(normal, normal)
+    there = np.concatenate([places, spreads.reshape(-1, 9)], axis=1)
+    mirrored = np.concatenate([places @ mirror, (mirror @ spreads @ mirror).reshape(-1, 9)], axis=1)
+    distances, _ = cKDTree(there).query(mirrored, distance_upper_bound=ALIKE * placed.diagonal)
+    return float(placed.weights[np.isfinite(distances)].sum())

@@ -1,0 +1,26 @@
+"""Which of two faces in one plane is seen: every backend sets the parts of higher layers back by the same hair."""
+
+from __future__ import annotations
+
+from stages.shape.arrays import FloatArray
+from stages.shape.views.camera import View
+from stages.shape.views.scene import Scene
+
+__all__ = ["layered_moves"]
+
+LAYER_STEP = 5e-5
+"""How far each layer is set back, in radii of the shape: far above rounding, far below a pixel."""
+
+
+def layered_moves(scene: Scene, view: View) -> FloatArray:
+    """Mesh coordinates to eye space for each part, float64 (n, 4, 4), parts set back along the rays by their layer.
+
+    In perspective a part is scaled about the eye, so nothing moves on the screen.
+    """
+    moves: FloatArray = view.eye @ scene.placed
+    back = LAYER_STEP * view.radius * scene.layers
+    if view.perspective:
+        moves[:, :3] *= (1.0 + back / view.depth)[:, None, None]
+    else:
+        moves[:, 2, 3] -= back
+    return moves

@@ -1,0 +1,146 @@
+"""Light for portraits: where a shape shadows itself and the ground, and how open the sky is at each pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from stages.shape.arrays import Float32Array, FloatArray
+from stages.shape.views.buffers import Backend, render_buffers
+from stages.shape.views.camera import Camera, View
+from stages.shape.views.scene import Scene
+
+__all__ = ["KeyLight", "eye_positions", "key_light", "openness", "to_world"]
+
+SHADOW_MAP = 1024
+"""Side of the shadow map in pixels."""
+GOLDEN_ANGLE = 2.399963229728653
+
+
+@dataclass(frozen=True)
+class KeyLight:
+    """A far light: `direction` float64 (3,), towards it, in the world; `view` and `depth` (s, s): its shadow map."""
+
+    direction: FloatArray
+    view: View
+    depth: Float32Array
+
+    def reaches(self, points: FloatArray, softness: float) -> FloatArray:
+        """Share 0..1 of the light that reaches world points (n, 3), blurred over `softness` (world units)."""
+        local = points @ self.view.eye[:3, :3].T + self.view.eye[:3, 3]
+        size = len(self.depth)
+        x = (local[:, 0] * self.view.projection[0, 0] + 1) / 2 * size
+        y = (1 - local[:, 1] * self.view.projection[1, 1]) / 2 * size
+        pixel = 2.0 / (self.view.projection[0, 0] * size)
+        bias = 2.0 * pixel + 0.004 * self.view.radius
+        share: FloatArray = _filtered(self.depth, x, y, -local[:, 2], softness / pixel, bias)
+        return share
+
+
+def key_light(scene: Scene, azimuth: float, elevation: float, backend: Backend) -> KeyLight:
+    """A light that shines on the scene from a direction given as a camera's is."""
+    camera = Camera(azimuth, elevation, "orthographic", margin=0.02)
+    view = camera.look(scene.points, scene.up)
+    buffers = render_buffers(scene, camera, (SHADOW_MAP, SHADOW_MAP), 1, backend)
+    return KeyLight(view.eye[2, :3].copy(), view, buffers.depth)
+
+
+def eye_positions(depth: Float32Array, view: View) -> FloatArray:
+    """Positions of the pixels in eye space, float64 (h, w, 3); infinite depths give infinite positions."""
+    height, width = depth.shape
+    x = ((np.arange(width) + 0.5) * 2 / width - 1) / view.projection[0, 0]
+    y = (1 - (np.arange(height) + 0.5) * 2 / height) / view.projection[1, 1]
+    away = depth.astype(np.float64)
+    scale = away if view.perspective else np.ones_like(away)
+    return np.stack([x[None, :] * scale, y[:, None] * scale, -away], axis=-1)
+
+
+def to_world(points: FloatArray, view: View) -> FloatArray:
+    """Points of eye space (n, 3) in the world."""
+    moved: FloatArray = (points - view.eye[:3, 3]) @ view.eye[:3, :3]
+    return moved
+
+
+def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float) -> FloatArray:
+    """How much of the half-sphere over each pixel is free of nearby surfaces, float64 (h, w), 1 for background.
+
+    Nearby means within `reach` (world units), and only what the picture itself shows is known.
+    """
+    positions = eye_positions(depth, view)
+    across = 2.0 / (view.projection[0, 0] * depth.shape[1])
+    raw = _openness(depth, normal.astype(np.float64), positions, reach, across, view.perspective)
+    smooth: FloatArray = _smoothed(raw, depth, reach)
+    return smooth
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _filtered(depth, x, y, distance, radius, bias):
+    """Share of unshadowed taps of a disc of `radius` pixels around each (x, y)."""
+    lit = np.empty(len(x))
+    size = len(depth)
+    taps = 32
+    # Taps on a sunflower's spiral cover the disc evenly.
+    spread = radius * np.sqrt((np.arange(taps) + 0.5) / taps)
+    right, down = spread * np.cos(np.arange(taps) * GOLDEN_ANGLE), spread * np.sin(np.arange(taps) * GOLDEN_ANGLE)
+    for k in range(len(x)):
+        free = 0
+        for tap in range(taps):
+            away = spread[tap]
+            column, row = int(np.floor(x[k] + right[tap])), int(np.floor(y[k] + down[tap]))
+            outside = column < 0 or row < 0 or column >= size or row >= size
+            free += outside or depth[row, column] + bias * (1.0 + away * 0.5) >= distance[k]
+        lit[k] = free / taps
+    return lit
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _openness(depth, normal, positions, reach, across, perspective):
+    height, width = depth.shape
+    result = np.ones((height, width))
+    taps = 20
+    angles = GOLDEN_ANGLE * np.arange(taps)[None, :] + 2.0 * np.pi * np.arange(16)[:, None] / 16.0
+    cosines, sines = np.cos(angles), np.sin(angles)
+    for row in range(height):
+        for column in range(width):
+            if not np.isfinite(depth[row, column]):
+                continue
+            p, n = positions[row, column], normal[row, column]
+            pixels = reach / (across * (depth[row, column] if perspective else 1.0))
+            # Sixteen turns of the spiral, one for each place in a square of four by four pixels.
+            start = ((row % 4) * 4 + column % 4) * 5 % 16
+            hidden = 0.0
+            for tap in range(taps):
+                away = pixels * (tap + 0.5 + start / 16.0) / (taps + 1)
+                c = int(column + 0.5 + away * cosines[start, tap])
+                r = int(row + 0.5 + away * sines[start, tap])
+                if c < 0 or r < 0 or c >= width or r >= height or not np.isfinite(depth[r, c]):
+                    continue
+                dx, dy, dz = positions[r, c, 0] - p[0], positions[r, c, 1] - p[1], positions[r, c, 2] - p[2]
+                length = np.sqrt(dx * dx + dy * dy + dz * dz)
+                rise = (dx * n[0] + dy * n[1] + dz * n[2]) / (length + 1e-12) - 0.06
+                if rise > 0.0 and length < 2.0 * reach:
+                    near = 1.0 - length / (2.0 * reach)
+                    hidden += rise * near
+            result[row, column] = max(0.0, 1.0 - 2.4 * hidden / taps)
+    return result
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _smoothed(values, depth, reach):
+    """Mean over four by four pixels of about the same depth: exactly one turn of the pattern of `_openness`."""
+    height, width = values.shape
+    result = values.copy()
+    for row in range(height):
+        for column in range(width):
+            if not np.isfinite(depth[row, column]):
+                continue
+            total, count = 0.0, 0
+            for r in range(max(row - 2, 0), min(row + 2, height)):
+                for c in range(max(column - 2, 0), min(column + 2, width)):
+                    if abs(depth[r, c] - depth[row, column]) < 0.25 * reach:
+                        total += values[r, c]
+                        count += 1
+            result[row, column] = total / count
+    return result

@@ -1,0 +1,167 @@
+"""Portraits: shaded pictures of shapes and of point clouds, for contact sheets, previews and the README."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numba
+import numpy as np
+
+from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.views.buffers import Backend, Visible, visible_triangles
+from stages.shape.views.camera import Camera, View
+from stages.shape.views.light import KeyLight, eye_positions, key_light, openness, to_world
+from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
+from stages.shape.views.probe import backend_for
+from stages.shape.views.scene import Scene
+
+__all__ = ["PAPER", "points_portrait", "portrait"]
+
+PAPER = (250, 248, 244)
+"""Background, sRGB: a warm near-white."""
+INK = (38, 32, 36)
+SUPERSAMPLE = 2
+
+KEY = np.array([1.0, 0.965, 0.90]) * 0.86
+SKY = np.array([0.93, 0.97, 1.0]) * 0.50
+GROUND = np.array([1.0, 0.95, 0.88]) * 0.26
+SHADOW = np.array([0.56, 0.55, 0.60])
+"""What a full shadow leaves of the paper, in linear light."""
+
+
+def portrait(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    part_colors: ByteArray | None = None,
+    backend: Backend | None = None,
+) -> ByteArray:
+    """A shaded picture of a scene, uint8 (height, width, 3) for `size` (width, height).
+
+    A soft key light from the upper left with its shadows, sky and ground light, darker corners, thin lines where
+    parts meet, and a shadow on the ground. `part_colors` uint8 (n, 3) paints each part in one colour instead of its
+    faces' own. `backend` None is what `backend_for("auto")` says. Raises ShardFailed for a blank picture.
+    """
+    from stages.shape.views.screen import surface_buffers
+
+    backend = backend_for("auto") if backend is None else backend
+    width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
+    seen = visible_triangles(scene, camera, (width, height), backend)
+    depth, normal, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
+    if part_colors is not None:
+        color = np.where(part[..., None] >= 0, part_colors[part], color)
+    light = key_light(scene, camera.azimuth - 52.0, 52.0, backend)
+    shown = part >= 0
+    picture = np.broadcast_to(srgb_to_linear(np.array(PAPER, dtype=np.uint8)), (height, width, 3)).copy()
+    if camera.elevation > 0.0:
+        picture *= _ground_light(scene, seen.view, light, (height, width))
+    world = to_world(eye_positions(depth, seen.view)[shown], seen.view)
+    upright = normal[shown] @ seen.view.eye[:3, :3]
+    lit = np.clip(upright @ light.direction, 0.0, None) * light.reaches(world, 0.012 * seen.view.radius)
+    up = upright[:, 1 if scene.up == "y" else 2]
+    sky = (0.5 + 0.5 * up)[:, None] * SKY + (0.5 - 0.5 * up)[:, None] * GROUND
+    open_sky = openness(depth, normal, seen.view, 0.10 * seen.view.radius)[shown][:, None]
+    # Bright albedos are held back a little, so that white models keep their shading.
+    albedo = 0.02 + 0.90 * srgb_to_linear(color[shown])
+    picture[shown] = albedo * (lit[:, None] * KEY * (0.35 + 0.65 * open_sky) + sky * open_sky)
+    drawn = _ink(seen, size)[..., None]
+    picture = _reduced(picture) * (1.0 - drawn) + srgb_to_linear(np.array(INK, dtype=np.uint8)) * drawn
+    return linear_to_srgb(picture)
+
+
+def points_portrait(
+    points: FloatArray, labels: IntArray, camera: Camera, size: tuple[int, int], up: Literal["y", "z"]
+) -> ByteArray:
+    """Points (n, 3) as small shaded balls coloured by `labels` (n,), uint8 (height, width, 3) for (width, height).
+
+    The more points, the smaller the balls. Raises ValueError where there are no points.
+    """
+    width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
+    view = camera.look(points, up, width / height)
+    radius = 0.9 * view.radius / np.sqrt(len(points))
+    local = points @ view.eye[:3, :3].T + view.eye[:3, 3]
+    depth, normal, owner = _balls(local, radius, view.projection, width, height)
+    shown = owner >= 0
+    picture = np.broadcast_to(srgb_to_linear(np.array(PAPER, dtype=np.uint8)), (height, width, 3)).copy()
+    upright = normal[shown] @ view.eye[:3, :3]
+    above = upright[:, 1 if up == "y" else 2]
+    lit = np.clip(normal[shown] @ np.array([-0.5, 0.68, 0.54]), 0.0, None)
+    sky = (0.5 + 0.5 * above)[:, None] * SKY + (0.5 - 0.5 * above)[:, None] * GROUND
+    open_sky = openness(depth, normal, view, 0.10 * view.radius)[shown][:, None]
+    used, which = np.unique(labels, return_inverse=True)
+    colors = label_colors(int(used.max()) + 1)[used]
+    albedo = srgb_to_linear(colors)[which[owner[shown]]]
+    picture[shown] = albedo * (lit[:, None] * KEY * 0.9 + 1.15 * sky) * (0.25 + 0.75 * open_sky)
+    return linear_to_srgb(_reduced(picture))
+
+
+def _ground_light(scene: Scene, view: View, light: KeyLight, shape: tuple[int, int]) -> FloatArray:
+    """What the shadow on the ground leaves of the light, float64 (h, w, 3); 1 where no ground is seen."""
+    axis = 1 if scene.up == "y" else 2
+    low = float(scene.points[:, axis].min())
+    ones = np.ones(shape, dtype=np.float32)
+    near = to_world(eye_positions(ones, view).reshape(-1, 3), view)
+    far = to_world(eye_positions(2 * ones, view).reshape(-1, 3), view)
+    slope = (far - near)[:, axis]
+    left = np.ones(shape[0] * shape[1])
+    down = slope < -1e-9
+    points = near[down] + (far - near)[down] * ((low - near[down, axis]) / slope[down])[:, None]
+    middle = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
+    close = np.linalg.norm(points - middle, axis=1) < 4.0 * view.radius
+    found = np.ones(len(points))
+    soft = light.reaches(points[close], 0.05 * view.radius)
+    wide = light.reaches(points[close], 0.22 * view.radius)
+    found[close] = 0.6 * soft + 0.4 * wide
+    left[down] = found
+    # Where a shadow would leave the picture it fades out, so that pictures stand side by side without a seam.
+    rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
+    edge = np.minimum(np.minimum(rows, shape[0] - rows)[:, None], np.minimum(columns, shape[1] - columns)[None, :]) / (
+        0.10 * min(shape)
+    )
+    fade = np.clip(edge, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(edge, 0.0, 1.0))
+    shadow = ((1.0 - left.reshape(shape)) * fade)[..., None]
+    light_left: FloatArray = 1.0 - shadow * (1.0 - SHADOW)
+    return light_left
+
+
+def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
+    """Thin lines over the picture, (height, width) 0..1."""
+    from stages.shape.views.ink import ink_strokes
+    from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
+
+    strokes = find_strokes(seen, 35.0, 0.5 * SUPERSAMPLE, 4.0 * SUPERSAMPLE)
+    widths = {OUTLINE: 1.1, CONTOUR: 0.9, BOUNDARY: 0.7, CREASE: 0.35}
+    return 0.62 * ink_strokes(strokes, widths, size[0], size[1], 1.0 / SUPERSAMPLE, 4.0)
+
+
+def _reduced(picture: FloatArray) -> FloatArray:
+    """The mean over each square of SUPERSAMPLE pixels."""
+    height, width, channels = picture.shape
+    tiles = picture.reshape(height // SUPERSAMPLE, SUPERSAMPLE, width // SUPERSAMPLE, SUPERSAMPLE, channels)
+    mean: FloatArray = tiles.mean(axis=(1, 3))
+    return mean
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _balls(local, radius, projection, width, height):
+    """Depth float32, normal float32 (3) and owner int32 of each pixel, for balls around eye-space points (n, 3)."""
+    depth = np.full((height, width), np.inf, dtype=np.float32)
+    normal = np.zeros((height, width, 3), dtype=np.float32)
+    owner = np.full((height, width), -1, dtype=np.int32)
+    for k in range(len(local)):
+        w = projection[3, 2] * local[k, 2] + projection[3, 3]
+        x = (projection[0, 0] * local[k, 0] / w + 1.0) * 0.5 * width
+        y = (1.0 - projection[1, 1] * local[k, 1] / w) * 0.5 * height
+        reach = radius * projection[1, 1] / w * 0.5 * height
+        for row in range(max(int(y - reach), 0), min(int(y + reach) + 1, height)):
+            for column in range(max(int(x - reach), 0), min(int(x + reach) + 1, width)):
+                u, v = (column + 0.5 - x) / reach, (y - row - 0.5) / reach
+                bulge = 1.0 - u * u - v * v
+                if bulge < 0.0:
+                    continue
+                towards = np.sqrt(bulge)
+                away = -local[k, 2] - radius * towards
+                if away < depth[row, column]:
+                    depth[row, column], owner[row, column] = away, k
+                    normal[row, column, 0], normal[row, column, 1], normal[row, column, 2] = u, v, towards
+    return depth, normal, owner

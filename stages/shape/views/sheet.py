@@ -1,0 +1,141 @@
+"""Contact sheets: titled rows of pictures with captions on one sheet of paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import ByteArray
+from stages.shape.views.portrait import PAPER
+
+__all__ = ["Cell", "Section", "contact_sheet", "picture_png"]
+
+TITLE_INK = (32, 30, 34)
+CAPTION_INK = (122, 116, 112)
+RULE = (226, 221, 213)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A picture, uint8 (h, w) or (h, w, 3), and a line under it (may be empty)."""
+
+    picture: ByteArray
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """Rows of cells under a heading; `note` stands beside it in small print. A cell is `span` columns wide."""
+
+    title: str
+    rows: Sequence[Sequence[Cell]]
+    note: str = ""
+    span: int = 1
+
+
+def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int = 320) -> ByteArray:
+    """The sheet, uint8 (h, w, 3). Pictures are scaled to `cell_width` pixels (times the section's span, and the gaps
+    between); rows of unequal length stay ragged.
+
+    Margins and letters grow with `cell_width`. Raises ValueError where there is no picture at all.
+    """
+    from PIL import Image, ImageDraw
+
+    columns = max((section.span * len(row) for section in sections for row in section.rows), default=0)
+    if columns == 0:
+        raise ValueError("a contact sheet needs at least one picture")
+    unit = cell_width / 320
+    margin, gap = round(40 * unit), round(16 * unit)
+    fonts = {"title": _font(round(30 * unit), True), "head": _font(round(19 * unit), True)}
+    fonts |= {"caption": _font(round(13.5 * unit), False), "note": _font(round(14 * unit), False)}
+    width = 2 * margin + columns * cell_width + (columns - 1) * gap
+    widths = [section.span * (cell_width + gap) - gap for section in sections]
+    heights = _row_heights(sections, widths, unit)
+    head = round(66 * unit)
+    height = 2 * margin + (round(62 * unit) if title else 0)
+    for section, rows in zip(sections, heights, strict=True):
+        height += (head if section.title else 0) + sum(rows) + gap * len(rows)
+    sheet = Image.new("RGB", (width, height), PAPER)
+    pen = ImageDraw.Draw(sheet)
+    y = margin
+    if title:
+        pen.text((margin, y), title, TITLE_INK, fonts["title"])
+        y += round(62 * unit)
+    for section, across, section_heights in zip(sections, widths, heights, strict=True):
+        if section.title:
+            pen.line([(margin, y + round(8 * unit)), (width - margin, y + round(8 * unit))], RULE, max(1, round(unit)))
+            pen.text((margin, y + round(24 * unit)), section.title, TITLE_INK, fonts["head"])
+            after = margin + pen.textlength(section.title, fonts["head"]) + 14 * unit
+            pen.text((after, y + round(28.5 * unit)), section.note, CAPTION_INK, fonts["note"])
+            y += head
+        for row, row_height in zip(section.rows, section_heights, strict=True):
+            for index, cell in enumerate(row):
+                x = margin + index * (across + gap)
+                picture = _scaled(cell.picture, across)
+                sheet.paste(picture, (x, y))
+                line = _fitting(pen, cell.caption, fonts["caption"], across)
+                middle = (across - pen.textlength(line, fonts["caption"])) / 2
+                pen.text((x + middle, y + picture.height + round(7 * unit)), line, CAPTION_INK, fonts["caption"])
+            y += row_height + gap
+    return np.asarray(sheet)
+
+
+def picture_png(picture: ByteArray) -> bytes:
+    """A picture, uint8 (h, w) or (h, w, 3), as PNG; equal pictures give equal bytes."""
+    import io
+
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "PNG", optimize=True)
+    return stream.getvalue()
+
+
+def _row_heights(sections: Sequence[Section], widths: Sequence[int], unit: float) -> list[list[int]]:
+    heights = []
+    for section, width in zip(sections, widths, strict=True):
+        rows = []
+        for row in section.rows:
+            caption = round(30 * unit) if any(cell.caption for cell in row) else 0
+            tallest = max(round(cell.picture.shape[0] * width / cell.picture.shape[1]) for cell in row)
+            rows.append(tallest + caption)
+        heights.append(rows)
+    return heights
+
+
+def _scaled(picture: ByteArray, width: int) -> Any:
+    """A PIL image of the width given; paper shows through the white of drawings of one channel."""
+    from PIL import Image
+
+    image = Image.fromarray(picture)
+    height = round(image.height * width / image.width)
+    if image.size != (width, height):
+        image = image.resize((width, height), Image.Resampling.LANCZOS)
+    if image.mode == "L":
+        light = np.asarray(image)[..., None] / 255.0
+        image = Image.fromarray(np.rint(light * np.array(PAPER)).astype(np.uint8))
+    return image
+
+
+def _fitting(pen: Any, text: str, font: Any, width: int) -> str:
+    """`text`, cut with an ellipsis to fit the width."""
+    if pen.textlength(text, font) <= width:
+        return text
+    while text and pen.textlength(text + "…", font) > width:
+        text = text[:-1]
+    return text + "…"
+
+
+@lru_cache(maxsize=16)
+def _font(size: int, bold: bool) -> Any:
+    """DejaVu Sans as it comes with matplotlib: the same letters on every machine."""
+    from matplotlib import get_data_path
+    from PIL import ImageFont
+
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    path = f"{get_data_path()}/fonts/ttf/{name}"
+    return ImageFont.truetype(path, size, layout_engine=ImageFont.Layout.BASIC)

@@ -1,0 +1,356 @@
+"""Strokes: the lines that a person would draw, found between the pixels of a view.
+
+Two neighbouring pixels that show different triangles have a line between them, or none. The surface itself decides:
+it is walked across the edges of its triangles from the one pixel towards the other.
+
+- The walk arrives: one surface. A sharp edge on the way is a crease, and it lies where the walk crossed it.
+- The walk ends at a border or where the surface turns away from the viewer. If what the other pixel shows lies
+  farther back there, that end is a contour; if it lies at the same depth, two surfaces meet: a boundary where they
+  belong to two parts, a crease where they meet at an angle, nothing where one plane goes on.
+- Both surfaces go on under each other: they pass through each other, and the line is where their depths are equal.
+
+So every crossing is known to a fraction of a pixel, a tessellated plane or cylinder has no lines of its own, and
+what is hidden cannot leave a trace: nothing is ever looked at but what some pixel shows. Crossings are then joined
+inside each square of four pixel centres into segments of lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from stages.shape.arrays import ByteArray, FloatArray
+from stages.shape.views.buffers import Visible
+from stages.shape.views.screen import clip_at, eye_depth
+
+__all__ = ["BOUNDARY", "CONTOUR", "CREASE", "OUTLINE", "Strokes", "find_strokes"]
+
+CREASE, BOUNDARY, CONTOUR, OUTLINE = 1, 2, 3, 4
+"""Kinds of strokes, the weightier ones with the higher numbers; an outline is a contour against the background."""
+
+MOST_STEPS = 24
+"""Triangles that a walk between two pixels may cross before it counts as ended."""
+ROUNDED_TURN = 60.0
+"""A smooth surface that turns by more than so many degrees between two pixels, both well visible, is a rounded edge
+finer than a pixel, and drawn as a crease."""
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Segments of lines: ends float64 (n, 2, 2) as (x, y) in pixels of the view; kind uint8 (n,)."""
+
+    ends: FloatArray
+    kinds: ByteArray
+
+
+def find_strokes(seen: Visible, crease_angle: float, step: float, shortest: float) -> Strokes:
+    """The strokes of a view.
+
+    crease_angle: degrees between the normals of two faces above which their edge is drawn. step: smallest jump in
+    depth that is a contour; shortest: connected lines shorter in all than this are left out; both in pixels.
+    """
+    height = len(seen.triangles)
+    scene = seen.scene
+    across, across_kind, down, down_kind = _crossings(
+        seen.triangles,
+        seen.screen,
+        seen.normals,
+        scene.triangle_part,
+        scene.triangle_face,
+        scene.triangle_first,
+        scene.meshes.face_first[scene.mesh_of],
+        scene.meshes.neighbours,
+        scene.layers,
+        seen.view.projection,
+        2.0 / (seen.view.projection[1, 1] * height),
+        seen.view.perspective,
+        np.cos(np.radians(crease_angle)),
+        step,
+    )
+    ends, kinds, nodes = _join(across, across_kind, down, down_kind)
+    kept = _long_enough(ends, nodes, shortest)
+    return Strokes(ends[kept], kinds[kept])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _side(screen, t, edge, x, y):
+    """Twice the signed area of (x, y) and an edge of the triangle `t` on the screen."""
+    end = edge + 1 if edge < 2 else 0
+    ax, ay = screen[t, edge, 0], screen[t, edge, 1]
+    return (screen[t, end, 0] - ax) * (y - ay) - (screen[t, end, 1] - ay) * (x - ax)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cosine(normals, a, b):
+    """Cosine of the angle between the normals of two triangles."""
+    return normals[a, 0] * normals[b, 0] + normals[a, 1] * normals[b, 1] + normals[a, 2] * normals[b, 2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _walk(start, goal, px, py, qx, qy, screen, normals, part_first, face_first, face_of, neighbours, cosine):
+    """Walk on the surface from triangle `start` at p straight to q on the screen.
+
+    Returns (arrived, s, last, sharp): whether the walk ended on `goal`; the share of the way where the surface ends
+    (1 if it reaches q); the last triangle; the share of the way at the sharpest edge above the crease angle, or -1.
+    """
+    triangle, entry = start, -1
+    s, sharp, sharpest = 0.0, -1.0, cosine
+    for _ in range(MOST_STEPS):
+        if triangle == goal:
+            return True, s, triangle, sharp
+        area = _side(screen, triangle, 0, screen[triangle, 2, 0], screen[triangle, 2, 1])
+        if area == 0.0:
+            return False, s, triangle, sharp
+        exit_edge, exit_s = -1, 2.0
+        for edge in range(3):
+            if edge == entry:
+                continue
+            at_q = _side(screen, triangle, edge, qx, qy) / area
+            if at_q < 0.0:
+                at_p = _side(screen, triangle, edge, px, py) / area
+                crossing = max(at_p / (at_p - at_q), s) if at_p > 0.0 else s
+                if crossing < exit_s:
+                    exit_edge, exit_s = edge, crossing
+        if exit_edge < 0:
+            return False, 1.0, triangle, sharp
+        s = min(exit_s, 1.0)
+        face = neighbours[face_of[triangle], exit_edge]
+        if face < 0:
+            return False, s, triangle, sharp
+        following = part_first + face - face_first
+        back = -1
+        for edge in range(3):
+            if neighbours[face, edge] == face_of[triangle]:
+                back = edge
+        # Where the next triangle lies on the same side of the edge as this one, the surface turns away here.
+        corner = (back + 2) % 3
+        if _side(screen, triangle, exit_edge, screen[following, corner, 0], screen[following, corner, 1]) / area >= 0.0:
+            return False, s, triangle, sharp
+        turn = _cosine(normals, triangle, following)
+        if turn < sharpest:
+            sharp, sharpest = s, turn
+        triangle, entry = following, back
+    return False, s, triangle, sharp
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _between(
+    p, q, px, py, qx, qy, screen, normals, parts, face_of, part_first, face_first, neighbours, layers,
+    projection, pixel, perspective, cosine, rounded, step,
+):  # fmt: skip
+    """Kind and place (share of the way from p to q) of the line between pixels that show triangles p and q."""
+    if p < 0:
+        kind, s = _between(
+            q, p, qx, qy, px, py, screen, normals, parts, face_of, part_first, face_first, neighbours, layers,
+            projection, pixel, perspective, cosine, rounded, step,
+        )  # fmt: skip
+        return kind, 1.0 - s
+    first, base = part_first[parts[p]], face_first[parts[p]]
+    goal = q if q >= 0 and parts[p] == parts[q] else -1
+    arrived, end_p, last_p, sharp = _walk(
+        p, goal, px, py, qx, qy, screen, normals, first, base, face_of, neighbours, cosine
+    )
+    if q < 0:
+        return OUTLINE, end_p
+    if arrived:
+        return _on_one_surface(p, q, sharp, normals, rounded)
+    first, base = part_first[parts[q]], face_first[parts[q]]
+    goal = p if goal >= 0 else -1
+    arrived, end_q, last_q, sharp = _walk(
+        q, goal, qx, qy, px, py, screen, normals, first, base, face_of, neighbours, cosine
+    )
+    if arrived:
+        kind, s = _on_one_surface(q, p, sharp, normals, rounded)
+        return kind, 1.0 - s
+    start_q = 1.0 - end_q
+    # How much farther the surface of p is than that of q, where that of q begins and where that of p ends.
+    at_start = _gap(start_q, last_p, last_q, px, py, qx, qy, screen, projection)
+    at_end = _gap(end_p, last_p, last_q, px, py, qx, qy, screen, projection)
+    depth = eye_depth(clip_at(screen, p, px, py), projection)
+    tolerance = step * pixel * (depth if perspective else 1.0)
+    if start_q >= end_p:
+        s, gap = (start_q + end_p) / 2, min(abs(at_start), abs(at_end))
+    elif max(abs(at_start), abs(at_end)) < 0.01 * tolerance:
+        # Two faces in one plane: the part of the lower layer is seen up to its end.
+        s, gap = end_p if layers[parts[p]] <= layers[parts[q]] else start_q, 0.0
+    elif at_start < 0.0 < at_end:
+        s, gap = start_q + (end_p - start_q) * at_start / (at_start - at_end), 0.0
+    elif at_start + at_end < 0.0:
+        s, gap = end_p, at_end
+    else:
+        s, gap = start_q, at_start
+    if abs(gap) > tolerance:
+        return CONTOUR, s
+    if parts[p] != parts[q]:
+        return BOUNDARY, s
+    if _cosine(normals, last_p, last_q) < cosine:
+        return CREASE, s
+    return 0, 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _gap(s, a, b, px, py, qx, qy, screen, projection):
+    """How much farther triangle `a` is than triangle `b` at the share `s` of the way."""
+    x, y = px + s * (qx - px), py + s * (qy - py)
+    return eye_depth(clip_at(screen, a, x, y), projection) - eye_depth(clip_at(screen, b, x, y), projection)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _on_one_surface(p, q, sharp, normals, rounded):
+    if sharp >= 0.0:
+        return CREASE, sharp
+    if normals[p, 2] > 0.3 and normals[q, 2] > 0.3 and _cosine(normals, p, q) < rounded:
+        return CREASE, 0.5
+    return 0, 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _runs_on(p, q, screen, normals, face_of, neighbours, cosine):
+    """Whether two triangles of one part share an edge that is neither sharp nor one where the surface turns away.
+
+    Most pairs are like that, and need no walk.
+    """
+    if _cosine(normals, p, q) < cosine:
+        return False
+    for edge in range(3):
+        if neighbours[face_of[p], edge] == face_of[q]:
+            for back in range(3):
+                if neighbours[face_of[q], back] == face_of[p]:
+                    near, far = (edge + 2) % 3, (back + 2) % 3
+                    side = _side(screen, p, edge, screen[p, near, 0], screen[p, near, 1])
+                    return side * _side(screen, p, edge, screen[q, far, 0], screen[q, far, 1]) < 0.0
+    return False
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _crossings(
+    triangles, screen, normals, parts, face_of, part_first, face_first, neighbours, layers,
+    projection, pixel, perspective, cosine, step,
+):  # fmt: skip
+    """Lines between horizontal neighbours: share (h, w) of the way from pixel (r, c) to (r, c + 1) and kind (h, w);
+    and between vertical neighbours."""
+    height, width = triangles.shape
+    rounded = np.cos(np.radians(ROUNDED_TURN))
+    across, down = np.zeros((height, width)), np.zeros((height, width))
+    across_kind = np.zeros((height, width), dtype=np.uint8)
+    down_kind = np.zeros((height, width), dtype=np.uint8)
+    for r in range(height):
+        for c in range(width):
+            p = triangles[r, c]
+            for way in range(2):
+                r2, c2 = r + way, c + 1 - way
+                if r2 == height or c2 == width:
+                    continue
+                q = triangles[r2, c2]
+                if p == q or (
+                    p >= 0
+                    and q >= 0
+                    and parts[p] == parts[q]
+                    and _runs_on(p, q, screen, normals, face_of, neighbours, cosine)
+                ):
+                    continue
+                kind, s = _between(
+                    p, q, c + 0.5, r + 0.5, c2 + 0.5, r2 + 0.5, screen, normals, parts, face_of, part_first,
+                    face_first, neighbours, layers, projection, pixel, perspective, cosine, rounded, step,
+                )  # fmt: skip
+                if kind:
+                    if way == 0:
+                        across[r, c], across_kind[r, c] = s, kind
+                    else:
+                        down[r, c], down_kind[r, c] = s, kind
+    return across, across_kind, down, down_kind
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _join(across, across_kind, down, down_kind):
+    """Join the crossings on the sides of each square of four pixel centres.
+
+    Returns segments (n, 2, 2), their kinds (n,) and the numbers of the nodes at their ends (n, 2).
+    """
+    height, width = across.shape
+    node = 0
+    across_node, down_node = np.empty((height, width), dtype=np.int32), np.empty((height, width), dtype=np.int32)
+    for r in range(height):
+        for c in range(width):
+            across_node[r, c] = node
+            node += across_kind[r, c] > 0
+            down_node[r, c] = node
+            node += down_kind[r, c] > 0
+    # Each crossing lies between two squares.
+    ends = np.empty((2 * node, 2, 2))
+    kinds = np.empty(2 * node, dtype=np.uint8)
+    nodes = np.empty((2 * node, 2), dtype=np.int32)
+    places, found, numbers = np.empty((4, 2)), np.empty(4, dtype=np.uint8), np.empty(4, dtype=np.int32)
+    total = 0
+    for r in range(height - 1):
+        for c in range(width - 1):
+            size = 0
+            for side in range(4):
+                row, column = r + (side == 1), c + (side == 3)
+                if side < 2 and across_kind[row, column]:
+                    places[size] = column + 0.5 + across[row, column], row + 0.5
+                    found[size], numbers[size] = across_kind[row, column], across_node[row, column]
+                    size += 1
+                if side >= 2 and down_kind[row, column]:
+                    places[size] = column + 0.5, row + 0.5 + down[row, column]
+                    found[size], numbers[size] = down_kind[row, column], down_node[row, column]
+                    size += 1
+            if size < 2:
+                continue
+            if size == 2:
+                ends[total, 0], ends[total, 1] = places[0], places[1]
+                kinds[total], nodes[total, 0], nodes[total, 1] = min(found[0], found[1]), numbers[0], numbers[1]
+                total += 1
+                continue
+            middle = _meeting(places, found, size)
+            for k in range(size):
+                ends[total, 0], ends[total, 1] = places[k], middle
+                kinds[total], nodes[total, 0], nodes[total, 1] = found[k], numbers[k], node
+                total += 1
+            node += 1
+    return ends[:total], kinds[:total], nodes[:total]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _meeting(places, found, size):
+    """Where three or four lines meet: on the chord between the two weightiest if they outweigh the rest."""
+    middle = np.zeros(2)
+    heaviest = found[:size].max()
+    chord = 0
+    for k in range(size):
+        if found[k] == heaviest:
+            chord += 1
+    counted = 0
+    for k in range(size):
+        if chord != 2 or found[k] == heaviest:
+            middle += places[k]
+            counted += 1
+    return middle / counted
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _root(parent, node):
+    while parent[node] != node:
+        parent[node] = parent[parent[node]]
+        node = parent[node]
+    return node
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _long_enough(ends, nodes, shortest):
+    """Which segments (n,) belong to a connected drawing of at least the length `shortest`."""
+    size = nodes.max() + 1 if len(nodes) else 0
+    parent = np.arange(size)
+    for k in range(len(nodes)):
+        a, b = _root(parent, nodes[k, 0]), _root(parent, nodes[k, 1])
+        parent[max(a, b)] = min(a, b)
+    length = np.zeros(size)
+    for k in range(len(nodes)):
+        dx, dy = ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1]
+        length[_root(parent, nodes[k, 0])] += np.sqrt(dx * dx + dy * dy)
+    kept = np.empty(len(nodes), dtype=np.bool_)
+    for k in range(len(nodes)):
+        kept[k] = length[_root(parent, nodes[k, 0])] >= shortest
+    return kept

@@ -1,0 +1,273 @@
+"""The search for variants of a kit: cut, match, dock, join, validate, over and over (strings §4)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import Float32Array, IntArray
+from stages.shape.kit import Assembly
+from stages.variations.archive import Archive, Cell, Place, cell_of
+from stages.variations.exchange.attempt import attempt, complete, cut_piece
+from stages.variations.exchange.centroids import match_centroids
+from stages.variations.exchange.checks import validate
+from stages.variations.exchange.correction import correct_orientations
+from stages.variations.exchange.joins import join
+from stages.variations.exchange.matches import lies_in
+from stages.variations.exchange.parents import Parent, Parents
+from stages.variations.exchange.steering import BATCH, Choice, Steering
+from stages.variations.features import FeatureTest, material_shares
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.kernels.graph_key import graph_key
+from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, UNKNOWNS, Outcome
+from stages.variations.kernels.tables import kit_tables, shape_tables, workspace
+from stages.variations.settings import SearchConfig
+
+__all__ = ["SPARE", "Search", "Variant"]
+
+SPARE = 4
+"""A search ends at so many times the variants that it looks for, if few of them add to the archive."""
+
+REASONS = {
+    Outcome.WHOLE: "cut took the whole shape",
+    Outcome.NO_SUCH_PART: "boundary part missing in the other shape",
+    Outcome.NO_MATCH: "boundary not matched",
+    Outcome.NOTHING_ATTACHED: "nothing attached",
+    Outcome.TOO_SMALL: "too few parts",
+    Outcome.TOO_LARGE: "too many parts",
+    Outcome.CLASH: "parts clash",
+    Outcome.GRAMMAR: "neighbourhood not in the grammar",
+}
+
+
+DUPLICATE = "duplicate"
+SUBASSEMBLY = "nothing but a piece of an exemplar"
+NEW = "new variant"
+
+KNOWN_GAIN = 0.2
+"""What a new variant of a known histogram counts beside one of a new histogram."""
+EARLY = {REASONS[each] for each in (Outcome.WHOLE, Outcome.NO_SUCH_PART, Outcome.NO_MATCH)}
+LATE_WORK = 3.0
+"""What a try costs that comes as far as being joined, beside one that finds no match."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A valid new shape. labels: int32 (m, 2), directed docking labels of its edges; graph and docked: its two keys
+    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (9,);
+    histogram: a hash of its type histogram; lineage: parents, number of parts from each, boundary and docking
+    motion, as JSON."""
+
+    assembly: Assembly
+    labels: IntArray
+    graph: int
+    docked: int
+    origins: np.ndarray
+    features: Float32Array
+    cell: Cell
+    histogram: int
+    lineage: dict[str, Any]
+
+
+class Search:
+    """One line of search: its parents, what it has seen, what it has learnt about contacts."""
+
+    def __init__(self, answers: ContactAnswers, config: SearchConfig) -> None:
+        kit = answers.kit
+        self.kit = kit
+        self.answers = answers
+        self.config = config
+        sizes = [len(each.assembly) for each in kit.exemplars]
+        self.smallest = max(2, round(config.smallest * min(sizes)))
+        self.largest = max(3, round(config.largest * max(sizes)))
+        self.tables = kit_tables(kit, config.upright)
+        self._ws = workspace(max(self.largest, *sizes))
+        self.archive = Archive(config.novelty.quota)
+        self.steering = Steering(config)
+        self._features = FeatureTest(kit)
+        self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
+        self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.parents.exemplars}
+        self.spares = 0
+        self.rejects: Counter[str] = Counter()
+        self.crossings: Counter[str] = Counter()
+
+    def _exemplar(self, number: int) -> Parent:
+        exemplar = self.kit.exemplars[number]
+        assembly, origins = exemplar.assembly, np.full(len(exemplar.assembly), number, dtype=np.int8)
+        shares = material_shares(origins, len(self.kit.exemplars))
+        features = self._features.features(assembly, shares, self._features.marks(assembly))
+        place = self.archive.add(self._cell(features), self.histogram(assembly.types))
+        return self.parent(exemplar.name, assembly, origins, place)
+
+    def parent(
+        self, name: str, assembly: Assembly, origins: np.ndarray, place: Place, labels: IntArray | None = None
+    ) -> Parent:
+        """A shape made ready for cutting and docking; `place` is where it stands in the archive."""
+        if labels is None:
+            labels = self.answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
+        shares = material_shares(origins, len(self.kit.exemplars))
+        tables = shape_tables(assembly, labels, len(self.kit.types))
+        return Parent(name, assembly, labels, tables, origins, shares, place)
+
+    def keys_of(self, parent: Parent) -> tuple[int, int]:
+        """The two refinement keys of a shape."""
+        self._load(parent)
+        return int(graph_key(self._ws, False)), int(graph_key(self._ws, True))
+
+    def run(
+        self, rng: np.random.Generator, tries: int, wanted: int, name: str, progress: Callable[[int], None]
+    ) -> tuple[list[Variant], int]:
+        """Try until `wanted` new variants are found that add to the archive, or SPARE times as many of any kind, or
+        `tries` are used up; the variants and the number of tries.
+
+        New variants that add to the archive become parents at once; in lineages they are called `<name>-<number>`.
+        `progress` is told how many there are.
+        """
+        found: list[Variant] = []
+        telling, number = 0, 0
+        while number < tries and telling < wanted and len(found) < SPARE * wanted:
+            batch = self.steering.plan(rng, self.parents, self.archive, min(BATCH, tries - number))
+            for choice in batch:
+                number += 1
+                variant = self._attempt(rng, choice)
+                if not (choice.a.shares * choice.b.shares).any():
+                    self.crossings[variant if isinstance(variant, str) else NEW] += 1
+                if isinstance(variant, str):
+                    self.rejects[variant] += 1
+                    self.steering.learn(choice, 0.0, 1.0 if variant in EARLY else LATE_WORK)
+                    continue
+                found.append(variant)
+                if self._keep(rng, variant, choice, f"{name}-{len(found) - 1}"):
+                    telling += 1
+                    progress(telling)
+                if telling >= wanted or len(found) >= SPARE * wanted:
+                    break
+        return found, number
+
+    def _keep(self, rng: np.random.Generator, variant: Variant, choice: Choice, name: str) -> bool:
+        """Count a find, and make it a parent where it adds to the archive; whether it does."""
+        self.seen.add(self.key(variant.assembly.types, variant.graph, variant.docked))
+        spare = self.archive.is_full(variant.cell, variant.histogram)
+        gain = KNOWN_GAIN if self.archive.has_histogram(variant.histogram) else 1.0
+        self.steering.learn(choice, 0.0 if spare else gain, LATE_WORK)
+        place = self.archive.add(variant.cell, variant.histogram)
+        if spare and self.config.novelty.guided:
+            self.spares += 1
+            return False
+        self.adopt(rng, self.parent(name, variant.assembly, variant.origins, place, variant.labels))
+        return True
+
+    def adopt(self, rng: np.random.Generator, parent: Parent) -> None:
+        """Add a parent."""
+        self.parents.adopt(rng, parent, self.archive)
+
+    def _attempt(self, rng: np.random.Generator, choice: Choice) -> Variant | str:
+        """One try: a new variant, or the reason why there is none."""
+        a, b, ws, kit = choice.a, choice.b, self._ws, self.tables
+        with_labels = self.config.duplicates == "docking"
+        limits = self.smallest, self.largest
+        known = self.answers.table
+        if self.config.matching == "pose":
+            outcome, key = attempt(
+                rng, kit, a.tables, b.tables, a is b, known, ws, choice.way, choice.large, *limits, with_labels
+            )
+        else:
+            outcome, key = cut_piece(rng, a.tables, b.tables, ws, choice.way, choice.large), 0
+            if outcome == Outcome.OK:
+                outcome = match_centroids(rng, kit, a.tables, b.tables, ws)
+            if outcome == Outcome.OK:
+                outcome = join(rng, kit, a.tables, b.tables, ws, *limits)
+            if outcome == Outcome.OK:
+                if not correct_orientations(self.answers.dockings, ws):
+                    return "orientation cannot be corrected"
+                outcome, key = complete(kit, known, ws, with_labels)
+        while outcome == Outcome.UNKNOWN:
+            if not self.answers.answer_unknown(ws, int(ws.counts[UNKNOWNS])):
+                outcome = Outcome.CLASH
+            else:
+                outcome, key = complete(kit, self.answers.table, ws, with_labels)
+        if outcome != Outcome.OK:
+            return REASONS[outcome]
+        types = ws.types[: ws.counts[PARTS]]
+        if (self.histogram(types) if self.config.duplicates == "histogram" else int(key)) in self.seen:
+            return DUPLICATE
+        if any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
+            return SUBASSEMBLY
+        outcome = self._validate()
+        if outcome != Outcome.OK:
+            return REASONS[outcome]
+        return self._variant(a, b, int(graph_key(ws, False)), int(graph_key(ws, True)))
+
+    def key(self, types: np.ndarray, graph: int, docked: int) -> int:
+        """What two shapes have in common when they count as the same."""
+        if self.config.duplicates == "histogram":
+            return self.histogram(types)
+        return graph if self.config.duplicates == "graph" else docked
+
+    def histogram(self, types: np.ndarray) -> int:
+        """A hash of a type histogram."""
+        return int(self.tables.weights[types].sum(dtype=np.uint64))
+
+    def _cell(self, features: Float32Array) -> Cell:
+        return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)
+
+    def _validate(self) -> int:
+        """Compute the shape graph anew, and again after answering the contacts that were not known."""
+        while True:
+            outcome: int = validate(self.tables, self.answers.table, self._ws)
+            if outcome != Outcome.UNKNOWN:
+                return outcome
+            if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
+                return Outcome.CLASH
+
+    def _variant(self, a: Parent, b: Parent, graph: int, docked: int) -> Variant:
+        ws = self._ws
+        parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
+        poses = np.tile(np.eye(4), (parts, 1, 1))
+        poses[:, :3, :3] = ws.turns[:parts]
+        poses[:, :3, 3] = ws.places[:parts]
+        edges = np.sort(ws.edges[:count], axis=1)
+        edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
+        labels = np.stack([ws.label[edges[:, 0], edges[:, 1]], ws.label[edges[:, 1], edges[:, 0]]], axis=1)
+        origin = ws.origin[:parts]
+        lineage = {
+            "parents": [a.name, b.name],
+            "parts_from": [int((origin != 1).sum()), int((origin == 1).sum())],
+            "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
+            "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
+            "motion": np.round(ws.motion, 9).tolist(),
+        }
+        assembly = Assembly(ws.types[:parts].astype(np.int16), poses, edges)
+        origins = np.empty(parts, dtype=np.int8)
+        for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
+            at = placed[: len(parent.assembly)]
+            origins[at[at >= 0]] = parent.origins[at >= 0]
+        # A part whose neighbourhood tells its exemplar is of that one, whichever copy of it a piece brought along.
+        marks = self._features.marks(assembly)
+        origins = np.where(marks >= 0, marks, origins)
+        features = self._features.features(assembly, material_shares(origins, len(self.kit.exemplars)), marks)
+        return Variant(
+            assembly,
+            labels.astype(np.int32),
+            graph,
+            docked,
+            origins,
+            features,
+            self._cell(features),
+            self.histogram(assembly.types),
+            lineage,
+        )
+
+    def _load(self, parent: Parent) -> None:
+        """Put a shape's graph into the workspace as if it were the variant in hand."""
+        ws, assembly = self._ws, parent.assembly
+        ws.types[: len(assembly)] = assembly.types
+        ws.edges[: len(assembly.edges)] = assembly.edges
+        i, j = assembly.edges[:, 0], assembly.edges[:, 1]
+        ws.label[i, j] = parent.labels[:, 0]
+        ws.label[j, i] = parent.labels[:, 1]
+        ws.counts[PARTS], ws.counts[EDGES] = len(assembly), len(assembly.edges)

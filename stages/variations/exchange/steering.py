@@ -1,0 +1,116 @@
+"""What to try next: which parents and which way of cutting, learnt from what each has found so far.
+
+A choice is a way of drawing parents together with a way of cutting. Each is tried now and then; most tries go to the
+choices that have lately found most histograms for their work. Plain random parents are one of them, so the search
+does what random search does where nothing else finds more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.variations.archive import Archive
+from stages.variations.exchange.parents import Parent, Parents
+from stages.variations.kernels.layout import GROWN, JOINTS, PLANES
+from stages.variations.settings import SearchConfig
+
+__all__ = ["BATCH", "CHOICES", "CUTS", "PLAIN", "RARE", "Choice", "Steering"]
+
+CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
+"""Ways of cutting, and whether the piece must be large."""
+PLAIN, RARE, FAMILY, CROSSED = range(4)
+"""Ways of drawing parents: at random; rare ones likelier; rare ones of a random family; a rare one and, of some, that
+of most other ancestry."""
+CHOICES = tuple(product(range(4), range(len(CUTS))))
+BATCH = 64
+"""Tries that are planned at once."""
+MEMORY = 4000.0
+"""Tries after which what was learnt counts for a third."""
+PARTNERS = 4
+"""Variants of which the one of most other ancestry is taken."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One try: its number among CHOICES, the parents, the way of cutting and whether the piece must be large."""
+
+    number: int
+    a: Parent
+    b: Parent
+    way: int
+    large: bool
+
+
+class Steering:
+    """Plans tries in batches and learns from what they brought."""
+
+    def __init__(self, config: SearchConfig) -> None:
+        self.config = config
+        self._gains = np.zeros(len(CHOICES))
+        self._work = np.zeros(len(CHOICES))
+
+    def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[Choice]:
+        """The next `count` tries."""
+        if self.config.novelty.guided:
+            odds = self._odds(len(parents.exemplars)).cumsum()
+            numbers = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, len(CHOICES) - 1)
+        else:
+            numbers = np.where(rng.random(count) < self.config.growth_share, 0, 1)
+        draws = np.array([CHOICES[number][0] for number in numbers.tolist()])
+        first = self._draw(rng, parents, archive, draws)
+        second = self._draw(rng, parents, archive, np.where(draws == CROSSED, RARE, draws))
+        crossed = np.flatnonzero(draws == CROSSED).tolist()
+        for place in crossed:
+            second[place] = self._stranger(rng, parents, first[place], second[place])
+        self._gains *= np.exp(-count / MEMORY)
+        self._work *= np.exp(-count / MEMORY)
+        return [
+            Choice(number, a, b, *CUTS[CHOICES[number][1]])
+            for number, a, b in zip(numbers.tolist(), first, second, strict=True)
+        ]
+
+    def learn(self, choice: Choice, gain: float, work: float) -> None:
+        """What a try has brought, and what it cost."""
+        self._gains[choice.number] += gain
+        self._work[choice.number] += work
+
+    def _odds(self, exemplars: int) -> FloatArray:
+        """How likely each choice is: a share for all alike, the rest by the square of what it gains for its work."""
+        possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, _ in CHOICES])
+        rates = np.where(possible, (self._gains + 1.0) / (self._work + 50.0), 0.0) ** 2
+        explored: FloatArray = self.config.novelty.explore * possible / possible.sum()
+        return explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()
+
+    def _draw(self, rng: np.random.Generator, parents: Parents, archive: Archive, draws: np.ndarray) -> list[Parent]:
+        """A parent for each of `draws`: an exemplar, or an earlier variant in the way that it says."""
+        known, exemplars = len(parents.variants), parents.exemplars
+        chosen = [exemplars[int(place)] for place in (rng.random(len(draws)) * len(exemplars)).tolist()]
+        earlier = rng.random(len(draws)) >= self.config.exemplar_share
+        families = (rng.random(len(draws)) * (len(exemplars) + 1)).astype(np.int64)
+        if not known:
+            return chosen
+        family_of = parents.families[:known]
+        rarity = 1.0 / archive.crowds(parents.places[:known])
+        groups = [(draws == PLAIN, np.ones(known)), (np.isin(draws, (RARE, CROSSED)), rarity)]
+        groups += [
+            ((draws == FAMILY) & (families == family), np.where(family_of == family, rarity, 0.0))
+            for family in range(len(exemplars) + 1)
+        ]
+        for wanted, weights in groups:
+            places = np.flatnonzero(wanted & earlier).tolist()
+            if places and weights.any():
+                for place, parent in zip(places, parents.draw(rng, weights, len(places)), strict=True):
+                    chosen[place] = parent
+        return chosen
+
+    def _stranger(self, rng: np.random.Generator, parents: Parents, a: Parent, b: Parent) -> Parent:
+        """Of `b`, an exemplar and some variants the one that has least of the ancestry of `a`."""
+        rivals = [b, parents.exemplars[int(rng.random() * len(parents.exemplars))]]
+        if parents.variants:
+            places = (rng.random(PARTNERS - 2) * len(parents.variants)).astype(np.int64).tolist()
+            rivals += [parents.variants[place] for place in places]
+        return min(rivals, key=lambda each: float(np.minimum(each.shares, a.shares).sum()))

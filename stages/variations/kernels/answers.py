@@ -1,0 +1,123 @@
+"""Contact answers by relative pose: asked of geometry once, looked up ever after."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.docking import DockingTable, symmetric_images
+from stages.shape.geometry.penetration import PenetrationTest, depth_bound
+from stages.shape.kit import Kit
+from stages.variations.kernels.layout import FORBIDDEN, LABELS, NONE, Answers, Workspace
+from stages.variations.kernels.lookup import hash_key, quantise
+from stages.variations.kernels.tables import QUANTUM
+
+__all__ = ["ContactAnswers"]
+
+BORDERLINE = 1.06
+"""Two parts closer than this many contact tolerances, yet not in contact, are too close to be called apart."""
+
+
+class ContactAnswers:
+    """What happens when a part of one type stands at a relative pose to a part of another.
+
+    An answer is NONE (apart), FORBIDDEN (in contact in a way no exemplar shows, nested, or too close to call) or
+    the docking's two directed labels in one number. Poses are rounded to QUANTUM of the contact tolerance, and of
+    all images of a pose under the symmetries of both parts one is chosen by its numbers alone; the answer is that
+    of the chosen pose. So it depends on what is asked and never on what was asked before.
+    """
+
+    def __init__(self, kit: Kit) -> None:
+        self.kit = kit
+        self.contact = ContactTest(kit.types, kit.contact_tolerance)
+        self.dockings = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
+        self.table = Answers(np.zeros(1 << 16, dtype=np.uint64), np.zeros(1 << 16, dtype=np.int64))
+        self.asked = 0
+        self._size = 0
+        self._penetration = PenetrationTest(kit.types)
+        self._of_geometry: dict[bytes, int] = {}
+        self._quantum = kit.contact_tolerance * QUANTUM
+
+    def answer_unknown(self, ws: Workspace, count: int) -> bool:
+        """Answer the first `count` pairs of `ws.unknown`; False as soon as one of them is FORBIDDEN."""
+        quanta = np.empty(12, dtype=np.int64)
+        for i, j in ws.unknown[:count].tolist():
+            a, b = int(ws.types[i]), int(ws.types[j])
+            reach = self.kit.types[b].diagonal / 2
+            quantise(ws.turns[i], ws.places[i], ws.turns[j], ws.places[j], reach, self._quantum, quanta)
+            value = self._answer(a, b, quanta)
+            self._insert(int(hash_key(a, b, quanta)), value)
+            if value == FORBIDDEN:
+                return False
+        return True
+
+    def answer(self, a: int, b: int, pose: FloatArray) -> int:
+        """The answer for a part of type `b` at `pose` (4, 4) in coordinates of a part of type `a`."""
+        quanta = np.empty(12, dtype=np.int64)
+        turn, place = np.eye(3), np.zeros(3)
+        reach = self.kit.types[b].diagonal / 2
+        quantise(turn, place, np.ascontiguousarray(pose[:3, :3]), pose[:3, 3], reach, self._quantum, quanta)
+        return self._answer(a, b, quanta)
+
+    def _answer(self, a: int, b: int, quanta: np.ndarray) -> int:
+        pose = self._pose(b, quanta)
+        images = symmetric_images(self.kit.types[a], self.kit.types[b], pose)
+        rounded = np.empty((len(images), 12), dtype=np.int64)
+        rounded[:, :3] = np.floor(images[:, :3, 3] / self._quantum + 0.5)
+        reach = self.kit.types[b].diagonal / 2
+        rounded[:, 3:] = np.floor(images[:, :3, :3].reshape(-1, 9) * (reach / self._quantum) + 0.5)
+        chosen = np.lexsort(rounded.T[::-1])[0]
+        key = a.to_bytes(2, "little") + b.to_bytes(2, "little") + rounded[chosen].tobytes()
+        if key not in self._of_geometry:
+            self._of_geometry[key] = self._ask_geometry(a, b, self._pose(b, rounded[chosen]))
+        return self._of_geometry[key]
+
+    def _ask_geometry(self, a: int, b: int, pose: FloatArray) -> int:
+        self.asked += 1
+        if self.contact.touches(a, b, pose):
+            label = int(self.dockings.label(a, b, pose[None])[0])
+            if label >= 0:
+                back = np.eye(4)
+                back[:3, :3] = pose[:3, :3].T
+                back[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+                return label * LABELS + int(self.dockings.label(b, a, back[None])[0])
+            if self.contact.kind(a, b, pose) in self.kit.contact_kinds:
+                return FORBIDDEN
+        elif self.contact.touches(a, b, pose, BORDERLINE * self.contact.tolerance):
+            return FORBIDDEN
+        return FORBIDDEN if self._nested(a, b, pose) else NONE
+
+    def _nested(self, a: int, b: int, pose: FloatArray) -> bool:
+        """Whether a part lies in the other without contact that counts, deeper than any of their types did before."""
+        allowed = self.kit.grammar.nested.get((min(a, b), max(a, b)), 0.0) + self.contact.tolerance
+        first, second = self.kit.types[a].bounds, self.kit.types[b].bounds
+        centre = pose[:3, :3] @ second.mean(axis=0) + pose[:3, 3]
+        half = np.abs(pose[:3, :3]) @ (second[1] - second[0]) / 2
+        if depth_bound(first, np.stack([centre - half, centre + half])) <= allowed:
+            return False
+        return self._penetration.depth(a, b, pose) > allowed
+
+    def _pose(self, b: int, quanta: np.ndarray) -> FloatArray:
+        pose = np.eye(4)
+        pose[:3, 3] = quanta[:3] * self._quantum
+        pose[:3, :3] = quanta[3:].reshape(3, 3) * (self._quantum / (self.kit.types[b].diagonal / 2))
+        return pose
+
+    def _insert(self, key: int, value: int) -> None:
+        if 2 * (self._size + 1) > len(self.table.keys):
+            old = self.table
+            self.table = Answers(
+                np.zeros(2 * len(old.keys), dtype=np.uint64), np.zeros(2 * len(old.keys), dtype=np.int64)
+            )
+            self._size = 0
+            for filled in np.flatnonzero(old.keys).tolist():
+                self._insert(int(old.keys[filled]), int(old.values[filled]))
+        mask = len(self.table.keys) - 1
+        slot = key & mask
+        while self.table.keys[slot] not in (0, key):
+            slot = (slot + 1) & mask
+        if self.table.keys[slot] == 0:
+            self._size += 1
+        self.table.keys[slot] = key
+        self.table.values[slot] = value

@@ -1,0 +1,46 @@
+"""Keys of a shape graph by colour refinement."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.variations.kernels.layout import EDGES, PARTS
+from stages.variations.kernels.lookup import mix
+
+__all__ = ["graph_key"]
+
+
+@numba.njit(cache=True)
+def graph_key(ws, with_labels):
+    """A hash of the variant by colour refinement, of its graph alone or with docking labels. Equal graphs have equal
+    keys; different keys mean different graphs."""
+    v, edges = ws.counts[PARTS], ws.counts[EDGES]
+    for i in range(v):
+        ws.colour[i] = mix(np.uint64(ws.types[i]) + np.uint64(0x51ED270B))
+    classes = 0
+    ranked = np.empty(v, dtype=np.uint64)
+    for _ in range(v):
+        for i in range(v):
+            ws.fresh[i] = mix(ws.colour[i])
+        for e in range(edges):
+            i, j = ws.edges[e, 0], ws.edges[e, 1]
+            to_j = np.uint64(ws.label[i, j]) if with_labels else np.uint64(0)
+            to_i = np.uint64(ws.label[j, i]) if with_labels else np.uint64(0)
+            ws.fresh[i] += mix(ws.colour[j] + to_j * np.uint64(0x9E3779B97F4A7C15) + np.uint64(0x7F4A7C15))
+            ws.fresh[j] += mix(ws.colour[i] + to_i * np.uint64(0x9E3779B97F4A7C15) + np.uint64(0x7F4A7C15))
+        for i in range(v):
+            ws.colour[i] = ws.fresh[i]
+            ranked[i] = ws.fresh[i]
+        ranked.sort()
+        found = 1
+        for i in range(1, v):
+            if ranked[i] != ranked[i - 1]:
+                found += 1
+        if found == classes:
+            break
+        classes = found
+    total = np.uint64(v)
+    for i in range(v):
+        total += mix(ranked[i])
+    return mix(total)

@@ -1,0 +1,57 @@
+"""Hashes of poses, and tables that are asked by them."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.variations.kernels.layout import MISSING
+
+__all__ = ["ask", "hash_key", "mix", "quantise", "random_below"]
+
+
+@numba.njit(cache=True)
+def quantise(first_turn, first_place, turn, place, reach, quantum, out):
+    """The pose of the second part in coordinates of the first in whole quanta, int64 (12,): translation, rotation."""
+    for i in range(3):
+        x = 0.0
+        for k in range(3):
+            x += first_turn[k, i] * (place[k] - first_place[k])
+        out[i] = np.int64(np.floor(x / quantum + 0.5))
+        for j in range(3):
+            y = 0.0
+            for k in range(3):
+                y += first_turn[k, i] * turn[k, j]
+            out[3 + 3 * i + j] = np.int64(np.floor(y * reach / quantum + 0.5))
+
+
+@numba.njit(cache=True, inline="always")
+def mix(x):
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+@numba.njit(cache=True)
+def hash_key(a, b, quanta):
+    """A key of a type pair and a quantised pose, uint64, never 0."""
+    x = mix(np.uint64(a) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(b) + np.uint64(1))
+    for k in range(12):
+        x = mix(x * np.uint64(0x9E3779B97F4A7C15) + np.uint64(quanta[k]))
+    return x | np.uint64(1)
+
+
+@numba.njit(cache=True)
+def ask(keys, values, key):
+    mask = np.uint64(len(keys) - 1)
+    slot = key & mask
+    while keys[slot] != np.uint64(0):
+        if keys[slot] == key:
+            return values[slot]
+        slot = (slot + np.uint64(1)) & mask
+    return MISSING
+
+
+@numba.njit(cache=True)
+def random_below(rng, n):
+    return min(np.int64(rng.random() * n), n - 1)

@@ -1,0 +1,85 @@
+"""Whether a grammar admits a neighbourhood, by its rule (strings §3); what was asked before is remembered.
+
+It says the same as `stages.shape.graphs.neighbourhoods.admits`, without hubs, which no shape of the search has.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.variations.kernels.layout import MISSING
+from stages.variations.kernels.lookup import ask, mix
+
+__all__ = ["admitted", "neighbourhood_key", "recalled"]
+
+
+@numba.njit(cache=True, inline="always")
+def neighbourhood_key(kit, part_type):
+    """What the key of a part's neighbourhood starts from; the weights of its neighbours' types are added."""
+    return mix(kit.weights[part_type])
+
+
+@numba.njit(cache=True)
+def recalled(rules, key):
+    """1 or 0 where the neighbourhood of this key is known to be admitted or not, else MISSING."""
+    verdict = ask(rules.keys, rules.verdicts, key)
+    return 0 if verdict == MISSING and rules.level == 0 else verdict
+
+
+@numba.njit(cache=True)
+def admitted(kit, part_type, near, count):
+    """Whether a part may have neighbours of the types `near[:count]`."""
+    key = neighbourhood_key(kit, part_type)
+    for n in range(count):
+        key += kit.weights[near[n]]
+    verdict = recalled(kit.rules, key)
+    if verdict == MISSING:
+        verdict = _rule(kit.rules, part_type, near, count)
+        _remember(kit.rules, key, verdict)
+    return verdict == 1
+
+
+@numba.njit(cache=True)
+def _rule(rules, part_type, near, count):
+    if count >= rules.sizes.shape[1] or not rules.sizes[part_type, count]:
+        return 0
+    if rules.level == 1:
+        key = mix(np.uint64(part_type) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(count))
+        for n in range(count):
+            first = True
+            for m in range(n):
+                if near[m] == near[n]:
+                    first = False
+                    break
+            if first:
+                key += rules.set_weights[near[n]]
+        at = np.searchsorted(rules.sets, key)
+        return 1 if at < len(rules.sets) and rules.sets[at] == key else 0
+    around = 0
+    for other in range(rules.local.shape[1]):
+        if rules.local[part_type, other] >= 0:
+            around += 1
+    for n in range(count):
+        row = rules.local[part_type, near[n]]
+        if row < 0:
+            return 0
+        for m in range(n):
+            column = rules.local[part_type, near[m]]
+            if row != column and not rules.pairs[rules.pair_starts[part_type] + row * around + column]:
+                return 0
+    return 1
+
+
+@numba.njit(cache=True)
+def _remember(rules, key, verdict):
+    """Keep a verdict while there is room: it never changes, so what is kept changes no answer."""
+    if 2 * rules.filled[0] >= len(rules.keys) or key == np.uint64(0):
+        return
+    mask = np.uint64(len(rules.keys) - 1)
+    slot = key & mask
+    while rules.keys[slot] != np.uint64(0):
+        slot = (slot + np.uint64(1)) & mask
+    rules.keys[slot] = key
+    rules.verdicts[slot] = verdict
+    rules.filled[0] += 1

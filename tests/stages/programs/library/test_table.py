@@ -1,0 +1,73 @@
+"""Tables stand, carry their tops, and look like tables; what every program promises is tested beside this."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.programs.draws import draw
+from stages.programs.library.table import PROGRAM, build
+from stages.programs.library.table_plan import Plan
+from stages.programs.schema import Values
+
+
+def tables(count: int, **fixed: float) -> list[Values]:
+    """Random tables with some values fixed, all valid."""
+    schema = PROGRAM.schema
+    columns = draw(schema, 2 * count, np.random.default_rng(3), True).columns
+    found = [schema.settled({**schema.from_vector(column), **fixed})[0] for column in columns.T]
+    return [values for values in found if not PROGRAM.broken(values)][:count]
+
+
+def test_the_table_has_as_many_parameters_and_values_as_published() -> None:
+    assert len(PROGRAM.parameters) == 36
+    assert sum(len(each.values) for each in PROGRAM.parameters) == 209
+    assert sum(each.classes for each in PROGRAM.parameters) == 238
+
+
+def test_tables_stand_on_the_ground_and_nothing_pierces_their_tops() -> None:
+    for values in tables(300):
+        parts, plan = build(values), Plan(values)
+        assert min(part.mesh.bounds[0, 1] for part in parts) == pytest.approx(0.0, abs=1e-9)
+        assert parts[0].mesh.bounds[:, 1] == pytest.approx([plan.under, plan.height])
+        assert parts[0].mesh.bounds[1, [0, 2]] == pytest.approx(plan.half)
+        for part in parts[1:]:
+            assert part.mesh.bounds[1, 1] < plan.height - 0.3 * plan.thickness
+
+
+def test_four_legs_begin_under_the_top_and_stay_apart() -> None:
+    for values in tables(200, is_monoleg=False):
+        plan = Plan(values)
+        legs = [part.mesh for part in build(values) if part.label == "leg"]
+        assert len(legs) == 4
+        for leg in legs:
+            head = leg.vertices[leg.vertices[:, 1] > plan.under - 1e-9][:, [0, 2]]
+            outline = plan.outline * (plan.bearing / plan.half)
+            sides = np.roll(outline, -1, axis=0) - outline
+            offsets = head[:, None] - outline
+            assert (sides[:, 0] * offsets[..., 1] - sides[:, 1] * offsets[..., 0] > -1e-9).all()
+        assert legs[0].bounds[0, 0] > 0.0
+        assert legs[0].bounds[0, 2] > 0.0
+
+
+def test_the_tent_has_its_legs_and_a_foot_under_each() -> None:
+    for values in tables(60, is_monoleg=True, is_monoleg_tent=True):
+        labels = [part.label for part in build(values)]
+        assert labels.count("leg") == labels.count("glide") == values["monoleg_tent_count"]
+        assert ("pedestal" in labels) == (values["monoleg_tent_pct"] < 0.4)
+
+
+def test_tops_go_from_a_rectangle_to_an_ellipse() -> None:
+    base = PROGRAM.schema.base
+    square, round_ = Plan({**base, "table_top_shape": 0.0}), Plan({**base, "table_top_shape": 1.0})
+    assert len(square.outline) == 4
+    assert ((round_.outline / round_.half) ** 2).sum(axis=1) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("state", range(4))
+def test_an_edge_takes_nothing_from_the_size_of_the_top(state: int) -> None:
+    for values in tables(20, table_top_profile_state=state):
+        edge = Plan(values).edge
+        assert edge[:, 0].min() == pytest.approx(0.0, abs=1e-12)
+        assert edge[[0, -1], 1] == pytest.approx([0.0, Plan(values).thickness])
+        assert (np.diff(edge[:, 1]) > 0.0).all()

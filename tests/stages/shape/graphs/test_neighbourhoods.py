@@ -1,0 +1,85 @@
+"""Which neighbourhoods a grammar admits: by hand, by brute force, and one level within the next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations_with_replacement
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stages.shape.graphs.neighbourhoods import STRICTNESS, admits
+from stages.shape.kit import Grammar, Multiset, Strictness
+
+A, B, C, D = range(4)
+
+
+def multiset(*types: int) -> Multiset:
+    return tuple((each, types.count(each)) for each in sorted(set(types)))
+
+
+def grammar(*observed: Multiset, strictness: Strictness = "multiset", hubs: tuple[int, ...] = ()) -> Grammar:
+    return Grammar({A: dict.fromkeys(observed, 1)}, (), {}, strictness, hubs)
+
+
+def every(most: int, types: int = 4) -> list[Multiset]:
+    """Every neighbourhood of at most `most` parts of so many types."""
+    return [multiset(*each) for size in range(most + 1) for each in combinations_with_replacement(range(types), size)]
+
+
+def language(rules: Grammar, most: int = 5) -> set[Multiset]:
+    return {each for each in every(most) if admits(rules, A, each)}
+
+
+SEEN = (multiset(B, B, C), multiset(C, D))
+
+
+@pytest.mark.parametrize(
+    ("strictness", "beside"),
+    [
+        ("multiset", []),
+        ("count_and_set", [multiset(B, C, C)]),
+        (
+            "count_and_pairs",
+            [
+                *(multiset(B, C, C), multiset(C, C, D), multiset(C, D, D)),
+                *(multiset(each, each, each) for each in (B, C, D)),
+                *(multiset(B, C), multiset(B, B), multiset(C, C), multiset(D, D)),
+            ],
+        ),
+    ],
+)
+def test_each_level_admits_what_was_observed_and_what_it_says(strictness: Strictness, beside: list[Multiset]) -> None:
+    assert language(grammar(*SEEN, strictness=strictness)) == {*SEEN, *beside}
+
+
+def test_a_type_never_seen_around_and_a_part_without_neighbours_are_refused_on_every_level() -> None:
+    for strictness in STRICTNESS:
+        rules = grammar(*SEEN, strictness=strictness)
+        assert not admits(rules, A, multiset(A, B, C))
+        assert not admits(rules, A, ())
+        assert not admits(rules, B, multiset(A))
+    assert all(admits(grammar((), strictness=each), A, ()) for each in STRICTNESS)
+
+
+observations = st.sets(
+    st.lists(st.integers(0, 3), max_size=5).map(lambda each: multiset(*each)), min_size=1, max_size=5
+)
+
+
+@given(observations)
+def test_levels_nest(observed: set[Multiset]) -> None:
+    inner = set(observed)
+    for strictness in STRICTNESS:
+        rules = grammar(*sorted(observed), strictness=strictness)
+        admitted = language(rules)
+        assert inner <= admitted
+        inner = admitted
+
+
+def test_hubs_may_have_any_neighbours_and_do_not_count_as_neighbours() -> None:
+    rules = replace(grammar(multiset(B, C), hubs=(D,)), neighbourhoods={A: {multiset(B, C): 1}, D: {multiset(A): 1}})
+    assert admits(rules, A, multiset(B, C, D, D))
+    assert not admits(rules, A, multiset(B, D))
+    assert admits(rules, D, multiset(A, A, B))

@@ -1,0 +1,171 @@
+"""The search: complete on languages that can be listed by hand, right on everything it finds, the same every time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stages.exemplars.build import build_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import KitConfig
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.graphs.canonical import docking_digest, graph_digest
+from stages.shape.kit import Kit
+from stages.variations.exchange.search import Search, Variant
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import SearchConfig
+from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, ring
+
+SHIPPED = sorted({shape.parent for shape in Path("datasets/exemplars").glob("*/*.glb")})
+
+
+def search(kit: Kit, seed: int = 0, tries: int = 3000, **settings: object) -> tuple[Search, list[Variant]]:
+    line = Search(ContactAnswers(kit), SearchConfig.model_validate(settings))
+    found, _ = line.run(np.random.default_rng(seed), tries, 10**9, "test", lambda count: None)
+    return line, found
+
+
+def histogram(kit: Kit, variant: Variant) -> tuple[int, ...]:
+    counts = Counter(kit.types[index].name for index in variant.assembly.types.tolist())
+    return tuple(counts[name] for name in sorted(each.name for each in kit.types))
+
+
+def shipped_kit(folder: Path) -> Kit:
+    shapes = tuple(sorted(folder.glob("*.glb")))
+    kit, _ = build_kit(KitConfig(name=folder.name, shapes=shapes), [read_model(shape) for shape in shapes])
+    return kit
+
+
+@pytest.mark.parametrize("matching", ["pose", "centroid"])
+def test_search_finds_every_chain_within_the_size_limits(matching: str) -> None:
+    kit = kit_of(CHAIN, [chain(3), chain(5)])
+    line, found = search(kit, smallest=0.5, largest=2.0, matching=matching)
+    assert (line.smallest, line.largest) == (2, 14)
+    lengths = sorted(len(each.assembly) - 2 for each in found)
+    # Two links are the fewest with which both caps keep a link; three and five are the exemplars themselves.
+    assert lengths == [2, 4, *range(6, 13)]
+
+
+def test_search_finds_every_rectangle_within_the_size_limits() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    _, found = search(kit, tries=120_000, smallest=1.0, largest=1.6)
+    rectangles = {
+        tuple(sorted((width, depth))): 4 + 2 * (width + depth) for width in range(1, 10) for depth in range(1, 10)
+    }
+    expected = {sides for sides, parts in rectangles.items() if 8 <= parts <= 22} - {(1, 1), (2, 3)}
+    seen = Counter()
+    for variant in found:
+        places = variant.assembly.poses[:, :3, 3]
+        corners = places[np.array([kit.types[t].name == "corner" for t in variant.assembly.types])]
+        span = np.round(np.sort(np.ptp(corners, axis=0))[1:]).astype(int)
+        seen[tuple(int(side) - 1 for side in span)] += 1
+    assert set(seen) == expected
+    assert set(seen.values()) == {1}
+
+
+def test_variants_of_a_one_way_ring_are_closed_rings() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    _, found = search(kit, tries=3000, largest=1.6)
+    for variant in found:
+        degrees = np.bincount(variant.assembly.edges.ravel(), minlength=len(variant.assembly))
+        assert (degrees == 2).all()
+
+
+def test_nothing_is_found_where_the_exemplar_says_all_there_is() -> None:
+    kit = kit_of(CHAIN, [chain(1)])
+    line, found = search(kit, tries=500, largest=3.0)
+    assert found == []
+    assert sum(line.rejects.values()) == 500
+
+
+def test_pieces_are_turned_about_the_vertical_only_unless_the_config_lets_them() -> None:
+    kit = kit_of(ROAD, [ring(1, 2), ring(2, 2)])
+    _, found = search(kit, tries=3000, largest=1.5, upright=True)
+    assert found
+    for variant in found:
+        assert np.abs(np.array(variant.lineage["motion"])[1, 1]) > 0.999
+        assert (variant.assembly.poses[:, 1, 1] > 0.999).all()
+
+
+def test_the_histogram_rule_keeps_one_shape_for_each_histogram() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    _, found = search(kit, tries=6000, smallest=1.0, largest=1.6, duplicates="histogram")
+    histograms = [histogram(kit, each) for each in found]
+    assert len(set(histograms)) == len(histograms)
+    # Rings of one perimeter share a histogram: 4 corners and 4, 6, ... straights, without the exemplars' own.
+    assert {each[1] for each in histograms} == {6, 8, 12, 14, 16, 18}
+
+
+def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_changes_nothing() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    _, first = search(kit, seed=3, tries=800)
+    warm = ContactAnswers(kit)
+    other = Search(warm, SearchConfig())
+    other.run(np.random.default_rng(99), 800, 10**9, "other", lambda count: None)
+    line = Search(warm, SearchConfig())
+    again, _ = line.run(np.random.default_rng(3), 800, 10**9, "test", lambda count: None)
+    assert [each.docked for each in first] == [each.docked for each in again]
+    for one, two in zip(first, again, strict=True):
+        assert one.assembly.poses.tobytes() == two.assembly.poses.tobytes()
+        assert one.assembly.edges.tobytes() == two.assembly.edges.tobytes()
+        assert one.lineage == two.lineage
+
+
+@pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
+def test_neither_variants_nor_reasons_depend_on_which_contacts_are_known(folder: Path) -> None:
+    kit = shipped_kit(folder)
+    cold, first = search(kit, seed=3, tries=700)
+    warm = ContactAnswers(kit)
+    for seed in (99, 3):
+        line = Search(warm, SearchConfig())
+        again, _ = line.run(np.random.default_rng(seed), 700, 10**9, "test", lambda count: None)
+    assert [each.docked for each in again] == [each.docked for each in first]
+    assert line.rejects == cold.rejects
+
+
+@pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
+def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path) -> None:
+    kit = shipped_kit(folder)
+    line, found = search(kit, tries=1500)
+    assert len(found) >= 50
+    contact = ContactTest(kit.types, kit.contact_tolerance)
+    digests = set()
+    for variant in found[::7]:
+        assembly = variant.assembly
+        assert line.smallest <= len(assembly) <= line.largest
+        assert np.array_equal(contact.contacts(assembly.types, assembly.poses), assembly.edges)
+        labels = line.answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
+        assert np.array_equal(labels, variant.labels)
+        assert (labels >= 0).all()
+        for part, neighbours in enumerate(assembly.neighbours()):
+            assert assembly.multiset(neighbours) in kit.grammar.neighbourhoods[int(assembly.types[part])]
+        digests.add(docking_digest(assembly.types, assembly.edges, labels))
+    assert len(digests) == len(found[::7])
+
+
+@pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
+def test_graph_keys_tell_apart_what_canonical_graphs_tell_apart(folder: Path) -> None:
+    kit = shipped_kit(folder)
+    _, found = search(kit, tries=800)
+    by_key: dict[int, set[str]] = {}
+    for variant in found:
+        digest = graph_digest(variant.assembly.types, variant.assembly.edges)
+        by_key.setdefault(variant.graph, set()).add(digest)
+    assert all(len(digests) == 1 for digests in by_key.values())
+    digests = [next(iter(each)) for each in by_key.values()]
+    assert len(set(digests)) == len(digests)
+
+
+def test_a_variant_says_where_its_parts_came_from() -> None:
+    kit = kit_of(CHAIN, [chain(3), chain(5)])
+    _, found = search(kit, tries=300)
+    for number, variant in enumerate(found):
+        lineage = variant.lineage
+        assert sum(lineage["parts_from"]) == len(variant.assembly)
+        assert len(lineage["boundary"]) == len(lineage["images"]) > 0
+        for parent in lineage["parents"]:
+            known = {"shape0", "shape1", *(f"test-{earlier}" for earlier in range(number))}
+            assert parent in known

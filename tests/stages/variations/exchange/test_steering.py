@@ -1,0 +1,54 @@
+"""Tries go where they find most, and everywhere now and then."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from stages.variations.exchange.search import Search
+from stages.variations.exchange.steering import CHOICES, PLAIN, RARE
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import NoveltyConfig, SearchConfig
+from tests.stages.variations.toy import CHAIN, chain, kit_of
+
+
+def line_of(exemplars: int, **novelty: float) -> Search:
+    kit = kit_of(CHAIN, [chain(3 + 2 * number) for number in range(exemplars)])
+    return Search(ContactAnswers(kit), SearchConfig(novelty=NoveltyConfig.model_validate(novelty)))
+
+
+def planned(line: Search, count: int = 4000) -> Counter[int]:
+    choices = line.steering.plan(np.random.default_rng(0), line.parents, line.archive, count)
+    assert all(each.a in line.parents.exemplars and each.b in line.parents.exemplars for each in choices)
+    return Counter(each.number for each in choices)
+
+
+def test_every_choice_is_tried_and_those_that_find_most_for_their_work_most_often() -> None:
+    line = line_of(2, explore=0.2)
+    for choice in line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 2000):
+        line.steering.learn(choice, float(choice.number == 5), 1.0)
+    tried = planned(line)
+    assert set(tried) == set(range(len(CHOICES)))
+    assert tried[5] > 2000
+    assert min(tried.values()) > 0.5 * 0.2 / len(CHOICES) * 4000
+
+
+def test_the_same_finds_for_more_work_are_worth_less() -> None:
+    line = line_of(2)
+    for choice in line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 4000):
+        line.steering.learn(choice, float(choice.number in (2, 9)), 3.0 if choice.number == 2 else 1.0)
+    tried = planned(line)
+    assert tried[9] > 3 * tried[2]
+
+
+def test_one_exemplar_has_neither_families_nor_strangers() -> None:
+    tried = planned(line_of(1))
+    assert {CHOICES[number][0] for number in tried} == {PLAIN, RARE}
+
+
+@pytest.mark.parametrize("growth_share", [0.0, 1.0])
+def test_without_guidance_parents_are_plain_and_cuts_as_the_config_says(growth_share: float) -> None:
+    line = Search(line_of(2).answers, SearchConfig(growth_share=growth_share, novelty=NoveltyConfig(guided=False)))
+    assert set(planned(line)) == {0 if growth_share else 1}
