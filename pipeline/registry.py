@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 import importlib
-import pkgutil
 from collections.abc import Mapping
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from pipeline.stage import Stage
 
-__all__ = ["find_stages", "upstream"]
+__all__ = ["find_stages", "folders_with", "upstream"]
 
 
 def find_stages(package: str = "stages") -> dict[str, Stage]:
     """The `STAGE` of each `<package>/<name>/stage.py`, earlier stages first.
 
-    Raises TypeError for a `stage.py` without a STAGE of its folder's name and for stages that read each other in a
-    circle or read a stage that is not there.
+    An input such as `*/producer.py` stands for every stage, other than the one that names it, whose folder holds such
+    a file. Raises TypeError for a `stage.py` without a STAGE of its folder's name and for stages that read each other
+    in a circle or read a stage that is not there.
     """
     found: dict[str, Stage] = {}
-    root = importlib.import_module(package)
-    for folder in sorted(each.name for each in pkgutil.iter_modules(root.__path__) if each.ispkg):
-        if not any((Path(base) / folder / "stage.py").is_file() for base in root.__path__):
-            continue
+    for folder in folders_with(package, "stage.py"):
         stage = getattr(importlib.import_module(f"{package}.{folder}.stage"), "STAGE", None)
         if not isinstance(stage, Stage) or stage.name != folder:
             raise TypeError(f"{package}/{folder}/stage.py must hold STAGE = Stage(name={folder!r}, ...)")
         found[folder] = stage
+    found = {name: replace(stage, inputs=_named(package, found, stage)) for name, stage in found.items()}
     for stage in found.values():
         for name in stage.inputs:
             if name not in found:
@@ -37,6 +36,24 @@ def find_stages(package: str = "stages") -> dict[str, Stage]:
         return {name: found[name] for name in order}
     except CycleError as error:
         raise TypeError(f"stages read each other in a circle: {' -> '.join(error.args[1])}") from error
+
+
+def folders_with(package: str, file: str) -> list[str]:
+    """The folders of a package that hold `file`, by name; the package may lie in several places."""
+    bases = [Path(base) for base in importlib.import_module(package).__path__]
+    folders = {each.name for base in bases if base.is_dir() for each in base.iterdir() if (each / file).is_file()}
+    return sorted(folders)
+
+
+def _named(package: str, found: Mapping[str, Stage], stage: Stage) -> tuple[str, ...]:
+    """The inputs of a stage, all by name, each once."""
+    names: dict[str, None] = {}
+    for each in stage.inputs:
+        meant = [each]
+        if each.startswith("*/"):
+            meant = [name for name in folders_with(package, each[2:]) if name in found and name != stage.name]
+        names.update(dict.fromkeys(meant))
+    return tuple(names)
 
 
 def upstream(stages: Mapping[str, Stage], name: str) -> list[str]:

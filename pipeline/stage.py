@@ -118,6 +118,9 @@ def _nothing_published(_: Plan) -> Mapping[str, str]:
 class Stage:
     """One stage of the mill. `version` is part of every fingerprint: raise it when the stage's bytes change.
 
+    `inputs` are the stages that it reads, by name; `*/producer.py` stands for every stage whose folder holds a file of
+    that name.
+
     `estimate_bytes` answers how much disk the whole stage will take at most about. `report`: lines about the
     finished part of the stage, for people, shown after a run and by `status`. `publish`: asked when every shard
     is done, which files stand in the output folder itself, `{path below OUT: file of a shard}`; the mill links

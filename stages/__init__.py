@@ -5,6 +5,10 @@ from __future__ import annotations
 import os
 from hashlib import sha256
 from pathlib import Path
+from pkgutil import extend_path
+
+__path__ = extend_path(__path__, __name__)
+"""A folder `stages` elsewhere on the PYTHONPATH adds its stages to these."""
 
 
 def _compiled_folder() -> Path:

@@ -3,55 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
 import yaml
 
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW
-from stages.variations.measures import measure_table
 
-__all__ = ["card", "citation", "member_text", "size_category"]
+__all__ = ["Story", "card", "citation", "size_category"]
 
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
-MADE = {
-    "variations": "exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
-    "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's `parents` are "
-    "exemplars, or variants by the `name` in their own `lineage`.",
-    "programs": "curve programs are run on parameters drawn from their ranges; a shape's parameters are its `txt`.",
-    "shapeassembly": "ShapeAssembly programs are executed; a shape's program is its `txt`.",
-}
-"""How the samples of each producer come about."""
 
-SPLITS = {
-    "variations": "Samples whose shape graphs are equal stand in one split.",
-    "programs": "No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike "
-    "up to their continuous parameters stand in one split; where every value of every parameter is sampled, all splits "
-    "have all values, as published.",
-    "shapeassembly": "Samples of programs that are alike up to their numbers stand in one split.",
-}
-"""What keeps the splits apart, for each producer."""
+@dataclass(frozen=True)
+class Story:
+    """How a dataset was made, in the words of its producer.
 
-MEMBERS = {
-    "glb": "The mesh: glTF 2.0, one node a part, named by its label (`tower.000`), equal parts sharing one mesh. Node "
-    "`extras` hold `type` and `instance`.",
-    "points.npy": "Point cloud, float32 (n, 3).",
-    "normals.npy": "Unit normals of the points, float32 (n, 3).",
-    "labels.npy": "Part label of each point, int16 (n,).",
-    "instances.npy": "Part of each point, int16 (n,).",
-    "txt": "The shape as text: of a kit its graph as strings, SMILES-like, one a line, the first canonical; else its "
-    "parameters as JSON, or its program.",
-    "json": "Everything else: parts with label, type and pose (4x4), contacts, counts, bounds, parents and lineage.",
-}
+    made: how its samples come about; splits: what keeps the splits apart; paragraphs, variety: Markdown; rejects:
+    refused items by reason.
+    """
 
-
-def member_text(member: str) -> str:
-    """What a member is, in words; every view of a sketch is a member of its own."""
-    if member.startswith("sketch"):
-        view = member.partition(".")[0].removeprefix("sketch")
-        return f"Line drawing of the shape, view {view}, single-channel PNG."
-    return MEMBERS.get(member, "")
+    made: str
+    splits: str
+    paragraphs: Sequence[str]
+    variety: Sequence[str]
+    rejects: Mapping[str, int]
 
 
 def citation(facts: Mapping[str, Any]) -> str:
@@ -71,20 +48,16 @@ def size_category(samples: int) -> str:
 def card(
     facts: Mapping[str, Any],
     shards: Sequence[Mapping[str, Any]],
+    members: Sequence[Mapping[str, Any]],
     rows: Sequence[Mapping[str, Any]],
-    producer: str,
     sources: Mapping[str, str],
-    search: Sequence[str],
-    rejects: Mapping[str, int],
-    measures: Mapping[str, Mapping[str, Any]],
-    recipes: Sequence[str],
+    story: Story,
 ) -> str:
     """The card's text.
 
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
-    of the package's shards; rows: those of the index; producer: the stage that made the samples; sources: the kits or
-    programs by name, with what there is to say of them in short; search: how each search ended, in words; rejects:
-    refused items by reason; measures: of the variants of each kit; recipes: a section of Markdown for each program.
+    of the package's shards; members: name, sentence, dtype and shape of each; rows: those of the index; sources: the
+    kits or programs by name, with what there is to say of them in short.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
@@ -107,10 +80,10 @@ def card(
         "## What is in it",
         _split_table(splits, shards),
         _source_table(sources, rows),
-        SPLITS[producer],
-        *(["## How different they are", measure_table(measures)] if measures else []),
+        story.splits,
+        *(["## How different they are", *story.variety] if story.variety else []),
         "## A sample",
-        _member_table([str(member) for member in shards[0]["members"]]),
+        _member_table(members),
         "All coordinates are in the units of the kit or program and upright: y points up, in the mesh, the points and "
         "the poses alike. "
         "Points lie on every part's whole surface, also where it is hidden inside another part. Vertex colours of the "
@@ -118,10 +91,9 @@ def card(
         "## Loading it",
         _loading(facts, splits, shards),
         "## How it was made",
-        f"By Shapemill: {MADE[producer]} `{MANIFEST}` holds the whole config.",
-        *([_list(search)] if search else []),
-        *([_reject_table(rejects)] if rejects else []),
-        *recipes,
+        f"By Shapemill: {story.made} `{MANIFEST}` holds the whole config.",
+        *([_reject_table(story.rejects)] if story.rejects else []),
+        *story.paragraphs,
         "## Checking it",
         f"`sha256sum -c {CHECKSUMS}` compares every file; `make verify` also computes contacts anew from the meshes.",
         "## Licence and citation",
@@ -163,9 +135,11 @@ def _span(numbers: Sequence[int]) -> str:
     return f"{min(numbers)} / {median(numbers):g} / {max(numbers)}" if numbers else "-"
 
 
-def _member_table(members: Sequence[str]) -> str:
-    lines = ["| member | what it is |", "| --- | --- |"]
-    lines += [f"| `<key>.{member}` | {member_text(member)} |" for member in members]
+def _member_table(members: Sequence[Mapping[str, Any]]) -> str:
+    lines = ["| member | array | what it is |", "| --- | --- | --- |"]
+    for each in members:
+        array = f"{each['dtype']} ({', '.join(map(str, each['shape']))})" if each["dtype"] else ""
+        lines.append(f"| `<key>.{each['name']}` | {array} | {each['sentence']} |")
     return "\n".join(lines)
 
 
@@ -173,10 +147,6 @@ def _reject_table(rejects: Mapping[str, int]) -> str:
     lines = ["| refused because | tries |", "| --- | ---: |"]
     lines += [f"| {reason} | {count:,} |" for reason, count in sorted(rejects.items(), key=lambda each: -each[1])]
     return "\n".join(lines)
-
-
-def _list(sentences: Sequence[str]) -> str:
-    return "\n".join(f"- {sentence}" for sentence in sentences)
 
 
 def _loading(facts: Mapping[str, Any], splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> str:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
-from stages.package.card import card, citation, member_text
+from stages.package.card import Story, card, citation
 from stages.package.croissant import croissant
 from stages.package.index import read_rows, write_index
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import checksums, manifest
-from stages.shape.kit import Kit
-from stages.shape.kit_input import input_kits
+from stages.shape.collection.declared import language_of
 
 __all__ = ["compose_dataset"]
 
@@ -24,13 +23,13 @@ __all__ = ["compose_dataset"]
 def compose_dataset(task: Task) -> Outcome:
     """Write card, Croissant, manifest, checksums and index.
 
-    The shard's params hold `facts`, `producer` (the stage that made the samples), `sections` (the whole config),
-    `shards` (summaries of the package's shards), `search`, `rejects` and `measures` (what the card says of the search
-    and its finds), `preview` (the shard with the picture) and `package` (the version of this stage).
+    The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
+    shards); `members` (what is to say of each); `made`, `splits`, `story`, `variety`, `rejects` and `measures` (what
+    there is to say of how it was made); `preview` (the shard with the picture) and `package` (the version of this
+    stage).
     """
     params = task.shard.params
-    producer = params["producer"]
-    shards, facts = params["shards"], params["facts"]
+    shards, facts, members = params["shards"], params["facts"], params["members"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)
     index = io.BytesIO()
     write_index(rows, index)
@@ -39,14 +38,12 @@ def compose_dataset(task: Task) -> Outcome:
         "bytes": len(index.getvalue()),
         "sha256": hashlib.sha256(index.getvalue()).hexdigest(),
     }
-    kits = input_kits(task)
-    sources = {name: _described(kits.get(name)) for name in sorted({row["kit"] for row in rows})}
-    members = {member: member_text(member) for member in shards[0]["members"]}
+    known = language_of(params["producer"]).speaker(task).sources
+    used = {row["kit"] for row in rows}
+    sources = {name: each.sentence for name, each in known.items() if name in used}
+    story = Story(params["made"], params["splits"], params["story"], params["variety"], params["rejects"])
     files = {
-        CARD: card(
-            *(facts, shards, rows, producer, sources, params["search"], params["rejects"], params["measures"]),
-            _recipes(producer, sources),
-        ).encode(),
+        CARD: card(facts, shards, members, rows, sources, story).encode(),
         CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
         MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["measures"], params["package"])),
     }
@@ -58,24 +55,6 @@ def compose_dataset(task: Task) -> Outcome:
         with task.output(f"{task.shard.name}.{file}") as stream:
             stream.write(content)
     return Outcome(samples=0, summary={"samples": len(rows)})
-
-
-def _recipes(producer: str, names: Iterable[str]) -> list[str]:
-    """What there is to say of each program that the samples were made with."""
-    if producer != "programs":
-        return []
-    from stages.programs.program import find_program
-    from stages.programs.recipe import recipe_markdown
-
-    return [recipe_markdown(find_program(name)).rstrip() for name in names]
-
-
-def _described(kit: Kit | None) -> str:
-    """What stands behind the name of a kit on the card; of a program nothing does."""
-    if kit is None:
-        return ""
-    count = len(kit.exemplars)
-    return f"{count} exemplar{'' if count == 1 else 's'}, {len(kit.types)} part types"
 
 
 def _text(document: Mapping[str, Any]) -> bytes:

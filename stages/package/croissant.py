@@ -65,10 +65,10 @@ FORMATS = {
 
 
 def croissant(
-    facts: Mapping[str, Any], shards: Sequence[Mapping[str, Any]], members: Mapping[str, str], citation: str
+    facts: Mapping[str, Any], shards: Sequence[Mapping[str, Any]], members: Sequence[Mapping[str, Any]], citation: str
 ) -> dict[str, Any]:
     """The document. `facts` has name, version, title, description, license, creator and published; `shards` are the
-    summaries of the package's shards; `members` says what each member is, in words."""
+    summaries of the package's shards; `members` has name, sentence, dtype and shape of each."""
     spdx = str(facts["license"])
     return {
         "@context": VOCABULARY,
@@ -82,8 +82,8 @@ def croissant(
         "datePublished": facts["published"],
         "citeAs": citation,
         "keywords": list(facts["tags"]),
-        "distribution": [*map(_shard, shards), *(_files(member, text, shards) for member, text in members.items())],
-        "recordSet": [_records(member, text) for member, text in members.items()],
+        "distribution": [*map(_shard, shards), *(_files(each["name"], each["sentence"], shards) for each in members)],
+        "recordSet": [_records(each["name"], each["sentence"]) for each in members],
     }
 
 

@@ -44,7 +44,7 @@ def glb_bytes(shape: Shape) -> bytes:
     """The GLB of `shape`: nodes in the order of the parts, with their names; only meshes in use.
 
     Vertices stay in each mesh's own coordinates as float32; the poses stand in the nodes as 4x4 matrices. Each
-    node's `extras` has `type` and `instance`, the indices that point labels refer to.
+    node's `extras` has `class` and `instance`, what labels and instances of points refer to.
     """
     chunks, assembly = _chunks(shape.meshes), shape.assembly
     used = sorted(set(assembly.types.tolist()))
@@ -67,9 +67,9 @@ def glb_bytes(shape: Shape) -> bytes:
         start += len(chunk.content)
     columns = assembly.poses.transpose(0, 2, 1).reshape(len(assembly), 16).tolist()
     nodes = [
-        {"name": name, "mesh": mesh_of[kind], "matrix": matrix, "extras": {"type": label, "instance": instance}}
+        {"name": name, "mesh": mesh_of[kind], "matrix": matrix, "extras": {"class": label, "instance": instance}}
         for instance, (name, kind, label, matrix) in enumerate(
-            zip(shape.part_names, assembly.types.tolist(), shape.part_labels.tolist(), columns, strict=True)
+            zip(shape.part_names, assembly.types.tolist(), shape.part_classes.tolist(), columns, strict=True)
         )
     ]
     header = {

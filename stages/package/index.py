@@ -7,28 +7,45 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-__all__ = ["COLUMNS", "read_rows", "write_index"]
+from stages.shape.collection.declared import members
+from stages.shape.collection.members import Column
+
+__all__ = ["columns", "index_row", "read_rows", "write_index"]
 
 COLUMNS = {
-    "key": "string",
-    "split": "string",
-    "kit": "string",
-    "graph": "string",
-    "producer": "string",
-    "shard": "string",
-    "offset": "int64",
-    "bytes": "int64",
-    "parts": "int32",
-    "contacts": "int32",
-    "cycles": "int32",
-    "types": "int32",
-    "rooted": "bool",
-    "stable": "bool",
-    "margin": "float64",
-    "text": "string",
+    "key": Column("string", ("key",)),
+    "split": Column("string", ("split",)),
+    "kit": Column("string", ("kit",)),
+    "graph": Column("string", ("graph",)),
+    "producer": Column("string", ("producer",)),
+    "parts": Column("int32", ("counts", "parts")),
+    "contacts": Column("int32", ("counts", "contacts")),
+    "cycles": Column("int32", ("counts", "cycles")),
+    "types": Column("int32", ("counts", "types")),
+    "text": Column("string", ("text",)),
 }
-"""Columns and their Arrow types. `shard` is relative to the dataset's folder; the `bytes` bytes at `offset` of that
-file are the sample's members as a tar."""
+"""What the index takes from a record, beside the columns that stages declare."""
+
+PLACE = {"shard": "string", "offset": "int64", "bytes": "int64"}
+"""Where a sample stands: `shard` is relative to the dataset's folder; the `bytes` bytes at `offset` of that file are
+the sample's members as a tar."""
+
+
+def columns() -> dict[str, Column]:
+    """All columns that come from a record, by name."""
+    return COLUMNS | {name: column for each in members().values() for name, column in each.columns.items()}
+
+
+def index_row(record: Mapping[str, Any], path: str, offset: int, content: Mapping[str, bytes]) -> dict[str, Any]:
+    """The row of a sample whose `content` begins at `offset` of the shard at `path`."""
+    row: dict[str, Any] = {}
+    for name, column in columns().items():
+        value: Any = record
+        for step in column.place:
+            value = value[step]
+        row[name] = value
+    sizes = (512 + (len(each) + 511) // 512 * 512 for each in content.values())
+    return row | {"shard": path, "offset": offset, "bytes": sum(sizes)}
 
 
 def read_rows(files: Iterable[Path]) -> list[dict[str, Any]]:
@@ -41,6 +58,7 @@ def write_index(rows: list[dict[str, Any]] | list[Mapping[str, Any]], stream: Bi
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    schema = pa.schema([(name, pa.type_for_alias(kind)) for name, kind in COLUMNS.items()])
-    table = pa.table({name: pa.array([row[name] for row in rows], schema.field(name).type) for name in COLUMNS})
+    kinds = {name: column.kind for name, column in columns().items()} | PLACE
+    schema = pa.schema([(name, pa.type_for_alias(kind)) for name, kind in kinds.items()])
+    table = pa.table({name: pa.array([row[name] for row in rows], schema.field(name).type) for name in kinds})
     pq.write_table(table, stream, compression="zstd", row_group_size=65_536)

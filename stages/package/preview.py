@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pipeline.shards import bytes_array, read_shard
+from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Task
 from stages.package.settings import PackageConfig
 from stages.shape.arrays import ByteArray
-from stages.shape.collection.shapes import Collection
-from stages.shape.kit import Assembly, Kit
+from stages.shape.collection.collection import Collection
+from stages.shape.collection.declared import members
 from stages.shape.sample import Sample
-from stages.shape.shape import Shape, kit_shape, upright
+from stages.shape.shape import Shape, part_count, upright
 from stages.shape.views.buffers import Backend
 from stages.shape.views.camera import Camera
-from stages.shape.views.portrait import points_portrait, portrait
+from stages.shape.views.portrait import portrait
 from stages.shape.views.probe import backend_for
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
@@ -28,8 +27,6 @@ __all__ = ["draw_preview", "varied"]
 
 COLUMNS = 8
 CELL = 232
-EXEMPLARS = 16
-"""At most so many exemplars are shown."""
 MARK = 12
 """What differs from the background by more than so many levels is something shown."""
 PAD = 0.02
@@ -42,34 +39,33 @@ BELOW = replace(ABOVE, elevation=-ABOVE.elevation)
 
 
 def draw_preview(task: Task) -> Outcome:
-    """File of the shard: `.png`. Its params: `title`, all `samples`, and the `shards` to choose from.
+    """File of the shard: `.png`. Its params: `title`, all `samples`, the `shards` to choose from, and the stages that
+    have `rows` to show.
 
-    The first row of shapes, the points and the sketches show the same shapes, one a column.
+    The first row of shapes and the rows of the stages show the same shapes, one a column.
     """
-    config, sketches = task.config.section(PackageConfig), task.config.section(SketchesConfig)
+    params, config = task.shard.params, task.config.section(PackageConfig)
+    sketches = task.config.section(SketchesConfig)
     backend = backend_for(sketches.backend)
     camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
-    collection, shards = Collection(task), task.shard.params["shards"]
-    made = {stage: _members(task, stage, shards) for stage in ("points", "sketches")}
+    collection, shards = Collection(task), params["shards"]
+    made = {stage: _members(task, stage, shards) for stage in params["rows"]}
     samples = [each for shard in shards for each in collection.samples(shard)]
-    whole = [each for each in samples if all(each.key in members for members in made.values())]
+    whole = [each for each in samples if all(each.key in added for added in made.values())]
     whole = whole[:: -(-len(whole) // CHOSEN_FROM)]
     shown = varied([(each, collection.shape(each)) for each in whole], config.previewed)
-    columns = [sample.key for sample, _ in shown[:COLUMNS]]
-    clouds = {key: {name: bytes_array(made["points"][key][name]) for name in _CLOUD} for key in columns}
-    variants = [Cell(_picture(shape, camera, backend), _size(shape)) for _, shape in shown]
-    points = [Cell(_cloud_picture(clouds[key], camera)) for key in columns]
-    drawings = [Cell(_decoded(made["sketches"][key]["sketch0.png"])) for key in columns]
-    count = len(clouds[columns[0]]["points.npy"])
-    exemplars = [Section("Exemplars", _rows(_exemplars(list(collection.kits.values()), backend)), "what goes in")]
-    sections = [
-        *(exemplars if collection.kits else []),
-        Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {task.shard.params['samples']:,}"),
-        Section("Points", _rows(points), f"{count:,} a shape, coloured by part label"),
-        Section("Sketches", _rows(drawings), f"{len(sketches.views)} a shape, {sketches.size} × {sketches.size}"),
-    ]
+    variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in shown]
+    sections = [Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {params['samples']:,}")]
+    going_in = [Cell(_picture(shape, ABOVE, backend), said) for said, shape in collection.speaker.shown(COLUMNS)]
+    if going_in:
+        sections.insert(0, Section("Exemplars", _rows(going_in), "what goes in"))
+    for stage, added in made.items():
+        row = members()[stage].row
+        if row is not None:
+            cells = [Cell(row.draw(added[sample.key], camera, CELL)) for sample, _ in shown[:COLUMNS]]
+            sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
-        stream.write(picture_png(contact_sheet(sections, task.shard.params["title"], CELL)))
+        stream.write(picture_png(contact_sheet(sections, params["title"], CELL)))
     return Outcome(samples=0)
 
 
@@ -94,52 +90,12 @@ def _farthest(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple
     return [samples[each] for each in chosen]
 
 
-_CLOUD = ("points.npy", "labels.npy")
-
-
 def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[str, bytes]]:
     return {key: members for shard in shards for key, members in read_shard(task.input(stage, f"{shard}.tar"))}
 
 
-def _exemplars(kits: Sequence[Kit], backend: Backend) -> list[Cell]:
-    """Exemplars of all kits; where they leave room in their row, the commonest part types of the kits as well."""
-    exemplars = [(each.name, kit_shape(kit, each.assembly)) for kit in kits for each in kit.exemplars][:EXEMPLARS]
-    cells = [Cell(_picture(shape, ABOVE, backend), f"{name}, {_size(shape)}") for name, shape in exemplars]
-    room = -len(cells) % COLUMNS
-    return [*cells, *_part_types(kits, room, backend)]
-
-
-def _part_types(kits: Sequence[Kit], count: int, backend: Backend) -> list[Cell]:
-    cells = []
-    for kit in kits:
-        used = np.concatenate([each.assembly.types for each in kit.exemplars])
-        commonest = np.argsort(-np.bincount(used, minlength=len(kit.types)), kind="stable")
-        for index in commonest[: -(-count // len(kits))].tolist():
-            exemplar = next(each.assembly for each in kit.exemplars if index in each.assembly.types)
-            pose = exemplar.poses[exemplar.types == index][:1]
-            alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
-            cells.append(Cell(_picture(kit_shape(kit, alone), ABOVE, backend), f"part {kit.types[index].name}"))
-    return cells[:count]
-
-
 def _picture(shape: Shape, camera: Camera, backend: Backend) -> ByteArray:
     return portrait(scene_of(upright(shape)), camera, (CELL, CELL), backend=backend)
-
-
-def _cloud_picture(cloud: Mapping[str, np.ndarray], camera: Camera) -> ByteArray:
-    return points_portrait(
-        cloud["points.npy"].astype(np.float64), cloud["labels.npy"].astype(np.int32), camera, (CELL, CELL), "y"
-    )
-
-
-def _decoded(png: bytes) -> ByteArray:
-    from PIL import Image
-
-    return np.asarray(Image.open(io.BytesIO(png)).convert("L"))
-
-
-def _size(shape: Shape) -> str:
-    return f"{len(shape)} part" + ("" if len(shape) == 1 else "s")
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[Cell]]:

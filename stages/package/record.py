@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from stages.points.frame import shape_bounds
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.kit import Assembly
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
@@ -20,35 +20,33 @@ __all__ = ["cycle_count", "describe_sample", "rounded"]
 DECIMALS = 12
 
 
-def describe_sample(
-    sample: Sample,
-    shape: Shape,
-    text: str,
-    judged: Mapping[str, Any],
-    points: Mapping[str, Any],
-    views: Sequence[str],
-) -> dict[str, Any]:
-    """What the JSON says. `text` is the producer's own: canonical string, parameters or program; `judged` is
-    its physical validity and which of its parts touch; `points` says how
-    the cloud was made; `views` names the views of the sketches.
+def describe_sample(sample: Sample, language: str, shape: Shape, text: str, added: Mapping[str, Any]) -> dict[str, Any]:
+    """What the JSON says. `text` is the member of that name, of which the record has the first line where it is a
+    list of strings; `added` are the fields of the stages that add some, `contacts` among them.
 
     Nothing is null or empty: loaders guess a field's type from the first samples they see. The lineage differs from
-    sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it. `type` is
-    the index of a part's label.
+    sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it.
     """
-    parts = replace(shape.assembly, edges=np.array(judged["contacts"], dtype=np.int32).reshape(-1, 2))
+    parts = replace(shape.assembly, edges=np.array(added["contacts"], dtype=np.int32).reshape(-1, 2))
     return {
         "key": sample.key,
         "split": sample.split,
         "producer": sample.producer,
+        "language": language,
         "kit": sample.kit,
         "graph": sample.graph,
         "parents": list(sample.lineage.get("parents", ())) or [sample.kit],
         "lineage": json.dumps(sample.lineage, sort_keys=True, allow_nan=False),
         "parts": [
-            {"name": name, "label": shape.labels[label], "type": label, "instance": instance, "pose": pose}
-            for instance, (name, label, pose) in enumerate(
-                zip(shape.part_names, shape.part_labels.tolist(), parts.poses.tolist(), strict=True)
+            {"name": name, "label": shape.labels[label], "class": number, "instance": instance, "pose": pose}
+            for instance, (name, label, number, pose) in enumerate(
+                zip(
+                    shape.part_names,
+                    shape.part_labels.tolist(),
+                    shape.part_classes.tolist(),
+                    parts.poses.tolist(),
+                    strict=True,
+                )
             )
         ],
         # a list of pairs would be empty for a shape of one part
@@ -59,11 +57,9 @@ def describe_sample(
             "cycles": cycle_count(parts),
             "types": len(set(shape.part_labels.tolist())),
         },
-        "physics": dict(judged["physics"]),
         "bounds": rounded(shape_bounds(shape)).tolist(),
-        "text": text,
-        "points": dict(points),
-        "sketches": list(views),
+        "text": sample.text or text.split("\n", 1)[0],
+        **{name: value for name, value in added.items() if name != "contacts"},
     }
 
 

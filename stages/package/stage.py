@@ -8,12 +8,21 @@ from typing import Any
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
+from stages.package.described import described_members
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import config_sections
-from stages.package.merge import merge_shard, merged_stages
+from stages.package.merge import merge_shard
 from stages.package.preview import draw_preview
 from stages.package.settings import PackageConfig
-from stages.shape.collection.shards import PRODUCERS, check_producers, collection_shards, planned_producer
+from stages.shape.collection.declared import language_of, members, producers
+from stages.shape.collection.shards import (
+    MEMBERS,
+    PRODUCERS,
+    check_producers,
+    collection_shards,
+    planned_producer,
+    sample_count,
+)
 
 __all__ = ["STAGE"]
 
@@ -29,7 +38,7 @@ def plan(plan: Plan) -> list[Shard]:
     producer = planned_producer(plan)
     if producer is None:
         return []
-    merged = collection_shards(plan, *merged_stages(producer))
+    merged = _merged(plan)
     summaries = [plan.summary("package", shard.name) for shard in merged]
     if not merged or any(summary is None for summary in summaries):
         return merged
@@ -37,28 +46,46 @@ def plan(plan: Plan) -> list[Shard]:
     filled = [shard for shard in described if shard["samples"]]
     if not filled:
         return merged
-    kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
+    read = language_of(producer).reads(plan)
     shown = [shard["name"] for shard in filled[:PICTURE_SHARDS]]
-    stages = (producer, "points", "sketches")
+    rows = [stage for stage, each in members().items() if each.row and shown[0] in plan.shards(stage)]
     pictured = {
+        "producer": producer,
         "title": plan.config.title or plan.config.name,
         "samples": sum(shard["samples"] for shard in filled),
         "shards": shown,
+        "rows": rows,
     }
-    picture = Shard(PICTURE, pictured, (*kits, *(f"{stage}/{name}" for name in shown for stage in stages)))
+    picture = Shard(PICTURE, pictured, (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows))))
+    declared = producers()[producer]
     params = {
         "facts": _facts(plan),
         "producer": producer,
         "sections": config_sections(plan.config),
         "shards": filled,
-        "search": _search_endings(plan),
+        "members": described_members(plan.config, filled[0]["members"], language_of(producer).text),
+        "made": declared.sentence,
+        "splits": declared.splits,
+        "story": list(declared.card(plan)),
+        "variety": list(declared.variety(plan)),
         "rejects": _rejects(plan, producer),
-        "measures": _measures(plan),
+        "measures": dict(declared.measures(plan)),
         "preview": PICTURE,
         "package": VERSION,
     }
-    inputs = (*kits, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
+    inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
     return [*merged, picture, Shard(WHOLE, params, inputs)]
+
+
+def _merged(plan: Plan) -> list[Shard]:
+    """The shards of the dataset. Each reads the shard of its name of every stage that adds members to it."""
+    shards = []
+    planned = {stage: set(plan.shards(stage)) for stage in members()}
+    for shard in collection_shards(plan):
+        stages = [stage for stage, names in planned.items() if shard.name in names]
+        params = {**shard.params, "stages": stages}
+        shards.append(Shard(shard.name, params, (*shard.inputs, *(f"{stage}/{shard.name}" for stage in stages))))
+    return shards
 
 
 def run_shard(task: Task) -> Outcome:
@@ -97,18 +124,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all shards: what the stages before have made of each sample, and a mesh of a usual size."""
-    samples = sum(int(shard.params["samples"]) for shard in collection_shards(plan))
-    return samples * 300_000
-
-
-def _search_endings(plan: Plan) -> list[str]:
-    """How the search of each kit ended, in words, from the summaries of its last pool."""
-    summaries = [plan.summary("variations", shard) or {} for shard in plan.shards("variations")]
-    return [
-        f"{each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
-        for each in summaries
-        if each.get("why")
-    ]
+    return sample_count(plan) * 300_000
 
 
 def _rejects(plan: Plan, producer: str) -> dict[str, int]:
@@ -117,13 +133,6 @@ def _rejects(plan: Plan, producer: str) -> dict[str, int]:
     for shard in plan.shards(producer):
         counts.update(plan.rejects(producer, shard))
     return dict(sorted(counts.items()))
-
-
-def _measures(plan: Plan) -> dict[str, Any]:
-    """What the variants of each kit are worth, where they are variants."""
-    assignment = f"{plan.config.name}-assignment"
-    summary = plan.summary("variations", assignment) if assignment in plan.shards("variations") else None
-    return dict(summary["kits"]) if summary is not None else {}
 
 
 def _facts(plan: Plan) -> dict[str, Any]:
@@ -146,7 +155,7 @@ STAGE = Stage(
     name="package",
     version=VERSION,
     config=PackageConfig,
-    inputs=("exemplars", *PRODUCERS, "validity", "strings", "points", "sketches"),
+    inputs=(PRODUCERS, MEMBERS),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

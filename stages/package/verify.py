@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +22,7 @@ from pipeline.randomness import decision_rng
 from pipeline.yaml_text import read_yaml
 from stages.package.layout import MANIFEST
 from stages.package.verify_files import FileFindings, check_files, shard_samples
-from stages.shape.collection.shards import KIT_PRODUCER
-from stages.shape.kit import Kit
-from stages.shape.kit_files import load_kit
+from stages.shape.collection.declared import languages
 
 __all__ = ["main"]
 
@@ -60,8 +58,9 @@ def _arguments(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def _check_geometry(folder: Path, count: int, seed: int, findings: FileFindings) -> None:
-    """Compute contacts anew for `count` random samples of the dataset, or the whole shape where it is made of text."""
-    kits = _kits(folder)
+    """Hold `count` random samples of the dataset against what they were made from, as their language does."""
+    places = Places(folder.resolve().parent, folder.resolve().name)
+    spoken = {name: each.faults(places) for name, each in languages().items()}
     manifest = json.loads((folder / MANIFEST).read_text())
     total = manifest["samples"]
     chosen = np.sort(decision_rng(seed, "verify").choice(total, size=min(count, total), replace=False))
@@ -74,30 +73,8 @@ def _check_geometry(folder: Path, count: int, seed: int, findings: FileFindings)
         for position, (key, _, members) in enumerate(shard_samples(folder / shard["path"])):
             if position in wanted:
                 findings.look("geometry")
-                for what in _sample_faults(kits, members):
+                for what in spoken[json.loads(members["json"])["language"]](members):
                     findings.fault("geometry", f"{shard['path']}: {key}", what)
-
-
-def _sample_faults(kits: Mapping[str, Kit], members: Mapping[str, bytes]) -> Sequence[str]:
-    from stages.package.verify_geometry import geometry_faults
-    from stages.package.verify_text import text_faults
-
-    record = json.loads(members["json"])
-    if record["producer"] != KIT_PRODUCER:
-        return text_faults(members)
-    if record["kit"] not in kits:
-        return [f"its kit {record['kit']} is not beside the dataset in .work: make the dataset here, or --samples 0"]
-    return geometry_faults(kits[record["kit"]], members)
-
-
-def _kits(folder: Path) -> dict[str, Kit]:
-    """The kits that the dataset was made from, out of the mill's own folder."""
-    made = Places(folder.resolve().parent, folder.resolve().name).stage("exemplars").root
-    return {
-        path.stem: load_kit(path, path.with_suffix(".tar"))
-        for path in sorted(made.glob("*.json"))
-        if path.with_suffix(".tar").is_file()
-    }
 
 
 def _print(folder: Path, findings: FileFindings) -> None:

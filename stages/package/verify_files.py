@@ -209,12 +209,12 @@ def _sample_faults(key: str, split: str, members: Mapping[str, bytes]) -> Iterat
     if len({len(array) for array in arrays.values()}) != 1:
         yield "its point arrays differ in length"
     else:
-        types = np.array([part["type"] for part in record["parts"]])
+        types = np.array([part["class"] for part in record["parts"]])
         instances = arrays["instances.npy"]
         if instances.min() < 0 or instances.max() >= len(types):
             yield "its points name parts that are not there"
         elif (types[instances] != arrays["labels.npy"]).any():
-            yield "its point labels are not the types of their parts"
+            yield "its point labels are not the classes of their parts"
     for name, content in members.items():
         if name.endswith(".png") and not content.startswith(b"\x89PNG\r\n\x1a\n"):
             yield f"{name} is no PNG"

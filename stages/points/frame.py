@@ -1,4 +1,4 @@
-"""Where a shape stands and how large it is, and how a cloud is brought to a standard place and size."""
+"""How a cloud is brought to a standard place and size."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray
-from stages.shape.geometry.contact import world_boxes
+from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
-__all__ = ["Normalization", "normalization", "shape_bounds"]
+__all__ = ["Normalization", "normalization"]
 
 NormalizeMode = Literal["none", "unit_sphere", "unit_box"]
 
@@ -23,12 +22,6 @@ class Normalization:
 
     centre: tuple[float, float, float]
     scale: float
-
-
-def shape_bounds(shape: Shape) -> FloatArray:
-    """Lowest and highest corner of the box around all parts, float64 (2, 3)."""
-    boxes = world_boxes(shape.meshes, shape.assembly.types, shape.assembly.poses)
-    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
 def normalization(shape: Shape, mode: NormalizeMode) -> Normalization:

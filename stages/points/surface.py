@@ -99,7 +99,7 @@ def sample_shape(shape: Shape, n: int, rng: np.random.Generator) -> SurfacePoint
     rotations = poses[parts, :3, :3]
     points = np.einsum("nij,nj->ni", rotations, points) + poses[parts, :3, 3]
     normals = np.einsum("nij,nj->ni", rotations, normals)
-    return SurfacePoints(points, normals, shape.part_labels[parts], parts.astype(np.int16))
+    return SurfacePoints(points, normals, shape.part_classes[parts], parts.astype(np.int16))
 
 
 @lru_cache(maxsize=16)

@@ -12,7 +12,7 @@ import numpy as np
 from stages.shape.arrays import TypeArray
 from stages.shape.kit import Assembly, Kit, PartMesh
 
-__all__ = ["Shape", "kit_shape", "upright"]
+__all__ = ["Shape", "kit_shape", "part_count", "upright"]
 
 Z_TO_Y = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
@@ -26,6 +26,7 @@ class Shape:
     up: the axis that points up, `"y"` or `"z"`; labels: the vocabulary of part labels, the same for every shape of
     one kit or program, in a fixed order. The name of each mesh is one of them.
     own_names: a name for each part that no other part of the shape has; without, its label and a number.
+    first_class: in a dataset the id of the class of the first of `labels`; the others follow.
     """
 
     meshes: tuple[PartMesh, ...]
@@ -33,6 +34,7 @@ class Shape:
     up: Literal["y", "z"]
     labels: tuple[str, ...]
     own_names: tuple[str, ...] = ()
+    first_class: int = 0
 
     @cached_property
     def label_of(self) -> TypeArray:
@@ -45,6 +47,11 @@ class Shape:
         """For each part the index of its label in `labels`, int16 (n,)."""
         labels: TypeArray = self.label_of[self.assembly.types]
         return labels
+
+    @cached_property
+    def part_classes(self) -> TypeArray:
+        """For each part the id of its class in the dataset, int16 (n,)."""
+        return (self.part_labels + np.int16(self.first_class)).astype(np.int16)
 
     @cached_property
     def part_names(self) -> tuple[str, ...]:
@@ -65,6 +72,11 @@ class Shape:
 def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
     """The shape of an assembly of the kit's types; the label of a part is its type."""
     return Shape(kit.types, assembly, kit.up, kit.type_names())
+
+
+def part_count(shape: Shape) -> str:
+    """How many parts a shape has, in words."""
+    return f"{len(shape)} part{'' if len(shape) == 1 else 's'}"
 
 
 def upright(shape: Shape) -> Shape:

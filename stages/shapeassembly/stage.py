@@ -24,10 +24,11 @@ from stages.shapeassembly.checks import overflow, violations
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
 from stages.shapeassembly.interpreter import execute
+from stages.shapeassembly.language import assignment_name
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig
-from stages.shapeassembly.shape import shape_of_execution
+from stages.shapeassembly.shape import LABELS, shape_of_execution
 from stages.shapeassembly.sources import program_texts, source_digest
 from stages.shapeassembly.structure import signature
 
@@ -47,7 +48,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
         return extraction
     digests = [source_digest(each.path) for each in config.programs]
     inputs = tuple(f"shapeassembly/{shard.name}" for shard in extraction)
-    assignment = Shard(f"{plan.config.name}-assignment", {"job": "assignment", "digests": digests}, inputs)
+    assignment = Shard(assignment_name(plan.config.name), {"job": "assignment", "digests": digests}, inputs)
     summary = plan.summary("shapeassembly", assignment.name)
     if summary is None:
         return [*extraction, assignment]
@@ -74,7 +75,8 @@ def run_shard(task: Task) -> Outcome:
 def run_assignment(task: Task) -> Outcome:
     """Read and check all programs, and share them out; programs of one signature stand in one split.
 
-    Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line.
+    Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line, and `.labels.json`,
+    the part labels of each category.
     """
     config = task.config.section(ShapeAssemblyConfig)
     rows = list(_accepted(task, config))
@@ -94,6 +96,8 @@ def run_assignment(task: Task) -> Outcome:
             with task.output(f"{task.shard.name}.{name}-{number:06d}.jsonl") as stream:
                 stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
     counts = dict(sorted(Counter(row["kit"] for row in rows).items()))
+    with task.output(f"{task.shard.name}.labels.json") as stream:
+        stream.write(json_bytes(dict.fromkeys(counts, LABELS)))
     parts = float(np.mean([row["parts"] for row in rows]))
     return Outcome(0, {"shards": shards, "programs": counts, "structures": len(groups), "parts": round(parts, 2)})
 
@@ -149,7 +153,7 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
 def run_collection(task: Task) -> Outcome:
     """Write the samples of one shard."""
     split, number = task.shard.params["split"], task.shard.params["number"]
-    assignment = f"{task.config.name}-assignment"
+    assignment = assignment_name(task.config.name)
     listing = task.input("shapeassembly", f"{assignment}.{split}-{number:06d}.jsonl").read_text()
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for line in listing.rstrip("\n").split("\n"):
@@ -171,7 +175,7 @@ def _sample(row: dict[str, Any], split: str) -> Sample:
 
 def report(plan: Plan) -> Sequence[str]:
     """How many programs there are and of how many structures, and why the others were refused."""
-    name = f"{plan.config.name}-assignment"
+    name = assignment_name(plan.config.name)
     config = plan.config.section(ShapeAssemblyConfig)
     summary = plan.summary("shapeassembly", name) if config.has_sources else None
     if summary is None:
@@ -187,7 +191,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all samples, as far as they are known."""
-    summary = plan.summary("shapeassembly", f"{plan.config.name}-assignment")
+    summary = plan.summary("shapeassembly", assignment_name(plan.config.name))
     return BYTES_A_PROGRAM * sum(summary["programs"].values()) if summary else 0
 
 

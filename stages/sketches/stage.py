@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from pipeline.errors import ShardFailed
-from pipeline.shards import ShardWriter
-from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.shape.collection.shapes import Collection
-from stages.shape.collection.shards import PRODUCERS, collection_shards
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Plan, Stage, Task
+from stages.shape.collection.collection import Collection, add_members
+from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
 from stages.shape.views.buffers import Backend
 from stages.shape.views.probe import backend_for
@@ -15,34 +17,27 @@ from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment, png_bytes
 from stages.sketches.settings import SketchesConfig
 
-__all__ = ["STAGE", "SketchesConfig"]
-
-
-def plan(plan: Plan) -> list[Shard]:
-    """One shard for each shard of the collection."""
-    return collection_shards(plan)
+__all__ = ["STAGE"]
 
 
 def run_shard(task: Task) -> Outcome:
-    """Members of each sample: `sketch0.png`, `sketch1.png`, ..., one for each view.
+    """The members of each sample that `members.py` declares.
 
     Raises ShardFailed, naming the sample, for a drawing without a line.
     """
     config = task.config.section(SketchesConfig)
-    collection = Collection(task)
     backend = backend_for(config.backend)
-    total = int(task.shard.params["samples"])
-    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in collection.samples():
-            scene = scene_of(collection.shape(sample))
-            writer.write(sample.key, _drawings(task, config, sample, scene, backend))
-            task.progress(writer.samples, total)
-    summary = {"split": task.shard.params["split"], "views": [view.name for view in config.views], "backend": backend}
-    return Outcome(samples=writer.samples, summary=summary)
+
+    def drawings(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
+        return _drawings(task, config, sample, scene_of(collection.shape(sample)), backend)
+
+    samples = add_members(task, drawings)
+    views = [view.name for view in config.views]
+    return Outcome(samples, {"split": task.shard.params["split"], "views": views, "backend": backend})
 
 
 def _drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, backend: Backend) -> dict[str, bytes]:
-    members = {}
+    members = {"json": json_bytes({"sketches": [view.name for view in config.views]})}
     for index, view in enumerate(config.views):
         camera = jittered_camera(view, task.rng(sample.key, view.name, "camera"))
         try:
@@ -59,16 +54,15 @@ def _drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, 
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all drawings: about a fifth of a byte a pixel, and the tar's headers and padding."""
     config = plan.config.section(SketchesConfig)
-    samples = sum(int(shard.params["samples"]) for shard in collection_shards(plan))
-    return int(samples * len(config.views) * (0.2 * config.size**2 + 1024))
+    return int(sample_count(plan) * len(config.views) * (0.2 * config.size**2 + 1024))
 
 
 STAGE = Stage(
     name="sketches",
     version=1,
     config=SketchesConfig,
-    inputs=("exemplars", *PRODUCERS),
-    plan=plan,
+    inputs=(PRODUCERS,),
+    plan=collection_shards,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
 )

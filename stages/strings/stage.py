@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.errors import ShardFailed
-from pipeline.shards import ShardWriter, json_bytes
+from pipeline.errors import Rejected, ShardFailed
+from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.shape.collection.shapes import Collection
-from stages.shape.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards, producer_of
+from stages.shape.collection.collection import Collection, add_members
+from stages.shape.collection.declared import language_of
+from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
 from stages.shape.kit_input import input_kits
@@ -29,12 +30,12 @@ BYTES_A_STRING = 3000
 
 def plan(plan: Plan) -> list[Shard]:
     """One shard for each shard of the collection; when all are done, the corpus, which reads them all. None for
-    samples that are not made of kits: they come with a text of their own."""
-    shards = _kit_shards(plan)
+    samples that are no shape graphs: they come with a text of their own."""
+    shards = _graph_shards(plan)
     if not shards or any(plan.summary("strings", shard.name) is None for shard in shards):
         return shards
-    kits = tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
     splits = {shard.name: shard.params["split"] for shard in shards}
+    kits = language_of(shards[0].params["producer"]).reads(plan)
     corpus = Shard(CORPUS, {"splits": splits}, (*kits, *(f"strings/{shard.name}" for shard in shards)))
     return [*shards, corpus]
 
@@ -53,21 +54,22 @@ def write_strings(task: Task) -> Outcome:
     """
     config = task.config.section(StringsConfig)
     alphabets = {name: make_alphabet(kit.type_names()) for name, kit in input_kits(task).items()}
-    total, written, rows = int(task.shard.params["samples"]), 0, []
-    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in Collection(task).samples():
-            try:
-                strings = _strings(sample, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
-            except NotConnectedError as error:
-                task.reject(sample.key, "shape graph is not connected", str(error))
-                continue
-            written += len(strings)
-            writer.write(sample.key, {"txt": ("\n".join(strings) + "\n").encode()})
-            rows.append({"key": sample.key, "kit": sample.kit, "graph": sample.graph})
-            task.progress(writer.samples, total)
+    written, rows = 0, []
+
+    def strings_of(_: Collection, sample: Sample) -> Mapping[str, bytes]:
+        nonlocal written
+        try:
+            strings = _strings(sample, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
+        except NotConnectedError as error:
+            raise Rejected("shape graph is not connected", str(error)) from error
+        written += len(strings)
+        rows.append({"key": sample.key, "kit": sample.kit, "graph": sample.graph})
+        return {"txt": ("\n".join(strings) + "\n").encode()}
+
+    samples = add_members(task, strings_of)
     with task.output(f"{task.shard.name}.jsonl") as listing:
         listing.writelines(json_bytes(row) for row in rows)
-    return Outcome(writer.samples, {"split": task.shard.params["split"], "strings": written})
+    return Outcome(samples, {"split": task.shard.params["split"], "strings": written})
 
 
 def publish(plan: Plan) -> Mapping[str, str]:
@@ -90,12 +92,12 @@ def report(plan: Plan) -> Sequence[str]:
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all strings, in the shards and once more in the corpus."""
     strings = plan.config.section(StringsConfig).strings_per_shape + 1
-    samples = sum(int(shard.params["samples"]) for shard in _kit_shards(plan))
+    samples = sum(int(shard.params["samples"]) for shard in _graph_shards(plan))
     return samples * (2 * strings * BYTES_A_STRING + 2048)
 
 
-def _kit_shards(plan: Plan) -> list[Shard]:
-    return [each for each in collection_shards(plan) if producer_of(each) == KIT_PRODUCER]
+def _graph_shards(plan: Plan) -> list[Shard]:
+    return [each for each in collection_shards(plan) if language_of(each.params["producer"]).graphs]
 
 
 def _strings(sample: Sample, alphabet: Alphabet, count: int, rng: np.random.Generator) -> list[str]:
@@ -127,7 +129,7 @@ STAGE = Stage(
     name="strings",
     version=1,
     config=StringsConfig,
-    inputs=("exemplars", *PRODUCERS),
+    inputs=(PRODUCERS,),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from pipeline.shards import ShardWriter, json_bytes
-from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.shape.collection.shapes import Collection
-from stages.shape.collection.shards import KIT_PRODUCER, PRODUCERS, collection_shards
+from pipeline.errors import Rejected
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Plan, Stage, Task
+from stages.shape.collection.collection import Collection, add_members
+from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
+from stages.shape.sample import Sample
 
 __all__ = ["STAGE"]
 
@@ -18,34 +20,27 @@ COUNTED = ("rooted", "stable")
 BYTES_A_SAMPLE = 4096
 
 
-def plan(plan: Plan) -> list[Shard]:
-    """One shard for each shard of the collection."""
-    return collection_shards(plan)
-
-
 def run_shard(task: Task) -> Outcome:
-    """The member `json` of each sample: `physics`, the fields of its validity, and `contacts`, the pairs of parts that
-    touch. A sample without extent or weight is refused. The summary counts the rooted and the stable samples."""
+    """The fields of each sample's record that `members.py` declares. A sample without extent or weight is refused. The
+    summary counts the rooted and the stable samples."""
     config = task.config.section(PhysicsConfig)
-    collection = Collection(task)
-    total = int(task.shard.params["samples"])
     counts: Counter[str] = Counter()
-    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in collection.samples():
-            shape = collection.shape(sample)
-            judge = judge_of(shape.meshes, shape.up, config)
-            # a kit says itself what counts as contact; of parts made from a text nobody has asked yet
-            known = shape.assembly.edges if collection.producer == KIT_PRODUCER else judge.contacts(shape.assembly)
-            try:
-                fields = physical_fields(judge.validity(shape.assembly))
-            except ValueError as error:
-                task.reject(sample.key, "no body to judge", str(error))
-                continue
-            writer.write(sample.key, {"json": json_bytes({"physics": fields, "contacts": known.tolist()})})
-            counts.update(each for each in COUNTED if fields[each])
-            task.progress(writer.samples, total)
+
+    def judged(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
+        shape = collection.shape(sample)
+        judge = judge_of(shape.meshes, shape.up, config)
+        # a shape graph says itself what counts as contact; of parts made from a text nobody has asked yet
+        known = shape.assembly.edges if collection.language.graphs else judge.contacts(shape.assembly)
+        try:
+            fields = physical_fields(judge.validity(shape.assembly))
+        except ValueError as error:
+            raise Rejected("no body to judge", str(error)) from error
+        counts.update(each for each in COUNTED if fields[each])
+        return {"json": json_bytes({"physics": fields, "contacts": known.tolist()})}
+
+    samples = add_members(task, judged)
     summary = {"split": task.shard.params["split"], **{each: counts[each] for each in COUNTED}}
-    return Outcome(samples=writer.samples, summary={**summary, "samples": writer.samples})
+    return Outcome(samples, {**summary, "samples": samples})
 
 
 def report(plan: Plan) -> Sequence[str]:
@@ -63,9 +58,9 @@ STAGE = Stage(
     name="validity",
     version=3,
     config=PhysicsConfig,
-    inputs=("exemplars", *PRODUCERS),
-    plan=plan,
+    inputs=(PRODUCERS,),
+    plan=collection_shards,
     run_shard=run_shard,
-    estimate_bytes=lambda plan: BYTES_A_SAMPLE * sum(int(each.params["samples"]) for each in collection_shards(plan)),
+    estimate_bytes=lambda plan: BYTES_A_SAMPLE * sample_count(plan),
     report=report,
 )

@@ -31,8 +31,8 @@ from tests.stages.package.toy import (
     toy_samples,
 )
 
-MEMBERS = ["glb", "points.npy", "normals.npy", "labels.npy", "instances.npy", "sketch0.png", "sketch1.png"]
-MEMBERS += ["txt", "json"]
+MEMBERS = ["glb", "txt", "points.npy", "normals.npy", "labels.npy", "instances.npy", "sketch0.png", "sketch1.png"]
+MEMBERS += ["json"]
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -81,7 +81,8 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
         sample.graph,
     )
     assert json.loads(record["contacts"]) == sample.assembly.edges.tolist()
-    assert [part["type"] for part in record["parts"]] == sample.assembly.types.tolist()
+    first = {"blocks": 0, "planks": 2}[sample.kit]
+    assert [part["class"] for part in record["parts"]] == (sample.assembly.types + first).tolist()
     assert [part["label"] for part in record["parts"]] == [("tower", "long.wall")[k] for k in sample.assembly.types]
     assert record["counts"] == {
         "parts": len(sample.assembly),
@@ -110,7 +111,7 @@ def test_mesh_points_poses_and_bounds_share_upright_coordinates(toy_folder: Path
             pose = np.array(part["pose"])
             assert np.array_equal(scene.graph.get(part["name"])[0], pose)
             own = transform_points(invert(pose), points[instances == part["instance"]].astype(float))
-            low, high = boxes[part["type"]]
+            low, high = boxes[("tower", "long.wall").index(part["label"])]
             outside = np.maximum(low - own, own - high).max(axis=1)
             assert np.abs(outside).max(initial=0.0) < 1e-6
         checked.add(record["kit"])

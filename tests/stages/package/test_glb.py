@@ -57,7 +57,7 @@ def test_equal_parts_share_one_mesh_and_types_not_in_use_are_left_out() -> None:
     assert len(header_of(glb_bytes(kit_shape(kit, chain(6, 0))))["meshes"]) == 2
     only = header_of(glb_bytes(kit_shape(kit, chain(1, 1))))
     assert [mesh["name"] for mesh in only["meshes"]] == ["long.wall"]
-    assert only["nodes"][0]["extras"] == {"type": 1, "instance": 0}
+    assert only["nodes"][0]["extras"] == {"class": 1, "instance": 0}
 
 
 def test_each_face_keeps_its_colour_in_linear_light() -> None:

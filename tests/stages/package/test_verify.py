@@ -108,7 +108,7 @@ def test_samples_that_break_the_rules_are_found(folder: Path) -> None:
         rewrite(folder, listing, lambda text: text.replace(before, file_digest(folder / SHARD)))
     faults = "\n".join(check_files(folder).faults["samples"])
     assert f"{SHARD}: {first}: its json has nothing at kit" in faults
-    assert f"{SHARD}: {second}: its point labels are not the types of their parts" in faults
+    assert f"{SHARD}: {second}: its point labels are not the classes of their parts" in faults
 
 
 def test_a_folder_without_a_dataset_is_refused_with_the_mend(
@@ -130,7 +130,7 @@ def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_pa
     import json
 
     from pipeline.shards import read_shard
-    from stages.package.verify_geometry import geometry_faults
+    from stages.exemplars.faults import geometry_faults
     from tests.stages.package.toy import toy_kit
 
     samples = [members for path in toy_folder.rglob("*.tar") for _, members in read_shard(path)]

@@ -13,20 +13,20 @@ import numpy as np
 from pipeline.config import Config, StrictModel
 from pipeline.places import Places
 from pipeline.run import run_stage
-from pipeline.shards import ShardWriter
+from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
+from stages.points.settings import PointsConfig
 from stages.points.stage import STAGE as POINTS
-from stages.points.stage import PointsConfig
-from stages.shape.collection.shards import collection_shards
+from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, read_samples, write_sample
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.validity.stage import STAGE as VALIDITY
-from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 
 BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 BOX_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -144,7 +144,7 @@ def _make_sketches(task: Task) -> Outcome:
             if sample.key == REFUSED:
                 task.reject(sample.key, "blank drawing")
                 continue
-            members = {}
+            members = {"json": json_bytes({"sketches": [view.name for view in views]})}
             for view in range(len(views)):
                 pixels = np.full((24, 24), 255, dtype=np.uint8)
                 pixels[4 + view : 8 + view, 2 : 2 + len(sample.assembly)] = 0
@@ -159,20 +159,18 @@ def _no_bytes(_: Plan) -> int:
     return 0
 
 
-TOY_STAGES: Mapping[str, Stage] = {
-    **ABSENT_STAGES,
-    "exemplars": Stage("exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
-    "variations": Stage("variations", 1, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
-    "strings": Stage(
-        "strings", 1, OtherNoConfig, ("exemplars", "variations"), collection_shards, _make_strings, _no_bytes
-    ),
-    "points": POINTS,
-    "validity": VALIDITY,
-    "sketches": Stage(
-        "sketches", 1, SketchesConfig, ("exemplars", "variations"), collection_shards, _make_sketches, _no_bytes
-    ),
-    "package": replace(PACKAGE, check=lambda _: None),
-}
+TOY_STAGES: Mapping[str, Stage] = named_inputs(
+    [
+        *ABSENT_STAGES.values(),
+        Stage("exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
+        Stage("variations", 1, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
+        Stage("strings", 1, OtherNoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
+        POINTS,
+        VALIDITY,
+        Stage("sketches", 1, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
+        replace(PACKAGE, check=lambda _: None),
+    ]
+)
 
 
 def toy_config(shards: int = 8) -> Config:

@@ -18,7 +18,7 @@ from stages.shape.sample import Sample, write_sample
 from stages.sketches.image import png_array
 from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
 from stages.sketches.stage import STAGE
-from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.shape.views.solids import box, cylinder, kit_of, part_type, posed
 
 SHARDS = {"toys-train-000000": ("train", 3), "toys-val-000000": ("val", 2)}
@@ -63,12 +63,14 @@ def small(plan: Plan) -> int:
     return 100_000
 
 
-STAGES = {
-    **ABSENT_STAGES,
-    "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
-    "variations": Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
-    "sketches": STAGE,
-}
+STAGES = named_inputs(
+    [
+        *ABSENT_STAGES.values(),
+        Stage("exemplars", 1, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
+        Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
+        STAGE,
+    ]
+)
 
 
 def turn(out: Path, flat: bool = False, **keys: object) -> dict[str, RunResult]:
@@ -100,8 +102,8 @@ def test_each_sample_gets_one_drawing_a_view(plain):
     assert [key for key, _ in plain["toys-train-000000"]] == ["train-0", "train-1", "train-2"]
     for samples in plain.values():
         for _, members in samples:
-            assert sorted(members) == ["sketch0.png", "sketch1.png", "sketch2.png"]
-            drawings = [png_array(content) for content in members.values()]
+            assert sorted(members) == ["json", "sketch0.png", "sketch1.png", "sketch2.png"]
+            drawings = [png_array(members[name]) for name in sorted(members) if name.endswith(".png")]
             assert all(drawing.shape == (48, 48) and drawing.min() < 128 for drawing in drawings)
             assert not (drawings[0] == drawings[2]).all()
 

@@ -26,7 +26,7 @@ from stages.strings.decoder import decode
 from stages.strings.settings import StringsConfig
 from stages.strings.stage import STAGE
 from stages.strings.statistics import measure_string
-from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.strings.graphs import arrays
 
 KITS = {"castle": ("tower", "gate", "wall"), "chain": tuple(f"link {index}" for index in range(53))}
@@ -93,12 +93,14 @@ def small(plan: Plan) -> int:
     return 100_000
 
 
-STAGES: Mapping[str, Stage] = {
-    **ABSENT_STAGES,
-    "exemplars": Stage("exemplars", 1, KitsConfig, (), plan_kits, make_kit, small),
-    "variations": Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
-    "strings": STAGE,
-}
+STAGES: Mapping[str, Stage] = named_inputs(
+    [
+        *ABSENT_STAGES.values(),
+        Stage("exemplars", 1, KitsConfig, (), plan_kits, make_kit, small),
+        Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
+        STAGE,
+    ]
+)
 
 
 def config(flaw: str = "", count: int = 8) -> Config:

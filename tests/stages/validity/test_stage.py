@@ -15,12 +15,13 @@ from pipeline.run import run_stage
 from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.programs.program import find_program
+from stages.programs.settings import ProgramsConfig
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, write_sample
 from stages.validity.stage import STAGE
-from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES
+from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.shape.views.solids import box, kit_of, part_type, posed
 
 STOOL = "tests.stages.programs.stool"
@@ -60,17 +61,20 @@ def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict
     producer = samples[0].producer
     stages: dict[str, Stage] = {
         "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda _: [Shard("solids")], make_kit, small),
-        "variations": Stage("variations", 1, SamplesConfig, (), lambda _: [], make_samples, small),
+        "variations": Stage("variations", 1, SamplesConfig, ("exemplars",), lambda _: [], make_samples, small),
         **ABSENT_STAGES,
     }
-    stages[producer] = Stage(producer, 1, SamplesConfig, (), plan, make_samples, small)
-    stages["validity"] = STAGE
+    config_of = {"programs": ProgramsConfig}.get(producer, SamplesConfig)
+    stages[producer] = Stage(producer, 1, config_of, stages[producer].inputs, plan, make_samples, small)
+    stages = named_inputs([*stages.values(), STAGE])
     sections = {
         "exemplars": KitsConfig(),
         "variations": SamplesConfig(),
         **ABSENT_SECTIONS,
         "validity": PhysicsConfig(),
     }
+    if producer == "programs":
+        sections["programs"] = ProgramsConfig(program=samples[0].kit)
     config = Config(name="toys", version="1.0.0", seed=5, sections=sections, path=Path("toys.yaml"))
     for name in stages:
         assert not run_stage(name, stages, config, Places(out, "toys"), workers=1).failed

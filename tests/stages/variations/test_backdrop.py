@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from trimesh.transformations import translation_matrix
 
+from stages.exemplars.faults import geometry_faults
 from stages.exemplars.settings import HubConfig
 from stages.package.glb import glb_bytes
-from stages.package.verify_geometry import geometry_faults
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
@@ -92,7 +92,8 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
     for exemplar in kit.exemplars:
         whole = backdrop.fit(exemplar.assembly)
         names = kit_shape(kit, whole).part_names
-        parts = [{"name": name, "type": index} for name, index in zip(names, whole.types.tolist(), strict=True)]
+        labels = [kit.types[index].name for index in whole.types]
+        parts = [{"name": name, "label": label} for name, label in zip(names, labels, strict=True)]
         record = json.dumps({"parts": parts, "contacts": json.dumps(whole.edges.tolist())}).encode()
         assert geometry_faults(kit, {"json": record, "glb": glb_bytes(kit_shape(kit, whole))}) == []
         string = canonical_string(whole.types, whole.edges, alphabet).string

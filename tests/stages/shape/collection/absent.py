@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from pipeline.config import StrictModel
 from pipeline.stage import Outcome, Stage
-from stages.shape.collection.shards import PRODUCERS
+from stages.shape.collection.declared import members, producers
 
-__all__ = ["ABSENT_SECTIONS", "ABSENT_STAGES"]
+__all__ = ["ABSENT_SECTIONS", "ABSENT_STAGES", "named_inputs"]
 
 
 class NothingConfig(StrictModel):
@@ -16,6 +17,23 @@ class NothingConfig(StrictModel):
 
 
 ABSENT_STAGES: Mapping[str, Stage] = {
-    name: Stage(name, 1, NothingConfig, (), lambda _: [], lambda _: Outcome(0), lambda _: 0) for name in PRODUCERS[1:]
+    name: Stage(name, 1, NothingConfig, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
+    for name in producers()
+    if name != "variations"
 }
 ABSENT_SECTIONS: Mapping[str, StrictModel] = {name: NothingConfig() for name in ABSENT_STAGES}
+
+
+def named_inputs(stages: Iterable[Stage]) -> dict[str, Stage]:
+    """The stages by name, with all inputs by name, as the mill finds them; of those that may be, the ones that are."""
+    known = {stage.name: stage for stage in stages}
+    meant = {"*/producer.py": tuple(producers()), "*/members.py": tuple(members())}
+    return {
+        name: replace(
+            stage,
+            inputs=tuple(
+                each for asked in stage.inputs for each in meant.get(asked, (asked,)) if asked == each or each in known
+            ),
+        )
+        for name, stage in known.items()
+    }

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 import yaml
 
+from pipeline.places import Places
 from pipeline.shards import bytes_array
 from stages.package.verify_files import shard_samples
-from stages.package.verify_text import text_faults
+from stages.programs.language import LANGUAGE
 
 STAGES = (
     "exemplars",
@@ -77,7 +78,7 @@ def test_samples_of_a_program_have_the_members_and_fields_of_all_samples(made: t
         assert record["text"] == members["txt"].decode()
         assert set(json.loads(record["text"])) <= {"height", "scale x", "has_rail", "rail_height"}
         labels = bytes_array(members["labels.npy"])
-        parts = np.array([part["type"] for part in record["parts"]])
+        parts = np.array([part["class"] for part in record["parts"]])
         assert (parts[bytes_array(members["instances.npy"])] == labels).all()
         assert {part["label"] for part in record["parts"]} <= {"seat", "leg", "rail"}
 
@@ -96,7 +97,7 @@ def test_the_card_explains_every_parameter(made: tuple[Path, tuple[str, ...]]) -
 
 
 def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tuple[str, ...]]) -> None:
-    samples = list(samples_of(made[0]).values())
+    samples, text_faults = list(samples_of(made[0]).values()), LANGUAGE.faults(Places(made[0], "toy"))
     assert text_faults(samples[0]) == []
     other = next(each for each in samples if each["txt"] != samples[0]["txt"])
     assert text_faults({**samples[0], "glb": other["glb"]})
@@ -134,11 +135,11 @@ def test_a_row_of_the_index_finds_its_sample(made: tuple[Path, tuple[str, ...]])
 def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
     code, printed = run("run", "exemplars", *config_of(tmp_path, {}))
     assert code == 2
-    assert "a dataset needs one of exemplars.kits, programs.program" in printed
+    assert "a dataset needs one of programs.program, shapeassembly.programs or hierarchies, exemplars.kits" in printed
     assert "this has none" in printed
 
 
 def test_a_config_that_makes_shapes_in_two_ways_is_refused(tmp_path: Path) -> None:
     code, printed = run("run", "exemplars", *config_of(tmp_path, {**STOOLS, **KITS}))
     assert code == 2
-    assert "this has exemplars.kits and programs.program" in printed
+    assert "this has programs.program and exemplars.kits" in printed

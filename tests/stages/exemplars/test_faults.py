@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from stages.exemplars.faults import geometry_faults
 from stages.package.glb import glb_bytes
-from stages.package.verify_geometry import geometry_faults
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from tests.stages.variations.toy import ROAD, kit_of, ring
@@ -21,7 +21,7 @@ def kit() -> Kit:
 
 def faults(kit: Kit, assembly: Assembly) -> list[str]:
     parts = [
-        {"name": name, "type": index}
+        {"name": name, "label": kit.types[index].name}
         for name, index in zip(kit_shape(kit, assembly).part_names, assembly.types.tolist(), strict=True)
     ]
     record = json.dumps({"parts": parts, "contacts": json.dumps(assembly.edges.tolist())}).encode()

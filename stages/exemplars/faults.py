@@ -35,7 +35,8 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     """
     record = json.loads(members["json"])
     names = [part["name"] for part in record["parts"]]
-    types = np.array([part["type"] for part in record["parts"]], dtype=np.int16)
+    places = {name: place for place, name in enumerate(kit.type_names())}
+    types = np.array([places[part["label"]] for part in record["parts"]], dtype=np.int16)
     meshes, poses = _parts_of(members["glb"], names)
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)

@@ -1,0 +1,96 @@
+"""The language of kits: a sample is an assembly of a kit's parts, and its shape is those parts at their poses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pipeline.places import Places
+from pipeline.stage import Plan
+from stages.shape.collection.language import Faults, Language, Source
+from stages.shape.kit import Assembly, Kit
+from stages.shape.kit_files import load_kit
+from stages.shape.kit_input import input_kits
+from stages.shape.sample import Sample
+from stages.shape.shape import Shape, kit_shape, part_count
+
+__all__ = ["LANGUAGE", "Kits"]
+
+
+class Kits:
+    """The kits that a shard reads."""
+
+    def __init__(self, kits: Mapping[str, Kit]) -> None:
+        self._kits = kits
+        self.sources = {name: _source(kit) for name, kit in kits.items()}
+
+    def shape(self, sample: Sample) -> Shape:
+        """The parts of the sample's assembly at their poses."""
+        return kit_shape(self._kits[sample.kit], sample.assembly)
+
+    def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
+        """The exemplars of all kits, twice `count` at most; where they leave a row of `count` unfilled, the commonest
+        part types of the kits as well."""
+        found = [(each.name, kit_shape(kit, each.assembly)) for kit in self._kits.values() for each in kit.exemplars][
+            : 2 * count
+        ]
+        captioned = [(f"{name}, {part_count(shape)}", shape) for name, shape in found]
+        return [*captioned, *self._commonest(-len(found) % count)]
+
+    def _commonest(self, count: int) -> list[tuple[str, Shape]]:
+        parts = []
+        for kit in self._kits.values():
+            used = np.concatenate([each.assembly.types for each in kit.exemplars])
+            commonest = np.argsort(-np.bincount(used, minlength=len(kit.types)), kind="stable")
+            for index in commonest[: -(-count // len(self._kits))].tolist():
+                exemplar = next(each.assembly for each in kit.exemplars if index in each.assembly.types)
+                pose = exemplar.poses[exemplar.types == index][:1]
+                alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
+                parts.append((f"part {kit.types[index].name}", kit_shape(kit, alone)))
+        return parts[:count]
+
+
+def _source(kit: Kit) -> Source:
+    count = len(kit.exemplars)
+    colors = [np.median(each.face_colors, axis=0).astype(np.uint8).tolist() for each in kit.types]
+    return Source(
+        kit.type_names(),
+        tuple((red, green, blue) for red, green, blue in colors),
+        f"{count} exemplar{'' if count == 1 else 's'}, {len(kit.types)} part types",
+    )
+
+
+def _reads(plan: Plan) -> tuple[str, ...]:
+    return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
+
+
+def _faults(places: Places) -> Faults:
+    """Contacts, grammar and penetration of a sample, with the kits of the dataset out of the mill's folder."""
+    from stages.exemplars.faults import geometry_faults
+
+    made = places.stage("exemplars").root
+    kits = {
+        path.stem: load_kit(path, path.with_suffix(".tar"))
+        for path in sorted(made.glob("*.json"))
+        if path.with_suffix(".tar").is_file()
+    }
+
+    def faults(members: Mapping[str, bytes]) -> Sequence[str]:
+        name = json.loads(members["json"])["kit"]
+        if name not in kits:
+            return [f"its kit {name} is not beside the dataset in .work: make the dataset here, or --samples 0"]
+        return geometry_faults(kits[name], members)
+
+    return faults
+
+
+LANGUAGE = Language(
+    name="kit",
+    reads=_reads,
+    speaker=lambda task: Kits(input_kits(task)),
+    graphs=True,
+    text="Its shape graph as strings, SMILES-like, one a line, the first canonical.",
+    faults=_faults,
+)

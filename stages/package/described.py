@@ -1,0 +1,37 @@
+"""The members of a dataset's samples in words and types: those that stages declare, and package's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pipeline.config import Config
+from stages.shape.collection.declared import members
+from stages.shape.collection.members import TEXT, Member
+
+__all__ = ["described_members"]
+
+OWN = (
+    Member(
+        "glb",
+        "The mesh: glTF 2.0, one node a part, named by its label (`tower.000`), equal parts sharing one mesh. Node "
+        "`extras` hold `class` and `instance`.",
+    ),
+    Member("json", "Everything else: parts with label, class and pose (4x4), contacts, counts, bounds, lineage."),
+)
+
+
+def described_members(config: Config, names: Sequence[str], text: str) -> list[dict[str, Any]]:
+    """Name, sentence, dtype and shape of each member that samples have, as JSON. `text` says what `txt` is.
+
+    Raises ValueError for a member that nobody declares.
+    """
+    declared = {each.name: each for stage in members().values() for each in stage.of(config)}
+    declared |= {each.name: each for each in (*OWN, Member(TEXT, text))}
+    unknown = [name for name in names if name not in declared]
+    if unknown:
+        raise ValueError(f"samples have {', '.join(unknown)}, which no stage declares in its members.py")
+    return [
+        {"name": name, "sentence": each.sentence, "dtype": each.dtype, "shape": list(each.shape)}
+        for name, each in ((name, declared[name]) for name in names)
+    ]

@@ -1,0 +1,63 @@
+"""What stage `points` adds to every sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.config import Config
+from pipeline.shards import bytes_array
+from stages.points.settings import PointsConfig
+from stages.shape.arrays import ByteArray
+from stages.shape.collection.members import Field, Member, Members, Row
+from stages.shape.views.camera import Camera
+
+__all__ = ["MEMBERS"]
+
+
+def _members(config: Config) -> tuple[Member, ...]:
+    section = config.section(PointsConfig)
+    count = section.uniform + section.farthest
+    return (
+        Member("points.npy", "Point cloud.", "float32", (count, 3)),
+        Member("normals.npy", "Unit normals of the points.", "float32", (count, 3)),
+        Member("labels.npy", "Class of the part that each point lies on, by its id.", "int16", (count,)),
+        Member("instances.npy", "Part that each point lies on, by its place in the record.", "int16", (count,)),
+    )
+
+
+def _fields(_: Config) -> Mapping[str, Field]:
+    count = {"type": "integer", "minimum": 0}
+    return {
+        "points": Field(
+            {
+                "description": "how the cloud was made: the first `farthest` points are picked farthest first, the "
+                "others drawn by area; (coordinates of the mesh - centre) * scale are those of the points",
+                "type": "object",
+                "properties": {
+                    "farthest": count,
+                    "uniform": count,
+                    "centre": {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+                    "scale": {"type": "number", "exclusiveMinimum": 0},
+                },
+                "required": ["farthest", "uniform", "centre", "scale"],
+                "additionalProperties": False,
+            }
+        )
+    }
+
+
+def _caption(config: Config) -> str:
+    section = config.section(PointsConfig)
+    return f"{section.uniform + section.farthest:,} a shape, coloured by part label"
+
+
+def _draw(members: Mapping[str, bytes], camera: Camera, size: int) -> ByteArray:
+    from stages.shape.views.portrait import points_portrait
+
+    points, labels = bytes_array(members["points.npy"]), bytes_array(members["labels.npy"])
+    return points_portrait(points.astype(np.float64), labels.astype(np.int32), camera, (size, size), "y")
+
+
+MEMBERS = Members(of=_members, fields=_fields, row=Row("Points", _caption, _draw))

@@ -1,0 +1,60 @@
+"""The language of curve programs: a sample is a program's parameters, its shape is what the program makes of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+
+from pipeline.places import Places
+from pipeline.stage import Plan, Task
+from stages.programs.program import find_program, shape_of_text
+from stages.programs.settings import ProgramsConfig
+from stages.shape.collection.language import Faults, Language, Source
+from stages.shape.sample import Sample
+from stages.shape.shape import Shape
+
+__all__ = ["LANGUAGE"]
+
+
+class Parameters:
+    """The program of the config."""
+
+    def __init__(self, name: str) -> None:
+        self.sources = {name: Source(find_program(name).labels)}
+
+    def shape(self, sample: Sample) -> Shape:
+        """The shape of the program called `sample.kit` at the parameters that `sample.text` says. Raises ParameterError
+        for a text that is none of its own."""
+        return shape_of_text(sample.kit, sample.text)
+
+    def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
+        """Nothing: a program begins with numbers."""
+        return ()
+
+
+def _reads(_: Plan) -> tuple[str, ...]:
+    return ()
+
+
+def _speaker(task: Task) -> Parameters:
+    return Parameters(task.config.section(ProgramsConfig).program)
+
+
+def _faults(_: Places) -> Faults:
+    from stages.shape.collection.text_faults import text_faults
+
+    def faults(members: Mapping[str, bytes]) -> Sequence[str]:
+        record = json.loads(members["json"])
+        return text_faults(shape_of_text(record["kit"], record["text"]), members)
+
+    return faults
+
+
+LANGUAGE = Language(
+    name="program",
+    reads=_reads,
+    speaker=_speaker,
+    graphs=False,
+    text="Its parameters as JSON.",
+    faults=_faults,
+)

@@ -1,0 +1,29 @@
+"""What stage `programs` says of itself as a producer of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.stage import Plan
+from stages.programs.program import find_program
+from stages.programs.recipe import recipe_markdown
+from stages.programs.settings import ProgramsConfig
+from stages.shape.collection.producer import Producer
+
+__all__ = ["PRODUCER"]
+
+
+def _recipe(plan: Plan) -> Sequence[str]:
+    return [recipe_markdown(find_program(plan.config.section(ProgramsConfig).program)).rstrip()]
+
+
+PRODUCER = Producer(
+    language="program",
+    keys="programs.program",
+    asked=lambda config: bool(config.section(ProgramsConfig).program),
+    sentence="curve programs are run on parameters drawn from their ranges; a shape's parameters are its `txt`.",
+    splits="No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike up to "
+    "their continuous parameters stand in one split; where every value of every parameter is sampled, all splits have "
+    "all values, as published.",
+    card=_recipe,
+)

@@ -1,0 +1,47 @@
+"""The classes of a dataset: one id for each part label of each of its sources, the same in every member and split."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from stages.shape.collection.language import Source
+
+__all__ = ["Classes", "PartClass"]
+
+GREY = (160, 160, 160)
+
+
+@dataclass(frozen=True)
+class PartClass:
+    """One class. id: what labels say; name: the part label; kit: the source it belongs to; color: sRGB."""
+
+    id: int
+    name: str
+    kit: str
+    color: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Classes:
+    """The classes in the order of their ids; first: the id of the first class of each source. The classes of one
+    source have ids that follow each other, in the order of its labels."""
+
+    all: tuple[PartClass, ...]
+    first: Mapping[str, int]
+
+    @classmethod
+    def of(cls, sources: Mapping[str, Source]) -> Classes:
+        """The classes of the sources of a dataset. Raises ValueError for more than an int16 can count."""
+        found: list[PartClass] = []
+        first: dict[str, int] = {}
+        for kit, source in sources.items():
+            first[kit] = len(found)
+            colors = source.colors or (GREY,) * len(source.labels)
+            found += [
+                PartClass(len(found) + place, name, kit, color)
+                for place, (name, color) in enumerate(zip(source.labels, colors, strict=True))
+            ]
+        if len(found) > 2**15:
+            raise ValueError(f"the dataset has {len(found):,} part labels; labels are 16-bit numbers: at most 32,768")
+        return cls(tuple(found), first)

@@ -1,0 +1,52 @@
+"""The samples of a shard of the collection and the shape of each, and the one loop that adds something to them all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+
+from pipeline.errors import Rejected
+from pipeline.shards import ShardWriter
+from pipeline.stage import Task
+from stages.shape.collection.classes import Classes
+from stages.shape.collection.declared import language_of
+from stages.shape.sample import Sample, read_samples
+from stages.shape.shape import Shape, upright
+
+__all__ = ["Collection", "add_members"]
+
+
+class Collection:
+    """What the shard of a task reads of the collection. Shapes are upright, y up: the coordinates of a dataset."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self.producer = str(task.shard.params["producer"])
+        self.language = language_of(self.producer)
+        self.speaker = self.language.speaker(task)
+        self.classes = Classes.of(self.speaker.sources)
+
+    def samples(self, shard: str = "") -> Iterator[Sample]:
+        """The samples of the collection's shard `shard`, or of the task's own, in order, one in memory at a time."""
+        return read_samples(self._task.input(self.producer, f"{shard or self._task.shard.name}.tar"))
+
+    def shape(self, sample: Sample) -> Shape:
+        """The shape of a sample. The classes of its parts are those of the dataset."""
+        shape = upright(self.speaker.shape(sample))
+        return replace(shape, first_class=self.classes.first[sample.kit])
+
+
+def add_members(task: Task, made: Callable[[Collection, Sample], Mapping[str, bytes]]) -> int:
+    """Write the shard's tar: for each sample of the collection what `made` answers, under the sample's key.
+
+    A sample for which it raises Rejected is refused and counted. Answers how many samples were written.
+    """
+    collection, total = Collection(task), int(task.shard.params["samples"])
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for sample in collection.samples():
+            try:
+                writer.write(sample.key, made(collection, sample))
+            except Rejected as error:
+                task.reject(sample.key, error.reason, error.detail)
+            task.progress(writer.samples, total)
+    return writer.samples

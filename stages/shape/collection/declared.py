@@ -1,0 +1,53 @@
+"""Finds what the folders of the house declare: producers, languages, members."""
+
+from __future__ import annotations
+
+import importlib
+from functools import cache
+from typing import TypeVar
+
+import stages
+from pipeline.errors import ConfigError
+from pipeline.registry import folders_with
+from stages.shape.collection.language import Language
+from stages.shape.collection.members import Members
+from stages.shape.collection.producer import Producer
+
+__all__ = ["language_of", "languages", "members", "producers"]
+
+Declared = TypeVar("Declared")
+
+
+def producers() -> dict[str, Producer]:
+    """The producers by the stage that each is."""
+    return _declared("producer", Producer)
+
+
+def languages() -> dict[str, Language]:
+    """The languages by their names."""
+    return {each.name: each for each in _declared("language", Language).values()}
+
+
+def members() -> dict[str, Members]:
+    """What is added to every sample, by the stage that adds it."""
+    return _declared("members", Members)
+
+
+def language_of(producer: str) -> Language:
+    """The language of the samples of a producer. Raises ConfigError for one that nobody declares."""
+    known, name = languages(), producers()[producer].language
+    if name not in known:
+        raise ConfigError(f"producer {producer} makes samples in the language {name!r}; there are {', '.join(known)}")
+    return known[name]
+
+
+@cache
+def _declared(what: str, kind: type[Declared]) -> dict[str, Declared]:
+    """The `WHAT` of each `stages/<folder>/<what>.py`, by folder. Raises TypeError for a file without it."""
+    found: dict[str, Declared] = {}
+    for folder in folders_with(stages.__name__, f"{what}.py"):
+        declared = getattr(importlib.import_module(f"{stages.__name__}.{folder}.{what}"), what.upper(), None)
+        if not isinstance(declared, kind):
+            raise TypeError(f"stages/{folder}/{what}.py must hold {what.upper()} = {kind.__name__}(...)")
+        found[folder] = declared
+    return found

@@ -1,0 +1,64 @@
+"""What a sample is: a language that turns its assembly or its text into a `Shape`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from pipeline.places import Places
+from pipeline.stage import Plan, Task
+from stages.shape.sample import Sample
+from stages.shape.shape import Shape
+
+__all__ = ["Faults", "Language", "Source", "Speaker"]
+
+Faults = Callable[[Mapping[str, bytes]], Sequence[str]]
+"""What is wrong with the sample of which these are the members: a sentence for each fault."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where samples come from: a kit, a program, a category of programs. `Sample.kit` names it.
+
+    labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none;
+    sentence: what a card says of it, in a few words.
+    """
+
+    labels: tuple[str, ...]
+    colors: tuple[tuple[int, int, int], ...] = ()
+    sentence: str = ""
+
+
+class Speaker(Protocol):
+    """A language with what it reads of a task: it knows the sources of the dataset."""
+
+    @property
+    def sources(self) -> Mapping[str, Source]:
+        """All sources of the dataset by name, in the order of the config."""
+
+    def shape(self, sample: Sample) -> Shape:
+        """The shape of a sample. Raises ValueError or an error of its own for a text that it does not understand."""
+
+    def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
+        """About `count` shapes with captions that go into the making, for the first row of a contact sheet."""
+
+
+@dataclass(frozen=True)
+class Language:
+    """One language. `LANGUAGE = Language(...)` stands in `stages/<stage>/language.py`.
+
+    name: what records call it; reads: the records, as `stage/shard`, without which it cannot make shapes;
+    speaker: the language inside a task whose shard has those among its inputs.
+    graphs: whether its samples are shape graphs, with contacts of their own and strings; else they have a text, and
+    contacts are found by whoever asks.
+    text: what the member `txt` of its samples is, for the card.
+    faults: how a packaged sample is held against what it was made from, given the mill's folders of its dataset.
+    """
+
+    name: str
+    reads: Callable[[Plan], tuple[str, ...]]
+    speaker: Callable[[Task], Speaker]
+    graphs: bool
+    text: str
+    faults: Callable[[Places], Faults]

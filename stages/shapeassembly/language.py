@@ -1,0 +1,63 @@
+"""The language of ShapeAssembly programs: a sample is a program, and its shape is its cuboids."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+
+from pipeline.places import Places
+from pipeline.stage import Plan, Task
+from stages.shape.collection.language import Faults, Language, Source
+from stages.shape.sample import Sample
+from stages.shape.shape import Shape
+from stages.shapeassembly.shape import shape_of_text
+
+__all__ = ["LANGUAGE", "assignment_name"]
+
+
+class Programs:
+    """The categories of programs that the assignment has listed with the labels of their parts."""
+
+    def __init__(self, listed: Mapping[str, Sequence[str]]) -> None:
+        self.sources = {kit: Source(tuple(labels)) for kit, labels in listed.items()}
+
+    def shape(self, sample: Sample) -> Shape:
+        """The executed program. Raises ProgramError for a text that is none."""
+        return shape_of_text(sample.text)
+
+    def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
+        """Nothing: a program begins with a text."""
+        return ()
+
+
+def assignment_name(dataset: str) -> str:
+    """The shard that shares out the programs of a dataset, and lists the labels of their parts."""
+    return f"{dataset}-assignment"
+
+
+def _reads(plan: Plan) -> tuple[str, ...]:
+    return (f"shapeassembly/{assignment_name(plan.config.name)}",)
+
+
+def _speaker(task: Task) -> Programs:
+    listed = task.input("shapeassembly", f"{assignment_name(task.config.name)}.labels.json")
+    return Programs(json.loads(listed.read_bytes()))
+
+
+def _faults(_: Places) -> Faults:
+    from stages.shape.collection.text_faults import text_faults
+
+    def faults(members: Mapping[str, bytes]) -> Sequence[str]:
+        return text_faults(shape_of_text(json.loads(members["json"])["text"]), members)
+
+    return faults
+
+
+LANGUAGE = Language(
+    name="shapeassembly",
+    reads=_reads,
+    speaker=_speaker,
+    graphs=False,
+    text="Its ShapeAssembly program.",
+    faults=_faults,
+)

@@ -1,0 +1,16 @@
+"""What stage `shapeassembly` says of itself as a producer of samples."""
+
+from __future__ import annotations
+
+from stages.shape.collection.producer import Producer
+from stages.shapeassembly.settings import ShapeAssemblyConfig
+
+__all__ = ["PRODUCER"]
+
+PRODUCER = Producer(
+    language="shapeassembly",
+    keys="shapeassembly.programs or hierarchies",
+    asked=lambda config: config.section(ShapeAssemblyConfig).has_sources,
+    sentence="ShapeAssembly programs are executed; a shape's program is its `txt`.",
+    splits="Samples of programs that are alike up to their numbers stand in one split.",
+)

@@ -1,0 +1,49 @@
+"""What stage `variations` says of itself as a producer of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pipeline.stage import Plan
+from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection.producer import Producer
+from stages.variations.measures import measure_table
+
+__all__ = ["PRODUCER"]
+
+
+def _measures(plan: Plan) -> Mapping[str, Any]:
+    """What the variants of each kit are worth."""
+    summary = plan.summary("variations", f"{plan.config.name}-assignment")
+    return dict(summary["kits"]) if summary is not None else {}
+
+
+def _variety(plan: Plan) -> Sequence[str]:
+    measures = _measures(plan)
+    return [measure_table(measures)] if measures else []
+
+
+def _endings(plan: Plan) -> Sequence[str]:
+    """How the search of each kit ended, in words, from the summaries of its last pool."""
+    summaries = [plan.summary("variations", shard) or {} for shard in plan.shards("variations")]
+    ended = [
+        f"- {each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
+        for each in summaries
+        if each.get("why")
+    ]
+    return ["\n".join(ended)] if ended else []
+
+
+PRODUCER = Producer(
+    language="kit",
+    keys="exemplars.kits",
+    asked=lambda config: bool(config.section(ExemplarsConfig).kits),
+    sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
+    "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's `parents` are "
+    "exemplars, or variants by the `name` in their own `lineage`.",
+    splits="Samples whose shape graphs are equal stand in one split.",
+    card=_endings,
+    variety=_variety,
+    measures=_measures,
+)

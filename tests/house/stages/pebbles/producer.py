@@ -1,0 +1,15 @@
+"""What stage `pebbles` says of itself."""
+
+from __future__ import annotations
+
+from stages.pebbles.stage import PebblesConfig
+from stages.shape.collection.producer import Producer
+
+PRODUCER = Producer(
+    language="heap",
+    keys="pebbles.heaps",
+    asked=lambda config: config.section(PebblesConfig).heaps > 0,
+    sentence="pebbles are thrown on a heap.",
+    splits="Every heap is thrown anew.",
+    card=lambda _: ["No pebble was harmed."],
+)

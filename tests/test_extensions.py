@@ -1,0 +1,101 @@
+"""The two recipes of CONTRIBUTING: a stage and a producer, each one folder, go the whole way with no change elsewhere.
+
+`tests/house` is a house of its own beside the project's: its folder `stages` stands on the PYTHONPATH and nowhere else.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+import yaml
+
+from pipeline.shards import bytes_array, read_shard
+
+ROOT = Path(__file__).resolve().parents[1]
+CONFIG = {
+    "name": "heaps",
+    "seed": 3,
+    "license": "MIT",
+    "pebbles": {"heaps": 2},
+    "mass": {"density": 2.5},
+    "points": {"uniform": 64},
+    "sketches": {"size": 64, "backend": "raycast", "views": [{"name": "front"}]},
+    "package": {"previewed": 4},
+}
+WHOLE_WAY = """
+import sys
+from pathlib import Path
+from pipeline.config import load_config
+from pipeline.places import Places
+from pipeline.registry import find_stages
+from pipeline.run import run_stage
+from stages.package.verify import main
+
+config, out = Path(sys.argv[1]), Path(sys.argv[2])
+stages = find_stages()
+loaded = load_config(config, {name: stage.config for name, stage in stages.items()})
+for stage in stages.values():
+    stage.check(loaded)
+for name in stages:
+    result = run_stage(name, stages, loaded, Places(out, loaded.name), workers=1)
+    assert not result.failed, result.failed
+print("stages:", *stages)
+sys.exit(main([str(out / loaded.name), "--samples", "6"]))
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder that holds the dataset, and what was printed on the way."""
+    folder = tmp_path_factory.mktemp("heaps")
+    config = folder / "heaps.yaml"
+    config.write_text(yaml.safe_dump(CONFIG))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "house")}
+    command = [sys.executable, "-c", WHOLE_WAY, str(config), str(folder / "out")]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "out", done.stdout
+
+
+def test_a_stage_comes_after_the_producers_and_before_package(made: tuple[Path, str]) -> None:
+    order = next(line for line in made[1].splitlines() if line.startswith("stages:")).split()[1:]
+    assert order.index("pebbles") < order.index("mass") < order.index("package")
+
+
+def test_samples_of_a_new_producer_have_what_all_stages_add(made: tuple[Path, str]) -> None:
+    samples = {k: m for path in sorted((made[0] / "heaps" / "data").rglob("*.tar")) for k, m in read_shard(path)}
+    assert len(samples) == 3 * 2 * 2
+    for members in samples.values():
+        record = json.loads(members["json"])
+        assert (record["producer"], record["language"]) == ("pebbles", "heap")
+        heights = [float(each) for each in members["txt"].decode().split()]
+        np.testing.assert_allclose(bytes_array(members["mass.npy"]), 2.5 * np.array(heights), rtol=1e-6)
+        assert record["total_mass"] == pytest.approx(2.5 * sum(heights), abs=1e-3)
+        assert {"glb", "points.npy", "labels.npy", "sketch0.png"} <= set(members)
+        assert record["contacts"]
+        assert record["physics"]["rooted"]
+
+
+def test_what_they_say_of_themselves_stands_in_card_croissant_index_and_manifest(made: tuple[Path, str]) -> None:
+    folder = made[0] / "heaps"
+    card = (folder / "README.md").read_text()
+    for said in ("pebbles are thrown on a heap", "Every heap is thrown anew", "No pebble was harmed", "of pebbles"):
+        assert said in card
+    assert "| `<key>.mass.npy` | float32 (parts) | Mass of each part. |" in card
+    croissant = json.loads((folder / "croissant.json").read_text())
+    assert "mass" in {each["name"] for each in croissant["recordSet"]}
+    rows = pyarrow.parquet.read_table(made[0] / "heaps-index" / "heaps.parquet").to_pylist()
+    assert all(row["total_mass"] > 0 for row in rows)
+    assert "mass.npy" in json.loads((folder / "manifest.json").read_text())["members"]
+
+
+def test_a_dataset_of_theirs_is_verified(made: tuple[Path, str]) -> None:
+    assert "geometry" in made[1]
+    assert "faults" not in made[1]
