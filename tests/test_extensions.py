@@ -93,7 +93,7 @@ def test_what_they_say_of_themselves_stands_in_card_croissant_index_and_manifest
     assert "mass" in {each["name"] for each in croissant["recordSet"]}
     rows = pyarrow.parquet.read_table(made[0] / "heaps-index" / "heaps.parquet").to_pylist()
     assert all(row["total_mass"] > 0 for row in rows)
-    assert "mass.npy" in json.loads((folder / "manifest.json").read_text())["members"]
+    assert "mass.npy" in {each["name"] for each in json.loads((folder / "manifest.json").read_text())["members"]}
 
 
 def test_a_dataset_of_theirs_is_verified(made: tuple[Path, str]) -> None:

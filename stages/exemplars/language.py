@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from pipeline.places import Places
 from pipeline.stage import Plan
-from stages.shape.collection.language import Faults, Language, Source
+from stages.shape.arrays import IntArray
+from stages.shape.collection.language import Anew, Faults, Language, Source
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import load_kit
 from stages.shape.kit_input import input_kits
@@ -66,22 +68,44 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def _faults(places: Places) -> Faults:
-    """Contacts, grammar and penetration of a sample, with the kits of the dataset out of the mill's folder."""
-    from stages.exemplars.faults import geometry_faults
-
+def _made_kits(places: Places) -> dict[str, Kit]:
+    """The kits of a dataset out of the mill's folder."""
     made = places.stage("exemplars").root
-    kits = {
+    return {
         path.stem: load_kit(path, path.with_suffix(".tar"))
         for path in sorted(made.glob("*.json"))
         if path.with_suffix(".tar").is_file()
     }
 
+
+def _anew(places: Places) -> Anew:
+    """The kit's meshes at the poses of the record."""
+    kits = _made_kits(places)
+
+    def shape(record: Mapping[str, Any], contacts: IntArray) -> Shape:
+        if record["kit"] not in kits:
+            raise LookupError(f"kit {record['kit']} is not beside the dataset in .work")
+        kit = kits[record["kit"]]
+        names = kit.type_names()
+        labels, poses = [each["label"] for each in record["parts"]], [each["pose"] for each in record["parts"]]
+        unknown = sorted(set(labels) - set(names))
+        if unknown:
+            raise ValueError(f"kit {kit.name} has no part type {', '.join(unknown)}")
+        types = np.array([names.index(label) for label in labels], dtype=np.int16)
+        return Shape(kit.types, Assembly(types, np.array(poses, dtype=np.float64), contacts), "y", names)
+
+    return shape
+
+
+def _faults(places: Places) -> Faults:
+    """Contacts, grammar and penetration of a sample."""
+    from stages.exemplars.faults import geometry_faults
+
+    kits = _made_kits(places)
+
     def faults(members: Mapping[str, bytes]) -> Sequence[str]:
         name = json.loads(members["json"])["kit"]
-        if name not in kits:
-            return [f"its kit {name} is not beside the dataset in .work: make the dataset here, or --samples 0"]
-        return geometry_faults(kits[name], members)
+        return geometry_faults(kits[name], members) if name in kits else []
 
     return faults
 
@@ -92,5 +116,6 @@ LANGUAGE = Language(
     speaker=lambda task: Kits(input_kits(task)),
     graphs=True,
     text="Its shape graph as strings, SMILES-like, one a line, the first canonical.",
+    anew=_anew,
     faults=_faults,
 )

@@ -24,9 +24,9 @@ def compose_dataset(task: Task) -> Outcome:
     """Write card, Croissant, manifest, checksums and index.
 
     The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
-    shards); `members` (what is to say of each); `made`, `splits`, `story`, `variety`, `rejects` and `measures` (what
-    there is to say of how it was made); `preview` (the shard with the picture) and `package` (the version of this
-    stage).
+    shards); `members` (what is to say of each); `made`, `splits`, `apart`, `story`, `variety`, `rejects` and `measures`
+    (what there is to say of how it was made); `preview` (the shard with the picture) and `package` (the version of
+    this stage).
     """
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
@@ -45,10 +45,14 @@ def compose_dataset(task: Task) -> Outcome:
     files = {
         CARD: card(facts, shards, members, rows, sources, story).encode(),
         CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
-        MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["measures"], params["package"])),
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))
+    described = manifest(
+        facts, params["sections"], shards, members, digests, indexed, params["measures"], params["package"]
+    )
+    files[MANIFEST] = _text({**described, "apart": params["apart"]})
+    digests[MANIFEST] = hashlib.sha256(files[MANIFEST]).hexdigest()
     digests.update({shard["path"]: shard["sha256"] for shard in shards})
     files[CHECKSUMS] = checksums(digests).encode()
     for file, content in {**files, "parquet": index.getvalue()}.items():

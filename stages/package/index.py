@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 from stages.shape.collection.declared import members
 from stages.shape.collection.members import Column
 
-__all__ = ["columns", "index_row", "read_rows", "write_index"]
+__all__ = ["columns", "index_row", "read_rows", "tar_bytes", "write_index"]
 
 COLUMNS = {
     "key": Column("string", ("key",)),
@@ -36,16 +36,20 @@ def columns() -> dict[str, Column]:
     return COLUMNS | {name: column for each in members().values() for name, column in each.columns.items()}
 
 
-def index_row(record: Mapping[str, Any], path: str, offset: int, content: Mapping[str, bytes]) -> dict[str, Any]:
-    """The row of a sample whose `content` begins at `offset` of the shard at `path`."""
+def index_row(record: Mapping[str, Any], path: str, offset: int, size: int) -> dict[str, Any]:
+    """The row of a sample of which `size` bytes begin at `offset` of the shard at `path`."""
     row: dict[str, Any] = {}
     for name, column in columns().items():
         value: Any = record
         for step in column.place:
             value = value[step]
         row[name] = value
-    sizes = (512 + (len(each) + 511) // 512 * 512 for each in content.values())
-    return row | {"shard": path, "offset": offset, "bytes": sum(sizes)}
+    return row | {"shard": path, "offset": offset, "bytes": size}
+
+
+def tar_bytes(members: Mapping[str, bytes]) -> int:
+    """How many bytes of a tar the members of a sample take, with their headers."""
+    return sum(512 + (len(each) + 511) // 512 * 512 for each in members.values())
 
 
 def read_rows(files: Iterable[Path]) -> list[dict[str, Any]]:

@@ -22,12 +22,15 @@ def manifest(
     facts: Mapping[str, Any],
     sections: Mapping[str, Any],
     shards: Sequence[Mapping[str, Any]],
+    members: Sequence[Mapping[str, Any]],
+    files: Mapping[str, str],
     index: Mapping[str, Any],
     measures: Mapping[str, Mapping[str, Any]],
     package_version: int,
 ) -> dict[str, Any]:
-    """What `manifest.json` holds. `shards` are the summaries of the package's shards; `index` has `path` (relative
-    to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit."""
+    """What `manifest.json` holds. `shards` are the summaries of the package's shards; `members` says name, sentence,
+    dtype and shape of each; `files` are the digests of the files about the whole but this one; `index` has `path`
+    (relative to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit."""
     kits: Counter[str] = Counter()
     splits: Counter[str] = Counter()
     for shard in shards:
@@ -41,7 +44,8 @@ def manifest(
         "samples": sum(splits.values()),
         "splits": dict(splits),
         "kits": dict(kits),
-        "members": list(shards[0]["members"]),
+        "members": [dict(each) for each in members],
+        "files": dict(files),
         "shards": [
             {name: shard[name] for name in ("path", "split", "samples", "bytes", "sha256", "kits")} for shard in shards
         ],

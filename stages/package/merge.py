@@ -13,7 +13,7 @@ from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes, read_shard
 from pipeline.stage import Outcome, Task
 from stages.package.glb import glb_bytes
-from stages.package.index import index_row
+from stages.package.index import index_row, tar_bytes
 from stages.package.layout import shard_path
 from stages.package.record import describe_sample, rounded
 from stages.shape.collection.collection import Collection
@@ -50,7 +50,7 @@ def merge_shard(task: Task) -> Outcome:
                 members_of_all = list(members)
                 writer.write(sample.key, members)
                 counts[sample.kit] += 1
-                rows.append(index_row(record, path, writer.offsets[sample.key], members))
+                rows.append(index_row(record, path, writer.offsets[sample.key], tar_bytes(members)))
                 task.progress(writer.samples, total)
     with task.output(f"{task.shard.name}.jsonl") as listing:
         listing.writelines(json_bytes(row) for row in rows)

@@ -66,6 +66,7 @@ def plan(plan: Plan) -> list[Shard]:
         "members": described_members(plan.config, filled[0]["members"], language_of(producer).text),
         "made": declared.sentence,
         "splits": declared.splits,
+        "apart": declared.apart,
         "story": list(declared.card(plan)),
         "variety": list(declared.variety(plan)),
         "rejects": _rejects(plan, producer),

@@ -9,9 +9,9 @@ from pipeline.places import Places
 from pipeline.stage import Plan, Task
 from stages.programs.program import find_program, shape_of_text
 from stages.programs.settings import ProgramsConfig
-from stages.shape.collection.language import Faults, Language, Source
+from stages.shape.collection.language import Anew, Faults, Language, Source
 from stages.shape.sample import Sample
-from stages.shape.shape import Shape
+from stages.shape.shape import Shape, upright
 
 __all__ = ["LANGUAGE"]
 
@@ -40,6 +40,10 @@ def _speaker(task: Task) -> Parameters:
     return Parameters(task.config.section(ProgramsConfig).program)
 
 
+def _anew(_: Places) -> Anew:
+    return lambda record, _: upright(shape_of_text(record["kit"], record["text"]))
+
+
 def _faults(_: Places) -> Faults:
     from stages.shape.collection.text_faults import text_faults
 
@@ -56,5 +60,6 @@ LANGUAGE = Language(
     speaker=_speaker,
     graphs=False,
     text="Its parameters as JSON.",
+    anew=_anew,
     faults=_faults,
 )

@@ -25,5 +25,6 @@ PRODUCER = Producer(
     splits="No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike up to "
     "their continuous parameters stand in one split; where every value of every parameter is sampled, all splits have "
     "all values, as published.",
+    apart=False,
     card=_recipe,
 )

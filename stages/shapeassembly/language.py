@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
-from stages.shape.collection.language import Faults, Language, Source
+from stages.shape.collection.language import Anew, Faults, Language, Source
 from stages.shape.sample import Sample
-from stages.shape.shape import Shape
+from stages.shape.shape import Shape, upright
 from stages.shapeassembly.shape import shape_of_text
 
 __all__ = ["LANGUAGE", "assignment_name"]
@@ -44,6 +44,10 @@ def _speaker(task: Task) -> Programs:
     return Programs(json.loads(listed.read_bytes()))
 
 
+def _anew(_: Places) -> Anew:
+    return lambda record, _: upright(shape_of_text(record["text"]))
+
+
 def _faults(_: Places) -> Faults:
     from stages.shape.collection.text_faults import text_faults
 
@@ -59,5 +63,6 @@ LANGUAGE = Language(
     speaker=_speaker,
     graphs=False,
     text="Its ShapeAssembly program.",
+    anew=_anew,
     faults=_faults,
 )

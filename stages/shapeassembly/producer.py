@@ -13,4 +13,5 @@ PRODUCER = Producer(
     asked=lambda config: config.section(ShapeAssemblyConfig).has_sources,
     sentence="ShapeAssembly programs are executed; a shape's program is its `txt`.",
     splits="Samples of programs that are alike up to their numbers stand in one split.",
+    apart=True,
 )

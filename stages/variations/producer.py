@@ -43,6 +43,7 @@ PRODUCER = Producer(
     "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's `parents` are "
     "exemplars, or variants by the `name` in their own `lineage`.",
     splits="Samples whose shape graphs are equal stand in one split.",
+    apart=True,
     card=_endings,
     variety=_variety,
     measures=_measures,

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
+from stages.shape.arrays import IntArray
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
-__all__ = ["Faults", "Language", "Source", "Speaker"]
+__all__ = ["Anew", "Faults", "Language", "Source", "Speaker"]
+
+Anew = Callable[[Mapping[str, Any], IntArray], Shape]
+"""The shape of a record and its contacts, int32 (m, 2)."""
 
 Faults = Callable[[Mapping[str, bytes]], Sequence[str]]
 """What is wrong with the sample of which these are the members: a sentence for each fault."""
@@ -53,7 +57,10 @@ class Language:
     graphs: whether its samples are shape graphs, with contacts of their own and strings; else they have a text, and
     contacts are found by whoever asks.
     text: what the member `txt` of its samples is, for the card.
-    faults: how a packaged sample is held against what it was made from, given the mill's folders of its dataset.
+    anew: the shape that the record of a packaged sample says, made anew and upright, given the mill's folders of its
+    dataset; raises LookupError where what it is made from is not there, ValueError where the record cannot be meant.
+    faults: how a packaged sample is held against what it was made from, by other means than it was made, for some
+    samples.
     """
 
     name: str
@@ -61,4 +68,5 @@ class Language:
     speaker: Callable[[Task], Speaker]
     graphs: bool
     text: str
+    anew: Callable[[Places], Anew]
     faults: Callable[[Places], Faults]

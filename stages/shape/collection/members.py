@@ -6,13 +6,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from pipeline.config import Config
 from stages.shape.arrays import ByteArray
+from stages.shape.collection.packaged import Packaged
 from stages.shape.views.camera import Camera
 
-__all__ = ["TEXT", "Column", "Field", "Member", "Members", "Packaged", "Row"]
+__all__ = ["TEXT", "Column", "Field", "Member", "Members", "Row"]
 
 TEXT = "txt"
 """The member that every sample has: its text. Of a shape graph a stage adds it; else the sample brings it."""
@@ -49,16 +48,6 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Packaged:
-    """A finished sample as `make verify` reads it. record: its `json`; arrays: its `.npy` members."""
-
-    key: str
-    record: Mapping[str, Any]
-    members: Mapping[str, bytes]
-    arrays: Mapping[str, np.ndarray]
-
-
-@dataclass(frozen=True)
 class Row:
     """A row of the preview picture: the same samples as in the first row, drawn from what a stage has made of them.
 
@@ -86,7 +75,8 @@ class Members:
     with the declared fields, which package merges into the record.
 
     of: the members, given the config; fields: of the record, by name; columns: of the index, by name.
-    faults: what is wrong with a finished sample, cheap enough to be asked of every sample.
+    faults: what is wrong with a finished sample, cheap enough to be asked of every sample; anew: the same, by making
+    again what the stage made, which is asked of some.
     row: how the preview shows it, or None.
     """
 
@@ -94,4 +84,5 @@ class Members:
     fields: Callable[[Config], Mapping[str, Field]] = _no_fields
     columns: Mapping[str, Column] = field(default_factory=dict)
     faults: Callable[[Packaged], Iterator[str]] = _no_faults
+    anew: Callable[[Packaged], Iterator[str]] = _no_faults
     row: Row | None = None

@@ -30,6 +30,7 @@ class Producer:
     language: the name of the language that its samples are in; keys: the keys of a config that ask for it, for
     messages; asked: whether a config does.
     sentence: how its samples come about; splits: what keeps its splits apart; both for the card.
+    apart: whether samples of one graph always stand in one split.
     card: paragraphs and tables for the card's section on how the dataset was made, from finished records.
     variety: Markdown for the card's section on how different the samples are.
     measures: figures for the manifest.
@@ -40,6 +41,7 @@ class Producer:
     asked: Callable[[Config], bool]
     sentence: str
     splits: str
+    apart: bool
     card: Callable[[Plan], Sequence[str]] = _nothing_to_add
     variety: Callable[[Plan], Sequence[str]] = _nothing_to_add
     measures: Callable[[Plan], Mapping[str, Any]] = _no_measures

@@ -18,7 +18,7 @@ import yaml
 from pipeline.places import Places, file_digest
 from pipeline.run import run_stage
 from pipeline.shards import bytes_array, read_shard
-from stages.package.verify_files import empty_values
+from stages.package.verify_samples import empty_values
 from stages.shape.geometry.pose import invert, transform_points
 from tests.stages.package.toy import (
     REFUSED,
@@ -195,7 +195,7 @@ def test_a_new_title_makes_card_and_picture_again_and_no_shard(toy_folder: Path,
     assert result.made == 2
     before, after = digests(toy_folder), digests(tmp_path / "out/toy")
     changed = {file for file in after if after[file] != before[file]}
-    assert changed == {"README.md", "croissant.json", "preview.png", "checksums.txt"}
+    assert changed == {"README.md", "croissant.json", "preview.png", "checksums.txt", "manifest.json"}
 
 
 @pytest.mark.parametrize(

@@ -6,20 +6,19 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from stages.package.verify import main
-from stages.package.verify_files import check_files
+from stages.package.verify import main, verify_dataset
+from tests.stages.package.forge import FOLDER_FORGERIES, FORGERIES, copy_dataset, forge
 
 SHARD = "data/val/toy-1_2_0-val-000002.tar"
 
 
 @pytest.fixture
 def folder(toy_folder: Path, tmp_path: Path) -> Path:
-    """A copy of the toy dataset and its index, to be damaged."""
-    for name in ("toy", "toy-index"):
-        shutil.copytree(toy_folder.parent / name, tmp_path / name)
-    return tmp_path / "toy"
+    """A copy of the toy dataset, its index and its kits, to be damaged."""
+    return copy_dataset(toy_folder, tmp_path, with_work=False)
 
 
 def flip(path: Path, place: int) -> None:
@@ -70,27 +69,27 @@ def test_a_foreign_file_is_found_and_named(folder: Path, capsys: pytest.CaptureF
 
 def test_a_missing_index_is_found_and_named(folder: Path) -> None:
     shutil.rmtree(folder.parent / "toy-index")
-    assert check_files(folder).faults == {"missing files": ["../toy-index/toy.parquet: is missing"]}
+    assert verify_dataset(folder, 0, 0).faults == {"missing files": ["../toy-index/toy.parquet: is missing"]}
 
 
 def test_a_truncated_checksums_file_makes_the_files_it_leaves_out_foreign(folder: Path) -> None:
     listing = folder / "checksums.txt"
     listing.write_text("".join(line for line in listing.read_text().splitlines(True) if SHARD not in line))
-    faults = check_files(folder).faults
+    faults = verify_dataset(folder, 0, 0).faults
     assert faults["foreign files"] == [f"{SHARD}: does not belong to the dataset"]
     assert any(SHARD in fault for fault in faults["manifest"])
 
 
 def test_counts_that_disagree_are_found(folder: Path) -> None:
     rewrite(folder, "manifest.json", lambda text: text.replace('"samples": 2,', '"samples": 3,', 1))
-    faults = check_files(folder).faults
+    faults = verify_dataset(folder, 0, 0).faults
     assert any("has 2 samples, the manifest counts 3" in fault for fault in faults["samples"])
     assert any("do not add up to 15 samples" in fault for fault in faults["manifest"])
 
 
 def test_croissant_and_manifest_must_name_the_same_shards(folder: Path) -> None:
     rewrite(folder, "croissant.json", lambda text: text.replace("val-000002", "val-000009"))
-    assert any("manifest.json and croissant.json" in fault for fault in check_files(folder).faults["manifest"])
+    assert any("manifest.json and croissant.json" in fault for fault in verify_dataset(folder, 0, 0).faults["manifest"])
 
 
 def test_samples_that_break_the_rules_are_found(folder: Path) -> None:
@@ -106,7 +105,7 @@ def test_samples_that_break_the_rules_are_found(folder: Path) -> None:
         writer.write(second, {**two, "labels.npy": array_bytes(1 - bytes_array(two["labels.npy"]))})
     for listing in ("checksums.txt", "manifest.json", "croissant.json"):
         rewrite(folder, listing, lambda text: text.replace(before, file_digest(folder / SHARD)))
-    faults = "\n".join(check_files(folder).faults["samples"])
+    faults = "\n".join(verify_dataset(folder, 0, 0).faults["samples"])
     assert f"{SHARD}: {first}: its json has nothing at kit" in faults
     assert f"{SHARD}: {second}: its point labels are not the classes of their parts" in faults
 
@@ -151,3 +150,39 @@ def test_the_dataset_can_be_named_by_its_config(
     config.write_text("name: toy\n")
     assert main(["--config", str(config), "--out", str(toy_folder.parent), "--samples", "0"]) == 0
     assert "faults" not in capsys.readouterr().out
+
+
+BY_STATICS_OR_DRAWING = {"a mirrored sketch", "the sketch of another sample", "a blank sketch", "a truncated sketch"}
+"""The toy dataset has sketches of its own, which show nothing."""
+
+
+@pytest.mark.parametrize("name", sorted({*FORGERIES} - BY_STATICS_OR_DRAWING))
+def test_a_forged_sample_is_found_and_named(folder: Path, name: str) -> None:
+    """Whatever is done to a sample, with checksums, offsets and counts made anew."""
+    key = forge(folder, name, np.random.default_rng(len(name)))
+    faults = [fault for found in verify_dataset(folder, 0, 0).faults.values() for fault in found]
+    assert any(key in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize("name", sorted(FOLDER_FORGERIES))
+def test_a_forged_folder_is_found(folder: Path, name: str) -> None:
+    forge(folder, name, np.random.default_rng(0))
+    assert verify_dataset(folder, 0, 0).faults
+
+
+def test_what_the_stages_made_gives_away_what_no_look_at_the_sample_could(toy_folder: Path, tmp_path: Path) -> None:
+    folder = copy_dataset(toy_folder, tmp_path, with_work=True)
+    assert not verify_dataset(folder, 0, 0).faults
+    key = forge(folder, "the sketch of another sample", np.random.default_rng(1))
+    faults = verify_dataset(folder, 0, 0).faults["samples"]
+    assert len(faults) == 1
+    assert faults[0].endswith(f"{key}: sketch0.png is not the one that stage sketches has made for it")
+
+
+def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(
+    toy_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("toy", "toy-index"):
+        shutil.copytree(toy_folder.parent / name, tmp_path / name)
+    assert main([str(tmp_path / "toy")]) == 0
+    assert "not looked at: 24 samples: kit blocks is not beside the dataset" in capsys.readouterr().out

@@ -20,6 +20,7 @@ from stages.package.stage import STAGE as PACKAGE
 from stages.points.settings import PointsConfig
 from stages.points.stage import STAGE as POINTS
 from stages.shape.collection.shards import PRODUCERS, collection_shards
+from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.physics.settings import PhysicsConfig
@@ -76,9 +77,10 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
     for item in range(count):
         number = (SPLITS.index(split) * 100 + index) * 10 + item
         kit = list(KITS)[number % 2]
-        assembly = chain(2 + number % 5, number % 2)
+        assembly = chain({"train": 2, "val": 4, "test": 5}[split] + number % 2 * (split != "val"), number % 2)
         lineage: dict[str, Any] = {"parents": ["row"]} if item else {}
-        samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, f"{number:032x}", lineage, assembly))
+        graph = graph_digest(assembly.types, assembly.edges)
+        samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, graph, lineage, assembly))
     return samples
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from stages.shape.collection.members import Column, Field, Member, Members, Packaged
+from stages.shape.collection.members import Column, Field, Member, Members
+from stages.shape.collection.packaged import Packaged
 
 
 def _faults(sample: Packaged) -> Iterator[str]:

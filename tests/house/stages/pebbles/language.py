@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pipeline.places import Places
-from stages.shape.collection.language import Faults, Language, Source
+from stages.shape.collection.language import Anew, Faults, Language, Source
 from stages.shape.collection.text_faults import text_faults
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.sample import Sample
-from stages.shape.shape import Shape
+from stages.shape.shape import Shape, upright
 
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -46,8 +46,12 @@ class Heaps:
         return [("a pebble", heap("1.0"))]
 
 
+def _anew(_: Places) -> Anew:
+    return lambda record, _: upright(heap(record["text"]))
+
+
 def _faults(_: Places) -> Faults:
     return lambda members: text_faults(heap(json.loads(members["json"])["text"]), members)
 
 
-LANGUAGE = Language("heap", lambda _: (), lambda _: Heaps(), False, "Heights of the pebbles.", _faults)
+LANGUAGE = Language("heap", lambda _: (), lambda _: Heaps(), False, "Heights of the pebbles.", _anew, _faults)

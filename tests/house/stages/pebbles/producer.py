@@ -11,5 +11,6 @@ PRODUCER = Producer(
     asked=lambda config: config.section(PebblesConfig).heaps > 0,
     sentence="pebbles are thrown on a heap.",
     splits="Every heap is thrown anew.",
+    apart=False,
     card=lambda _: ["No pebble was harmed."],
 )

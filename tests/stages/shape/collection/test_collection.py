@@ -15,7 +15,7 @@ import yaml
 
 from pipeline.places import Places
 from pipeline.shards import bytes_array
-from stages.package.verify_files import shard_samples
+from stages.package.verify_shard import shard_samples
 from stages.programs.language import LANGUAGE
 
 STAGES = (

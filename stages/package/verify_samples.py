@@ -1,0 +1,205 @@
+"""Is a sample what its record says? Asked of all samples: members, arrays, record, mesh, and whatever the stages that
+added something ask of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from pipeline.shards import bytes_array
+from stages.package.glb import glb_bytes
+from stages.package.record import cycle_count, rounded
+from stages.shape.collection.declared import members as declared_members
+from stages.shape.collection.language import Anew
+from stages.shape.collection.packaged import Packaged
+from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.kit import Assembly
+from stages.shape.shape import Shape
+
+__all__ = [
+    "SampleError",
+    "array_faults",
+    "empty_values",
+    "read_packaged",
+    "read_record",
+    "record_faults",
+    "sample_faults",
+]
+
+
+class SampleError(Exception):
+    """A sample that cannot be read far enough to be looked at; the sentence says why."""
+
+
+def read_record(content: bytes) -> dict[str, Any]:
+    """The record of a sample. Raises SampleError for what is none."""
+    try:
+        record = json.loads(content)
+    except ValueError as error:
+        raise SampleError(f"its json cannot be read: {error}") from error
+    if not isinstance(record, dict):
+        raise SampleError("its json is no record")
+    return record
+
+
+def read_packaged(
+    key: str,
+    record: Mapping[str, Any],
+    members: Mapping[str, bytes],
+    anew: Mapping[str, Anew],
+    sections: Mapping[str, Any],
+) -> Packaged:
+    """The sample, with the shape that its record says. `anew`: by language.
+
+    Raises SampleError where arrays or shape cannot be had; LookupError where what the shape is made from is not there.
+    """
+    arrays = {name: _array(name, content) for name, content in members.items() if name.endswith(".npy")}
+    packaged = Packaged(key, record, members, arrays, _NOTHING, sections)
+    try:
+        shape = anew[record["language"]](record, packaged.contacts)
+        parts = record["parts"]
+        first = parts[0]["class"] - int(shape.part_labels[0])
+        shape = Shape(shape.meshes, shape.assembly, "y", shape.labels, shape.own_names, first)
+        return Packaged(key, record, members, arrays, shape, sections)
+    except LookupError as error:
+        if isinstance(error, KeyError | IndexError):
+            raise SampleError(f"its json cannot be meant: nothing at {error}") from error
+        raise
+    except Exception as error:
+        raise SampleError(f"its json cannot be meant: {error}") from error
+
+
+def record_faults(record: Mapping[str, Any], key: str, split: str, kits: Collection[str]) -> Iterator[str]:
+    """What is wrong with a record by itself: a sentence for each fault."""
+    if record.get("key") != key or record.get("split") != split:
+        yield "its json names another key or split"
+    if record.get("kit") not in kits:
+        yield "its json names a kit that the manifest does not know"
+    empty = list(empty_values(record))
+    if empty:
+        yield f"its json has nothing at {', '.join(empty[:3])}"
+
+
+def sample_faults(sample: Packaged) -> Iterator[str]:
+    """What is wrong with a sample beside that: a sentence for each fault."""
+    record, shape = sample.record, sample.shape
+    yield from _part_faults(record, shape)
+    yield from _count_faults(sample)
+    if sample.members["glb"] != glb_bytes(shape):
+        yield _glb_fault(sample)
+    if np.abs(np.array(record["bounds"]) - rounded(shape_bounds(shape))).max() > 1e-9 * sample.size:
+        yield "its bounds are not those of its parts"
+    if not sample.members["txt"].decode().startswith(record["text"]):
+        yield "its txt and its json hold different texts"
+    for stage in declared_members().values():
+        yield from _asked(stage.faults, sample)
+
+
+def array_faults(sample: Packaged, described: list[dict[str, Any]]) -> Iterator[str]:
+    """Arrays that are not of the type and shape that the manifest says, or hold what is no number."""
+    lengths: dict[str, int] = {"parts": len(sample.record["parts"])}
+    for each in described:
+        if not each["dtype"] or each["name"] not in sample.arrays:
+            continue
+        array, name = sample.arrays[each["name"]], each["name"]
+        if array.dtype != np.dtype(each["dtype"]) or array.ndim != len(each["shape"]):
+            yield f"{name} is {array.dtype} of {array.ndim} dimensions, not {each['dtype']} of {len(each['shape'])}"
+            continue
+        for wanted, found in zip(each["shape"], array.shape, strict=True):
+            if (wanted if isinstance(wanted, int) else lengths.setdefault(wanted, found)) != found:
+                yield f"{name} has shape {array.shape}, not ({', '.join(map(str, each['shape']))})"
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            yield f"{name} holds what is not a number"
+
+
+def empty_values(value: Any, place: str = "") -> Iterator[str]:
+    """Where in a JSON value a null, an empty text, list or mapping stands: `parts[3].label`."""
+    if value is None or value in ("", [], {}):
+        yield place or "the whole"
+    elif isinstance(value, Mapping):
+        for name, each in value.items():
+            yield from empty_values(each, f"{place}.{name}" if place else name)
+    elif isinstance(value, list):
+        for position, each in enumerate(value):
+            yield from empty_values(each, f"{place}[{position}]")
+
+
+_NOTHING = Shape((), Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), np.int32)), "y", ())
+
+
+def _array(name: str, content: bytes) -> np.ndarray:
+    try:
+        return bytes_array(content)
+    except ValueError as error:
+        raise SampleError(f"{name} cannot be read: {error}") from error
+
+
+def _asked(faults: Callable[[Packaged], Iterator[str]], sample: Packaged) -> Iterator[str]:
+    """The faults; a record in which what is asked for is missing has one."""
+    try:
+        yield from faults(sample)
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        yield f"its json cannot be meant: {type(error).__name__}: {error}"
+
+
+def _part_faults(record: Mapping[str, Any], shape: Shape) -> Iterator[str]:
+    parts = record["parts"]
+    if len(parts) != len(shape):
+        yield f"its json lists {len(parts)} parts, and its source makes {len(shape)}"
+        return
+    for place, (part, name, label, number) in enumerate(
+        zip(parts, shape.part_names, shape.part_labels.tolist(), shape.part_classes.tolist(), strict=True)
+    ):
+        found = part["name"], part["label"], part["class"], part["instance"]
+        if found != (name, shape.labels[label], number, place):
+            yield f"its json calls part {place} {found}, and its source {(name, shape.labels[label], number, place)}"
+            return
+    poses = np.array([part["pose"] for part in parts])
+    if poses.shape != shape.assembly.poses.shape or np.abs(poses - rounded(shape.assembly.poses)).max() > 1e-9:
+        yield "its json has other poses than its source makes"
+
+
+def _count_faults(sample: Packaged) -> Iterator[str]:
+    pairs, parts = sample.contacts, len(sample.record["parts"])
+    if len(pairs) and (pairs.min() < 0 or pairs.max() >= parts or (pairs[:, 0] >= pairs[:, 1]).any()):
+        yield "its contacts are no pairs of its parts, the lower one first"
+        return
+    assembly = sample.shape.assembly
+    counted = {
+        "parts": parts,
+        "contacts": len(pairs),
+        "cycles": cycle_count(Assembly(assembly.types, assembly.poses, pairs)),
+        "types": len(set(sample.shape.part_labels.tolist())),
+    }
+    for name, count in counted.items():
+        if sample.record["counts"][name] != count:
+            yield f"its json counts {sample.record['counts'][name]} {name} and lists {count}"
+
+
+def _glb_fault(sample: Packaged) -> str:
+    """Which part of the mesh it is."""
+    import io
+
+    import trimesh
+
+    if not sample.members["glb"].startswith(b"glTF"):
+        return "glb is no GLB"
+    try:
+        scene = trimesh.load_scene(io.BytesIO(sample.members["glb"]), file_type="glb", process=False)
+    except Exception as error:  # trimesh raises whatever it trips over
+        return f"glb cannot be read: {type(error).__name__}: {error}"
+    shape = sample.shape
+    for part, name in enumerate(shape.part_names):
+        if name not in scene.graph.nodes_geometry:
+            return f"{name} is not in its glb"
+        pose, geometry = scene.graph.get(name)
+        found, mesh = scene.geometry[geometry], shape.meshes[shape.assembly.types[part]]
+        stored = np.asarray(found.triangles) @ pose[:3, :3].T + pose[:3, 3]
+        placed = shape.assembly.poses[part]
+        made = mesh.vertices[mesh.faces] @ placed[:3, :3].T + placed[:3, 3]
+        if stored.shape != made.shape or np.abs(stored - made).max() > 1e-5 * sample.size:
+            return f"{name} has another surface in its glb than its source makes"
+    return "its glb is not the one that its record says"

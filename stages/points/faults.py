@@ -1,0 +1,113 @@
+"""Are the points of a sample points of its shape? Looked up with Open3D, which had no part in making them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.collection.packaged import Packaged
+
+__all__ = ["point_faults"]
+
+NEAR = 1e-5
+"""Points are 32-bit numbers: as a share of the shape's size they lie as near to its surface as this."""
+ALONG = 1e-3
+"""As much the cosine of a normal and that of its triangle may differ from 1."""
+
+
+def point_faults(sample: Packaged) -> Iterator[str]:
+    """A sentence for points that are not on the part that they name, and for normals that are not its own."""
+    described = sample.record["points"]
+    points = sample.arrays["points.npy"].astype(np.float64) / described["scale"] + described["centre"]
+    normals = sample.arrays["normals.npy"].astype(np.float64)
+    instances = sample.arrays["instances.npy"].astype(np.int32)
+    if not np.isfinite(points).all() or not np.isfinite(normals).all():
+        return  # named already: arrays that hold what is no number
+    if instances.min() < 0 or instances.max() >= len(sample.shape):
+        yield "its points name parts that are not there"
+        return
+    if (sample.shape.part_classes[instances] != sample.arrays["labels.npy"]).any():
+        yield "its point labels are not the classes of their parts"
+    near = NEAR * max(sample.size, float(np.abs(sample.record["bounds"]).max()))
+    corners, parts = sample.triangles
+    off, turned = _strangers(points, normals, instances, corners, parts, near)
+    if off:
+        yield f"{off} of its {len(points):,} points are not on the surface of their part"
+    if turned:
+        yield f"{turned} of its {len(points):,} normals are not those of their part"
+
+
+def _strangers(
+    points: FloatArray, normals: FloatArray, instances: IntArray, corners: FloatArray, parts: IntArray, near: float
+) -> tuple[int, int]:
+    """How many points are off the surface of their part, and how many of the others have a normal of no triangle there.
+
+    The nearest triangle of all answers for nearly all points; the others, where parts meet or at edges, are held
+    against each triangle of their part.
+    """
+    nearest, distances = _nearest(points, corners)
+    own = parts[nearest] == instances
+    along = np.einsum("ij,ij->i", normals, _unit_normals(corners[nearest])) > 1.0 - ALONG
+    doubtful = np.flatnonzero(~(own & along & (distances <= near)))
+    off = turned = 0
+    for part in np.unique(instances[doubtful]).tolist():
+        mine = doubtful[instances[doubtful] == part]
+        triangles = corners[parts == part]
+        gaps = _distances(points[mine], triangles)
+        touching = gaps <= near
+        off += int((~touching.any(axis=1)).sum())
+        fitting = normals[mine] @ _unit_normals(triangles).T > 1.0 - ALONG
+        turned += int((touching.any(axis=1) & ~(touching & fitting).any(axis=1)).sum())
+    return off, turned
+
+
+def _nearest(points: FloatArray, corners: FloatArray) -> tuple[IntArray, FloatArray]:
+    """The nearest triangle of each point and how far it is, of triangles float64 (t, 3, 3)."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    middle = corners.reshape(-1, 3).mean(axis=0)
+    vertices = (corners.reshape(-1, 3) - middle).astype(np.float32)
+    numbers = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+    scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(numbers))
+    asked = o3d.core.Tensor.from_numpy((points - middle).astype(np.float32))
+    found = scene.compute_closest_points(asked, nthreads=1)
+    gaps = np.linalg.norm(found["points"].numpy().astype(np.float64) - (points - middle), axis=1)
+    return found["primitive_ids"].numpy().astype(np.int32), gaps
+
+
+def _unit_normals(corners: FloatArray) -> FloatArray:
+    """Normals of triangles float64 (t, 3, 3) by their winding; zero where a triangle has no area."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+
+
+def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Distance of each of n points from each of t triangles, float64 (n, t), by barycentric regions."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    inside = _plane_distances(points, a, b, c)
+    edges = np.minimum.reduce([_segment_distances(points, *ends) for ends in ((a, b), (b, c), (c, a))])
+    return np.minimum(inside, edges)
+
+
+def _plane_distances(points: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """Distance from the plane of a triangle where the foot of the point lies inside, else infinite."""
+    normals = np.cross(b - a, c - a)
+    area = np.einsum("ij,ij->i", normals, normals)
+    safe = np.where(area > 0, area, 1.0)
+    away = points[:, None] - a[None]
+    first = np.einsum("ntj,tj->nt", np.cross((b - a)[None], away), normals) / safe
+    second = np.einsum("ntj,tj->nt", np.cross(away, (c - a)[None]), normals) / safe
+    height = np.abs(np.einsum("ntj,tj->nt", away, normals)) / np.sqrt(safe)
+    return np.where((first >= 0) & (second >= 0) & (first + second <= 1) & (area > 0), height, np.inf)
+
+
+def _segment_distances(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    along = end - start
+    length = np.einsum("ij,ij->i", along, along)
+    away = points[:, None] - start[None]
+    share = np.einsum("ntj,tj->nt", away, along) / np.where(length > 0, length, 1.0)
+    return np.linalg.norm(away - np.clip(share, 0, 1)[:, :, None] * along[None], axis=2)

@@ -1,0 +1,57 @@
+"""A finished sample as `make verify` reads it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.shape import Shape
+
+__all__ = ["Packaged"]
+
+
+@dataclass(frozen=True)
+class Packaged:
+    """One sample of a finished dataset.
+
+    record: its `json`; members: its files by what stands after the key; arrays: the `.npy` ones among them.
+    shape: what its record says that it is, made anew from its source, in the coordinates of the dataset.
+    sections: the config that the dataset was made with, as the manifest has it.
+    """
+
+    key: str
+    record: Mapping[str, Any]
+    members: Mapping[str, bytes]
+    arrays: Mapping[str, np.ndarray]
+    shape: Shape
+    sections: Mapping[str, Any]
+
+    @cached_property
+    def contacts(self) -> IntArray:
+        """The pairs of parts that touch, int32 (m, 2), as recorded."""
+        return np.array(json.loads(self.record["contacts"]), dtype=np.int32).reshape(-1, 2)
+
+    @cached_property
+    def size(self) -> float:
+        """The longest side of the box around the shape, in its units."""
+        bounds = shape_bounds(self.shape)
+        return float((bounds[1] - bounds[0]).max())
+
+    @cached_property
+    def triangles(self) -> tuple[FloatArray, IntArray]:
+        """Corners of all triangles, float64 (t, 3, 3), and the part that each belongs to, int32 (t,)."""
+        assembly, meshes = self.shape.assembly, self.shape.meshes
+        corners, parts = [], []
+        for part, (kind, pose) in enumerate(zip(assembly.types.tolist(), assembly.poses, strict=True)):
+            mesh = meshes[kind]
+            placed = mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
+            corners.append(placed[mesh.faces])
+            parts.append(np.full(len(mesh.faces), part, dtype=np.int32))
+        return np.concatenate(corners), np.concatenate(parts)

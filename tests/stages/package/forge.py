@@ -1,0 +1,508 @@
+"""A forger: changes one thing in a finished dataset and makes every checksum, offset and count anew.
+
+    python -m tests.stages.package.forge datasets/castle --count 30 --seed 0
+
+copies the dataset beside what `make verify` needs of the mill's folder, applies each forgery to a sample chosen at
+random, verifies the copy, and says what was found. `--with-work` leaves what all stages made beside the copy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.places import file_digest
+from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
+from stages.package.index import index_row, tar_bytes, write_index
+from stages.package.manifest import checksums
+from stages.package.verify import verify_dataset
+from stages.package.verify_shard import shard_samples
+
+Members = dict[str, bytes]
+
+
+@dataclass
+class Forged:
+    """A sample to be forged, another one of the dataset, and randomness."""
+
+    members: Members
+    other: Members
+    rng: np.random.Generator
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The record as it is now; `write` takes it back."""
+        value: dict[str, Any] = json.loads(self.members["json"])
+        return value
+
+    def write(self, record: Any) -> None:
+        """Take a changed record."""
+        self.members["json"] = json_bytes(record)
+
+    def array(self, name: str) -> np.ndarray:
+        """An array, to be changed and put back."""
+        return bytes_array(self.members[name]).copy()
+
+    def put(self, name: str, array: np.ndarray) -> None:
+        """Take a changed array."""
+        self.members[name] = array_bytes(array)
+
+
+FORGERIES: dict[str, Callable[[Forged], None]] = {}
+"""What is done to a sample, by name."""
+
+
+def forgery(change: Callable[[Forged], None]) -> Callable[[Forged], None]:
+    """Adds a forgery to the list."""
+    FORGERIES[change.__name__.replace("_", " ")] = change
+    return change
+
+
+def glb_parts(content: bytes) -> tuple[dict[str, Any], bytearray]:
+    """Header and binary part of a GLB."""
+    length = int.from_bytes(content[12:16], "little")
+    return json.loads(content[20 : 20 + length]), bytearray(content[28 + length :])
+
+
+def glb_of(header: dict[str, Any], binary: bytes) -> bytes:
+    """A GLB of header and binary part."""
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = len(text).to_bytes(4, "little") + b"JSON" + text + len(binary).to_bytes(4, "little") + b"BIN\0" + binary
+    return b"glTF" + (2).to_bytes(4, "little") + (12 + len(chunks)).to_bytes(4, "little") + chunks
+
+
+@forgery
+def a_vertex_of_the_mesh_moved_by_metres(it: Forged) -> None:
+    header, binary = glb_parts(it.members["glb"])
+    view = header["bufferViews"][header["accessors"][0]["bufferView"]]
+    start = view.get("byteOffset", 0)
+    vertex = np.frombuffer(bytes(binary[start : start + 12]), np.float32) + np.float32(3.0)
+    binary[start : start + 12] = vertex.tobytes()
+    it.members["glb"] = glb_of(header, bytes(binary))
+
+
+@forgery
+def a_part_moved_in_mesh_and_record(it: Forged) -> None:
+    header, binary = glb_parts(it.members["glb"])
+    record = it.record
+    part = int(it.rng.integers(len(record["parts"])))
+    size = np.ptp(np.array(record["bounds"]), axis=0).max()
+    header["nodes"][part]["matrix"][12] += 0.1 * size
+    it.members["glb"] = glb_of(header, bytes(binary))
+    if "pose" in record["parts"][part]:
+        record["parts"][part]["pose"][0][3] += 0.1 * size
+    it.write(record)
+
+
+@forgery
+def points_that_are_no_numbers(it: Forged) -> None:
+    points = it.array("points.npy")
+    points[3] = np.nan
+    it.put("points.npy", points)
+
+
+@forgery
+def points_moved(it: Forged) -> None:
+    points = it.array("points.npy")
+    it.put("points.npy", points + np.float32(0.01) * np.ptp(points, axis=0).max().astype(np.float32))
+
+
+@forgery
+def one_point_moved(it: Forged) -> None:
+    points = it.array("points.npy")
+    points[int(it.rng.integers(len(points)))] += 0.05 * np.ptp(points, axis=0).max()
+    it.put("points.npy", points)
+
+
+@forgery
+def points_as_doubles(it: Forged) -> None:
+    it.put("points.npy", it.array("points.npy").astype(np.float64))
+
+
+@forgery
+def a_point_too_few(it: Forged) -> None:
+    for name in ("points.npy", "normals.npy", "labels.npy", "instances.npy"):
+        it.put(name, it.array(name)[:-1])
+
+
+@forgery
+def normals_negated(it: Forged) -> None:
+    it.put("normals.npy", -it.array("normals.npy"))
+
+
+@forgery
+def one_normal_turned(it: Forged) -> None:
+    normals = it.array("normals.npy")
+    normals[int(it.rng.integers(len(normals)))] *= -1
+    it.put("normals.npy", normals)
+
+
+@forgery
+def one_label_changed(it: Forged) -> None:
+    labels = it.array("labels.npy")
+    labels[int(it.rng.integers(len(labels)))] += 1
+    it.put("labels.npy", labels)
+
+
+@forgery
+def one_instance_out_of_range(it: Forged) -> None:
+    instances = it.array("instances.npy")
+    instances[0] = 32000
+    it.put("instances.npy", instances)
+
+
+@forgery
+def the_cloud_of_another_sample(it: Forged) -> None:
+    for name in ("points.npy", "normals.npy"):
+        it.members[name] = it.other[name]
+
+
+@forgery
+def the_mesh_of_another_sample(it: Forged) -> None:
+    it.members["glb"] = it.other["glb"]
+
+
+@forgery
+def the_text_of_another_sample(it: Forged) -> None:
+    it.members["txt"] = it.other["txt"]
+
+
+@forgery
+def the_text_of_another_sample_in_record_too(it: Forged) -> None:
+    it.members["txt"] = it.other["txt"]
+    it.write({**it.record, "text": json.loads(it.other["json"])["text"]})
+
+
+@forgery
+def the_sketch_of_another_sample(it: Forged) -> None:
+    it.members["sketch0.png"] = it.other["sketch0.png"]
+
+
+@forgery
+def a_blank_sketch(it: Forged) -> None:
+    it.members["sketch0.png"] = _png(np.full_like(_pixels(it.members["sketch0.png"]), 255))
+
+
+@forgery
+def a_mirrored_sketch(it: Forged) -> None:
+    it.members["sketch0.png"] = _png(_pixels(it.members["sketch0.png"])[::-1])
+
+
+@forgery
+def a_truncated_sketch(it: Forged) -> None:
+    it.members["sketch0.png"] = it.members["sketch0.png"][:60]
+
+
+@forgery
+def stable_flipped(it: Forged) -> None:
+    record = it.record
+    record["physics"]["stable"] = not record["physics"]["stable"]
+    it.write(record)
+
+
+@forgery
+def rooted_flipped(it: Forged) -> None:
+    record = it.record
+    record["physics"]["rooted"] = not record["physics"]["rooted"]
+    it.write(record)
+
+
+@forgery
+def a_margin_of_its_own(it: Forged) -> None:
+    record = it.record
+    record["physics"]["margin"] = "much"
+    it.write(record)
+
+
+@forgery
+def a_dropped_contact(it: Forged) -> None:
+    _contacts(it, lambda pairs: pairs[:-1])
+
+
+@forgery
+def a_contact_with_itself(it: Forged) -> None:
+    _contacts(it, lambda pairs: [*pairs, [0, 0]])
+
+
+@forgery
+def a_graph_of_another_name(it: Forged) -> None:
+    it.write({**it.record, "graph": "f" * 64})
+
+
+@forgery
+def another_label_in_the_record(it: Forged) -> None:
+    record = it.record
+    record["parts"][0]["label"] = "gargoyle"
+    it.write(record)
+
+
+@forgery
+def another_class_in_the_record(it: Forged) -> None:
+    record = it.record
+    record["parts"][-1]["class"] += 1
+    it.write(record)
+
+
+@forgery
+def bounds_twice_as_large(it: Forged) -> None:
+    record = it.record
+    record["bounds"] = (2 * np.array(record["bounds"])).tolist()
+    it.write(record)
+
+
+@forgery
+def a_part_miscounted(it: Forged) -> None:
+    record = it.record
+    record["counts"]["parts"] += 1
+    it.write(record)
+
+
+@forgery
+def a_record_that_is_a_list(it: Forged) -> None:
+    it.write([])
+
+
+@forgery
+def a_record_without_parts(it: Forged) -> None:
+    record = it.record
+    del record["parts"]
+    it.write(record)
+
+
+@forgery
+def a_null_in_the_record(it: Forged) -> None:
+    it.write({**it.record, "kit": None})
+
+
+@forgery
+def an_array_of_rubbish(it: Forged) -> None:
+    it.members["normals.npy"] = b"\x93NUMPY rubbish"
+
+
+@forgery
+def a_member_too_few(it: Forged) -> None:
+    del it.members["txt"]
+
+
+@forgery
+def another_key_in_the_record(it: Forged) -> None:
+    it.write({**it.record, "key": "somebody-else"})
+
+
+FOLDER_FORGERIES: dict[str, Callable[[Path], None]] = {}
+"""What is done to the folder of a dataset, by name."""
+
+
+def of_folder(change: Callable[[Path], None]) -> Callable[[Path], None]:
+    """Adds a forgery of a folder to the list."""
+    FOLDER_FORGERIES[change.__name__.replace("_", " ")] = change
+    return change
+
+
+@of_folder
+def an_edited_card(folder: Path) -> None:
+    card = folder / "README.md"
+    card.write_text(card.read_text().replace("rooted", "well rooted"))
+
+
+@of_folder
+def a_link_to_elsewhere(folder: Path) -> None:
+    (folder / "data" / "more").symlink_to("/etc")
+
+
+@of_folder
+def an_empty_folder(folder: Path) -> None:
+    (folder / "data" / "later").mkdir()
+
+
+@of_folder
+def a_foreign_file(folder: Path) -> None:
+    (folder / "notes.txt").write_text("mine")
+
+
+@of_folder
+def samples_of_two_splits_exchanged(folder: Path) -> None:
+    shards = _shards(folder)
+    paths = [next(path for path in sorted(shards) if f"-{split}-" in path) for split in ("train", "test")]
+    (key, one), (other, two) = (next(iter(shards[path].items())) for path in paths)
+    for members, split in ((one, "test"), (two, "train")):
+        members["json"] = json_bytes({**json.loads(members["json"]), "split": split})
+    del shards[paths[0]][key], shards[paths[1]][other]
+    shards[paths[0]] = {other: two, **shards[paths[0]]}
+    shards[paths[1]] = {key: one, **shards[paths[1]]}
+    _write(folder, shards)
+
+
+@of_folder
+def shards_of_two_splits_exchanged(folder: Path) -> None:
+    train, test = (sorted((folder / "data" / split).glob("*.tar"))[0] for split in ("train", "test"))
+    one, two = train.read_bytes(), test.read_bytes()
+    train.write_bytes(two)
+    test.write_bytes(one)
+
+
+@of_folder
+def a_manifest_that_ends_early(folder: Path) -> None:
+    (folder / "manifest.json").write_text("{")
+
+
+@of_folder
+def a_manifest_that_is_a_list(folder: Path) -> None:
+    (folder / "manifest.json").write_text("[]")
+
+
+def reseal(folder: Path) -> None:
+    """Make index, manifest, Croissant and checksums agree with what stands in `folder` now, as far as they can be
+    read."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text())
+        rows = []
+        for shard in manifest["shards"]:
+            path = folder / shard["path"]
+            shard["sha256"], shard["bytes"] = file_digest(path), path.stat().st_size
+            for key, offset, members in shard_samples(path):
+                rows.append(_row(key, shard, offset, members))
+        index = folder.parent / f"{folder.name}-index" / f"{folder.name}.parquet"
+        stream = io.BytesIO()
+        write_index(rows, stream)
+        index.write_bytes(stream.getvalue())
+        manifest["index"] |= {"sha256": file_digest(index), "bytes": index.stat().st_size}
+        croissant = json.loads((folder / "croissant.json").read_text())
+        digests = {shard["path"]: shard["sha256"] for shard in manifest["shards"]}
+        for each in croissant["distribution"]:
+            if each["@id"] in digests:
+                each["sha256"] = digests[each["@id"]]
+        (folder / "croissant.json").write_text(json.dumps(croissant, indent=1, ensure_ascii=False) + "\n")
+        manifest["files"]["croissant.json"] = file_digest(folder / "croissant.json")
+        (folder / "manifest.json").write_text(json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
+    except (ValueError, TypeError, KeyError):
+        pass  # a manifest of rubbish: only the checksums are made anew
+    listed = (path for path in sorted(folder.rglob("*")) if path.is_file() and not path.is_symlink())
+    digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in listed}
+    digests.pop("checksums.txt", None)
+    if "notes.txt" in digests:
+        del digests["notes.txt"]
+    (folder / "checksums.txt").write_text(checksums(digests))
+
+
+def forge(folder: Path, name: str, rng: np.random.Generator) -> str:
+    """Apply the forgery `name` to the dataset in `folder`, to a sample chosen at random, and seal it again. Answers
+    what must be named: the sample's key, or nothing for a forgery of the folder."""
+    if name in FOLDER_FORGERIES:
+        FOLDER_FORGERIES[name](folder)
+        reseal(folder)
+        return ""
+    shards = _shards(folder)
+    places = [(path, key) for path, samples in shards.items() for key in samples]
+    path, key = places[int(rng.integers(len(places)))]
+    members, others = shards[path][key], [shards[p][k] for p, k in places if k != key]
+    differing = [each for each in others if each["txt"] != members["txt"] and each["glb"] != members["glb"]]
+    it = Forged(dict(members), differing[int(rng.integers(len(differing)))], rng)
+    FORGERIES[name](it)
+    if it.members == members:
+        raise ValueError(f"{name} changes nothing in {key}")
+    shards[path][key] = it.members
+    _write(folder, {path: shards[path]})
+    reseal(folder)
+    return key
+
+
+def _row(key: str, shard: Mapping[str, Any], offset: int, members: Members) -> dict[str, Any]:
+    record: Any = json.loads(members["json"])
+    try:
+        return index_row(record, shard["path"], offset, tar_bytes(members))
+    except (KeyError, TypeError):
+        blank = {"key": key, "split": shard["split"], "shard": shard["path"], "offset": offset}
+        return {**dict.fromkeys(_columns()), **blank, "bytes": tar_bytes(members)}
+
+
+def _columns() -> list[str]:
+    from stages.package.index import columns
+
+    return [*columns(), "shard", "offset", "bytes"]
+
+
+def _shards(folder: Path) -> dict[str, dict[str, Members]]:
+    paths = sorted((folder / "data").rglob("*.tar"))
+    return {
+        path.relative_to(folder).as_posix(): {key: members for key, _, members in shard_samples(path)} for path in paths
+    }
+
+
+def _write(folder: Path, shards: Mapping[str, Mapping[str, Members]]) -> None:
+    for path, samples in shards.items():
+        (folder / path).unlink()
+        with open(folder / path, "wb") as stream, ShardWriter(stream) as writer:
+            for key, members in samples.items():
+                writer.write(key, members)
+
+
+def _contacts(it: Forged, change: Callable[[list[list[int]]], list[list[int]]]) -> None:
+    record = it.record
+    pairs = change(json.loads(record["contacts"]))
+    record["contacts"] = json.dumps(pairs)
+    record["counts"]["cycles"] += len(pairs) - record["counts"]["contacts"]
+    record["counts"]["contacts"] = len(pairs)
+    it.write(record)
+
+
+def _pixels(content: bytes) -> np.ndarray:
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(content)).convert("L"))
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "png")
+    return stream.getvalue()
+
+
+def copy_dataset(source: Path, target: Path, with_work: bool) -> Path:
+    """A copy of a dataset and its index in the folder `target`, with what verify needs of the mill's folder."""
+    for name in (source.name, f"{source.name}-index"):
+        shutil.copytree(source.parent / name, target / name)
+    work = source.parent / ".work" / source.name
+    for stage in work.iterdir() if with_work else [work / "exemplars"]:
+        if stage.is_dir() and stage.name != "package":
+            shutil.copytree(stage, target / ".work" / source.name / stage.name)
+    return target / source.name
+
+
+def main() -> None:
+    """Forge a dataset in many ways, one at a time."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--samples", default="100")
+    parser.add_argument("--with-work", action="store_true")
+    asked = parser.parse_args()
+    missed = 0
+    names = [*FORGERIES, *FOLDER_FORGERIES]
+    for number, name in enumerate(names):
+        with tempfile.TemporaryDirectory() as place:
+            folder = copy_dataset(asked.folder, Path(place), asked.with_work)
+            key = forge(folder, name, np.random.default_rng([asked.seed, number]))
+            found = verify_dataset(folder, None if asked.samples == "all" else int(asked.samples), 0)
+            said = [fault for faults in found.faults.values() for fault in faults if key in fault]
+            missed += not said
+            print(f"{'found ' if said else 'MISSED'} {name}: {said[0] if said else key}", flush=True)
+    print(f"{len(names) - missed} of {len(names)} found")
+    sys.exit(bool(missed))
+
+
+if __name__ == "__main__":
+    main()
