@@ -8,7 +8,7 @@ import numpy as np
 from stages.variations.kernels.layout import BOUNDARY, PARTS, UPRIGHT, Outcome
 from stages.variations.kernels.lookup import random_below
 
-__all__ = ["lies_in", "looks_same", "match_poses", "move", "turn_by"]
+__all__ = ["lies_in", "looks_same", "match_poses", "move", "squared_distance", "turn_by"]
 
 
 @numba.njit(cache=True)
@@ -46,10 +46,16 @@ def part_at(places, by_type, first, last, place, tolerance):
     limit = tolerance * tolerance
     for k in range(first, last):
         part = by_type[k]
-        x, y, z = places[part, 0] - place[0], places[part, 1] - place[1], places[part, 2] - place[2]
-        if x * x + y * y + z * z <= limit:
+        if squared_distance(places[part], place) <= limit:
             return part
     return -1
+
+
+@numba.njit(cache=True)
+def squared_distance(p, q):
+    """The squared distance of two points."""
+    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    return x * x + y * y + z * z
 
 
 @numba.njit(cache=True)
