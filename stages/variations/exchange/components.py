@@ -6,7 +6,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.matches import move, squared_distance
+from stages.variations.exchange.matches import squared_distance, transform
 from stages.variations.kernels.layout import BOUNDARY, CHOICES
 from stages.variations.kernels.lookup import random_below
 from stages.variations.kernels.membership import admitted
@@ -91,7 +91,7 @@ def _possible_neighbours(tolerance, a, b, ws, components):
     near = np.empty(firsts[count], dtype=np.int64)
     owner = np.empty(firsts[count], dtype=np.int64)
     touched = np.zeros(components, dtype=np.bool_)
-    place = np.empty(3)
+    point = np.empty(3)
     for k in range(count):
         part, image = ws.boundary[k], ws.images[k]
         for e in range(a.starts[part], a.starts[part + 1]):
@@ -108,8 +108,8 @@ def _possible_neighbours(tolerance, a, b, ws, components):
             for f in range(a.starts[part], a.starts[part + 1]):
                 other = a.ends[f]
                 if ws.inside[other] and a.types[other] == b.types[end]:
-                    move(ws.motion, a.places[other], place)
-                    if squared_distance(place, b.places[end]) <= tolerance**2:
+                    transform(ws.motion, a.translations[other], point)
+                    if squared_distance(point, b.translations[end]) <= tolerance**2:
                         brought = True
                         break
             if not brought:

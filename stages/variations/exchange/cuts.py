@@ -126,7 +126,7 @@ def _cut_by_planes(rng, shape, inside, within, stack, seed):
     n = len(shape.types)
     axes = np.empty((3, 3))
     if rng.random() < OF_A_PART:
-        axes[:] = shape.turns[random_below(rng, n)].T
+        axes[:] = shape.rotations[random_below(rng, n)].T
     else:
         _draw_axes(rng, axes)
     kind = random_below(rng, 3)
@@ -135,7 +135,8 @@ def _cut_by_planes(rng, shape, inside, within, stack, seed):
     low, high = np.empty(3), np.empty(3)
     far = random_below(rng, n)
     for u in range(used):
-        a, b = _along(axes[(first + u) % 3], shape.places[seed]), _along(axes[(first + u) % 3], shape.places[far])
+        axis = axes[(first + u) % 3]
+        a, b = _along(axis, shape.translations[seed]), _along(axis, shape.translations[far])
         slack = 1e-3 * (1.0 + abs(a) + abs(b))
         if kind == HALF_SPACE:
             if rng.random() < 0.5:
@@ -147,7 +148,7 @@ def _cut_by_planes(rng, shape, inside, within, stack, seed):
     for part in range(n):
         within[part] = 1
         for u in range(used):
-            x = _along(axes[(first + u) % 3], shape.places[part])
+            x = _along(axes[(first + u) % 3], shape.translations[part])
             if x < low[u] or x > high[u]:
                 within[part] = 0
                 break

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 
 from stages.variations.exchange.components import choose_components, find_components
-from stages.variations.exchange.matches import looks_same, move, squared_distance, turn_by
+from stages.variations.exchange.matches import looks_same, rotate, squared_distance, transform
 from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, TRY, UNKNOWNS, Outcome
 
 __all__ = ["join", "place_boxes", "set_edge"]
@@ -44,7 +44,7 @@ def join(rng, kit, a, b, ws, smallest, largest):
         return Outcome.NOTHING_ATTACHED
     _inherit_edges(a.starts, a.ends, a.labels, ws.from_a, ws)
     _inherit_edges(b.starts, b.ends, b.labels, ws.from_b, ws)
-    place_boxes(kit.boxes, ws.types, ws.turns, ws.places, parts, ws.boxes)
+    place_boxes(kit.boxes, ws.types, ws.rotations, ws.translations, parts, ws.boxes)
     return Outcome.OK
 
 
@@ -75,8 +75,8 @@ def _put_piece(a, b, ws):
         if ws.inside[part]:
             ws.from_a[part] = v
             ws.types[v] = a.types[part]
-            move(ws.motion, a.places[part], ws.places[v])
-            turn_by(ws.motion, a.turns[part], ws.turns[v])
+            transform(ws.motion, a.translations[part], ws.translations[v])
+            rotate(ws.motion, a.rotations[part], ws.rotations[v])
             ws.origin[v] = 0
             v += 1
     for k in range(ws.counts[BOUNDARY]):
@@ -94,9 +94,9 @@ def _put_rest(kit, a, b, ws, piece):
         if ws.component[part] < 0 or not ws.keep[ws.component[part]]:
             continue
         first, last = a.type_starts[b.types[part]], a.type_starts[b.types[part] + 1]
-        same = _part_of_piece(a.by_type, first, last, ws.from_a, ws.places, b.places[part], kit.limits[0])
+        same = _part_of_piece(a.by_type, first, last, ws.from_a, ws.translations, b.translations[part], kit.limits[0])
         if same >= 0:
-            if ws.origin[same] != 0 or looks_same(kit, ws.types[same], ws.turns[same], b.turns[part]) < 0:
+            if ws.origin[same] != 0 or looks_same(kit, ws.types[same], ws.rotations[same], b.rotations[part]) < 0:
                 return -1
             ws.origin[same] = 2
             ws.from_b[part] = same
@@ -104,21 +104,21 @@ def _put_rest(kit, a, b, ws, piece):
         ws.from_b[part] = v
         ws.types[v] = b.types[part]
         for i in range(3):
-            ws.places[v, i] = b.places[part, i]
+            ws.translations[v, i] = b.translations[part, i]
             for j in range(3):
-                ws.turns[v, i, j] = b.turns[part, i, j]
+                ws.rotations[v, i, j] = b.rotations[part, i, j]
         ws.origin[v] = 1
         v += 1
     return v
 
 
 @numba.njit(cache=True)
-def _part_of_piece(by_type, first, last, from_a, places, place, tolerance):
-    """Which of the parts `by_type[first:last]` of A is in the variant and stands at a place there, as a part of the
+def _part_of_piece(by_type, first, last, from_a, translations, point, tolerance):
+    """Which of the parts `by_type[first:last]` of A is in the variant and stands at a point there, as a part of the
     variant, or -1."""
     for k in range(first, last):
         v = from_a[by_type[k]]
-        if v >= 0 and squared_distance(places[v], place) <= tolerance**2:
+        if v >= 0 and squared_distance(translations[v], point) <= tolerance**2:
             return v
     return -1
 
@@ -156,13 +156,13 @@ def set_edge(stamp, label, edges, counts, i, j, label_ij, label_ji):
 
 
 @numba.njit(cache=True)
-def place_boxes(type_boxes, types, turns, places, count, boxes):
+def place_boxes(type_boxes, types, rotations, translations, count, boxes):
     """The axis-aligned boxes around the parts as centre and half extents."""
     for v in range(count):
         for i in range(3):
-            centre, half = places[v, i], 0.0
+            centre, half = translations[v, i], 0.0
             for j in range(3):
-                centre += turns[v, i, j] * type_boxes[types[v], 0, j]
-                half += abs(turns[v, i, j]) * type_boxes[types[v], 1, j]
+                centre += rotations[v, i, j] * type_boxes[types[v], 0, j]
+                half += abs(rotations[v, i, j]) * type_boxes[types[v], 1, j]
             boxes[v, 0, i] = centre
             boxes[v, 1, i] = half
