@@ -10,9 +10,9 @@ from pydantic import Field, model_validator
 from pipeline.config import StrictModel
 from pipeline.shards import ShardWriter, array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.points.area_sampling import SurfacePoints
 from stages.points.cloud import sample_cloud
 from stages.points.frame import Normalization, normalization
-from stages.points.surface import SurfacePoints
 from stages.shape.collection.shapes import Collection
 from stages.shape.collection.shards import PRODUCERS, collection_shards
 
