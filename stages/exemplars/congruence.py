@@ -85,12 +85,12 @@ def _maps_onto(source: ComparableMesh, target: ComparableMesh, rotation: FloatAr
     from stages.shape.geometry.triangles import points_on_surface
 
     step = max(len(source.vertices) // QUICK_CHECK, 1)
-    for probes, onto, rotated in (
+    for probes, onto, by in (
         (source.vertices[::step], target, rotation),
         (source.probes, target, rotation),
         (target.probes, source, rotation.T),
     ):
-        if not points_on_surface(*onto.tree, np.ascontiguousarray(probes @ rotated.T), slack):
+        if not points_on_surface(*onto.tree, np.ascontiguousarray(probes @ by.T), slack):
             return False
     return True
 
