@@ -11,14 +11,14 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.findings import kit_warnings, pieces, refusals
 from stages.exemplars.formats.scene import unique_name
-from stages.exemplars.grammar import observe
+from stages.exemplars.grammar import observe_contacts, observe_grammar
 from stages.exemplars.hubs import chosen_hubs, set_hubs_aside, with_touching
-from stages.exemplars.identify import identify_parts
+from stages.exemplars.identify import Identified, identify_parts
 from stages.exemplars.read import Model
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.kit import NOTHING, ContactKind, Exemplar, Kit
+from stages.shape.kit import NOTHING, Assembly, ContactKind, Exemplar, Kit
 
 __all__ = ["KitReport", "Observation", "build_kit", "observe_models"]
 
@@ -88,39 +88,30 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
     diagonals = np.concatenate([[types[each].diagonal for each in made.types] for made in identified.assemblies])
     median = float(np.median(diagonals))
     contact = ContactTest(types, config.contact.tolerance * median)
-    pose_tolerance = config.pose_tolerance * median
+    pose_tolerance, counted = config.pose_tolerance * median, config.contact.kinds
     touching = [replace(each, edges=contact.contacts(each.types, each.poses)) for each in identified.assemblies]
-    assemblies, grammar, kinds = observe(types, touching, contact, pose_tolerance, config.contact.kinds)
-    warnings = [f"{model.path.name}: {warning}" for model in models for warning in model.warnings]
-    hubs = chosen_hubs(config, types, assemblies)
+    contacts = observe_contacts(types, touching, contact, pose_tolerance, counted)
+    hubs = chosen_hubs(config, types, contacts.counted)
     left_out = [types[index].name for index in hubs]
-    kept = [np.flatnonzero(~np.isin(each.types, hubs)) for each in assemblies]
-    for model, each, keep in zip(models, assemblies, kept, strict=True):
-        if not len(keep):
-            raise ConfigError(f"{model.path}: every part of it is of a hub type; name fewer types in `hubs`")
-        if len(keep) < len(each):
-            named = ", ".join(types[index].name for index in np.intersect1d(hubs, each.types))
-            warnings.append(f"{model.path.name}: {len(each) - len(keep)} hubs are left out of the graph: {named}")
-    if config.disconnected == "largest":
-        for index, (each, model) in enumerate(zip(assemblies, models, strict=True)):
-            apart = kept[index][pieces(each.select(kept[index])) > 0]
-            if len(apart):
-                left = ", ".join(names[index][part] for part in apart[:5].tolist())
-                warnings.append(f"{model.path.name}: {len(apart)} parts apart from the rest are left out: {left}")
-                kept[index] = np.setdiff1d(kept[index], apart)
-    backdrops = [NOTHING] * len(assemblies)
-    if any(len(keep) < len(each) for keep, each in zip(kept, assemblies, strict=True)):
+    kept, warnings = _kept_parts(config, models, identified, contacts.counted, hubs)
+    is_whole = all(len(keep) == len(each) for keep, each in zip(kept, touching, strict=True))
+    if is_whole:
+        grammar = observe_grammar(types, touching, contacts, counted)
+        assemblies, kinds, backdrops = contacts.counted, contacts.kinds, [NOTHING] * len(touching)
+    else:
+        # Classes of dockings, their order and their poses are those of the parts that are seen.
         backdrop = hubs if config.hubs.keep == "backdrop" else ()
-        seen = [with_touching(each, keep, backdrop) for each, keep in zip(assemblies, kept, strict=True)]
+        seen = [with_touching(each, keep, backdrop) for each, keep in zip(contacts.counted, kept, strict=True)]
         everything = [each.select(parts) for each, parts in zip(touching, seen, strict=True)]
         used = np.unique(np.concatenate([each.types for each in everything]))
         types, aliases = tuple(types[index] for index in used), tuple(aliases[index] for index in used)
         everything = [replace(each, types=np.searchsorted(used, each.types).astype(np.int16)) for each in everything]
         contact = ContactTest(types, contact.tolerance)
-        assemblies, grammar, kinds = observe(types, everything, contact, pose_tolerance, config.contact.kinds)
+        contacts = observe_contacts(types, everything, contact, pose_tolerance, counted)
+        grammar = observe_grammar(types, everything, contacts, counted)
         aside = np.flatnonzero(np.isin(used, backdrop)).tolist()
         edges = [each.edges for each in everything]
-        assemblies, backdrops, grammar, kinds = set_hubs_aside(aside, assemblies, grammar, kinds, edges)
+        assemblies, backdrops, grammar, kinds = set_hubs_aside(aside, contacts.counted, grammar, contacts.kinds, edges)
         names = [tuple(words[part] for part in keep.tolist()) for words, keep in zip(names, kept, strict=True)]
         touching = [each.select(keep) for each, keep in zip(touching, kept, strict=True)]
     kit = Kit(
@@ -142,6 +133,34 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
         refusals=tuple(refusals(kit, models, identified.empty, left_out)),
         warnings=(*warnings, *kit_warnings(kit)),
     )
+
+
+def _kept_parts(
+    config: KitConfig,
+    models: Sequence[Model],
+    identified: Identified,
+    assemblies: Sequence[Assembly],
+    hubs: Sequence[int],
+) -> tuple[list[IntArray], list[str]]:
+    """The parts of each of `assemblies`, ascending, that are no hubs and in no piece that the config leaves out; and
+    the warnings of the models and of what is left out. Raises ConfigError where nothing is kept of a model."""
+    types = identified.types
+    warnings = [f"{model.path.name}: {warning}" for model in models for warning in model.warnings]
+    kept = [np.flatnonzero(~np.isin(each.types, hubs)) for each in assemblies]
+    for model, each, keep in zip(models, assemblies, kept, strict=True):
+        if not len(keep):
+            raise ConfigError(f"{model.path}: every part of it is of a hub type; name fewer types in `hubs`")
+        if len(keep) < len(each):
+            named = ", ".join(types[index].name for index in np.intersect1d(hubs, each.types))
+            warnings.append(f"{model.path.name}: {len(each) - len(keep)} hubs are left out of the graph: {named}")
+    if config.disconnected == "largest":
+        for index, (each, model) in enumerate(zip(assemblies, models, strict=True)):
+            apart = kept[index][pieces(each.select(kept[index])) > 0]
+            if len(apart):
+                left = ", ".join(identified.part_names[index][part] for part in apart[:5].tolist())
+                warnings.append(f"{model.path.name}: {len(apart)} parts apart from the rest are left out: {left}")
+                kept[index] = np.setdiff1d(kept[index], apart)
+    return kept, warnings
 
 
 def _exemplar_names(models: Sequence[Model]) -> list[str]:

@@ -9,14 +9,14 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle
 
-__all__ = ["Surface", "congruences", "surface"]
+__all__ = ["ComparableMesh", "comparable_mesh", "congruences"]
 
 QUICK_CHECK = 24
 CANDIDATES = 4096
 
 
 @dataclass(frozen=True)
-class Surface:
+class ComparableMesh:
     """A mesh made ready for comparison.
 
     vertices: float64 (v, 3), distinct corners relative to the centroid; centroid: float64 (3,), area-weighted;
@@ -31,7 +31,7 @@ class Surface:
     diagonal: float
 
 
-def surface(vertices: FloatArray, faces: IntArray) -> Surface:
+def comparable_mesh(vertices: FloatArray, faces: IntArray) -> ComparableMesh:
     """The mesh `vertices` (v, 3), `faces` (f, 3) made ready for `congruences`."""
     from stages.shape.geometry.triangles import build_tree
 
@@ -42,7 +42,7 @@ def surface(vertices: FloatArray, faces: IntArray) -> Surface:
     diagonal = float(np.linalg.norm(np.ptp(used, axis=0)))
     distinct = _distinct(used, 1e-5 * diagonal)
     centres = corners.mean(axis=1) - centroid
-    return Surface(
+    return ComparableMesh(
         vertices=distinct,
         centroid=centroid,
         area=float(areas.sum()),
@@ -52,7 +52,7 @@ def surface(vertices: FloatArray, faces: IntArray) -> Surface:
     )
 
 
-def congruences(source: Surface, target: Surface, tolerance: float, reflections: bool) -> FloatArray:
+def congruences(source: ComparableMesh, target: ComparableMesh, tolerance: float, reflections: bool) -> FloatArray:
     """All rigid motions (k, 4, 4) that move `source` onto `target` within `tolerance`; with `reflections` also
     those that turn a part into its mirror image.
 
@@ -81,16 +81,16 @@ def congruences(source: Surface, target: Surface, tolerance: float, reflections:
     return motions[np.lexsort(rank.T[::-1])]
 
 
-def _maps_onto(source: Surface, target: Surface, rotation: FloatArray, slack: float) -> bool:
+def _maps_onto(source: ComparableMesh, target: ComparableMesh, rotation: FloatArray, slack: float) -> bool:
     from stages.shape.geometry.triangles import points_on_surface
 
     step = max(len(source.vertices) // QUICK_CHECK, 1)
-    for probes, onto, turn in (
+    for probes, onto, by in (
         (source.vertices[::step], target, rotation),
         (source.probes, target, rotation),
         (target.probes, source, rotation.T),
     ):
-        if not points_on_surface(*onto.tree, np.ascontiguousarray(probes @ turn.T), slack):
+        if not points_on_surface(*onto.tree, np.ascontiguousarray(probes @ by.T), slack):
             return False
     return True
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.exemplars.congruence import congruences, surface
+from stages.exemplars.congruence import comparable_mesh, congruences
 from stages.exemplars.read import Model
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
@@ -117,10 +117,10 @@ def ways_together(kit: Kit) -> Iterator[str]:
 
 def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int, int]]:
     """Pairs i < j of types that are each other's mirror image; `tolerance` is a share of the diagonal."""
-    surfaces = [surface(each.vertices, each.faces) for each in types]
+    meshes = [comparable_mesh(each.vertices, each.faces) for each in types]
     twins: list[tuple[int, int]] = []
     for i, j in itertools.combinations(range(len(types)), 2):
-        motions = congruences(surfaces[i], surfaces[j], tolerance, reflections=True)
+        motions = congruences(meshes[i], meshes[j], tolerance, reflections=True)
         # Types that rotations alone make equal, told apart by their labels, are no twins.
         if len(motions) and (np.linalg.det(motions[:, :3, :3]) < 0).all():
             twins.append((i, j))

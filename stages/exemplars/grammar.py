@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from stages.shape.geometry.penetration import PenetrationTest
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType
 
-__all__ = ["observe", "observe_dockings", "observe_neighbourhoods"]
+__all__ = ["Contacts", "observe_contacts", "observe_dockings", "observe_grammar", "observe_neighbourhoods"]
 
 IMAGES = 24
 """Most symmetric images of a docking whose penetration is measured; round parts have hundreds."""
@@ -59,36 +59,62 @@ def observe_dockings(types: Sequence[PartType], assemblies: Sequence[Assembly], 
     return [docking for _, found in sorted(classes.items()) for docking, _ in found]
 
 
-def observe(
+@dataclass(frozen=True)
+class Contacts:
+    """The contacts in some assemblies.
+
+    dockings: their classes, with their kinds of contact and depths of 0; counted: the assemblies with those edges alone
+    whose kinds count; kinds: for each assembly the kind of every edge that it came with.
+    """
+
+    dockings: tuple[Docking, ...]
+    counted: list[Assembly]
+    kinds: list[tuple[ContactKind, ...]]
+
+
+def observe_contacts(
     types: Sequence[PartType],
     assemblies: Sequence[Assembly],
     contact: ContactTest,
     tolerance: float,
     kinds: Sequence[ContactKind],
-) -> tuple[list[Assembly], Grammar, list[tuple[ContactKind, ...]]]:
-    """The grammar of `assemblies`, counting only contacts of the given `kinds`.
-
-    Returns the assemblies with the edges that count, the grammar, and for each assembly the kind of every edge that
-    it came with.
-    """
-    dockings = _measure_dockings(types, observe_dockings(types, assemblies, tolerance), contact)
+) -> Contacts:
+    """What the contacts of `assemblies` are, and which of them count: those of the given `kinds`."""
+    dockings = tuple(
+        replace(each, kind=contact.kind(each.a, each.b, each.pose) or "point")
+        for each in observe_dockings(types, assemblies, tolerance)
+    )
     table = DockingTable(types, dockings, tolerance)
     found: list[tuple[ContactKind, ...]] = []
-    kept: list[Assembly] = []
+    counted: list[Assembly] = []
     for assembly in assemblies:
         labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0] // 2
         found.append(tuple(dockings[label].kind for label in labels.tolist()))
-        counted = np.array([kind in kinds for kind in found[-1]], dtype=bool)
-        kept.append(replace(assembly, edges=assembly.edges[counted]))
-    usable = tuple(each for each in dockings if each.kind in kinds)
-    return kept, Grammar(observe_neighbourhoods(kept), usable, _observe_nested(types, assemblies, contact)), found
+        chosen = np.array([kind in kinds for kind in found[-1]], dtype=bool)
+        counted.append(replace(assembly, edges=assembly.edges[chosen]))
+    return Contacts(dockings, counted, found)
+
+
+def observe_grammar(
+    types: Sequence[PartType],
+    assemblies: Sequence[Assembly],
+    contacts: Contacts,
+    kinds: Sequence[ContactKind],
+) -> Grammar:
+    """The grammar of `assemblies`, whose `contacts` count where they are of the given `kinds`."""
+    penetration = PenetrationTest(types)
+    dockings = tuple(
+        replace(each, depth=round(_deepest(types, each, penetration), 6))
+        for each in contacts.dockings
+        if each.kind in kinds
+    )
+    return Grammar(observe_neighbourhoods(contacts.counted), dockings, _observe_nested(types, assemblies, penetration))
 
 
 def _observe_nested(
-    types: Sequence[PartType], assemblies: Sequence[Assembly], contact: ContactTest
+    types: Sequence[PartType], assemblies: Sequence[Assembly], penetration: PenetrationTest
 ) -> dict[tuple[int, int], float]:
     """For pairs of types the greatest depth of parts that reach into each other without any contact of surfaces."""
-    penetration = PenetrationTest(types)
     nested: dict[tuple[int, int], float] = {}
     for assembly in assemblies:
         touching = set(map(tuple, assembly.edges.tolist()))
@@ -102,21 +128,6 @@ def _observe_nested(
                 if depth > 0.0:
                     nested[a, b] = max(nested.get((a, b), 0.0), round(depth, 6))
     return dict(sorted(nested.items()))
-
-
-def _measure_dockings(
-    types: Sequence[PartType], dockings: Sequence[Docking], contact: ContactTest
-) -> tuple[Docking, ...]:
-    """`dockings` with their kind of contact and their penetration depth."""
-    penetration = PenetrationTest(types)
-    return tuple(
-        replace(
-            each,
-            kind=contact.kind(each.a, each.b, each.pose) or "point",
-            depth=round(_deepest(types, each, penetration), 6),
-        )
-        for each in dockings
-    )
 
 
 def _deepest(types: Sequence[PartType], docking: Docking, penetration: PenetrationTest) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.congruence import Surface, congruences, surface
+from stages.exemplars.congruence import ComparableMesh, comparable_mesh, congruences
 from stages.exemplars.frame import extremal_frame
 from stages.exemplars.read import Model, RawPart
 from stages.exemplars.repair import repair_mesh
@@ -40,10 +40,10 @@ class Identified:
 
 @dataclass
 class _Type:
-    """A part type, its surface ready for comparison, the label it stands for, and the models' words for it,
+    """A part type, its mesh ready for comparison, the label it stands for, and the models' words for it,
     its own first."""
 
-    surface: Surface
+    mesh: ComparableMesh
     part: PartType
     label: str | None
     words: dict[str, None]
@@ -100,12 +100,12 @@ def _identify(
     repairs.update(repair.changes)
     if len(faces) == 0:
         return None
-    shape = surface(vertices, faces)
+    shape = comparable_mesh(vertices, faces)
     for index, each in enumerate(types):
         if each.label == label:
-            motions = congruences(each.surface, shape, config.congruence_tolerance, config.mirror_images_match)
+            motions = congruences(each.mesh, shape, config.congruence_tolerance, config.mirror_images_match)
             if len(motions):
-                # Both surfaces are compared about their centroids; the type's coordinates start at its own.
+                # Both meshes are compared about their centroids; the type's coordinates start at its own.
                 motion = motions[0].copy()
                 motion[:3, 3] = shape.centroid
                 return index, motion

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.points.surface import SurfacePoints, sample_shape
+from stages.points.area_sampling import SurfacePoints, sample_shape
 from stages.shape.shape import Shape
 
 __all__ = ["sample_cloud"]

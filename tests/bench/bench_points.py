@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from stages.points.area_sampling import sample_surface
 from stages.points.farthest import farthest_points
-from stages.points.surface import sample_surface
 from tests.bench.measure import Measure, rate
 
 UNIFORM, PICKED, POOL = 2048, 1500, 30_000

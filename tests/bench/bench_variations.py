@@ -101,8 +101,8 @@ def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -
         for parent in parents:
             n, shape = len(parent.assembly), parent.tables
             line._load(parent)
-            ws.turns[:n], ws.places[:n] = shape.turns, shape.places
-            place_boxes(tables.boxes, ws.types, ws.turns, ws.places, n, ws.boxes)
+            ws.rotations[:n], ws.translations[:n] = shape.rotations, shape.translations
+            place_boxes(tables.boxes, ws.types, ws.rotations, ws.translations, n, ws.boxes)
             ws.counts[TRY] += 1
             i, j = parent.assembly.edges.T
             ws.stamp[i, j] = ws.stamp[j, i] = ws.counts[TRY]

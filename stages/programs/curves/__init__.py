@@ -58,9 +58,9 @@ from stages.programs.curves.profile import (
     superellipse,
 )
 from stages.programs.curves.revolve import hollow, revolve
+from stages.programs.curves.shell import solidify
 from stages.programs.curves.solids import box, cylinder, ellipsoid, extrude, rounded_box
 from stages.programs.curves.style import Style
-from stages.programs.curves.surface import solidify
 from stages.programs.curves.sweep import loft, loft_rings, sweep
 
 __all__ = [

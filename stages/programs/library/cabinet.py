@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from stages.programs.curves import Part
 from stages.programs.library.cabinet_case import base_parts, case_parts, shelf_parts, top_parts
+from stages.programs.library.cabinet_dimensions import CabinetDimensions
 from stages.programs.library.cabinet_fronts import front_parts
-from stages.programs.library.cabinet_plan import Plan
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
 from stages.programs.rules import Rule
@@ -16,8 +16,14 @@ __all__ = ["PROGRAM", "build"]
 
 def build(values: Values) -> list[Part]:
     """The parts of the cabinet at `values`."""
-    plan = Plan(values)
-    return [*case_parts(plan), *top_parts(plan), *base_parts(plan), *shelf_parts(plan), *front_parts(plan)]
+    cabinet = CabinetDimensions(values)
+    return [
+        *case_parts(cabinet),
+        *top_parts(cabinet),
+        *base_parts(cabinet),
+        *shelf_parts(cabinet),
+        *front_parts(cabinet),
+    ]
 
 
 OPEN, CLOSED = "open_columns > 0", "open_columns < column_count"

@@ -16,7 +16,7 @@ from stages.programs.curves import (
     sweep,
     symmetric,
 )
-from stages.programs.library.cabinet_plan import Plan, block
+from stages.programs.library.cabinet_dimensions import CabinetDimensions, block
 
 __all__ = ["base_parts", "case_parts", "shelf_parts", "top_parts"]
 
@@ -26,83 +26,89 @@ SUNK = 0.004
 """How far boards reach into each other."""
 
 
-def case_parts(plan: Plan) -> list[Part]:
+def case_parts(cabinet: CabinetDimensions) -> list[Part]:
     """Sides, bottom, dividers and back; what lies between the sides stands back a hair from their front edges."""
-    top, inner = plan.ceiling + SUNK, plan.half - plan.board
-    side = block((-plan.half, plan.floor, plan.back), (-inner, top, plan.front))
-    floor = block((-inner - SUNK, plan.floor, plan.back), (inner + SUNK, plan.floor + plan.board, plan.front - 0.001))
+    top, inner = cabinet.ceiling + SUNK, cabinet.half - cabinet.board
+    side = block((-cabinet.half, cabinet.floor, cabinet.back), (-inner, top, cabinet.front))
+    floor = block(
+        (-inner - SUNK, cabinet.floor, cabinet.back),
+        (inner + SUNK, cabinet.floor + cabinet.board, cabinet.front - 0.001),
+    )
     parts = [*symmetric([Part("side", side, OAK)], "x"), Part("bottom", floor, OAK)]
-    behind = plan.back
-    if plan.values["has_back"]:
-        behind = plan.back + 0.008
-        panel = block((-inner - SUNK, plan.floor + plan.board - SUNK, plan.back), (inner + SUNK, top, behind))
+    behind = cabinet.back
+    if cabinet.values["has_back"]:
+        behind = cabinet.back + 0.008
+        panel = block((-inner - SUNK, cabinet.floor + cabinet.board - SUNK, cabinet.back), (inner + SUNK, top, behind))
         parts.append(Part("back", panel, SHADE))
-    for column in plan.columns[1:]:
+    for column in cabinet.columns[1:]:
         right, bottom = column.low
-        low = (right - plan.board, bottom - SUNK, behind - SUNK * bool(plan.values["has_back"]))
-        parts.append(Part("divider", block(low, (right, top, plan.front - 0.001)), OAK))
+        low = (right - cabinet.board, bottom - SUNK, behind - SUNK * bool(cabinet.values["has_back"]))
+        parts.append(Part("divider", block(low, (right, top, cabinet.front - 0.001)), OAK))
     return parts
 
 
-def shelf_parts(plan: Plan) -> list[Part]:
+def shelf_parts(cabinet: CabinetDimensions) -> list[Part]:
     """The shelves of the open columns."""
     shelves = []
-    count = plan.values["shelf_count"]
-    thick = min(plan.board, 0.024)
-    for column, bare in zip(plan.columns, plan.is_open, strict=True):
+    count = cabinet.values["shelf_count"]
+    thick = min(cabinet.board, 0.024)
+    for column, bare in zip(cabinet.columns, cabinet.is_open, strict=True):
         for place in range(count if bare else 0):
             level = column.low[1] + (column.size[1] * (place + 1)) / (count + 1)
-            low = (column.low[0] - SUNK, level - thick / 2.0, plan.back + 0.004)
-            high = (column.high[0] + SUNK, level + thick / 2.0, plan.front - 0.012)
+            low = (column.low[0] - SUNK, level - thick / 2.0, cabinet.back + 0.004)
+            high = (column.high[0] + SUNK, level + thick / 2.0, cabinet.front - 0.012)
             shelves.append(Part("shelf", block(low, high), SHADE))
     return shelves
 
 
-def top_parts(plan: Plan) -> list[Part]:
+def top_parts(cabinet: CabinetDimensions) -> list[Part]:
     """The top, flush with the wall behind, and the crown under it."""
-    values = plan.values
-    thick, flare = values["top_thickness"], 0.7 * plan.crown
+    values = cabinet.values
+    thick, flare = values["top_thickness"], 0.7 * cabinet.crown
     out = values["top_overhang"] + flare
-    depth = plan.face + out - plan.back
+    depth = cabinet.face + out - cabinet.back
     bevel = 0.45 * thick * values["edge_roundness"]
-    outline = rectangle(2.0 * (plan.half + out), depth).moved(0.0, (plan.face + out + plan.back) / 2.0)
+    outline = rectangle(2.0 * (cabinet.half + out), depth).moved(0.0, (cabinet.face + out + cabinet.back) / 2.0)
     mesh = extrude(outline, thick, base=values["height"] - thick, bevel=bevel, steps=3)
     parts = [Part("top", mesh, OAK)]
-    if plan.crown:
-        parts.append(Part("crown", _crown(plan, flare), OAK))
+    if cabinet.crown:
+        parts.append(Part("crown", _crown(cabinet, flare), OAK))
     return parts
 
 
-def _crown(plan: Plan, flare: float) -> QuadMesh:
+def _crown(cabinet: CabinetDimensions, flare: float) -> QuadMesh:
     """A cove between two fillets, flaring to the front and to both sides."""
     turn = np.linspace(0.0, np.pi / 2.0, 6)
     out = np.concatenate([[0.0], 0.12 + 0.68 * (1.0 - np.cos(turn)), [1.0, 1.0]]) * flare
-    rise = np.concatenate([[0.0], 0.08 + 0.72 * np.sin(turn), [0.86, 1.05]]) * plan.crown
+    rise = np.concatenate([[0.0], 0.08 + 0.72 * np.sin(turn), [0.86, 1.05]]) * cabinet.crown
     # From the top down, counter-clockwise in the plane of x and z.
     out, rise = out[::-1], rise[::-1]
     rings = np.empty((len(out), 4, 3))
-    rings[:, [0, 3], 0], rings[:, [1, 2], 0] = (plan.half + out)[:, None], -(plan.half + out)[:, None]
-    rings[..., 1] = (plan.ceiling + rise)[:, None]
-    rings[:, :2, 2], rings[:, 2:, 2] = (plan.face + out)[:, None], plan.back
+    rings[:, [0, 3], 0], rings[:, [1, 2], 0] = (cabinet.half + out)[:, None], -(cabinet.half + out)[:, None]
+    rings[..., 1] = (cabinet.ceiling + rise)[:, None]
+    rings[:, :2, 2], rings[:, 2:, 2] = (cabinet.face + out)[:, None], cabinet.back
     return loft_rings(rings)
 
 
-def base_parts(plan: Plan) -> list[Part]:
+def base_parts(cabinet: CabinetDimensions) -> list[Part]:
     """A plinth, legs or runners."""
-    kind = plan.values["base_kind"]
-    inset = 0.1 * plan.values["base_inset"]
-    top = plan.floor + min(SUNK, plan.board / 3.0)
+    kind = cabinet.values["base_kind"]
+    inset = 0.1 * cabinet.values["base_inset"]
+    top = cabinet.floor + min(SUNK, cabinet.board / 3.0)
     if kind == 0:
-        low, high = (0.005 + inset - plan.half, 0.0, plan.back), (plan.half - 0.005 - inset, top, plan.front - inset)
+        low, high = (
+            (0.005 + inset - cabinet.half, 0.0, cabinet.back),
+            (cabinet.half - 0.005 - inset, top, cabinet.front - inset),
+        )
         return [Part("plinth", block(low, high), DARK)]
     thick = 0.06 if kind == 1 else 0.03
-    x, z = plan.half - thick / 2.0 - 0.006 - inset, plan.front - thick / 2.0 - 0.006 - 0.6 * inset
+    x, z = cabinet.half - thick / 2.0 - 0.006 - inset, cabinet.front - thick / 2.0 - 0.006 - 0.6 * inset
     if kind == 2:
         return symmetric([Part("runner", _runner(x, z, thick, top), DARK)], "x")
-    section = square_circle(plan.values["leg_roundness"], thick)
-    style = Style.taper(1.0 - 0.6 * plan.values["leg_taper"], 1.0)
+    section = square_circle(cabinet.values["leg_roundness"], thick)
+    style = Style.taper(1.0 - 0.6 * cabinet.values["leg_taper"], 1.0)
     # A wide cabinet has a pair of legs in its middle, too.
-    sides = [(x, z), (x, -z), (-x, z), (-x, -z), *([(0.0, z), (0.0, -z)] if plan.half > 0.9 else [])]
+    sides = [(x, z), (x, -z), (-x, z), (-x, -z), *([(0.0, z), (0.0, -z)] if cabinet.half > 0.9 else [])]
     return [
         Part("leg", sweep(line((across, 0.0, along), (across, top, along)), section, style), DARK)
         for across, along in sides

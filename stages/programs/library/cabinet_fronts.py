@@ -17,7 +17,7 @@ from stages.programs.curves import (
     sweep,
     translation,
 )
-from stages.programs.library.cabinet_plan import FRONT, Opening, Plan, block
+from stages.programs.library.cabinet_dimensions import FRONT, CabinetDimensions, Opening, block
 
 __all__ = ["front_parts"]
 
@@ -35,56 +35,56 @@ ROOT = 0.014
 SLAB, FRAMED, LOUVRED, GLAZED = range(4)
 
 
-def front_parts(plan: Plan) -> list[Part]:
+def front_parts(cabinet: CabinetDimensions) -> list[Part]:
     """The fronts of every column that is not open."""
     return [
         part
-        for column, bare in zip(plan.columns, plan.is_open, strict=True)
+        for column, bare in zip(cabinet.columns, cabinet.is_open, strict=True)
         if not bare
-        for part in _column(plan, column)
+        for part in _column(cabinet, column)
     ]
 
 
-def _column(plan: Plan, column: Opening) -> list[Part]:
+def _column(cabinet: CabinetDimensions, column: Opening) -> list[Part]:
     """Drawers one above the other, a board, and one door or two."""
-    values, rows = plan.values, plan.values["drawer_rows"]
+    values, rows = cabinet.values, cabinet.values["drawer_rows"]
     if rows == 0:
-        return _doors(plan, column, column)
+        return _doors(cabinet, column, column)
     width, height = column.size
     # A drawer is as high as a hand and no higher than an arm is long; the doors keep a fifth of the column.
     least, most = min(0.1 * rows, 0.6 * height), min(0.34 * rows, 0.8 * height)
     stack = least + (most - least) * values["drawer_share"]
     level = column.high[1] - stack if values["has_drawers_on_top"] else column.low[1] + stack
     below, above = column.split(level)
-    half = min(plan.board, 0.02) / 2.0
-    low = (column.low[0] - 0.004, level - half, plan.back + 0.01)
-    parts = [Part("rail", block(low, (column.high[0] + 0.004, level + half, plan.front - FRONT - 0.002)), OAK)]
+    half = min(cabinet.board, 0.02) / 2.0
+    low = (column.low[0] - 0.004, level - half, cabinet.back + 0.01)
+    parts = [Part("rail", block(low, (column.high[0] + 0.004, level + half, cabinet.front - FRONT - 0.002)), OAK)]
     drawers, doors = (above, below) if values["has_drawers_on_top"] else (below, above)
     for row in range(rows):
         bottom = drawers.low[1] + drawers.size[1] * row / rows
         piece = Opening((column.low[0], bottom), (column.high[0], bottom + drawers.size[1] / rows))
-        leaf = _leaf(plan, column, piece)
+        leaf = _leaf(cabinet, column, piece)
         style = SLAB if values["door_style"] == SLAB else FRAMED
         middle = (leaf.low[0] + leaf.high[0]) / 2.0, (leaf.low[1] + leaf.high[1]) / 2.0
-        parts += _panel(plan, leaf, style, "drawer")
-        handle = _handle(plan, min(width, 0.6))
-        parts.append(Part("handle", handle.transformed(translation(*middle, plan.face)), STEEL))
-    return [*parts, *_doors(plan, column, doors)]
+        parts += _panel(cabinet, leaf, style, "drawer")
+        handle = _handle(cabinet, min(width, 0.6))
+        parts.append(Part("handle", handle.transformed(translation(*middle, cabinet.face)), STEEL))
+    return [*parts, *_doors(cabinet, column, doors)]
 
 
-def _leaf(plan: Plan, column: Opening, piece: Opening) -> Opening:
+def _leaf(cabinet: CabinetDimensions, column: Opening, piece: Opening) -> Opening:
     """What the front of a `piece` of a column covers: its opening, or half of the boards around it, too."""
-    if plan.values["has_inset_fronts"]:
+    if cabinet.values["has_inset_fronts"]:
         return piece.grown(-GAP, -GAP, -GAP, -GAP)
-    left = plan.board if column is plan.columns[0] else plan.board / 2.0
-    right = plan.board if column is plan.columns[-1] else plan.board / 2.0
-    bottom = plan.board if piece.low[1] == column.low[1] else 0.0
+    left = cabinet.board if column is cabinet.columns[0] else cabinet.board / 2.0
+    right = cabinet.board if column is cabinet.columns[-1] else cabinet.board / 2.0
+    bottom = cabinet.board if piece.low[1] == column.low[1] else 0.0
     return piece.grown(left - GAP / 2.0, bottom - GAP / 2.0, right - GAP / 2.0, -GAP / 2.0)
 
 
-def _doors(plan: Plan, column: Opening, piece: Opening) -> list[Part]:
+def _doors(cabinet: CabinetDimensions, column: Opening, piece: Opening) -> list[Part]:
     """One door, or two that open from their middle."""
-    leaf, values = _leaf(plan, column, piece), plan.values
+    leaf, values = _leaf(cabinet, column, piece), cabinet.values
     middle = (leaf.low[0] + leaf.high[0]) / 2.0
     pair = piece.size[0] > WIDEST
     leaves = [leaf]
@@ -95,16 +95,16 @@ def _doors(plan: Plan, column: Opening, piece: Opening) -> list[Part]:
         ]
     parts = []
     height = leaf.size[1]
-    length = _length(plan, min(height, 0.6))
-    handle = _handle(plan, min(height, 0.6)).transformed(rotation("z", 90.0))
+    length = _length(cabinet, min(height, 0.6))
+    handle = _handle(cabinet, min(height, 0.6)).transformed(rotation("z", 90.0))
     reach = max(length, 0.3 * height) / 2.0 + 0.04 * height
     level = leaf.low[1] + reach + (height - 2.0 * reach) * values["handle_height"]
     for place, each in enumerate(leaves):
-        parts += _panel(plan, each, values["door_style"], "door")
+        parts += _panel(cabinet, each, values["door_style"], "door")
         side = max(_stile(each) / 2.0, min(0.03, 0.2 * each.size[0]))
         # Doors of a pair are gripped in the middle, single ones on the right.
         x = each.low[0] + side if pair and place == 1 else each.high[0] - side
-        parts.append(Part("handle", handle.transformed(translation(x, level, plan.face)), STEEL))
+        parts.append(Part("handle", handle.transformed(translation(x, level, cabinet.face)), STEEL))
     return parts
 
 
@@ -113,14 +113,14 @@ def _stile(leaf: Opening) -> float:
     return min(0.06, 0.2 * min(leaf.size))
 
 
-def _panel(plan: Plan, leaf: Opening, style: int, label: str) -> list[Part]:
+def _panel(cabinet: CabinetDimensions, leaf: Opening, style: int, label: str) -> list[Part]:
     """A door or drawer front: a slab, or a frame around a panel, slats or glass."""
-    back, face = plan.face - FRONT, plan.face
+    back, face = cabinet.face - FRONT, cabinet.face
     # Fronts on the case touch it.
-    back -= 0.0 if plan.values["has_inset_fronts"] else 0.0005
+    back -= 0.0 if cabinet.values["has_inset_fronts"] else 0.0005
     if style == SLAB:
         middle = [(leaf.low[0] + leaf.high[0]) / 2.0, (leaf.low[1] + leaf.high[1]) / 2.0, (back + face) / 2.0]
-        radius = 0.4 * FRONT * plan.values["edge_roundness"]
+        radius = 0.4 * FRONT * cabinet.values["edge_roundness"]
         return [Part(label, rounded_box([*leaf.size, face - back], radius, middle, steps=2), PAINT)]
     stile = _stile(leaf)
     (left, bottom), (right, top) = leaf.low, leaf.high
@@ -167,16 +167,16 @@ def _bars(inner: Opening, back: float, face: float) -> list[QuadMesh]:
     return bars
 
 
-def _length(plan: Plan, room: float) -> float:
+def _length(cabinet: CabinetDimensions, room: float) -> float:
     """How long a handle is where it has `room`."""
-    return (0.25 + 0.4 * plan.values["handle_size"]) * room
+    return (0.25 + 0.4 * cabinet.values["handle_size"]) * room
 
 
-def _handle(plan: Plan, room: float) -> QuadMesh:
+def _handle(cabinet: CabinetDimensions, room: float) -> QuadMesh:
     """A handle along x on the plane z = 0, its feet sunk into the front: a knob, a bar on posts, or a bow."""
-    kind, half = plan.values["handle_type"], _length(plan, room) / 2.0
+    kind, half = cabinet.values["handle_type"], _length(cabinet, room) / 2.0
     if kind == 0:
-        radius = (0.009 + 0.01 * plan.values["handle_size"]) * min(1.0, room / 0.11)
+        radius = (0.009 + 0.01 * cabinet.values["handle_size"]) * min(1.0, room / 0.11)
         stem = sweep(line((0.0, 0.0, -ROOT), (0.0, 0.0, 0.02)), circle(0.45 * radius, 8))
         return QuadMesh.joined([stem, ellipsoid((radius, radius, 0.7 * radius), (0.0, 0.0, 0.02), count=12)])
     # What is short is thin, or it would not bend.

@@ -8,7 +8,7 @@ from stages.programs.curves import Part
 from stages.programs.library.chair_arms import arm_parts
 from stages.programs.library.chair_back import back_parts
 from stages.programs.library.chair_base import base_parts
-from stages.programs.library.chair_plan import Plan
+from stages.programs.library.chair_dimensions import ChairDimensions
 from stages.programs.library.chair_seat import seat_parts
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
@@ -20,8 +20,8 @@ __all__ = ["PROGRAM", "build"]
 
 def build(values: Values) -> Sequence[Part]:
     """The parts of the chair at `values`."""
-    plan = Plan(values)
-    return [*seat_parts(plan), *base_parts(plan), *back_parts(plan), *arm_parts(plan)]
+    chair = ChairDimensions(values)
+    return [*seat_parts(chair), *base_parts(chair), *back_parts(chair), *arm_parts(chair)]
 
 
 OPEN = "not is_back_rest"

@@ -18,7 +18,7 @@ from stages.programs.curves import (
     symmetric,
     translation,
 )
-from stages.programs.library.chair_plan import METAL, WOOD, Plan, post
+from stages.programs.library.chair_dimensions import METAL, WOOD, ChairDimensions, post
 from stages.shape.arrays import FloatArray
 
 __all__ = ["base_parts"]
@@ -27,62 +27,62 @@ RINGS = 9
 """Rings of a leg."""
 
 
-def base_parts(plan: Plan) -> list[Part]:
+def base_parts(chair: ChairDimensions) -> list[Part]:
     """All that carries the seat; its upper ends are sunk into it."""
-    if not plan.values["is_monoleg"]:
-        return _four_legs(plan)
-    return _star(plan) if plan.values["is_monoleg_tent"] else [_pedestal(plan)]
+    if not chair.values["is_monoleg"]:
+        return _four_legs(chair)
+    return _star(chair) if chair.values["is_monoleg_tent"] else [_pedestal(chair)]
 
 
-def _four_legs(plan: Plan) -> list[Part]:
+def _four_legs(chair: ChairDimensions) -> list[Part]:
     """Straight legs in front, bent ones behind."""
-    top = plan.seat_middle
+    top = chair.seat_middle
     share = np.linspace(1.0, 0.0, RINGS)
-    middle = 0.22 * top * float(plan.values["back_leg_mid_y_offset_pct"])
-    foot = 0.35 * top * float(plan.values["back_leg_bottom_y_offset_pct"])
-    centers = np.stack([np.full(RINGS, plan.x), top * (1.0 - share), np.full(RINGS, plan.z)], axis=1)
+    middle = 0.22 * top * float(chair.values["back_leg_mid_y_offset_pct"])
+    foot = 0.35 * top * float(chair.values["back_leg_bottom_y_offset_pct"])
+    centers = np.stack([np.full(RINGS, chair.x), top * (1.0 - share), np.full(RINGS, chair.z)], axis=1)
     behind = centers * [1.0, 1.0, -1.0]
     behind[:, 2] -= 3.0 * share * (1.0 - share) * middle + share**2 * foot
-    profile = square_circle(float(plan.values["legs_bevel"]), 1.2 * plan.unit)
-    width = _width(plan, share)
+    profile = square_circle(float(chair.values["legs_bevel"]), 1.2 * chair.unit)
+    width = _width(chair, share)
     return symmetric([Part("leg", post(each, profile, width), WOOD) for each in (centers, behind)], "x")
 
 
-def _width(plan: Plan, share: FloatArray) -> FloatArray:
+def _width(chair: ChairDimensions, share: FloatArray) -> FloatArray:
     """Relative width of a leg at shares of the way from its top down to its foot."""
-    foot = 0.5 + 0.5 * float(plan.values["legs_shape_1"])
-    waist = (0.62 + 0.38 * float(plan.values["legs_shape_2"])) * (1.0 + foot) / 2.0
+    foot = 0.5 + 0.5 * float(chair.values["legs_shape_1"])
+    waist = (0.62 + 0.38 * float(chair.values["legs_shape_2"])) * (1.0 + foot) / 2.0
     width: FloatArray = (1.0 - share) * (1.0 - 2.0 * share) + 4.0 * share * (1.0 - share) * waist
     width += share * (2.0 * share - 1.0) * foot
     return width
 
 
-def _handles(plan: Plan) -> FloatArray:
+def _handles(chair: ChairDimensions) -> FloatArray:
     """The handles of the curve of a single foot, float64 (2, 2): relative reach, and share of the way down."""
     return np.array(
         [
             [
-                0.12 + 0.88 * float(plan.values[f"monoleg_bezier_{end}_handle_x_offset"]),
-                float(plan.values[f"monoleg_bezier_{end}_handle_z_pct"]),
+                0.12 + 0.88 * float(chair.values[f"monoleg_bezier_{end}_handle_x_offset"]),
+                float(chair.values[f"monoleg_bezier_{end}_handle_z_pct"]),
             ]
             for end in ("start", "end")
         ]
     )
 
 
-def _pedestal(plan: Plan) -> Part:
+def _pedestal(chair: ChairDimensions) -> Part:
     """A turned foot whose outline is the Bezier curve; its section goes from square to round and is long where the
     seat is."""
-    lip = 0.5 * plan.unit
-    top = 0.12 + 0.58 * float(plan.values["monoleg_bezier_start_x_offset"])
-    ground = 0.4 + 0.6 * float(plan.values["monoleg_bezier_end_x_offset"])
-    outline = bezier([[top, 0.0], *_handles(plan), [ground, 1.0]], count=14).points[::-1]
-    heights = plan.seat_middle + (lip - plan.seat_middle) * outline[:, 1]
-    narrow = min(plan.width, plan.depth)
+    lip = 0.5 * chair.unit
+    top = 0.12 + 0.58 * float(chair.values["monoleg_bezier_start_x_offset"])
+    ground = 0.4 + 0.6 * float(chair.values["monoleg_bezier_end_x_offset"])
+    outline = bezier([[top, 0.0], *_handles(chair), [ground, 1.0]], count=14).points[::-1]
+    heights = chair.seat_middle + (lip - chair.seat_middle) * outline[:, 1]
+    narrow = min(chair.width, chair.depth)
     profile = square_circle(
-        float(plan.values["legs_bevel"]),
-        0.94 * (narrow * plan.width) ** 0.5,
-        0.94 * (narrow * plan.depth) ** 0.5,
+        float(chair.values["legs_bevel"]),
+        0.94 * (narrow * chair.width) ** 0.5,
+        0.94 * (narrow * chair.depth) ** 0.5,
         count=24,
     )
     # The lip stands upright on the ground: a foot that runs out flat has no sharp edge.
@@ -90,28 +90,28 @@ def _pedestal(plan: Plan) -> Part:
     return Part("pedestal", _upright(profile, np.concatenate([[0.0], heights]), radii), WOOD)
 
 
-def _star(plan: Plan) -> list[Part]:
+def _star(chair: ChairDimensions) -> list[Part]:
     """A column on a hub from which curved legs reach out to glides on the ground."""
-    unit, values = plan.unit, plan.values
-    reach = 0.5 * (plan.width * plan.depth) ** 0.5
-    level = plan.seat_middle * float(values["monoleg_tent_pct"])
+    unit, values = chair.unit, chair.values
+    reach = 0.5 * (chair.width * chair.depth) ** 0.5
+    level = chair.seat_middle * float(values["monoleg_tent_pct"])
     hub = 0.6 * unit + 0.45 * reach * float(values["monoleg_bezier_start_x_offset"])
     end, foot = reach * (0.55 + 0.55 * float(values["monoleg_bezier_end_x_offset"])), 0.5 * unit
     # The upper handle stays in the upper part and the lower one in the lower, or thick legs would cut themselves.
-    handles = _handles(plan) * [reach, 0.75] + [[0.0, 0.0], [0.0, 0.25]]
+    handles = _handles(chair) * [reach, 0.75] + [[0.0, 0.0], [0.0, 0.25]]
     rail = bezier(
         [[0.0, level + (foot - level) * down, out] for out, down in [(hub, 0.0), *handles.tolist(), (end, 1.0)]],
         count=12,
     )
     profile = square_circle(float(values["legs_bevel"]), 0.92 * unit)
-    width = _width(plan, rail.positions)
+    width = _width(chair, rail.positions)
     style = Style(rail.positions, np.stack([width, width], axis=1), np.zeros(len(width)))
     leg = Part("leg", sweep(rail, profile, style, up=(1.0, 0.0, 0.0), caps=("flat", "round")), METAL)
     glide = Part("glide", cylinder(0.5 * unit, 0.7 * unit).transformed(translation(0.0, 0.0, end)), METAL)
     column = square_circle(float(values["legs_bevel"]), 1.3 * unit)
     heights, plate = np.array([level - 0.45 * unit, level + 0.45 * unit]), hub + 0.5 * unit
     return [
-        Part("column", _upright(column, np.array([level, plan.seat_middle]), np.ones(2)), METAL),
+        Part("column", _upright(column, np.array([level, chair.seat_middle]), np.ones(2)), METAL),
         Part("hub", _upright(circle(plate, 24), heights, np.array([1.0, 1.0 - 0.2 * unit / plate])), METAL),
         *radial([leg, glide], int(values["monoleg_tent_count"])),
     ]

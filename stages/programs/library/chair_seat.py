@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.programs.curves import Part, QuadMesh, loft_rings
-from stages.programs.library.chair_plan import FABRIC, SEAT, Plan
+from stages.programs.library.chair_dimensions import FABRIC, SEAT, ChairDimensions
 from stages.shape.arrays import FloatArray
 
 __all__ = ["seat_parts"]
@@ -16,18 +16,18 @@ PUFFED = ((0.92, -0.05), (0.98, 0.12), (1.0, 0.35), (0.99, 0.6), (0.94, 0.8), (0
 """Rings from below: how wide, and how high as a share of the height; a cushion's foot is sunk into the seat."""
 
 
-def seat_parts(plan: Plan) -> list[Part]:
+def seat_parts(chair: ChairDimensions) -> list[Part]:
     """The seat board and, where there is one, the cushion, which ends before the posts of the back."""
-    thickness = plan.seat_thickness
-    board = _stacked(plan.outline.points, plan.seat_top - thickness, thickness, BOARD)
+    thickness = chair.seat_thickness
+    board = _stacked(chair.outline.points, chair.seat_top - thickness, thickness, BOARD)
     parts = [Part("seat", board, SEAT)]
-    state = int(plan.values["pillow_state"])
+    state = int(chair.values["pillow_state"])
     if state:
-        outline = plan.outline.points * (0.97 if plan.values["pillow_fill_edge"] else 0.8)
+        outline = chair.outline.points * (0.97 if chair.values["pillow_fill_edge"] else 0.8)
         behind = outline[:, 1] < 0.0
-        outline[behind, 1] *= (plan.z - 0.6 * plan.unit) / (0.5 * plan.depth)
-        height, rings = (0.8 * plan.unit, FLAT) if state == 1 else (1.9 * plan.unit, PUFFED)
-        parts.append(Part("cushion", _stacked(outline, plan.seat_top, height, rings), FABRIC))
+        outline[behind, 1] *= (chair.z - 0.6 * chair.unit) / (0.5 * chair.depth)
+        height, rings = (0.8 * chair.unit, FLAT) if state == 1 else (1.9 * chair.unit, PUFFED)
+        parts.append(Part("cushion", _stacked(outline, chair.seat_top, height, rings), FABRIC))
     return parts
 
 

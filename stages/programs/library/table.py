@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from stages.programs.curves import Part
+from stages.programs.library.table_dimensions import OAK, TableDimensions, upright
 from stages.programs.library.table_legs import leg_parts
 from stages.programs.library.table_pedestal import pedestal_parts
-from stages.programs.library.table_plan import OAK, Plan, upright
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
 from stages.programs.rules import Rule
@@ -16,10 +16,10 @@ __all__ = ["PROGRAM", "build"]
 
 def build(values: Values) -> list[Part]:
     """The parts of the table at `values`."""
-    plan = Plan(values)
-    centers = (plan.height - plan.edge[:, 1:]) * [0.0, 1.0, 0.0]
-    top = Part("top", upright(plan.outline, centers, 1.0 - plan.edge[:, :1] / plan.half), OAK)
-    return [top, *(pedestal_parts(plan) if values["is_monoleg"] else leg_parts(plan))]
+    table = TableDimensions(values)
+    centers = (table.height - table.edge[:, 1:]) * [0.0, 1.0, 0.0]
+    top = Part("top", upright(table.outline, centers, 1.0 - table.edge[:, :1] / table.half), OAK)
+    return [top, *(pedestal_parts(table) if values["is_monoleg"] else leg_parts(table))]
 
 
 LEGS = "(is_monoleg and is_monoleg_tent) or (not is_monoleg)"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.programs.curves import Part, Profile, QuadMesh, loft_rings, rounded_rectangle, square_circle, symmetric
-from stages.programs.library.table_plan import WALNUT, Plan, upright
+from stages.programs.library.table_dimensions import WALNUT, TableDimensions, upright
 from stages.shape.arrays import FloatArray
 
 __all__ = ["leg_parts", "leg_width"]
@@ -17,73 +17,73 @@ SPANS = 12
 """Pieces of an arched rail."""
 
 
-def leg_width(plan: Plan, share: FloatArray) -> FloatArray:
+def leg_width(table: TableDimensions, share: FloatArray) -> FloatArray:
     """Relative width of a leg at shares (n,) of the way from its top down to its foot."""
-    foot = 0.45 + 0.55 * plan.values["legs_shape_1"]
-    waist = (0.6 + 0.4 * plan.values["legs_shape_2"]) * (1.0 + foot) / 2.0
+    foot = 0.45 + 0.55 * table.values["legs_shape_1"]
+    waist = (0.6 + 0.4 * table.values["legs_shape_2"]) * (1.0 + foot) / 2.0
     width: FloatArray = (1.0 - share) * (1.0 - 2.0 * share) + 4.0 * share * (1.0 - share) * waist
     width += share * (2.0 * share - 1.0) * foot
     return width
 
 
-def leg_parts(plan: Plan) -> list[Part]:
+def leg_parts(table: TableDimensions) -> list[Part]:
     """The four legs and, where there are, the rails along x and along z."""
-    frame = _Frame(plan)
+    frame = _Frame(table)
     share = np.linspace(0.0, 1.0, RINGS)
-    heights = plan.under * (1.0 - share)
+    heights = table.under * (1.0 - share)
     centers = np.column_stack([frame.at(heights), heights])[:, [0, 2, 1]]
-    tip = centers[:1] * [1.0, 0.0, 1.0] + [0.0, plan.sunk, 0.0]
-    width = leg_width(plan, share)
+    tip = centers[:1] * [1.0, 0.0, 1.0] + [0.0, table.sunk, 0.0]
+    width = leg_width(table, share)
     mesh = upright(frame.section.points, np.concatenate([tip, centers]), np.concatenate([width[:1], width]))
     parts = symmetric(symmetric([Part("leg", mesh, WALNUT)], "x"), "z")
-    if plan.values["is_std_legs_support_x"]:
-        parts += symmetric([_rail(plan, frame, "x", 0)], "z")
-    if plan.values["is_std_legs_support_y"]:
-        parts += symmetric([_rail(plan, frame, "y", 1)], "x")
+    if table.values["is_std_legs_support_x"]:
+        parts += symmetric([_rail(table, frame, "x", 0)], "z")
+    if table.values["is_std_legs_support_y"]:
+        parts += symmetric([_rail(table, frame, "y", 1)], "x")
     return parts
 
 
 class _Frame:
     """Where the leg at +x and +z runs, and its section."""
 
-    def __init__(self, plan: Plan) -> None:
-        values = plan.values
+    def __init__(self, table: TableDimensions) -> None:
+        values = table.values
         angle = 90.0 * values["std_legs_rotation"]
-        self.section = square_circle(values["legs_bevel"], 0.94 * plan.stick, 1.14 * plan.stick).turned(-angle)
-        self.plan = plan
+        self.section = square_circle(values["legs_bevel"], 0.94 * table.stick, 1.14 * table.stick).turned(-angle)
+        self.table = table
         sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
         self.way = np.array([sine, cosine])
         extent = self.section.size / 2.0
         offset = np.array([values["std_legs_top_offset_x"], values["std_legs_top_offset_y"]])
-        self.top = (plan.corner - extent) * (1.0 - 0.5 * offset)
+        self.top = (table.corner - extent) * (1.0 - 0.5 * offset)
         # How far the leg may go inwards before it comes near the middle, and outwards before it trips people.
         safe = np.maximum(self.way, 1e-9)
         room = float(((self.top - 1.2 * extent) / safe).min())
-        beyond = float(((plan.half - extent - self.top) / safe).min()) + 0.12 * plan.under
-        inmost, outmost = min(0.45 * room, 0.4 * plan.under), min(beyond, 0.4 * plan.under)
+        beyond = float(((table.half - extent - self.top) / safe).min()) + 0.12 * table.under
+        inmost, outmost = min(0.45 * room, 0.4 * table.under), min(beyond, 0.4 * table.under)
         self.foot = (inmost + outmost) * values["std_legs_bottom_offset_y"] - inmost
-        self.waist = min(0.28 * plan.under, 0.65 * room + 0.5 * self.foot) * values["std_legs_mid_offset_y"]
+        self.waist = min(0.28 * table.under, 0.65 * room + 0.5 * self.foot) * values["std_legs_mid_offset_y"]
 
     def at(self, heights: FloatArray) -> FloatArray:
         """The leg's middle at `heights`, any shape (...), as x and z, (..., 2)."""
-        down = 1.0 - heights / self.plan.under
+        down = 1.0 - heights / self.table.under
         out = self.foot * down - 4.0 * self.waist * down * (1.0 - down)
         place: FloatArray = self.top + out[..., None] * self.way
         return place
 
 
-def _rail(plan: Plan, frame: _Frame, name: str, axis: int) -> Part:
+def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:
     """The rail along x (axis 0) at +z, or along z (axis 1) at +x. Its ends lie in the middle of the legs at every
     height, so that it leans with them; it may arch, and its highest place lets it carry the top."""
-    values, prefix = plan.values, f"std_legs_support_{name}"
-    tall = (0.05 + 0.12 * values[f"{prefix}_profile_height"]) * plan.under
-    lowest, highest = 0.1 * plan.under + tall / 2.0, plan.under + 0.3 * plan.thickness - tall / 2.0
+    values, prefix = table.values, f"std_legs_support_{name}"
+    tall = (0.05 + 0.12 * values[f"{prefix}_profile_height"]) * table.under
+    lowest, highest = 0.1 * table.under + tall / 2.0, table.under + 0.3 * table.thickness - tall / 2.0
     level = lowest + (highest - lowest) * values[f"{prefix}_height"]
     span = float(frame.at(np.array(level))[axis])
-    arch = min(0.75 * (level - tall / 2.0 - 0.03 * plan.under), 0.25 * plan.under, 0.5 * span)
+    arch = min(0.75 * (level - tall / 2.0 - 0.03 * table.under), 0.25 * table.under, 0.5 * span)
     arch *= values[f"{prefix}_curvature"]
-    thinnest = float(leg_width(plan, np.linspace(0.0, 1.0, RINGS)).min())
-    wide = (0.3 + 0.55 * values[f"{prefix}_profile_width"]) * 0.85 * thinnest * plan.stick
+    thinnest = float(leg_width(table, np.linspace(0.0, 1.0, RINGS)).min())
+    wide = (0.3 + 0.55 * values[f"{prefix}_profile_width"]) * 0.85 * thinnest * table.stick
     profile = rounded_rectangle(wide, tall, 0.15 * min(wide, tall), steps=1)
     return Part("support", _between_legs(frame, profile, axis, level, arch), WALNUT)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stages.programs.curves import Part, Style, bezier, circle, cylinder, square_circle, sweep, translation
+from stages.programs.library.table_dimensions import METAL, WALNUT, TableDimensions, upright
 from stages.programs.library.table_legs import leg_width
-from stages.programs.library.table_plan import METAL, WALNUT, Plan, upright
 from stages.shape.arrays import FloatArray
 
 __all__ = ["pedestal_parts"]
@@ -15,64 +15,64 @@ SPOKE = 10
 """Pieces of a leg of the tent."""
 
 
-def pedestal_parts(plan: Plan) -> list[Part]:
+def pedestal_parts(table: TableDimensions) -> list[Part]:
     """The parts of the single foot."""
-    if not plan.values["is_monoleg_tent"]:
-        return [_turned(plan, plan.spread, 0.0)]
-    level = plan.under * plan.values["monoleg_tent_pct"]
-    thick = min(0.85 * plan.stick, 0.6 * level)
-    return [*_column(plan, level, thick), *_tent(plan, level, thick)]
+    if not table.values["is_monoleg_tent"]:
+        return [_turned(table, table.spread, 0.0)]
+    level = table.under * table.values["monoleg_tent_pct"]
+    thick = min(0.85 * table.stick, 0.6 * level)
+    return [*_column(table, level, thick), *_tent(table, level, thick)]
 
 
-def _turned(plan: Plan, spread: FloatArray, base: float) -> Part:
+def _turned(table: TableDimensions, spread: FloatArray, base: float) -> Part:
     """A body whose outline is the Bezier curve from its neck under the top to `base`; `spread` (2,) is what its widest
     could fill."""
     start, end = (
         (
-            0.06 + 0.8 * plan.values[f"monoleg_bezier_{each}_handle_x_offset"],
-            plan.values[f"monoleg_bezier_{each}_handle_z_pct"],
+            0.06 + 0.8 * table.values[f"monoleg_bezier_{each}_handle_x_offset"],
+            table.values[f"monoleg_bezier_{each}_handle_z_pct"],
         )
         for each in ("start", "end")
     )
-    neck = 0.1 + 0.5 * plan.values["monoleg_bezier_start_x_offset"]
-    ground = 0.3 + 0.5 * plan.values["monoleg_bezier_end_x_offset"]
+    neck = 0.1 + 0.5 * table.values["monoleg_bezier_start_x_offset"]
+    ground = 0.3 + 0.5 * table.values["monoleg_bezier_end_x_offset"]
     outline = bezier([(neck, 0.0), start, end, (ground, 1.0)], count=16).points
     # It stands on an upright lip, or it would run out flat in a sharp edge.
-    lip = 0.05 * (plan.under - base)
-    heights = plan.under + (base + lip - plan.under) * outline[:, 1]
-    levels = np.concatenate([[plan.sunk], heights, [base]])
+    lip = 0.05 * (table.under - base)
+    heights = table.under + (base + lip - table.under) * outline[:, 1]
+    levels = np.concatenate([[table.sunk], heights, [base]])
     radii = np.concatenate([outline[:1, 0], outline[:, 0], outline[-1:, 0]])
     return Part("pedestal", upright(circle(1.0, 32).points, _axis(levels), radii[:, None] * spread), WALNUT)
 
 
-def _column(plan: Plan, level: float, thick: float) -> list[Part]:
+def _column(table: TableDimensions, level: float, thick: float) -> list[Part]:
     """What stands on the tent: a turned body where the tent is low, else a plain column under a plate."""
-    if plan.values["monoleg_tent_pct"] < 0.4:
-        return [_turned(plan, np.maximum(0.45 * plan.spread, 4.0 * thick), level - 0.6 * thick)]
-    section = square_circle(plan.values["legs_bevel"], 1.5 * thick).points
-    column = upright(section, _axis(np.array([plan.sunk, level])), np.ones(2))
-    rim = np.array([plan.sunk, plan.under - 0.012, plan.under - 0.016])
-    plate = upright(circle(1.0, 32).points, _axis(rim), np.array([1.0, 1.0, 0.97])[:, None] * 0.45 * plan.spread)
+    if table.values["monoleg_tent_pct"] < 0.4:
+        return [_turned(table, np.maximum(0.45 * table.spread, 4.0 * thick), level - 0.6 * thick)]
+    section = square_circle(table.values["legs_bevel"], 1.5 * thick).points
+    column = upright(section, _axis(np.array([table.sunk, level])), np.ones(2))
+    rim = np.array([table.sunk, table.under - 0.012, table.under - 0.016])
+    plate = upright(circle(1.0, 32).points, _axis(rim), np.array([1.0, 1.0, 0.97])[:, None] * 0.45 * table.spread)
     hub = np.array([0.75, 0.6, -0.6, -0.75]) * thick + level
     boss = upright(circle(1.5 * thick, 32).points, _axis(hub), np.array([0.9, 1.0, 1.0, 0.9]))
     return [Part("column", column, METAL), Part("plate", plate, METAL), Part("hub", boss, METAL)]
 
 
-def _tent(plan: Plan, level: float, thick: float) -> list[Part]:
+def _tent(table: TableDimensions, level: float, thick: float) -> list[Part]:
     """Legs from the middle at `level` out and down to glides on the ground."""
-    count = plan.values["monoleg_tent_count"]
-    reach = 0.42 + 0.53 * plan.values["monoleg_tent_base_radius"]
-    section = square_circle(plan.values["legs_bevel"], thick, 1.1 * thick)
+    count = table.values["monoleg_tent_count"]
+    reach = 0.42 + 0.53 * table.values["monoleg_tent_base_radius"]
+    section = square_circle(table.values["legs_bevel"], thick, 1.1 * thick)
     foot = 0.6 * thick
     # An even number of legs stands astride of both axes, an odd one has a leg in front.
     turns = np.arange(count) / count + (0.5 / count if count % 2 == 0 else 0.0)
     parts = []
     for angle in (2.0 * np.pi * turns).tolist():
-        end = reach * plan.spread * [np.sin(angle), np.cos(angle)]
+        end = reach * table.spread * [np.sin(angle), np.cos(angle)]
         out = [0.0, 0.45, 0.85, 1.0]
         rise = np.array([level, level, foot + 0.45 * (level - foot), foot])
         rail = bezier(np.column_stack([np.outer(out, end), rise])[:, [0, 2, 1]], count=SPOKE)
-        width = leg_width(plan, rail.positions)
+        width = leg_width(table, rail.positions)
         style = Style(rail.positions, np.column_stack([width, width]), np.zeros(len(width)))
         parts.append(Part("leg", sweep(rail, section, style, caps=("flat", "round")), METAL))
         glide = cylinder(0.7 * foot, foot).transformed(translation(end[0], 0.0, end[1]))

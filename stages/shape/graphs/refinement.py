@@ -5,10 +5,22 @@ Numba compiles this module when it is imported: import it inside functions.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
 __all__ = ["refine"]
+
+
+class _Partition(NamedTuple):
+    """Nodes in cells, all int64 (n,): the `order` of the nodes, cell by cell; the `position` of each node in it; by
+    position where its cell begins, its `start`; where a cell begins its `size`."""
+
+    order: np.ndarray
+    position: np.ndarray
+    start: np.ndarray
+    size: np.ndarray
 
 
 @numba.njit(cache=True)
@@ -23,7 +35,58 @@ def refine(colors, edges, forward, backward, classes):  # type: ignore[no-untype
     `classes` - 1) of the arc from `edges[:, 0]` to `edges[:, 1]`, and of the arc back.
     """
     n, m = len(colors), len(edges)
-    # arcs into each node, as the node they come from and their class
+    first, source, kind = _arcs(n, edges, forward, backward)
+    partition = _partition(colors)
+    order, start, size = partition.order, partition.start, partition.size
+    queue, waiting = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    head, queued, cells = 0, 0, 0
+    for k in range(n):
+        if start[k] == k:
+            queued = _wait(queue, waiting, head, queued, k)
+            cells += 1
+    members = np.empty(2 * m, dtype=np.int64), np.empty(2 * m, dtype=np.int64)
+    newest = np.full(classes, -1, dtype=np.int64)
+    used = np.empty(classes, dtype=np.int64)
+    count = np.zeros(n, dtype=np.int64)  # by node: arcs of one class into the splitting cell
+    touched = np.empty(n, dtype=np.int64)
+    moved = np.zeros(n, dtype=np.int64)  # by cell: how many of its nodes are touched
+    parted = np.empty(n, dtype=np.int64)
+    while queued > 0 and cells < n:
+        splitter = queue[head]
+        head = (head + 1) % n
+        queued -= 1
+        waiting[splitter] = False
+        nodes = order[splitter : splitter + size[splitter]]
+        kinds = _arcs_by_class(nodes, first, source, kind, members, newest, used)
+        for c in used[:kinds]:
+            reached, broken = _touch(partition, members, newest[c], count, touched, moved, parted)
+            newest[c] = -1
+            for cell in parted[:broken]:
+                end = cell + size[cell]
+                low = end - moved[cell]
+                moved[cell] = 0
+                if size[cell] == 1:
+                    continue
+                _sort_by_count(partition, count, low, end)
+                found, largest = _split(partition, count, cell, low)
+                cells += found - 1
+                # of a cell that does not wait, the largest piece need not wait
+                was_waiting = waiting[cell]
+                begin = cell
+                while begin < end:
+                    if not waiting[begin] and (was_waiting or begin != largest):
+                        queued = _wait(queue, waiting, head, queued, begin)
+                    begin += size[begin]
+            for k in range(reached):
+                count[touched[k]] = 0
+    return order, start
+
+
+@numba.njit(cache=True)
+def _arcs(n, edges, forward, backward):  # type: ignore[no-untyped-def]
+    """The arcs into each node: those into `v` come from `source[first[v]:first[v + 1]]` and are of the classes `kind`
+    there."""
+    m = len(edges)
     first = np.zeros(n + 1, dtype=np.int64)
     for k in range(m):
         first[edges[k, 0] + 1] += 1
@@ -39,109 +102,106 @@ def refine(colors, edges, forward, backward, classes):  # type: ignore[no-untype
         fill[j] += 1
         source[fill[i]], kind[fill[i]] = j, backward[k]
         fill[i] += 1
-
-    order = np.argsort(colors, kind="mergesort")
-    position = np.empty(n, dtype=np.int64)
-    start = np.zeros(n, dtype=np.int64)  # by position
-    size = np.zeros(n, dtype=np.int64)  # by position at which a cell begins
-    waiting = np.zeros(n, dtype=np.bool_)
-    queue = np.empty(n, dtype=np.int64)
-    head, queued, cells = 0, 0, 0
-    for k in range(n):
-        position[order[k]] = k
-        fresh = k == 0 or colors[order[k]] != colors[order[k - 1]]
-        start[k] = k if fresh else start[k - 1]
-        size[start[k]] += 1
-        if fresh:
-            cells += 1
-            waiting[k] = True
-            queue[queued] = k
-            queued += 1
-
-    count = np.zeros(n, dtype=np.int64)  # by node: arcs of one class into the splitting cell
-    touched = np.empty(n, dtype=np.int64)
-    moved = np.zeros(n, dtype=np.int64)  # by cell: how many of its nodes are touched
-    split = np.empty(n, dtype=np.int64)
-    newest = np.full(classes, -1, dtype=np.int64)  # arcs into the splitting cell, a list for each class
-    older = np.empty(2 * m, dtype=np.int64)
-    member = np.empty(2 * m, dtype=np.int64)
-    used = np.empty(classes, dtype=np.int64)
-    while queued > 0 and cells < n:
-        splitter = queue[head]
-        head = (head + 1) % n
-        queued -= 1
-        waiting[splitter] = False
-        arcs, kinds = 0, 0
-        for k in range(splitter, splitter + size[splitter]):
-            for arc in range(first[order[k]], first[order[k] + 1]):
-                c = kind[arc]
-                if newest[c] < 0:
-                    used[kinds] = c
-                    kinds += 1
-                member[arcs], older[arcs] = source[arc], newest[c]
-                newest[c] = arcs
-                arcs += 1
-        if kinds > 1:
-            used[:kinds].sort()
-        for c in used[:kinds]:
-            reached, parted = 0, 0
-            arc = newest[c]
-            newest[c] = -1
-            while arc >= 0:
-                v = member[arc]
-                if count[v] == 0:
-                    touched[reached] = v
-                    reached += 1
-                    cell = start[position[v]]
-                    if moved[cell] == 0:
-                        split[parted] = cell
-                        parted += 1
-                    # touched nodes gather at the end of their cell
-                    moved[cell] += 1
-                    target = cell + size[cell] - moved[cell]
-                    other, place = order[target], position[v]
-                    order[place], position[other] = other, place
-                    order[target], position[v] = v, target
-                count[v] += 1
-                arc = older[arc]
-            if parted > 1:
-                split[:parted].sort()
-            for cell in split[:parted]:
-                end = cell + size[cell]
-                low = end - moved[cell]
-                moved[cell] = 0
-                if size[cell] == 1:
-                    continue
-                _sort_by_count(order, position, count, low, end)
-                # cut the cell wherever the count changes; of a cell that does not wait, the largest piece need not wait
-                was_waiting = waiting[cell]
-                begin, largest = cell, cell
-                for k in range(cell, end):
-                    if k > cell and (k == low or (k > low and count[order[k]] != count[order[k - 1]])):
-                        size[begin] = k - begin
-                        if size[begin] > size[largest]:
-                            largest = begin
-                        begin = k
-                        cells += 1
-                    start[k] = begin
-                size[begin] = end - begin
-                if size[begin] > size[largest]:
-                    largest = begin
-                begin = cell
-                while begin < end:
-                    if not waiting[begin] and (was_waiting or begin != largest):
-                        waiting[begin] = True
-                        queue[(head + queued) % n] = begin
-                        queued += 1
-                    begin += size[begin]
-            for k in range(reached):
-                count[touched[k]] = 0
-    return order, start
+    return first, source, kind
 
 
 @numba.njit(cache=True)
-def _sort_by_count(order, position, count, low, end):  # type: ignore[no-untyped-def]
-    """Sort `order[low:end]` by the counts of its nodes."""
+def _partition(colors):  # type: ignore[no-untyped-def]
+    """The cells of a colouring, by colour."""
+    n = len(colors)
+    order = np.argsort(colors, kind="mergesort")
+    position = np.empty(n, dtype=np.int64)
+    start = np.zeros(n, dtype=np.int64)
+    size = np.zeros(n, dtype=np.int64)
+    for k in range(n):
+        position[order[k]] = k
+        start[k] = k if k == 0 or colors[order[k]] != colors[order[k - 1]] else start[k - 1]
+        size[start[k]] += 1
+    return _Partition(order, position, start, size)
+
+
+@numba.njit(cache=True)
+def _wait(queue, waiting, head, queued, cell):  # type: ignore[no-untyped-def]
+    """Put a cell at the end of the ring `queue`; returns how many wait."""
+    waiting[cell] = True
+    queue[(head + queued) % len(queue)] = cell
+    return queued + 1
+
+
+@numba.njit(cache=True)
+def _arcs_by_class(nodes, first, source, kind, members, newest, used):  # type: ignore[no-untyped-def]
+    """List the arcs into `nodes` by their classes: their sources go to `members[0]`, the last one of a class at
+    `newest` and the one before each at `members[1]`, or -1. Returns how many classes there are; they are `used`,
+    ascending."""
+    member, older = members
+    arcs, kinds = 0, 0
+    for v in nodes:
+        for arc in range(first[v], first[v + 1]):
+            c = kind[arc]
+            if newest[c] < 0:
+                used[kinds] = c
+                kinds += 1
+            member[arcs], older[arcs] = source[arc], newest[c]
+            newest[c] = arcs
+            arcs += 1
+    if kinds > 1:
+        used[:kinds].sort()
+    return kinds
+
+
+@numba.njit(cache=True)
+def _touch(partition, members, arc, count, touched, moved, parted):  # type: ignore[no-untyped-def]
+    """Count, in `count`, the arcs of the list that begins at `arc` by the nodes they come from, and bring these to the
+    end of their cells, `moved` of each. Returns how many nodes are `touched` and how many cells `parted`, ascending."""
+    order, position, start, size = partition
+    member, older = members
+    reached, broken = 0, 0
+    while arc >= 0:
+        v = member[arc]
+        if count[v] == 0:
+            touched[reached] = v
+            reached += 1
+            cell = start[position[v]]
+            if moved[cell] == 0:
+                parted[broken] = cell
+                broken += 1
+            moved[cell] += 1
+            target = cell + size[cell] - moved[cell]
+            other, place = order[target], position[v]
+            order[place], position[other] = other, place
+            order[target], position[v] = v, target
+        count[v] += 1
+        arc = older[arc]
+    if broken > 1:
+        parted[:broken].sort()
+    return reached, broken
+
+
+@numba.njit(cache=True)
+def _split(partition, count, cell, low):  # type: ignore[no-untyped-def]
+    """Cut a cell wherever the count of its nodes changes, the first of which is counted at `low`. Returns the number
+    of pieces and where the largest starts, the first of those alike."""
+    order, _, start, size = partition
+    end = cell + size[cell]
+    begin, largest, pieces = cell, cell, 1
+    for k in range(cell, end):
+        if k > cell and (k == low or (k > low and count[order[k]] != count[order[k - 1]])):
+            size[begin] = k - begin
+            if size[begin] > size[largest]:
+                largest = begin
+            begin = k
+            pieces += 1
+        start[k] = begin
+    size[begin] = end - begin
+    if size[begin] > size[largest]:
+        largest = begin
+    return pieces, largest
+
+
+@numba.njit(cache=True)
+def _sort_by_count(partition, count, low, end):  # type: ignore[no-untyped-def]
+    """Sort the nodes at the positions from `low` to `end` by their counts."""
+    order, position, _, _ = partition
     top = 0
     for k in range(low, end):
         top = max(top, count[order[k]])

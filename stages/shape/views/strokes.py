@@ -17,6 +17,7 @@ inside each square of four pixel centres into segments of lines.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -51,27 +52,68 @@ def find_strokes(seen: Visible, crease_angle: float, step: float, shortest: floa
     crease_angle: degrees between the normals of two faces above which their edge is drawn. step: smallest jump in
     depth that is a contour; shortest: connected lines shorter in all than this are left out; both in pixels.
     """
-    height = len(seen.triangles)
-    scene = seen.scene
-    across, across_kind, down, down_kind = _crossings(
-        seen.triangles,
-        seen.screen,
-        seen.normals,
-        scene.triangle_part,
-        scene.triangle_face,
-        scene.triangle_first,
-        scene.meshes.face_first[scene.mesh_of],
-        scene.meshes.neighbours,
-        scene.layers,
-        seen.view.projection,
-        2.0 / (seen.view.projection[1, 1] * height),
-        seen.view.perspective,
-        np.cos(np.radians(crease_angle)),
-        step,
-    )
+    across, across_kind, down, down_kind = _crossings(_drawn(seen), _thresholds(seen, crease_angle, step))
     ends, kinds, nodes = _join(across, across_kind, down, down_kind)
     kept = _long_enough(ends, nodes, shortest)
     return Strokes(ends[kept], kinds[kept])
+
+
+class _Drawn(NamedTuple):
+    """What the kernels walk on. Of the view: triangles int32 (h, w), the triangle that each pixel shows or -1, screen
+    float64 (t, 3, 3), normals float64 (t, 3) of all triangles, projection float64 (4, 4). Of each triangle: parts
+    (t,), its part, and faces (t,), its face in its mesh. Of each part: triangle_first, face_first, where those of its
+    begin, and layers. neighbours (f, 3): the faces beside each face of the meshes, or -1."""
+
+    triangles: np.ndarray
+    screen: np.ndarray
+    normals: np.ndarray
+    projection: np.ndarray
+    parts: np.ndarray
+    faces: np.ndarray
+    triangle_first: np.ndarray
+    face_first: np.ndarray
+    layers: np.ndarray
+    neighbours: np.ndarray
+
+
+class _Thresholds(NamedTuple):
+    """What makes a line.
+
+    crease, rounded: cosines of the angles between normals, across an edge and between two pixels on a smooth surface,
+    above which there is a crease. jump: smallest jump in depth that is a contour, in units of the scene; where
+    `perspective`, at a depth of 1, and it grows with the depth.
+    """
+
+    crease: float
+    rounded: float
+    jump: float
+    perspective: bool
+
+
+def _drawn(seen: Visible) -> _Drawn:
+    scene = seen.scene
+    return _Drawn(
+        triangles=seen.triangles,
+        screen=seen.screen,
+        normals=seen.normals,
+        projection=seen.view.projection,
+        parts=scene.triangle_part,
+        faces=scene.triangle_face,
+        triangle_first=scene.triangle_first,
+        face_first=scene.meshes.face_first[scene.mesh_of],
+        layers=scene.layers,
+        neighbours=scene.meshes.neighbours,
+    )
+
+
+def _thresholds(seen: Visible, crease_angle: float, step: float) -> _Thresholds:
+    pixel = 2.0 / (seen.view.projection[1, 1] * len(seen.triangles))
+    return _Thresholds(
+        crease=float(np.cos(np.radians(crease_angle))),
+        rounded=float(np.cos(np.radians(ROUNDED_TURN))),
+        jump=float(step * pixel),
+        perspective=seen.view.perspective,
+    )
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -89,14 +131,17 @@ def _cosine(normals, a, b):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _walk(start, goal, px, py, qx, qy, screen, normals, part_first, face_first, face_of, neighbours, cosine):
-    """Walk on the surface from triangle `start` at p straight to q on the screen.
+def _walk(drawn, crease, start, goal, p, q):
+    """Walk on the surface from triangle `start` at the point `p` of the screen straight to the point `q`.
 
     Returns (arrived, s, last, sharp): whether the walk ended on `goal`; the share of the way where the surface ends
     (1 if it reaches q); the last triangle; the share of the way at the sharpest edge above the crease angle, or -1.
     """
+    screen, neighbours, faces = drawn.screen, drawn.neighbours, drawn.faces
+    part = drawn.parts[start]
+    shift = drawn.triangle_first[part] - drawn.face_first[part]
     triangle, entry = start, -1
-    s, sharp, sharpest = 0.0, -1.0, cosine
+    s, sharp, sharpest = 0.0, -1.0, crease
     for _ in range(MOST_STEPS):
         if triangle == goal:
             return True, s, triangle, sharp
@@ -107,154 +152,135 @@ def _walk(start, goal, px, py, qx, qy, screen, normals, part_first, face_first, 
         for edge in range(3):
             if edge == entry:
                 continue
-            at_q = _side(screen, triangle, edge, qx, qy) / area
+            at_q = _side(screen, triangle, edge, q[0], q[1]) / area
             if at_q < 0.0:
-                at_p = _side(screen, triangle, edge, px, py) / area
+                at_p = _side(screen, triangle, edge, p[0], p[1]) / area
                 crossing = max(at_p / (at_p - at_q), s) if at_p > 0.0 else s
                 if crossing < exit_s:
                     exit_edge, exit_s = edge, crossing
         if exit_edge < 0:
             return False, 1.0, triangle, sharp
         s = min(exit_s, 1.0)
-        face = neighbours[face_of[triangle], exit_edge]
+        face = neighbours[faces[triangle], exit_edge]
         if face < 0:
             return False, s, triangle, sharp
-        following = part_first + face - face_first
+        following = face + shift
         back = -1
         for edge in range(3):
-            if neighbours[face, edge] == face_of[triangle]:
+            if neighbours[face, edge] == faces[triangle]:
                 back = edge
         # Where the next triangle lies on the same side of the edge as this one, the surface turns away here.
         corner = (back + 2) % 3
         if _side(screen, triangle, exit_edge, screen[following, corner, 0], screen[following, corner, 1]) / area >= 0.0:
             return False, s, triangle, sharp
-        turn = _cosine(normals, triangle, following)
-        if turn < sharpest:
-            sharp, sharpest = s, turn
+        cosine = _cosine(drawn.normals, triangle, following)
+        if cosine < sharpest:
+            sharp, sharpest = s, cosine
         triangle, entry = following, back
     return False, s, triangle, sharp
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _between(
-    p, q, px, py, qx, qy, screen, normals, parts, face_of, part_first, face_first, neighbours, layers,
-    projection, pixel, perspective, cosine, rounded, step,
-):  # fmt: skip
-    """Kind and place (share of the way from p to q) of the line between pixels that show triangles p and q."""
-    if p < 0:
-        kind, s = _between(
-            q, p, qx, qy, px, py, screen, normals, parts, face_of, part_first, face_first, neighbours, layers,
-            projection, pixel, perspective, cosine, rounded, step,
-        )  # fmt: skip
-        return kind, 1.0 - s
-    first, base = part_first[parts[p]], face_first[parts[p]]
-    goal = q if q >= 0 and parts[p] == parts[q] else -1
-    arrived, end_p, last_p, sharp = _walk(
-        p, goal, px, py, qx, qy, screen, normals, first, base, face_of, neighbours, cosine
-    )
-    if q < 0:
-        return OUTLINE, end_p
+def _between(drawn, thresholds, a, b, p, q):
+    """Kind and place (share of the way from p to q) of the line between the pixels at `p` and `q` of the screen, which
+    show the triangles `a` and `b`, one of them perhaps none."""
+    crease, parts, layers = thresholds.crease, drawn.parts, drawn.layers
+    if b < 0:
+        return OUTLINE, _walk(drawn, crease, a, -1, p, q)[1]
+    if a < 0:
+        return OUTLINE, 1.0 - _walk(drawn, crease, b, -1, q, p)[1]
+    one_part = parts[a] == parts[b]
+    arrived, end_a, last_a, sharp = _walk(drawn, crease, a, b if one_part else -1, p, q)
     if arrived:
-        return _on_one_surface(p, q, sharp, normals, rounded)
-    first, base = part_first[parts[q]], face_first[parts[q]]
-    goal = p if goal >= 0 else -1
-    arrived, end_q, last_q, sharp = _walk(
-        q, goal, qx, qy, px, py, screen, normals, first, base, face_of, neighbours, cosine
-    )
+        return _on_one_surface(drawn.normals, thresholds.rounded, a, b, sharp)
+    arrived, end_b, last_b, sharp = _walk(drawn, crease, b, a if one_part else -1, q, p)
     if arrived:
-        kind, s = _on_one_surface(q, p, sharp, normals, rounded)
+        kind, s = _on_one_surface(drawn.normals, thresholds.rounded, b, a, sharp)
         return kind, 1.0 - s
-    start_q = 1.0 - end_q
-    # How much farther the surface of p is than that of q, where that of q begins and where that of p ends.
-    at_start = _gap(start_q, last_p, last_q, px, py, qx, qy, screen, projection)
-    at_end = _gap(end_p, last_p, last_q, px, py, qx, qy, screen, projection)
-    depth = eye_depth(clip_at(screen, p, px, py), projection)
-    tolerance = step * pixel * (depth if perspective else 1.0)
-    if start_q >= end_p:
-        s, gap = (start_q + end_p) / 2, min(abs(at_start), abs(at_end))
+    start_b = 1.0 - end_b
+    # How much farther the surface of a is than that of b, where that of b begins and where that of a ends.
+    at_start = _gap(drawn.screen, drawn.projection, last_a, last_b, p, q, start_b)
+    at_end = _gap(drawn.screen, drawn.projection, last_a, last_b, p, q, end_a)
+    depth = eye_depth(clip_at(drawn.screen, a, p[0], p[1]), drawn.projection)
+    tolerance = thresholds.jump * (depth if thresholds.perspective else 1.0)
+    if start_b >= end_a:
+        s, gap = (start_b + end_a) / 2, min(abs(at_start), abs(at_end))
     elif max(abs(at_start), abs(at_end)) < 0.01 * tolerance:
         # Two faces in one plane: the part of the lower layer is seen up to its end.
-        s, gap = end_p if layers[parts[p]] <= layers[parts[q]] else start_q, 0.0
+        s, gap = end_a if layers[parts[a]] <= layers[parts[b]] else start_b, 0.0
     elif at_start < 0.0 < at_end:
-        s, gap = start_q + (end_p - start_q) * at_start / (at_start - at_end), 0.0
+        s, gap = start_b + (end_a - start_b) * at_start / (at_start - at_end), 0.0
     elif at_start + at_end < 0.0:
-        s, gap = end_p, at_end
+        s, gap = end_a, at_end
     else:
-        s, gap = start_q, at_start
+        s, gap = start_b, at_start
     if abs(gap) > tolerance:
         return CONTOUR, s
-    if parts[p] != parts[q]:
+    if not one_part:
         return BOUNDARY, s
-    if _cosine(normals, last_p, last_q) < cosine:
+    if _cosine(drawn.normals, last_a, last_b) < crease:
         return CREASE, s
     return 0, 0.0
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _gap(s, a, b, px, py, qx, qy, screen, projection):
-    """How much farther triangle `a` is than triangle `b` at the share `s` of the way."""
-    x, y = px + s * (qx - px), py + s * (qy - py)
+def _gap(screen, projection, a, b, p, q, s):
+    """How much farther triangle `a` is than triangle `b` at the share `s` of the way from p to q."""
+    x, y = p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])
     return eye_depth(clip_at(screen, a, x, y), projection) - eye_depth(clip_at(screen, b, x, y), projection)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _on_one_surface(p, q, sharp, normals, rounded):
+def _on_one_surface(normals, rounded, a, b, sharp):
+    """Kind and place of the line between two triangles that a walk joins, with `sharp` as the walk says."""
     if sharp >= 0.0:
         return CREASE, sharp
-    if normals[p, 2] > 0.3 and normals[q, 2] > 0.3 and _cosine(normals, p, q) < rounded:
+    if normals[a, 2] > 0.3 and normals[b, 2] > 0.3 and _cosine(normals, a, b) < rounded:
         return CREASE, 0.5
     return 0, 0.0
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _runs_on(p, q, screen, normals, face_of, neighbours, cosine):
+def _runs_on(drawn, crease, a, b):
     """Whether two triangles of one part share an edge that is neither sharp nor one where the surface turns away.
 
     Most pairs are like that, and need no walk.
     """
-    if _cosine(normals, p, q) < cosine:
+    screen, neighbours, faces = drawn.screen, drawn.neighbours, drawn.faces
+    if _cosine(drawn.normals, a, b) < crease:
         return False
     for edge in range(3):
-        if neighbours[face_of[p], edge] == face_of[q]:
+        if neighbours[faces[a], edge] == faces[b]:
             for back in range(3):
-                if neighbours[face_of[q], back] == face_of[p]:
+                if neighbours[faces[b], back] == faces[a]:
                     near, far = (edge + 2) % 3, (back + 2) % 3
-                    side = _side(screen, p, edge, screen[p, near, 0], screen[p, near, 1])
-                    return side * _side(screen, p, edge, screen[q, far, 0], screen[q, far, 1]) < 0.0
+                    side = _side(screen, a, edge, screen[a, near, 0], screen[a, near, 1])
+                    return side * _side(screen, a, edge, screen[b, far, 0], screen[b, far, 1]) < 0.0
     return False
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _crossings(
-    triangles, screen, normals, parts, face_of, part_first, face_first, neighbours, layers,
-    projection, pixel, perspective, cosine, step,
-):  # fmt: skip
+def _crossings(drawn, thresholds):
     """Lines between horizontal neighbours: share (h, w) of the way from pixel (r, c) to (r, c + 1) and kind (h, w);
     and between vertical neighbours."""
+    triangles, parts = drawn.triangles, drawn.parts
     height, width = triangles.shape
-    rounded = np.cos(np.radians(ROUNDED_TURN))
     across, down = np.zeros((height, width)), np.zeros((height, width))
     across_kind = np.zeros((height, width), dtype=np.uint8)
     down_kind = np.zeros((height, width), dtype=np.uint8)
     for r in range(height):
         for c in range(width):
-            p = triangles[r, c]
+            a = triangles[r, c]
             for way in range(2):
                 r2, c2 = r + way, c + 1 - way
                 if r2 == height or c2 == width:
                     continue
-                q = triangles[r2, c2]
-                if p == q or (
-                    p >= 0
-                    and q >= 0
-                    and parts[p] == parts[q]
-                    and _runs_on(p, q, screen, normals, face_of, neighbours, cosine)
-                ):
+                b = triangles[r2, c2]
+                if a == b:
                     continue
-                kind, s = _between(
-                    p, q, c + 0.5, r + 0.5, c2 + 0.5, r2 + 0.5, screen, normals, parts, face_of, part_first,
-                    face_first, neighbours, layers, projection, pixel, perspective, cosine, rounded, step,
-                )  # fmt: skip
+                if a >= 0 and b >= 0 and parts[a] == parts[b] and _runs_on(drawn, thresholds.crease, a, b):
+                    continue
+                kind, s = _between(drawn, thresholds, a, b, (c + 0.5, r + 0.5), (c2 + 0.5, r2 + 0.5))
                 if kind:
                     if way == 0:
                         across[r, c], across_kind[r, c] = s, kind

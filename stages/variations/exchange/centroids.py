@@ -17,13 +17,14 @@ def match_centroids(rng: np.random.Generator, kit: KitTables, a: ShapeTables, b:
     """Find parts of B with the types and the pairwise centroid distances of the boundary in `ws`.
 
     The first match in random order counts; its images go to `ws.images` and the docking motion, fitted to the
-    centroids without reflection, to `ws.motion`. One boundary part, or several in a row, leave turns undecided that
-    nothing but luck settles: this is the rule's known weakness. Mirrored matches are refused by the fit's residual.
+    centroids without reflection, to `ws.motion`. One boundary part, or several in a row, leave a rotation
+    undecided that nothing but luck settles: this is the rule's known weakness. Mirrored matches are refused by the
+    fit's residual.
     """
     count, tolerance = int(ws.counts[BOUNDARY]), kit.limits[0]
     boundary = ws.boundary[:count]
-    places = a.places[boundary]
-    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)
+    centroids = a.translations[boundary]
+    gaps = np.linalg.norm(centroids[:, None] - centroids[None], axis=2)
     candidates = [
         rng.permutation(b.by_type[b.type_starts[part_type] : b.type_starts[part_type + 1]])
         for part_type in a.types[boundary]
@@ -40,7 +41,7 @@ def match_centroids(rng: np.random.Generator, kit: KitTables, a: ShapeTables, b:
             steps += 1
             if steps > STEPS:
                 return Outcome.NO_MATCH
-            distances = np.linalg.norm(b.places[images] - b.places[image], axis=1)
+            distances = np.linalg.norm(b.translations[images] - b.translations[image], axis=1)
             if image not in images and np.all(np.abs(distances - gaps[level, :level]) <= tolerance):
                 images.append(image)
                 advanced = True
@@ -54,9 +55,9 @@ def match_centroids(rng: np.random.Generator, kit: KitTables, a: ShapeTables, b:
             break
         else:
             tried.append(0)
-    motion = rigid_fit(places, b.places[images])
-    moved = places @ motion[:3, :3].T + motion[:3, 3]
-    if np.linalg.norm(moved - b.places[images], axis=1).max() > tolerance:
+    motion = rigid_fit(centroids, b.translations[images])
+    moved = centroids @ motion[:3, :3].T + motion[:3, 3]
+    if np.linalg.norm(moved - b.translations[images], axis=1).max() > tolerance:
         return Outcome.NO_MATCH
     if kit.up >= 0 and motion[kit.up, kit.up] < UPRIGHT:
         return Outcome.NO_MATCH

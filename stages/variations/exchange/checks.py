@@ -45,7 +45,8 @@ def _overlaps(boxes, count, origin, between_sides, slack, pairs):
 @numba.njit(cache=True)
 def _contact(kit, answers, ws, i, j, quanta):
     """The answer for a pair: NONE, FORBIDDEN, MISSING or a packed pair of labels."""
-    quantise(ws.turns[i], ws.places[i], ws.turns[j], ws.places[j], kit.reach[ws.types[j]], kit.limits[2], quanta)
+    reach, quantum = kit.reach[ws.types[j]], kit.limits[2]
+    quantise(ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], reach, quantum, quanta)
     return ask(answers.keys, answers.values, hash_key(ws.types[i], ws.types[j], quanta))
 
 

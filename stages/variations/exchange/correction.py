@@ -22,7 +22,7 @@ def correct_orientations(dockings: DockingTable, ws: Workspace) -> bool:
     edges = ws.edges[:count].astype(np.int32)
     types = ws.types[:parts]
     poses = np.tile(np.eye(4), (parts, 1, 1))
-    poses[:, :3, :3], poses[:, :3, 3] = ws.turns[:parts], ws.places[:parts]
+    poses[:, :3, :3], poses[:, :3, 3] = ws.rotations[:parts], ws.translations[:parts]
     labels = dockings.label_edges(types, poses, edges)
     wrong = np.unique(edges[(labels < 0).any(axis=1)])
     # The parts with most wrong edges are the likeliest culprits.
@@ -36,7 +36,7 @@ def correct_orientations(dockings: DockingTable, ws: Workspace) -> bool:
                 for near, each in zip(around, relative, strict=True)
             ):
                 poses[part] = pose
-                ws.turns[part], ws.places[part] = pose[:3, :3], pose[:3, 3]
+                ws.rotations[part], ws.translations[part] = pose[:3, :3], pose[:3, 3]
                 break
     labels = dockings.label_edges(types, poses, edges)
     if (labels < 0).any():

@@ -8,11 +8,11 @@ import numpy as np
 from stages.variations.kernels.layout import BOUNDARY, PARTS, UPRIGHT, Outcome
 from stages.variations.kernels.lookup import random_below
 
-__all__ = ["lies_in", "looks_same", "match_poses", "move", "turn_by"]
+__all__ = ["lies_in", "looks_same", "match_poses", "rotate", "squared_distance", "transform"]
 
 
 @numba.njit(cache=True)
-def _same_turn(symmetries, first, last, turn, other, slack):
+def _same_rotation(symmetries, first, last, rotation, other, slack):
     """Whether two rotations of a part look the same, entries within `slack` together; the symmetry or -1."""
     limit = slack * slack
     between = np.empty((3, 3))
@@ -20,7 +20,7 @@ def _same_turn(symmetries, first, last, turn, other, slack):
         for j in range(3):
             x = 0.0
             for k in range(3):
-                x += other[k, i] * turn[k, j]
+                x += other[k, i] * rotation[k, j]
             between[i, j] = x
     for index in range(first, last):
         gap = 0.0
@@ -34,35 +34,60 @@ def _same_turn(symmetries, first, last, turn, other, slack):
 
 
 @numba.njit(cache=True)
-def looks_same(kit, part_type, turn, other):
-    """`_same_turn` for a part of a type, within the pose tolerance."""
+def looks_same(kit, part_type, rotation, other):
+    """Whether two rotations of a part of a type look the same within the pose tolerance; the symmetry or -1."""
     first, last = kit.symmetry_starts[part_type], kit.symmetry_starts[part_type + 1]
-    return _same_turn(kit.symmetries, first, last, turn, other, kit.limits[0] / kit.reach[part_type])
+    return _same_rotation(kit.symmetries, first, last, rotation, other, kit.limits[0] / kit.reach[part_type])
 
 
 @numba.njit(cache=True)
-def part_at(places, by_type, first, last, place, tolerance):
-    """Which of the parts `by_type[first:last]` stands at a place, or -1."""
+def part_at(translations, by_type, first, last, point, tolerance):
+    """Which of the parts `by_type[first:last]` stands at a point, or -1."""
     limit = tolerance * tolerance
     for k in range(first, last):
         part = by_type[k]
-        x, y, z = places[part, 0] - place[0], places[part, 1] - place[1], places[part, 2] - place[2]
-        if x * x + y * y + z * z <= limit:
+        if squared_distance(translations[part], point) <= limit:
             return part
     return -1
 
 
 @numba.njit(cache=True)
-def move(motion, place, out):
-    for i in range(3):
-        out[i] = motion[i, 0] * place[0] + motion[i, 1] * place[1] + motion[i, 2] * place[2] + motion[3, i]
+def squared_distance(p, q):
+    """The squared distance of two points."""
+    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    return x * x + y * y + z * z
 
 
 @numba.njit(cache=True)
-def turn_by(motion, turn, out):
+def transform(motion, point, out):
+    """Put a point, moved by a motion, into `out`."""
+    for i in range(3):
+        out[i] = motion[i, 0] * point[0] + motion[i, 1] * point[1] + motion[i, 2] * point[2] + motion[3, i]
+
+
+@numba.njit(cache=True)
+def rotate(motion, rotation, out):
+    """Put the product of two rotations, of which that of a motion is the second, into `out`."""
     for i in range(3):
         for j in range(3):
-            out[i, j] = motion[i, 0] * turn[0, j] + motion[i, 1] * turn[1, j] + motion[i, 2] * turn[2, j]
+            out[i, j] = motion[i, 0] * rotation[0, j] + motion[i, 1] * rotation[1, j] + motion[i, 2] * rotation[2, j]
+
+
+@numba.njit(cache=True)
+def _motion_between(rotation, translation, symmetry, onto_rotation, onto_translation, motion):
+    """Put the motion that takes a part's pose, by one of its symmetries, onto another pose into `motion`."""
+    for i in range(3):
+        x, y, z = 0.0, 0.0, 0.0
+        for k in range(3):
+            x += onto_rotation[i, k] * symmetry[k, 0]
+            y += onto_rotation[i, k] * symmetry[k, 1]
+            z += onto_rotation[i, k] * symmetry[k, 2]
+        for j in range(3):
+            motion[i, j] = 0.0 + x * rotation[j, 0] + y * rotation[j, 1] + z * rotation[j, 2]
+    for i in range(3):
+        motion[3, i] = onto_translation[i]
+        for j in range(3):
+            motion[3, i] -= motion[i, j] * translation[j]
 
 
 @numba.njit(cache=True)
@@ -74,27 +99,27 @@ def _fit_motion(kit, a, b, ws):
     centre_a, centre_b = np.zeros(3), np.zeros(3)
     for k in range(count):
         for i in range(3):
-            centre_a[i] += a.places[ws.boundary[k], i] / count
-            centre_b[i] += b.places[ws.images[k], i] / count
+            centre_a[i] += a.translations[ws.boundary[k], i] / count
+            centre_b[i] += b.translations[ws.images[k], i] / count
     covariance = np.zeros((3, 3))
-    turn, target = np.empty((3, 3)), np.empty((3, 3))
+    rotation, target = np.empty((3, 3)), np.empty((3, 3))
     for k in range(count):
         part, image = ws.boundary[k], ws.images[k]
         part_type = a.types[part]
-        turn_by(ws.motion, a.turns[part], turn)
-        symmetry = looks_same(kit, part_type, turn, b.turns[image])
+        rotate(ws.motion, a.rotations[part], rotation)
+        symmetry = looks_same(kit, part_type, rotation, b.rotations[image])
         weight = kit.reach[part_type] ** 2 / 3.0
         for i in range(3):
             for j in range(3):
                 x = 0.0
                 for axis in range(3):
-                    x += b.turns[image, i, axis] * kit.symmetries[symmetry, axis, j]
+                    x += b.rotations[image, i, axis] * kit.symmetries[symmetry, axis, j]
                 target[i, j] = x
         for i in range(3):
             for j in range(3):
-                x = (a.places[part, i] - centre_a[i]) * (b.places[image, j] - centre_b[j])
+                x = (a.translations[part, i] - centre_a[i]) * (b.translations[image, j] - centre_b[j])
                 for axis in range(3):
-                    x += weight * a.turns[part, i, axis] * target[j, axis]
+                    x += weight * a.rotations[part, i, axis] * target[j, axis]
                 covariance[i, j] += x
     u, _, vt = np.linalg.svd(covariance)
     old = ws.motion[:3]
@@ -114,55 +139,38 @@ def match_poses(rng, kit, a, b, same_shape, ws):
     """Look for the boundary of the piece in B by the poses of its parts modulo symmetry, from the part of the rarest
     type on; the images go to `ws.images`, the docking motion to `ws.motion`. The first match in random order counts.
     """
-    count = ws.counts[BOUNDARY]
     anchor = ws.boundary[0]
     anchor_type = a.types[anchor]
     fewest = b.type_starts[anchor_type + 1] - b.type_starts[anchor_type]
-    symmetry = kit.symmetry_starts[anchor_type]
-    turns = kit.symmetry_starts[anchor_type + 1] - symmetry
-    offset = random_below(rng, fewest * turns)
-    place = np.empty(3)
-    turn = np.empty((3, 3))
-    between = np.empty((3, 3))
+    first = kit.symmetry_starts[anchor_type]
+    symmetries = kit.symmetry_starts[anchor_type + 1] - first
+    offset = random_below(rng, fewest * symmetries)
     motion = ws.motion
-    for step in range(fewest * turns):
-        choice = (offset + step) % (fewest * turns)
-        image = b.by_type[b.type_starts[anchor_type] + choice // turns]
-        if same_shape and image == anchor and choice % turns == 0:
+    point, rotation = np.empty(3), np.empty((3, 3))
+    for step in range(fewest * symmetries):
+        choice = (offset + step) % (fewest * symmetries)
+        image = b.by_type[b.type_starts[anchor_type] + choice // symmetries]
+        if same_shape and image == anchor and choice % symmetries == 0:
             continue
-        rotation = kit.symmetries[symmetry + choice % turns]
-        for i in range(3):
-            for j in range(3):
-                x = 0.0
-                for k in range(3):
-                    x += b.turns[image, i, k] * rotation[k, j]
-                between[i, j] = x
-        for i in range(3):
-            for j in range(3):
-                x = 0.0
-                for k in range(3):
-                    x += between[i, k] * a.turns[anchor, j, k]
-                motion[i, j] = x
+        _motion_between(
+            a.rotations[anchor], a.translations[anchor], kit.symmetries[first + choice % symmetries],
+            b.rotations[image], b.translations[image], motion,
+        )  # fmt: skip
         if kit.up >= 0 and motion[kit.up, kit.up] < UPRIGHT:
             continue
-        for i in range(3):
-            motion[3, i] = b.places[image, i]
-            for j in range(3):
-                motion[3, i] -= motion[i, j] * a.places[anchor, j]
         ws.images[0] = image
         found = True
-        for k in range(1, count):
+        for k in range(1, ws.counts[BOUNDARY]):
             part = ws.boundary[k]
-            move(motion, a.places[part], place)
             part_type = a.types[part]
-            at = part_at(
-                b.places, b.by_type, b.type_starts[part_type], b.type_starts[part_type + 1], place, kit.limits[0]
-            )
+            low, high = b.type_starts[part_type], b.type_starts[part_type + 1]
+            transform(motion, a.translations[part], point)
+            at = part_at(b.translations, b.by_type, low, high, point, kit.limits[0])
             if at < 0:
                 found = False
                 break
-            turn_by(motion, a.turns[part], turn)
-            if looks_same(kit, part_type, turn, b.turns[at]) < 0:
+            rotate(motion, a.rotations[part], rotation)
+            if looks_same(kit, part_type, rotation, b.rotations[at]) < 0:
                 found = False
                 break
             ws.images[k] = at
@@ -186,32 +194,23 @@ def lies_in(kit, ws, b):
         if present < fewest:
             anchor, fewest = v, present
     anchor_type = ws.types[anchor]
-    place = np.empty(3)
-    turn = np.empty((3, 3))
-    between = np.empty((3, 3))
-    motion = np.empty((4, 3))
+    point, rotation, motion = np.empty(3), np.empty((3, 3)), np.empty((4, 3))
     for at in range(b.type_starts[anchor_type], b.type_starts[anchor_type + 1]):
+        image = b.by_type[at]
         for symmetry in range(kit.symmetry_starts[anchor_type], kit.symmetry_starts[anchor_type + 1]):
-            turn_by(b.turns[b.by_type[at]], kit.symmetries[symmetry], between)
-            for i in range(3):
-                for j in range(3):
-                    x = 0.0
-                    for k in range(3):
-                        x += between[i, k] * ws.turns[anchor, j, k]
-                    motion[i, j] = x
-            for i in range(3):
-                motion[3, i] = b.places[b.by_type[at], i]
-                for j in range(3):
-                    motion[3, i] -= motion[i, j] * ws.places[anchor, j]
+            _motion_between(
+                ws.rotations[anchor], ws.translations[anchor], kit.symmetries[symmetry],
+                b.rotations[image], b.translations[image], motion,
+            )  # fmt: skip
             inside = True
             for v in range(n):
                 part_type = ws.types[v]
                 first, last = b.type_starts[part_type], b.type_starts[part_type + 1]
-                move(motion, ws.places[v], place)
-                found = part_at(b.places, b.by_type, first, last, place, kit.limits[0])
+                transform(motion, ws.translations[v], point)
+                found = part_at(b.translations, b.by_type, first, last, point, kit.limits[0])
                 if found >= 0:
-                    turn_by(motion, ws.turns[v], turn)
-                if found < 0 or looks_same(kit, part_type, turn, b.turns[found]) < 0:
+                    rotate(motion, ws.rotations[v], rotation)
+                if found < 0 or looks_same(kit, part_type, rotation, b.rotations[found]) < 0:
                     inside = False
                     break
             if inside:

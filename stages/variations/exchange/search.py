@@ -228,8 +228,8 @@ class Search:
         ws = self._ws
         parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
         poses = np.tile(np.eye(4), (parts, 1, 1))
-        poses[:, :3, :3] = ws.turns[:parts]
-        poses[:, :3, 3] = ws.places[:parts]
+        poses[:, :3, :3] = ws.rotations[:parts]
+        poses[:, :3, 3] = ws.translations[:parts]
         edges = np.sort(ws.edges[:count], axis=1)
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
         labels = np.stack([ws.label[edges[:, 0], edges[:, 1]], ws.label[edges[:, 1], edges[:, 0]]], axis=1)

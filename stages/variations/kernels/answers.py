@@ -44,8 +44,8 @@ class ContactAnswers:
         quanta = np.empty(12, dtype=np.int64)
         for i, j in ws.unknown[:count].tolist():
             a, b = int(ws.types[i]), int(ws.types[j])
-            reach = self.kit.types[b].diagonal / 2
-            quantise(ws.turns[i], ws.places[i], ws.turns[j], ws.places[j], reach, self._quantum, quanta)
+            reach, quantum = self.kit.types[b].diagonal / 2, self._quantum
+            quantise(ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], reach, quantum, quanta)
             value = self._answer(a, b, quanta)
             self._insert(int(hash_key(a, b, quanta)), value)
             if value == FORBIDDEN:
@@ -55,9 +55,9 @@ class ContactAnswers:
     def answer(self, a: int, b: int, pose: FloatArray) -> int:
         """The answer for a part of type `b` at `pose` (4, 4) in coordinates of a part of type `a`."""
         quanta = np.empty(12, dtype=np.int64)
-        turn, place = np.eye(3), np.zeros(3)
+        rotation, translation = np.eye(3), np.zeros(3)
         reach = self.kit.types[b].diagonal / 2
-        quantise(turn, place, np.ascontiguousarray(pose[:3, :3]), pose[:3, 3], reach, self._quantum, quanta)
+        quantise(rotation, translation, np.ascontiguousarray(pose[:3, :3]), pose[:3, 3], reach, self._quantum, quanta)
         return self._answer(a, b, quanta)
 
     def _answer(self, a: int, b: int, quanta: np.ndarray) -> int:

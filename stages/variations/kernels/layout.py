@@ -81,14 +81,14 @@ class KitTables(NamedTuple):
 
 
 class ShapeTables(NamedTuple):
-    """A shape for the kernels: types int64 (n,), turns float64 (n, 3, 3), places float64 (n, 3), the shape graph as
-    starts int64 (n + 1,), ends int64 (2 m,), labels int64 (2 m,) seen from the start, and the parts of each type as
-    type_starts int64 (types + 1,), by_type int64 (n,).
+    """A shape for the kernels: types int64 (n,), rotations float64 (n, 3, 3), translations float64 (n, 3), the shape
+    graph as starts int64 (n + 1,), ends int64 (2 m,), labels int64 (2 m,) seen from the start, and the parts of each
+    type as type_starts int64 (types + 1,), by_type int64 (n,).
     """
 
     types: np.ndarray
-    turns: np.ndarray
-    places: np.ndarray
+    rotations: np.ndarray
+    translations: np.ndarray
     starts: np.ndarray
     ends: np.ndarray
     labels: np.ndarray
@@ -118,8 +118,8 @@ class Workspace(NamedTuple):
     from_a: np.ndarray  # int64, A part -> v or -1
     from_b: np.ndarray  # int64, B part -> v or -1
     types: np.ndarray  # int64 (v,)
-    turns: np.ndarray  # float64 (v, 3, 3)
-    places: np.ndarray  # float64 (v, 3)
+    rotations: np.ndarray  # float64 (v, 3, 3)
+    translations: np.ndarray  # float64 (v, 3)
     origin: np.ndarray  # int64 (v,): 0 only in A, 1 only in B, 2 in both
     stamp: np.ndarray  # int64 (v, v): number of the try that set the label
     label: np.ndarray  # int64 (v, v): directed docking label

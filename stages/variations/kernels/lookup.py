@@ -11,17 +11,17 @@ __all__ = ["ask", "hash_key", "mix", "quantise", "random_below"]
 
 
 @numba.njit(cache=True)
-def quantise(first_turn, first_place, turn, place, reach, quantum, out):
+def quantise(first_rotation, first_translation, rotation, translation, reach, quantum, out):
     """The pose of the second part in coordinates of the first in whole quanta, int64 (12,): translation, rotation."""
     for i in range(3):
         x = 0.0
         for k in range(3):
-            x += first_turn[k, i] * (place[k] - first_place[k])
+            x += first_rotation[k, i] * (translation[k] - first_translation[k])
         out[i] = np.int64(np.floor(x / quantum + 0.5))
         for j in range(3):
             y = 0.0
             for k in range(3):
-                y += first_turn[k, i] * turn[k, j]
+                y += first_rotation[k, i] * rotation[k, j]
             out[3 + 3 * i + j] = np.int64(np.floor(y * reach / quantum + 0.5))
 
 

@@ -18,7 +18,7 @@ QUANTUM = 1 / 64
 def kit_tables(kit: Kit, upright: bool) -> KitTables:
     """The kit for the kernels.
 
-    With `upright` a docking motion may turn a piece about the vertical only.
+    With `upright` a docking motion may rotate a piece about the vertical only.
     """
     bounds = np.stack([each.bounds for each in kit.types])
     weights = np.random.Generator(np.random.PCG64(len(kit.types))).integers(1, 2**63, len(kit.types), dtype=np.uint64)
@@ -100,8 +100,8 @@ def shape_tables(assembly: Assembly, labels: IntArray, types: int) -> ShapeTable
     part_types = assembly.types.astype(np.int64)
     return ShapeTables(
         types=part_types,
-        turns=np.ascontiguousarray(assembly.poses[:, :3, :3]),
-        places=np.ascontiguousarray(assembly.poses[:, :3, 3]),
+        rotations=np.ascontiguousarray(assembly.poses[:, :3, :3]),
+        translations=np.ascontiguousarray(assembly.poses[:, :3, 3]),
         starts=np.searchsorted(tails[order], np.arange(n + 1)),
         ends=heads[order],
         labels=np.concatenate([labels[:, 0], labels[:, 1]]).astype(np.int64)[order],
@@ -124,8 +124,8 @@ def workspace(largest: int) -> Workspace:
         from_a=np.zeros(largest, dtype=np.int64),
         from_b=np.zeros(largest, dtype=np.int64),
         types=np.zeros(2 * largest, dtype=np.int64),
-        turns=np.zeros((2 * largest, 3, 3)),
-        places=np.zeros((2 * largest, 3)),
+        rotations=np.zeros((2 * largest, 3, 3)),
+        translations=np.zeros((2 * largest, 3)),
         origin=np.zeros(2 * largest, dtype=np.int64),
         stamp=np.zeros((2 * largest, 2 * largest), dtype=np.int64),
         label=np.zeros((2 * largest, 2 * largest), dtype=np.int64),

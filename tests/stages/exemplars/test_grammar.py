@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.exemplars.grammar import observe, observe_dockings, observe_neighbourhoods
+from stages.exemplars.grammar import observe_contacts, observe_dockings, observe_grammar, observe_neighbourhoods
 from stages.exemplars.settings import ContactConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import ContactTest
@@ -98,7 +98,9 @@ class TestDockings:
         contact = ContactTest(types, 0.01)
         kinds = rng.integers(0, 2, 14).astype(np.int16)
         assembly = Assembly(kinds, poses, contact.contacts(kinds, poses))
-        (kept,), grammar, (found,) = observe(types, [assembly], contact, 0.01, ("point", "line", "face"))
+        contacts = observe_contacts(types, [assembly], contact, 0.01, ("point", "line", "face"))
+        grammar = observe_grammar(types, [assembly], contacts, ("point", "line", "face"))
+        (kept,), (found,) = contacts.counted, contacts.kinds
         assert kept.edges.tolist() == assembly.edges.tolist()
         labels = DockingTable(types, grammar.dockings, 0.01).label_edges(kinds, poses, assembly.edges)
         assert len(labels) > 5
@@ -118,10 +120,11 @@ class TestNested:
         contact = ContactTest(types, 1e-3)
         poses = np.array([placed(), placed(0, 0, 0), placed(5, 0, 0)])
         assembly = Assembly(np.array([1, 0, 1], np.int16), poses, np.empty((0, 2), np.int32))
-        _, grammar, found = observe(types, [assembly], contact, 1e-3, ("face",))
+        contacts = observe_contacts(types, [assembly], contact, 1e-3, ("face",))
+        grammar = observe_grammar(types, [assembly], contacts, ("face",))
         assert list(grammar.nested) == [(0, 1)]
         assert grammar.nested[0, 1] == pytest.approx(0.75, abs=1e-3)
-        assert found == [()]
+        assert contacts.kinds == [()]
 
     def test_parts_that_touch_are_not_nested(self) -> None:
         assert block_kit(ring()).grammar.nested == {}

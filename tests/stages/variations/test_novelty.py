@@ -110,7 +110,10 @@ def test_a_piece_of_an_exemplar_is_told_from_a_new_shape() -> None:
 
     def put(assembly: Assembly) -> None:
         ws.types[: len(assembly)] = assembly.types
-        ws.turns[: len(assembly)], ws.places[: len(assembly)] = assembly.poses[:, :3, :3], assembly.poses[:, :3, 3]
+        ws.rotations[: len(assembly)], ws.translations[: len(assembly)] = (
+            assembly.poses[:, :3, :3],
+            assembly.poses[:, :3, 3],
+        )
         ws.counts[PARTS], ws.counts[EDGES] = len(assembly), 0
 
     put(piece)
@@ -130,7 +133,7 @@ def test_no_variant_is_a_piece_of_an_exemplar() -> None:
     for variant in found:
         line._load(line.parent("variant", variant.assembly, variant.origins, (0, 0), variant.labels))
         ws, n = line._ws, len(variant.assembly)
-        ws.turns[:n], ws.places[:n] = variant.assembly.poses[:, :3, :3], variant.assembly.poses[:, :3, 3]
+        ws.rotations[:n], ws.translations[:n] = variant.assembly.poses[:, :3, :3], variant.assembly.poses[:, :3, 3]
         assert not any(lies_in(line.tables, ws, each.tables) for each in line.parents.exemplars)
     assert line.rejects[SUBASSEMBLY] > 0
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from stages.exemplars.congruence import congruences, surface
+from stages.exemplars.congruence import comparable_mesh, congruences
 from stages.exemplars.kits.catalogue import KITS, write_kits
 from stages.exemplars.kits.layout import Layout
 from stages.shape.arrays import FloatArray, IntArray
@@ -93,7 +93,7 @@ def test_every_shell_of_a_part_is_closed_and_right_side_out(kit: str, name: str)
 
 @pytest.mark.parametrize(("kit", "name"), PARTS)
 def test_no_part_looks_the_same_upside_down_or_on_its_side(kit: str, name: str) -> None:
-    own = surface(*part_mesh(kit, name))
+    own = comparable_mesh(*part_mesh(kit, name))
     for motion in congruences(own, own, 1e-3, reflections=False):
         assert motion[:3, 1] == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
 

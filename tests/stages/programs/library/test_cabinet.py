@@ -11,7 +11,7 @@ import pytest
 from stages.programs.curves import mesh_faults
 from stages.programs.draws import draw
 from stages.programs.library.cabinet import PROGRAM, build
-from stages.programs.library.cabinet_plan import Plan
+from stages.programs.library.cabinet_dimensions import CabinetDimensions
 from stages.programs.schema import Values
 
 
@@ -50,7 +50,7 @@ def test_each_column_has_its_shelves_or_its_drawers_and_doors() -> None:
 def test_open_columns_are_in_the_middle() -> None:
     base = PROGRAM.schema.base
     kept = {
-        (count, bare): Plan({**base, "column_count": count, "open_columns": bare}).is_open
+        (count, bare): CabinetDimensions({**base, "column_count": count, "open_columns": bare}).is_open
         for count, bare in ((3, 1), (4, 2), (2, 1), (3, 3))
     }
     assert kept == {
@@ -63,11 +63,11 @@ def test_open_columns_are_in_the_middle() -> None:
 
 def test_fronts_do_not_overlap_and_stay_within_the_case() -> None:
     for values in cabinets(150, open_columns=0):
-        plan = Plan(values)
+        cabinet = CabinetDimensions(values)
         fronts = [part.mesh.bounds for part in build(values) if part.label in {"door", "drawer"}]
         for place, one in enumerate(fronts):
-            assert -plan.half < one[0, 0] < one[1, 0] < plan.half
-            assert plan.floor < one[0, 1] < one[1, 1] < plan.ceiling
+            assert -cabinet.half < one[0, 0] < one[1, 0] < cabinet.half
+            assert cabinet.floor < one[0, 1] < one[1, 1] < cabinet.ceiling
             for other in fronts[:place]:
                 apart = np.maximum(one[0, :2], other[0, :2]) - np.minimum(one[1, :2], other[1, :2])
                 assert apart.max() > 0.0015
@@ -98,5 +98,5 @@ def test_handles_of_framed_drawers_reach_the_panel() -> None:
         for drawer, handle in itertools.pairwise(parts):
             if drawer.label == "drawer":
                 panel = drawer.mesh.vertices[-8:, 2].max()
-                assert panel < Plan(values).face - 0.005
+                assert panel < CabinetDimensions(values).face - 0.005
                 assert handle.mesh.bounds[0, 2] < panel

@@ -7,7 +7,7 @@ import pytest
 
 from stages.programs.draws import draw
 from stages.programs.library.table import PROGRAM, build
-from stages.programs.library.table_plan import Plan
+from stages.programs.library.table_dimensions import TableDimensions
 from stages.programs.schema import Values
 
 
@@ -27,22 +27,22 @@ def test_the_table_has_as_many_parameters_and_values_as_published() -> None:
 
 def test_tables_stand_on_the_ground_and_nothing_pierces_their_tops() -> None:
     for values in tables(300):
-        parts, plan = build(values), Plan(values)
+        parts, table = build(values), TableDimensions(values)
         assert min(part.mesh.bounds[0, 1] for part in parts) == pytest.approx(0.0, abs=1e-9)
-        assert parts[0].mesh.bounds[:, 1] == pytest.approx([plan.under, plan.height])
-        assert parts[0].mesh.bounds[1, [0, 2]] == pytest.approx(plan.half)
+        assert parts[0].mesh.bounds[:, 1] == pytest.approx([table.under, table.height])
+        assert parts[0].mesh.bounds[1, [0, 2]] == pytest.approx(table.half)
         for part in parts[1:]:
-            assert part.mesh.bounds[1, 1] < plan.height - 0.3 * plan.thickness
+            assert part.mesh.bounds[1, 1] < table.height - 0.3 * table.thickness
 
 
 def test_four_legs_begin_under_the_top_and_stay_apart() -> None:
     for values in tables(200, is_monoleg=False):
-        plan = Plan(values)
+        table = TableDimensions(values)
         legs = [part.mesh for part in build(values) if part.label == "leg"]
         assert len(legs) == 4
         for leg in legs:
-            head = leg.vertices[leg.vertices[:, 1] > plan.under - 1e-9][:, [0, 2]]
-            outline = plan.outline * (plan.bearing / plan.half)
+            head = leg.vertices[leg.vertices[:, 1] > table.under - 1e-9][:, [0, 2]]
+            outline = table.outline * (table.bearing / table.half)
             sides = np.roll(outline, -1, axis=0) - outline
             offsets = head[:, None] - outline
             assert (sides[:, 0] * offsets[..., 1] - sides[:, 1] * offsets[..., 0] > -1e-9).all()
@@ -59,7 +59,10 @@ def test_the_tent_has_its_legs_and_a_foot_under_each() -> None:
 
 def test_tops_go_from_a_rectangle_to_an_ellipse() -> None:
     base = PROGRAM.schema.base
-    square, round_ = Plan({**base, "table_top_shape": 0.0}), Plan({**base, "table_top_shape": 1.0})
+    square, round_ = (
+        TableDimensions({**base, "table_top_shape": 0.0}),
+        TableDimensions({**base, "table_top_shape": 1.0}),
+    )
     assert len(square.outline) == 4
     assert ((round_.outline / round_.half) ** 2).sum(axis=1) == pytest.approx(1.0)
 
@@ -67,7 +70,7 @@ def test_tops_go_from_a_rectangle_to_an_ellipse() -> None:
 @pytest.mark.parametrize("state", range(4))
 def test_an_edge_takes_nothing_from_the_size_of_the_top(state: int) -> None:
     for values in tables(20, table_top_profile_state=state):
-        edge = Plan(values).edge
+        edge = TableDimensions(values).edge
         assert edge[:, 0].min() == pytest.approx(0.0, abs=1e-12)
-        assert edge[[0, -1], 1] == pytest.approx([0.0, Plan(values).thickness])
+        assert edge[[0, -1], 1] == pytest.approx([0.0, TableDimensions(values).thickness])
         assert (np.diff(edge[:, 1]) > 0.0).all()

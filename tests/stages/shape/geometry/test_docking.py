@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.exemplars.congruence import congruences, surface
+from stages.exemplars.congruence import comparable_mesh, congruences
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Docking, PartType
@@ -14,7 +14,7 @@ TOLERANCE = 0.01
 
 def symmetric_part(body: Body) -> PartType:
     vertices, faces = body
-    shape = surface(vertices, faces)
+    shape = comparable_mesh(vertices, faces)
     return part(body, symmetries=congruences(shape, shape, 1e-4, reflections=False))
 
 

@@ -65,12 +65,12 @@ def test_contact_answers_do_not_depend_on_what_was_asked_before(chains: Search) 
             first, second, _ = cases[name]
             ws.types[:2] = link, link
             # Part coordinates start at the centroid, which the arrow moves off the middle by the same way in both.
-            ws.turns[:2], ws.places[:2] = [first[:3, :3], second[:3, :3]], [first[:3, 3], second[:3, 3]]
+            ws.rotations[:2], ws.translations[:2] = [first[:3, :3], second[:3, :3]], [first[:3, 3], second[:3, 3]]
             ws.unknown[0] = 0, 1
             fresh.answer_unknown(ws, 1)
             quanta = np.empty(12, dtype=np.int64)
             quantise(
-                ws.turns[0], ws.places[0], ws.turns[1], ws.places[1], kit.types[link].diagonal / 2,
+                ws.rotations[0], ws.translations[0], ws.rotations[1], ws.translations[1], kit.types[link].diagonal / 2,
                 kit.contact_tolerance / 64, quanta,
             )  # fmt: skip
             key = np.uint64(hash_key(link, link, quanta))
@@ -101,9 +101,9 @@ def test_joining_a_chain_to_itself_moved_by_one_link_makes_it_one_longer(chains:
     kit, tables, ws = chains.kit, chains.tables, chains._ws
     shape = chains.parents.exemplars[0].tables
     links = [part for part in range(5) if kit.types[shape.types[part]].name == "link"]
-    links.sort(key=lambda part: shape.places[part, 0])
+    links.sort(key=lambda part: shape.translations[part, 0])
     caps = [part for part in range(5) if part not in links]
-    left_cap = min(caps, key=lambda part: shape.places[part, 0])
+    left_cap = min(caps, key=lambda part: shape.translations[part, 0])
     # The piece: the left cap and two links; its boundary, the second link, is laid on the third.
     ws.inside[:5] = False
     ws.inside[[left_cap, links[0], links[1]]] = True

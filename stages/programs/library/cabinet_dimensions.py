@@ -8,7 +8,7 @@ from functools import cached_property
 from stages.programs.curves import QuadMesh, box
 from stages.programs.schema import Values
 
-__all__ = ["Opening", "Plan", "block"]
+__all__ = ["CabinetDimensions", "Opening", "block"]
 
 FRONT = 0.02
 """Thickness of doors and drawer fronts."""
@@ -38,7 +38,7 @@ class Opening:
         return Opening(self.low, (self.high[0], level)), Opening((self.low[0], level), self.high)
 
 
-class Plan:
+class CabinetDimensions:
     """The sizes of the cabinet at `values`.
 
     board: thickness of its boards; half: half its width without the top; back, front: where the case begins and ends

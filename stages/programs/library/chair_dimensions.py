@@ -1,4 +1,4 @@
-"""The plan of a chair: the measures that all its parts are attached to (geocode §3.1, "structural integrity")."""
+"""The dimensions of a chair: the measures that all its parts are attached to (geocode §3.1, "structural integrity")."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stages.programs.curves import Profile, QuadMesh, loft_rings, square_circle
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["FABRIC", "LEATHER", "METAL", "SEAT", "WOOD", "Plan", "post"]
+__all__ = ["FABRIC", "LEATHER", "METAL", "SEAT", "WOOD", "ChairDimensions", "post"]
 
 WOOD, SEAT, METAL = (151, 104, 66), (176, 128, 84), (92, 96, 102)
 FABRIC, LEATHER = (64, 104, 122), (118, 66, 50)
@@ -23,7 +23,7 @@ OUTLINE = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class ChairDimensions:
     """What the values mean in metres: a chair of scale 1 is half a metre wide and deep and 0.95 high.
 
     The seat's middle stands over the origin. `x`, `z`: how far from it, to each side, the legs and the posts of the

@@ -10,7 +10,7 @@ from stages.programs.curves import Profile, QuadMesh, loft_rings, rectangle
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["METAL", "OAK", "WALNUT", "Plan", "upright"]
+__all__ = ["METAL", "OAK", "WALNUT", "TableDimensions", "upright"]
 
 OAK, WALNUT, METAL = (201, 164, 118), (122, 85, 58), (74, 77, 82)
 
@@ -21,7 +21,7 @@ KEPT = 1.0 - np.cos(np.pi / 4.0)
 """How much a corner of radius 1 cuts off along each axis, in its middle."""
 
 
-class Plan:
+class TableDimensions:
     """The sizes of the table at `values`.
 
     half: half width and depth of the top, float64 (2,); height: of its upper side; thickness: of the top;

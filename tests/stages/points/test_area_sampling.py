@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from stages.points.surface import sample_shape, sample_surface, surface_table
+from stages.points.area_sampling import sample_shape, sample_surface, surface_table
 from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import Assembly, PartType
 from stages.shape.shape import Shape
