@@ -11,22 +11,24 @@ from typing import Any
 
 from pipeline.places import StagePlaces
 from pipeline.shards import json_bytes
-from pipeline.stage import Shard, Stage
+from pipeline.stage import Shard
 
-__all__ = ["ShardRecord", "fingerprint", "read_record"]
+__all__ = ["ShardRecord", "fingerprint", "read_record", "recipe"]
 
 
 @dataclass(frozen=True)
 class ShardRecord:
     """One finished shard.
 
-    files: `{file: {"sha256", "bytes"}}`; rejects: refused items by reason; seconds: time that the shard took;
-    peak_bytes: the largest memory that its worker had held until then; summary: the stage's own facts.
+    fingerprint: of its recipe; files: `{file: {"sha256", "bytes"}}`; rejects: refused items by reason; seconds: time
+    that the shard took; peak_bytes: the largest memory that its worker had held until then; summary: the stage's own
+    facts.
     """
 
     stage: str
     shard: str
     fingerprint: str
+    recipe: Mapping[str, str]
     files: Mapping[str, Mapping[str, Any]]
     samples: int
     rejects: Mapping[str, int]
@@ -58,20 +60,31 @@ def read_record(path: Path) -> ShardRecord | None:
         return None
 
 
-def fingerprint(
-    stage: Stage, section: Mapping[str, Any], dataset: tuple[str, str, int], shard: Shard, inputs: Mapping[str, str]
-) -> str:
-    """The sha256 over all that a shard's bytes depend on.
+def recipe(
+    stage: str,
+    shard: Shard,
+    code: str,
+    section: Mapping[str, Any],
+    dataset: tuple[str, str, int],
+    inputs: Mapping[str, str],
+) -> dict[str, str]:
+    """All that a shard's bytes depend on, as a digest of each kind of thing: `code`, `config`, `dataset`, `plan`,
+    `inputs`.
 
-    `section` is the stage's config as JSON, `dataset` name, version and seed, `inputs` the fingerprint of each
-    record that the shard reads. What else the bytes depend on (the bytes of a mesh, the title on a card) the
-    stage puts in the shard's `params`.
+    `code` is the digest of the code that it reaches, `section` the stage's config as JSON, `dataset` name, version and
+    seed, `inputs` the fingerprint of each record that the shard reads. What else the bytes depend on (the bytes of a
+    mesh, the title on a card) the stage puts in the shard's `params`.
     """
     described = {
-        "stage": [stage.name, stage.version],
+        "code": code,
         "config": section,
         "dataset": dataset,
-        "shard": [shard.name, dict(shard.params)],
+        "plan": [stage, shard.name, dict(shard.params)],
         "inputs": dict(inputs),
     }
-    return hashlib.sha256(json_bytes(described)).hexdigest()
+    return {kind: hashlib.sha256(json_bytes(value)).hexdigest() for kind, value in described.items()}
+
+
+def fingerprint(recipe: Mapping[str, str]) -> str:
+    """The sha256 over a recipe."""
+    return hashlib.sha256(json_bytes(dict(recipe))).hexdigest()

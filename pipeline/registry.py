@@ -25,8 +25,8 @@ def find_stages(package: str = "stages") -> dict[str, Stage]:
         if not any((Path(base) / folder / "stage.py").is_file() for base in root.__path__):
             continue
         stage = getattr(importlib.import_module(f"{package}.{folder}.stage"), "STAGE", None)
-        if not isinstance(stage, Stage) or stage.name != folder:
-            raise TypeError(f"{package}/{folder}/stage.py must hold STAGE = Stage(name={folder!r}, ...)")
+        if not isinstance(stage, Stage) or (stage.name, stage.module) != (folder, f"{package}.{folder}.stage"):
+            raise TypeError(f"{package}/{folder}/stage.py must hold STAGE = Stage({folder!r}, __name__, ...)")
         found[folder] = stage
     for stage in found.values():
         for name in stage.inputs:

@@ -16,6 +16,8 @@ from pipeline.errors import ConfigError, Fatal
 from pipeline.finish import finish_stage
 from pipeline.journal import Journal, span
 from pipeline.places import Places, StagePlaces, stops_everything, write_whole
+from pipeline.reasons import reasons
+from pipeline.records import fingerprint
 from pipeline.registry import upstream
 from pipeline.shards import json_bytes
 from pipeline.space import check_space
@@ -129,6 +131,8 @@ class _Run:
         self._take_away(surveyed, surveyed.places.failed, "*")
         self._take_away_unfinished(surveyed)
         if surveyed.missing:
+            for line in reasons(surveyed):
+                self._journal.say(line)
             surveyed.places.manifest.unlink(missing_ok=True)
             self._journal.note(check_space(surveyed, self._places.out))
             self._make_missing(surveyed, count)
@@ -172,7 +176,8 @@ class _Run:
         workers = Workers(count, self._places.worker_output)
         try:
             while True:
-                ready = deque(self._job(surveyed, shard) for shard in self._mine(surveyed) if surveyed.ready(shard))
+                mine = (shard for shard in self._mine(surveyed) if surveyed.ready(shard))
+                ready = deque(self._survey.job(self._name, shard) for shard in mine)
                 if not ready:
                     break
                 self._make(workers, ready, surveyed)
@@ -194,10 +199,6 @@ class _Run:
                     f"plan of {self._name}: shard {shard.name} was made just now, and is planned otherwise since: "
                     "a plan is a function of the config and of records alone"
                 )
-
-    def _job(self, surveyed: StageSurvey, shard: Shard) -> Job:
-        stage = surveyed.stage
-        return Job(stage.name, stage.run_shard, shard, surveyed.config, self._places, surveyed.fingerprints[shard.name])
 
     def _make(self, workers: Workers, ready: deque[Job], surveyed: StageSurvey) -> None:
         """Make the `ready` shards, each until it is done or set aside."""
@@ -247,7 +248,7 @@ class _Run:
         self._result.failed[name] = report.message
         self._journal.say(f"shard {name} is set aside: {report.message}")
         self._journal.note(report.trace)
-        described = {"fingerprint": job.fingerprint, "message": report.message, "trace": report.trace}
+        described = {"fingerprint": fingerprint(job.recipe), "message": report.message, "trace": report.trace}
         write_whole(self._places.stage(self._name).failed / f"{name}.json", json_bytes(described))
 
     def _show(self, surveyed: StageSurvey, workers: Workers) -> None:

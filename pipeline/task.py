@@ -8,18 +8,19 @@ import resource
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, Literal
 
 import numpy as np
 
+from pipeline.code import reached
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
 from pipeline.places import Places, StagePlaces, file_digest, stops_everything, sync_folder, temporary, write_whole
 from pipeline.randomness import decision_rng
-from pipeline.records import ShardRecord, read_record
+from pipeline.records import ShardRecord, fingerprint, read_record
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
 
@@ -31,14 +32,19 @@ _PROGRESS_EVERY = 0.5
 
 @dataclass(frozen=True)
 class Job:
-    """All that a worker must know to make one shard; small, because it is sent to another process."""
+    """All that a worker must know to make one shard; small, because it is sent to another process.
+
+    starts, code: where the code of the shard begins, and the digests of what was reached from there when the run began.
+    """
 
     stage: str
     run_shard: Callable[[Task], Outcome]
     shard: Shard
     config: Config
     places: Places
-    fingerprint: str
+    recipe: Mapping[str, str]
+    starts: tuple[str, ...] = ()
+    code: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,7 @@ def make_shard(job: Job) -> Report:
     task = _ShardTask(job)
     try:
         outcome = job.run_shard(task)
+        _check_code(job)
         task.commit(outcome)
         return Report(job.shard.name, "done")
     except BaseException as error:
@@ -73,6 +80,14 @@ def make_shard(job: Job) -> Report:
             return Report(job.shard.name, "refused", str(error), trace)
         message = str(error) if isinstance(error, ShardFailed) else f"{type(error).__name__}: {error}"
         return Report(job.shard.name, "failed", message, trace)
+
+
+def _check_code(job: Job) -> None:
+    """Raises Fatal where the code is not what it was when the run began: workers import late, and fresh ones anew."""
+    now = reached(job.starts)
+    edited = sorted(module for module, _ in set(now.items()) ^ set(job.code.items()))
+    if edited:
+        raise Fatal(f"the code was edited while stage {job.stage} ran ({', '.join(dict.fromkeys(edited))})")
 
 
 class _ShardTask:
@@ -142,7 +157,8 @@ class _ShardTask:
         record = ShardRecord(
             stage=self._job.stage,
             shard=self.shard.name,
-            fingerprint=self._job.fingerprint,
+            fingerprint=fingerprint(self._job.recipe),
+            recipe=dict(self._job.recipe),
             files=files,
             samples=outcome.samples,
             rejects=dict(self._rejects),

@@ -144,7 +144,7 @@ def _facts(plan: Plan) -> dict[str, Any]:
 
 STAGE = Stage(
     name="package",
-    version=VERSION,
+    module=__name__,
     config=PackageConfig,
     inputs=("exemplars", *PRODUCERS, "validity", "strings", "points", "sketches"),
     plan=plan,

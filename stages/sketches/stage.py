@@ -65,7 +65,7 @@ def estimate_bytes(plan: Plan) -> int:
 
 STAGE = Stage(
     name="sketches",
-    version=1,
+    module=__name__,
     config=SketchesConfig,
     inputs=("exemplars", *PRODUCERS),
     plan=plan,

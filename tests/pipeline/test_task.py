@@ -26,7 +26,7 @@ def make(tmp_path: Path) -> Callable[[Body], Report]:
 
     def run(body: Body) -> Report:
         shard = Shard("shard", {}, ("earlier/in",))
-        return make_shard(Job("own", body, shard, Config("toy", "1.0.0", 5, {}, Path("t.yaml")), places, "f"))
+        return make_shard(Job("own", body, shard, Config("toy", "1.0.0", 5, {}, Path("t.yaml")), places, {}))
 
     return run
 

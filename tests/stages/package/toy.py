@@ -161,15 +161,19 @@ def _no_bytes(_: Plan) -> int:
 
 TOY_STAGES: Mapping[str, Stage] = {
     **ABSENT_STAGES,
-    "exemplars": Stage("exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
-    "variations": Stage("variations", 1, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
+    "exemplars": Stage(
+        "exemplars", __name__, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes
+    ),
+    "variations": Stage(
+        "variations", __name__, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes
+    ),
     "strings": Stage(
-        "strings", 1, OtherNoConfig, ("exemplars", "variations"), collection_shards, _make_strings, _no_bytes
+        "strings", __name__, OtherNoConfig, ("exemplars", "variations"), collection_shards, _make_strings, _no_bytes
     ),
     "points": POINTS,
     "validity": VALIDITY,
     "sketches": Stage(
-        "sketches", 1, SketchesConfig, ("exemplars", "variations"), collection_shards, _make_sketches, _no_bytes
+        "sketches", __name__, SketchesConfig, ("exemplars", "variations"), collection_shards, _make_sketches, _no_bytes
     ),
     "package": replace(PACKAGE, check=lambda _: None),
 }

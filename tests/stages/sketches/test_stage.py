@@ -65,8 +65,8 @@ def small(plan: Plan) -> int:
 
 STAGES = {
     **ABSENT_STAGES,
-    "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
-    "variations": Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
+    "exemplars": Stage("exemplars", __name__, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
+    "variations": Stage("variations", __name__, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
     "sketches": STAGE,
 }
 

@@ -59,11 +59,11 @@ def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict
 
     producer = samples[0].producer
     stages: dict[str, Stage] = {
-        "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda _: [Shard("solids")], make_kit, small),
-        "variations": Stage("variations", 1, SamplesConfig, (), lambda _: [], make_samples, small),
+        "exemplars": Stage("exemplars", __name__, KitsConfig, (), lambda _: [Shard("solids")], make_kit, small),
+        "variations": Stage("variations", __name__, SamplesConfig, (), lambda _: [], make_samples, small),
         **ABSENT_STAGES,
     }
-    stages[producer] = Stage(producer, 1, SamplesConfig, (), plan, make_samples, small)
+    stages[producer] = Stage(producer, __name__, SamplesConfig, (), plan, make_samples, small)
     stages["validity"] = STAGE
     sections = {
         "exemplars": KitsConfig(),

@@ -46,4 +46,4 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(samples=writer.samples, summary={"grains": writer.samples})
 
 
-STAGE = Stage("grain", 1, GrainConfig, (), plan, run_shard, lambda _: 100_000)
+STAGE = Stage("grain", __name__, GrainConfig, (), plan, run_shard, lambda _: 100_000)

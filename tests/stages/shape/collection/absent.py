@@ -16,6 +16,7 @@ class NothingConfig(StrictModel):
 
 
 ABSENT_STAGES: Mapping[str, Stage] = {
-    name: Stage(name, 1, NothingConfig, (), lambda _: [], lambda _: Outcome(0), lambda _: 0) for name in PRODUCERS[1:]
+    name: Stage(name, __name__, NothingConfig, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
+    for name in PRODUCERS[1:]
 }
 ABSENT_SECTIONS: Mapping[str, StrictModel] = {name: NothingConfig() for name in ABSENT_STAGES}
