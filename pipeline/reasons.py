@@ -35,7 +35,9 @@ def _changes(surveyed: StageSurvey, old: ShardRecord) -> str:
     edited = _edited(surveyed) if "code" in changed else []
     if edited:
         changed["code"] += f" ({', '.join(edited)})"
-    return f"changed: {', '.join(changed.values())}" if changed else "a file is gone"
+    if changed:
+        return f"changed: {', '.join(changed.values())}"
+    return "what it is made from has other bytes" if old.is_whole(surveyed.places) else "a file is gone"
 
 
 def _edited(surveyed: StageSurvey) -> list[str]:

@@ -92,7 +92,8 @@ class Task(Protocol):
         """The stream of one decision inside this shard: counted from seed, stage, shard and `decision`."""
 
     def input(self, stage: str, file: str) -> Path:
-        """A file that an input shard has committed. Raises ShardFailed if no input record lists it."""
+        """A file that an input shard has committed, with the bytes that it had then. Raises ShardFailed if no input
+        record lists it; if it is damaged, the mill makes it again first."""
 
     def output(self, file: str) -> BinaryIO:
         """A stream to a new file of this shard, named `<shard>.<anything>`; committed with it, or not at all."""

@@ -99,9 +99,18 @@ class Survey:
         if record is not None and record.fingerprint == surveyed.fingerprints[shard]:
             surveyed.records[shard] = record
 
+    def forget(self) -> None:
+        """Read plans and records anew when next asked: those of any stage may be others now."""
+        self._surveyed.clear()
+
     def job(self, name: str, shard: Shard) -> Job:
-        """What a worker must know to make a shard of stage `name`."""
+        """What a worker must know to make a shard of stage `name` whose inputs are all there."""
         surveyed = self._surveyed[name]
+        inputs = {
+            f"{stage}/{file}": noted["sha256"]
+            for stage, _, other in (each.partition("/") for each in shard.inputs)
+            for file, noted in self.stage(stage).records[other].files.items()
+        }
         return Job(
             stage=name,
             run_shard=surveyed.stage.run_shard,
@@ -109,6 +118,7 @@ class Survey:
             config=surveyed.config,
             places=self._places,
             recipe=surveyed.recipes[shard.name],
+            inputs=inputs,
             starts=starts_of(surveyed.stage.module, shard.code),
             code=self._code(surveyed.stage, shard),
         )
@@ -133,8 +143,7 @@ class Survey:
             raise ValueError(f"plan of {name}: shard {shard.name} reads {wanted}, which is not planned before it")
         return fingerprints[other]
 
-    @staticmethod
-    def _read_records(surveyed: StageSurvey) -> bool:
+    def _read_records(self, surveyed: StageSurvey) -> bool:
         before = set(surveyed.records)
         matching: dict[str, ShardRecord] = {}
         surveyed.outdated.clear()
@@ -142,12 +151,26 @@ class Survey:
             record = surveyed.records.get(name)
             if record is None or record.fingerprint != wanted:
                 record = read_record(surveyed.places.records / f"{name}.json")
-            if record is not None and record.fingerprint == wanted and record.is_whole(surveyed.places):
+            if record is None:
+                continue
+            whole = record.fingerprint == wanted and record.is_whole(surveyed.places)
+            if whole and self._read_what_is_there(surveyed.stage.name, matching, record):
                 matching[name] = record
-            elif record is not None:
+            else:
                 surveyed.outdated[name] = record
         surveyed.records = matching
         return set(matching) != before
+
+    def _read_what_is_there(self, name: str, own: Mapping[str, ShardRecord], record: ShardRecord) -> bool:
+        """Whether a shard of stage `name` was made of the bytes that its inputs have now, by their records; `own` are
+        those of its own stage that are good. An input that was made again with the same bytes changes nothing."""
+        for read, digest in record.inputs.items():
+            stage, _, file = read.partition("/")
+            records = own if stage == name else self.stage(stage).records
+            source = records.get(file.partition(".")[0])
+            if source is None or source.files.get(file, {}).get("sha256") != digest:
+                return False
+        return True
 
 
 class _View:

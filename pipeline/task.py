@@ -34,6 +34,7 @@ _PROGRESS_EVERY = 0.5
 class Job:
     """All that a worker must know to make one shard; small, because it is sent to another process.
 
+    inputs: `{stage/file: sha256}` of all files of its input shards, from their records.
     starts, code: where the code of the shard begins, and the digests of what was reached from there when the run began.
     """
 
@@ -43,6 +44,7 @@ class Job:
     config: Config
     places: Places
     recipe: Mapping[str, str]
+    inputs: Mapping[str, str]
     starts: tuple[str, ...] = ()
     code: Mapping[str, str] = field(default_factory=dict)
 
@@ -51,13 +53,15 @@ class Job:
 class Report:
     """How a shard ended.
 
-    done: committed; failed: may be tried again; refused: would fail again; fatal: nothing else may start.
+    done: committed; failed: may be tried again; refused: would fail again; fatal: nothing else may start; damaged: a
+    file of the input `damaged`, `stage/shard`, is not what its record says.
     """
 
     shard: str
-    status: Literal["done", "failed", "refused", "fatal"]
+    status: Literal["done", "failed", "refused", "fatal", "damaged"]
     message: str = ""
     trace: str = ""
+    damaged: str = ""
 
 
 def make_shard(job: Job) -> Report:
@@ -71,6 +75,8 @@ def make_shard(job: Job) -> Report:
     except BaseException as error:
         task.withdraw()
         trace = traceback.format_exc()
+        if task.damage is not None:
+            return task.damage
         culprit = stops_everything(error)
         if culprit is not None:
             return Report(job.shard.name, "fatal", str(culprit), trace)
@@ -97,10 +103,12 @@ class _ShardTask:
         self._job = job
         self._places: StagePlaces = job.places.stage(job.stage)
         self._streams: dict[str, BinaryIO] = {}
+        self._read: dict[str, str] = {}
         self._rejects: Counter[str] = Counter()
         self._reject_stream: BinaryIO | None = None
         self._start = time.perf_counter()
         self._noted = 0.0
+        self.damage: Report | None = None
 
     @property
     def shard(self) -> Shard:
@@ -114,13 +122,27 @@ class _ShardTask:
         return decision_rng(self.config.seed, self._job.stage, self.shard.name, *decision)
 
     def input(self, stage: str, file: str) -> Path:
-        source = f"{stage}/{file.partition('.')[0]}"
+        source, name = f"{stage}/{file.partition('.')[0]}", f"{stage}/{file}"
         path = self._job.places.stage(stage).root / file
         if source not in self.shard.inputs:
             raise ShardFailed(f"{self._job.stage}/{self.shard.name} reads {file}, but {source} is not among its inputs")
-        if not path.is_file():
+        if name not in self._job.inputs:
             raise ShardFailed(f"{source} has no file {file}")
+        if name not in self._read:
+            self._check(path, name, source)
+            self._read[name] = self._job.inputs[name]
         return path
+
+    def _check(self, path: Path, name: str, source: str) -> None:
+        """Raises ShardFailed, and notes the damage, where an input is not what its record says."""
+        try:
+            wrong = "its sha256 is not the one in its record" if file_digest(path) != self._job.inputs[name] else ""
+        except FileNotFoundError:
+            wrong = "the file is gone"
+        if wrong:
+            message = f"{name} is damaged: {wrong}"
+            self.damage = Report(self.shard.name, "damaged", message, damaged=source)
+            raise ShardFailed(message)
 
     def output(self, file: str) -> BinaryIO:
         if "/" in file or not file.startswith(f"{self.shard.name}."):
@@ -148,7 +170,12 @@ class _ShardTask:
         return self._places.rejects / f"{self.shard.name}.jsonl"
 
     def commit(self, outcome: Outcome) -> None:
-        """Bring the files to disk under their names, then the record that makes them count."""
+        """Bring the files to disk under their names, then the record that makes them count.
+
+        Raises ShardFailed where an input was damaged and the stage went on all the same.
+        """
+        if self.damage is not None:
+            raise ShardFailed(self.damage.message)
         record_path = self._places.records / f"{self.shard.name}.json"
         old = read_record(record_path)
         files = {name: self._finish(stream, self._places.root / name) for name, stream in self._streams.items()}
@@ -159,6 +186,7 @@ class _ShardTask:
             shard=self.shard.name,
             fingerprint=fingerprint(self._job.recipe),
             recipe=dict(self._job.recipe),
+            inputs=self._read,
             files=files,
             samples=outcome.samples,
             rejects=dict(self._rejects),

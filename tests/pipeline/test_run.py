@@ -11,7 +11,8 @@ import pytest
 from pipeline.config import Config, StrictModel
 from pipeline.errors import ConfigError
 from pipeline.places import Places
-from pipeline.run import Slice, run_stage
+from pipeline.run import run_stage
+from pipeline.slices import Slice
 from pipeline.stage import Outcome, Shard, Stage, Task
 from tests.pipeline.conftest import WriteConfig, made, record_times
 from tests.pipeline.turn import turn

@@ -118,8 +118,26 @@ def test_plan_sees_only_the_stages_and_sections_that_it_reads(tmp_path: Path) ->
 
 def test_record_survives_its_way_to_disk_and_back(tmp_path: Path) -> None:
     record = ShardRecord(
-        "s", "a", "f" * 64, {"code": "c"}, {"a.tar": {"sha256": "0", "bytes": 3}}, 2, {"odd": 1}, 0.5, 9, {"k": [1]}
+        "s",
+        "a",
+        "f" * 64,
+        {"code": "c"},
+        {"r/b.tar": "1"},
+        {"a.tar": {"sha256": "0", "bytes": 3}},
+        2,
+        {"odd": 1},
+        0.5,
+        9,
+        {"k": [1]},
     )
     (tmp_path / "a.json").write_bytes(record.to_bytes())
     assert read_record(tmp_path / "a.json") == record
     assert read_record(tmp_path / "none.json") is None
+
+
+def test_record_with_a_flipped_byte_counts_as_none(tmp_path: Path) -> None:
+    record = ShardRecord("s", "a", "f" * 64, {}, {}, {"a.tar": {"sha256": "0", "bytes": 3}}, 2, {}, 0.5, 9, {"k": 10})
+    path, content = tmp_path / "a.json", record.to_bytes()
+    for place in range(len(content) - 1):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+        assert read_record(path) is None
