@@ -5,7 +5,7 @@
 #   make help           shows every target and what the variables are set to
 #
 # Stages are never up to date for make: it always asks the mill, which compares fingerprints (of config, seed, code
-# version and inputs) with its records, and answers in a second when there is nothing to do. Times of files would
+# and inputs) with its records, and answers in a second when there is nothing to do. Times of files would
 # miss an edited config and would not survive a copy.
 
 SHELL       := bash

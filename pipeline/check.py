@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from pipeline.config import Config
-from pipeline.places import Places, file_digest
+from pipeline.places import Places, StagePlaces, file_digest
+from pipeline.records import ShardRecord, read_record
 from pipeline.stage import Stage
 from pipeline.survey import Survey
 
-__all__ = ["damaged_shards"]
+__all__ = ["damaged_files", "damaged_shards", "withdraw_damaged"]
 
 
 def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) -> Iterator[str]:
@@ -24,7 +26,23 @@ def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) 
             missing = surveyed.missing
             yield f"{name}: {len(missing)} of {len(surveyed.shards)} shards are not made, first {missing[0].name}"
         for shard, record in surveyed.records.items():
-            for file, noted in record.files.items():
-                if file_digest(surveyed.places.root / file) != noted["sha256"]:
-                    (surveyed.places.records / f"{shard}.json").unlink(missing_ok=True)
-                    yield f"{name}: {surveyed.places.root / file} is damaged; the next run makes {shard} again"
+            for file in damaged_files(record, surveyed.places):
+                (surveyed.places.records / f"{shard}.json").unlink(missing_ok=True)
+                yield f"{name}: {file} is damaged; the next run makes {shard} again"
+
+
+def damaged_files(record: ShardRecord, places: StagePlaces) -> list[Path]:
+    """The files of a shard whose bytes are not what its record says, or that are gone."""
+    paths = {places.root / file: noted["sha256"] for file, noted in record.files.items()}
+    return [path for path, digest in paths.items() if not path.is_file() or file_digest(path) != digest]
+
+
+def withdraw_damaged(places: Places, source: str) -> bool:
+    """Take away the record of `source`, `stage/shard`, if its files are not what it says; tell whether it was so."""
+    stage, _, shard = source.partition("/")
+    path = places.stage(stage).records / f"{shard}.json"
+    record = read_record(path)
+    if record is not None and not damaged_files(record, places.stage(stage)):
+        return False
+    path.unlink(missing_ok=True)
+    return True

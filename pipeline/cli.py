@@ -59,7 +59,8 @@ def run(
     retries: Annotated[int, typer.Option(min=0, help="how often a shard that failed is tried again")] = 2,
 ) -> None:
     """Make what is missing of one stage."""
-    from pipeline.run import Slice, run_stage
+    from pipeline.run import run_stage
+    from pipeline.slices import Slice
 
     part = Slice(*_slice(shards))
     stages = find_stages(context.obj)

@@ -34,6 +34,7 @@ def finish_stage(survey: Survey, name: str, places: Places) -> None:
             "seed": survey.config.seed,
             "samples": sum(record.samples for record in surveyed.records.values()),
             "rejects": dict(rejects),
+            "code": surveyed.code,
             "shards": surveyed.fingerprints,
         }
     )

@@ -8,8 +8,8 @@
     OUT/.work/<dataset>/<stage>/failed/            shards set aside, with their tracebacks
     OUT/.work/<dataset>/<stage>/progress/          how far running shards are
     OUT/.work/<dataset>/<stage>/mill/              manifest.json (written last: all shards of the finished stage with
-                                                   their fingerprints), published.json (the files that it has put in
-                                                   OUT itself), locks
+                                                   their fingerprints, and the digests of its code), published.json
+                                                   (the files that it has put in OUT itself), locks
 
 A file that begins with a dot and ends in `.tmp` is being written; every other file is whole.
 """

@@ -11,22 +11,25 @@ from typing import Any
 
 from pipeline.places import StagePlaces
 from pipeline.shards import json_bytes
-from pipeline.stage import Shard, Stage
+from pipeline.stage import Shard
 
-__all__ = ["ShardRecord", "fingerprint", "read_record"]
+__all__ = ["ShardRecord", "fingerprint", "read_record", "recipe"]
 
 
 @dataclass(frozen=True)
 class ShardRecord:
     """One finished shard.
 
-    files: `{file: {"sha256", "bytes"}}`; rejects: refused items by reason; seconds: time that the shard took;
-    peak_bytes: the largest memory that its worker had held until then; summary: the stage's own facts.
+    fingerprint: of its recipe; inputs: `{stage/file: sha256}` of what it has read; files: `{file: {"sha256", "bytes"}}`
+    of what it has written; rejects: refused items by reason; seconds: time that the shard took; peak_bytes: the largest
+    memory that its worker had held until then; summary: the stage's own facts.
     """
 
     stage: str
     shard: str
     fingerprint: str
+    recipe: Mapping[str, str]
+    inputs: Mapping[str, str]
     files: Mapping[str, Mapping[str, Any]]
     samples: int
     rejects: Mapping[str, int]
@@ -35,15 +38,19 @@ class ShardRecord:
     summary: Mapping[str, Any]
 
     def to_bytes(self) -> bytes:
-        """The record as one line of JSON."""
-        return json_bytes(asdict(self))
+        """The record as one line of JSON, with a digest of itself: plans are made of what it says."""
+        return json_bytes({**asdict(self), "seal": self._seal()})
+
+    def _seal(self) -> str:
+        return hashlib.sha256(json_bytes(json.loads(json_bytes(asdict(self))))).hexdigest()
 
     def bytes_on_disk(self) -> int:
         """Bytes of all its files."""
         return sum(int(each["bytes"]) for each in self.files.values())
 
     def is_whole(self, places: StagePlaces) -> bool:
-        """Whether all its files are there with the recorded size (`make verify` reads the bytes as well)."""
+        """Whether all its files are there with the recorded size. Whoever reads one looks at its bytes (`Task.input`),
+        and so does `make verify` at all."""
         try:
             return all((places.root / name).stat().st_size == each["bytes"] for name, each in self.files.items())
         except FileNotFoundError:
@@ -51,27 +58,41 @@ class ShardRecord:
 
 
 def read_record(path: Path) -> ShardRecord | None:
-    """The record in a file, or None if there is none, or none that this version of the mill wrote."""
+    """The record in a file, or None if there is none, or none that this version of the mill wrote, or a damaged one."""
     try:
-        return ShardRecord(**json.loads(path.read_bytes()))
-    except (FileNotFoundError, ValueError, TypeError):
+        written = json.loads(path.read_bytes())
+        seal = written.pop("seal")
+        record = ShardRecord(**written)
+        return record if record._seal() == seal else None
+    except (FileNotFoundError, ValueError, TypeError, KeyError, AttributeError):
         return None
 
 
-def fingerprint(
-    stage: Stage, section: Mapping[str, Any], dataset: tuple[str, str, int], shard: Shard, inputs: Mapping[str, str]
-) -> str:
-    """The sha256 over all that a shard's bytes depend on.
+def recipe(
+    stage: str,
+    shard: Shard,
+    code: str,
+    section: Mapping[str, Any],
+    dataset: tuple[str, str, int],
+    inputs: Mapping[str, str],
+) -> dict[str, str]:
+    """All that a shard's bytes depend on, as a digest of each kind of thing: `code`, `config`, `dataset`, `plan`,
+    `inputs`.
 
-    `section` is the stage's config as JSON, `dataset` name, version and seed, `inputs` the fingerprint of each
-    record that the shard reads. What else the bytes depend on (the bytes of a mesh, the title on a card) the
-    stage puts in the shard's `params`.
+    `code` is the digest of the code that it reaches, `section` the stage's config as JSON, `dataset` name, version and
+    seed, `inputs` the fingerprint of each record that the shard reads. What else the bytes depend on (the bytes of a
+    mesh, the title on a card) the stage puts in the shard's `params`.
     """
     described = {
-        "stage": [stage.name, stage.version],
+        "code": code,
         "config": section,
         "dataset": dataset,
-        "shard": [shard.name, dict(shard.params)],
+        "plan": [stage, shard.name, dict(shard.params)],
         "inputs": dict(inputs),
     }
-    return hashlib.sha256(json_bytes(described)).hexdigest()
+    return {kind: hashlib.sha256(json_bytes(value)).hexdigest() for kind, value in described.items()}
+
+
+def fingerprint(recipe: Mapping[str, str]) -> str:
+    """The sha256 over a recipe."""
+    return hashlib.sha256(json_bytes(dict(recipe))).hexdigest()

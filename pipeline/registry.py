@@ -23,8 +23,8 @@ def find_stages(package: str = "stages") -> dict[str, Stage]:
     found: dict[str, Stage] = {}
     for folder in folders_with(package, "stage.py"):
         stage = getattr(importlib.import_module(f"{package}.{folder}.stage"), "STAGE", None)
-        if not isinstance(stage, Stage) or stage.name != folder:
-            raise TypeError(f"{package}/{folder}/stage.py must hold STAGE = Stage(name={folder!r}, ...)")
+        if not isinstance(stage, Stage) or (stage.name, stage.module) != (folder, f"{package}.{folder}.stage"):
+            raise TypeError(f"{package}/{folder}/stage.py must hold STAGE = Stage({folder!r}, __name__, ...)")
         found[folder] = stage
     found = {name: replace(stage, inputs=_named(package, found, stage)) for name, stage in found.items()}
     for stage in found.values():

@@ -5,44 +5,33 @@ from __future__ import annotations
 import fcntl
 import time
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
+from pipeline.check import withdraw_damaged
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal
 from pipeline.finish import finish_stage
 from pipeline.journal import Journal, span
 from pipeline.places import Places, StagePlaces, stops_everything, write_whole
+from pipeline.reasons import reasons
+from pipeline.records import fingerprint
 from pipeline.registry import upstream
 from pipeline.shards import json_bytes
+from pipeline.slices import WHOLE, Slice, locked
 from pipeline.space import check_space
 from pipeline.stage import Shard, Stage
 from pipeline.survey import StageSurvey, Survey
 from pipeline.task import Job, Report
 from pipeline.workers import DIED, Workers
 
-__all__ = ["WHOLE", "RunResult", "Slice", "run_stage"]
+__all__ = ["RunResult", "run_stage"]
 
 _DEATHS_BEFORE_ALONE = 3
 _LOOK_EVERY = 0.5
 """Seconds between two looks at how far the running shards are."""
-
-
-@dataclass(frozen=True)
-class Slice:
-    """Part `index` of `count` of every plan, from 1: what one job of a job array makes."""
-
-    index: int = 1
-    count: int = 1
-
-    def __contains__(self, position: object) -> bool:
-        return isinstance(position, int) and position % self.count == self.index - 1
-
-
-WHOLE = Slice()
 
 
 @dataclass
@@ -62,11 +51,13 @@ def run_stage(
     workers: int,
     part: Slice = WHOLE,
     retries: int = 2,
+    waits: bool = False,
 ) -> RunResult:
     """Make all shards of stage `name` that have no matching record; the stages that it reads must be finished.
 
     A shard that raises is tried again `retries` times, then set aside; one that has killed its worker three times
-    is run once more with nothing beside it, then set aside. The rest goes on.
+    is run once more with nothing beside it, then set aside. The rest goes on. An input that is found damaged is made
+    again first, of whatever stage it is. `waits`: another run that is at work here is waited for.
 
     Raises ConfigError when nothing can start (an earlier stage is unfinished, the disk is too small, another run
     is at work here) and Fatal when everything had to stop; whole files and their records are left, and the next
@@ -76,26 +67,14 @@ def run_stage(
     own.make()
     journal = Journal(name, places.log)
     try:
-        with _locked(own, part) as lock:
-            return _Run(name, stages, config, places, part, retries, journal).through(workers, lock)
+        with locked(own, part, waits) as lock:
+            return _Run(name, stages, config, places, workers, part, retries, journal).through(lock)
     except OSError as error:
         if stops_everything(error) is None:
             raise
         raise Fatal(f"{error.strerror}: {error.filename or own.root}") from error
     finally:
         journal.close()
-
-
-@contextmanager
-def _locked(own: StagePlaces, part: Slice) -> Iterator[BinaryIO]:
-    """One run at a time: a whole run excludes every other, a slice the same slice and whole runs."""
-    with open(own.mill / "lock", "ab") as whole, open(own.mill / f"lock-{part.index}-{part.count}", "ab") as slot:
-        try:
-            fcntl.flock(whole, fcntl.LOCK_NB | (fcntl.LOCK_EX if part.count == 1 else fcntl.LOCK_SH))
-            fcntl.flock(slot, fcntl.LOCK_NB | fcntl.LOCK_EX)
-        except BlockingIOError as error:
-            raise ConfigError(f"another run is at work in {own.root}: wait for it, or end it") from error
-        yield whole
 
 
 class _Run:
@@ -105,6 +84,7 @@ class _Run:
         stages: Mapping[str, Stage],
         config: Config,
         places: Places,
+        workers: int,
         part: Slice,
         retries: int,
         journal: Journal,
@@ -112,26 +92,32 @@ class _Run:
         self._name = name
         self._stages = stages
         self._places = places
+        self._workers = workers
         self._part = part
-        self._tries = retries + 1
+        self._retries = retries
         self._journal = journal
         self._survey = Survey(config, stages, places)
         self._result = RunResult()
         self._made: set[str] = set()
+        self._damaged: dict[str, str] = {}
+        self._mended: set[str] = set()
         self._failures: Counter[str] = Counter()
         self._deaths: Counter[str] = Counter()
         self._shown = 0.0
 
-    def through(self, count: int, lock: BinaryIO) -> RunResult:
-        """Make what is missing with `count` workers, then finish the stage if it is complete."""
+    def through(self, lock: BinaryIO) -> RunResult:
+        """Make what is missing, then finish the stage if it is complete."""
         self._check_upstream()
         surveyed = self._survey.stage(self._name)
         self._take_away(surveyed, surveyed.places.failed, "*")
         self._take_away_unfinished(surveyed)
         if surveyed.missing:
+            for line in reasons(surveyed):
+                self._journal.say(line)
             surveyed.places.manifest.unlink(missing_ok=True)
             self._journal.note(check_space(surveyed, self._places.out))
-            self._make_missing(surveyed, count)
+            self._make_missing()
+            surveyed = self._survey.stage(self._name)
         if not surveyed.missing:
             fcntl.flock(lock, fcntl.LOCK_EX)
             finish_stage(self._survey, self._name, self._places)
@@ -168,15 +154,22 @@ class _Run:
             if index in self._part and shard.name not in done and shard.name not in failed
         ]
 
-    def _make_missing(self, surveyed: StageSurvey, count: int) -> None:
-        workers = Workers(count, self._places.worker_output)
+    def _make_missing(self) -> None:
+        workers = Workers(self._workers, self._places.worker_output)
+        surveyed = self._survey.stage(self._name)
         try:
             while True:
-                ready = deque(self._job(surveyed, shard) for shard in self._mine(surveyed) if surveyed.ready(shard))
+                mine = (shard for shard in self._mine(surveyed) if surveyed.ready(shard))
+                ready = deque(self._survey.job(self._name, shard) for shard in mine)
                 if not ready:
                     break
                 self._make(workers, ready, surveyed)
-                self._survey.refresh(self._name)
+                if self._damaged:
+                    workers.stop(kill=False)
+                    self._mend()
+                    surveyed = self._survey.stage(self._name)
+                else:
+                    self._survey.refresh(self._name)
                 self._check_plan(surveyed)
             workers.stop(kill=False)
         except BaseException as error:
@@ -195,9 +188,32 @@ class _Run:
                     "a plan is a function of the config and of records alone"
                 )
 
-    def _job(self, surveyed: StageSurvey, shard: Shard) -> Job:
-        stage = surveyed.stage
-        return Job(stage.name, stage.run_shard, shard, surveyed.config, self._places, surveyed.fingerprints[shard.name])
+    def _mend(self) -> None:
+        """Have what was found damaged made again: here, or first of all by a run of the stage that it belongs to.
+
+        What was made of it before has read good bytes, and stays as long as these come back. Raises Fatal for damage
+        to what was made again just before.
+        """
+        for source, message in self._damaged.items():
+            if not withdraw_damaged(self._places, source):
+                continue  # another run has made it again
+            shard = source.partition("/")[2]
+            if source in self._mended:
+                raise Fatal(f"{message}, and {shard} was made again just now: disk or memory cannot be trusted")
+            self._journal.say(f"{message}; {shard} is made again")
+            self._mended.add(source)
+        self._damaged.clear()
+        self._made.clear()
+        self._survey.forget()
+        for each in upstream(self._stages, self._name):
+            if each != self._name and self._survey.stage(each).missing:
+                run_stage(
+                    *(each, self._stages, self._survey.config, self._places, self._workers),
+                    retries=self._retries,
+                    waits=True,
+                )
+                self._survey.forget()
+        self._check_upstream()
 
     def _make(self, workers: Workers, ready: deque[Job], surveyed: StageSurvey) -> None:
         """Make the `ready` shards, each until it is done or set aside."""
@@ -214,6 +230,8 @@ class _Run:
                     self._result.made += 1
                     self._made.add(job.shard.name)
                     self._survey.accept(self._name, job.shard.name)
+                elif report.status == "damaged":
+                    self._damaged[report.damaged] = report.message
                 else:
                     self._count_failure(job, report, ready)
             if time.monotonic() - self._shown >= _LOOK_EVERY:
@@ -236,7 +254,7 @@ class _Run:
             self._journal.note(report.trace)
             raise Fatal(f"shard {job.shard.name} of {self._name}: {report.message}")
         self._failures[job.shard.name] += 1
-        if report.status == "failed" and self._failures[job.shard.name] < self._tries:
+        if report.status == "failed" and self._failures[job.shard.name] <= self._retries:
             self._journal.note(f"{job.shard.name} failed and is tried again: {report.message}\n{report.trace}")
             ready.append(job)
         else:
@@ -247,7 +265,7 @@ class _Run:
         self._result.failed[name] = report.message
         self._journal.say(f"shard {name} is set aside: {report.message}")
         self._journal.note(report.trace)
-        described = {"fingerprint": job.fingerprint, "message": report.message, "trace": report.trace}
+        described = {"fingerprint": fingerprint(job.recipe), "message": report.message, "trace": report.trace}
         write_whole(self._places.stage(self._name).failed / f"{name}.json", json_bytes(described))
 
     def _show(self, surveyed: StageSurvey, workers: Workers) -> None:

@@ -12,8 +12,9 @@ The contract for who writes a stage:
   (`plan.summary` answers None), leave the rest out.
 - `run_shard(task) -> Outcome` runs in a worker. What it writes depends on `task.config`, `task.shard`, the files of
   `task.shard.inputs` and `task.rng(...)`, and on nothing else: no clock, no global randomness, no order of a set.
-- A shard is made again when its fingerprint changes: stage name and version, the stage's own config section,
-  dataset name, version and seed, shard name and params, the fingerprints of its inputs. Whatever else its bytes
+- A shard is made again when its fingerprint changes: the code that the stage's folder reaches (`pipeline/code.py`),
+  the stage's own config section, dataset name, version and seed, shard name and params, the fingerprints of its
+  inputs. Code that is found at run time, by a name in the config, goes into `Shard.code`. Whatever else its bytes
   depend on goes into `params`: the sha256 of a mesh that it reads, the title that a card shows.
 - `task.config` and `plan.config` hold only the sections of the stage and of the stages it can read (its `inputs`,
   and theirs), because a shard could not be made again for a change of any other.
@@ -45,12 +46,13 @@ class Shard:
 
     `name` is the stem of its files and of its record (letters, digits, `-`, `_`). `params` is JSON and says what
     the shard holds. `inputs` names the records it reads, as `stage/shard`, of earlier stages or of earlier
-    shards of its own stage.
+    shards of its own stage. `code` names the modules that it finds at run time, and no import of the stage reaches.
     """
 
     name: str
     params: Mapping[str, Any] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()
+    code: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ class Task(Protocol):
         """The stream of one decision inside this shard: counted from seed, stage, shard and `decision`."""
 
     def input(self, stage: str, file: str) -> Path:
-        """A file that an input shard has committed. Raises ShardFailed if no input record lists it."""
+        """A file that an input shard has committed, with the bytes that it had then. Raises ShardFailed if no input
+        record lists it; if it is damaged, the mill makes it again first."""
 
     def output(self, file: str) -> BinaryIO:
         """A stream to a new file of this shard, named `<shard>.<anything>`; committed with it, or not at all."""
@@ -116,7 +119,7 @@ def _nothing_published(_: Plan) -> Mapping[str, str]:
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage of the mill. `version` is part of every fingerprint: raise it when the stage's bytes change.
+    """One stage of the mill. `module` is `__name__`: the code that its bytes depend on is what is reached from there.
 
     `inputs` are the stages that it reads, by name; `*/producer.py` stands for every stage whose folder holds a file of
     that name.
@@ -130,7 +133,7 @@ class Stage:
     """
 
     name: str
-    version: int
+    module: str
     config: type[StrictModel]
     inputs: tuple[str, ...]
     plan: Callable[[Plan], list[Shard]]

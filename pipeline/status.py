@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from pipeline.config import Config
 from pipeline.journal import span
 from pipeline.places import Places
+from pipeline.reasons import reasons
 from pipeline.space import byte_size
 from pipeline.stage import Stage
 from pipeline.survey import StageSurvey, Survey
@@ -36,6 +37,7 @@ def status_lines(config: Config, stages: Mapping[str, Stage], places: Places, wo
         failures = _failures(surveyed)
         rejects = sum((Counter(record.rejects) for record in surveyed.records.values()), Counter[str]())
         rows.append(_row(surveyed, len(failures), sum(rejects.values()), workers))
+        notes += [f"{name}: {line}" for line in reasons(surveyed)]
         notes += [f"{name}: {line}" for line in stage.report(surveyed.view)]
         notes += [f"{name}: {count:,} rejected: {reason}" for reason, count in rejects.most_common()]
         notes += [f"{name}: {shard} is set aside: {message}" for shard, message in failures.items()]

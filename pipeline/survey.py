@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from pipeline.code import code_digest, reached, starts_of
 from pipeline.config import Config
 from pipeline.places import Places, StagePlaces
-from pipeline.records import ShardRecord, fingerprint, read_record
+from pipeline.records import ShardRecord, fingerprint, read_record, recipe
 from pipeline.registry import upstream
 from pipeline.stage import Plan, Shard, Stage
+from pipeline.task import Job
 
 __all__ = ["StageSurvey", "Survey"]
 
@@ -20,15 +22,19 @@ _SHARD_NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 @dataclass
 class StageSurvey:
-    """One stage: its plan as far as it is known, the fingerprint of each shard, the records that match."""
+    """One stage: its plan as far as it is known, the recipe and the fingerprint of each shard, the records that match
+    and those that do not, and the digest of each module that its code reaches."""
 
     stage: Stage
     config: Config
     places: StagePlaces
     view: Plan
     shards: list[Shard] = field(default_factory=list)
+    recipes: dict[str, dict[str, str]] = field(default_factory=dict)
     fingerprints: dict[str, str] = field(default_factory=dict)
     records: dict[str, ShardRecord] = field(default_factory=dict)
+    outdated: dict[str, ShardRecord] = field(default_factory=dict)
+    code: dict[str, str] = field(default_factory=dict)
 
     @property
     def missing(self) -> list[Shard]:
@@ -49,6 +55,7 @@ class Survey:
         self._stages = stages
         self._places = places
         self._surveyed: dict[str, StageSurvey] = {}
+        self._reached: dict[tuple[str, ...], dict[str, str]] = {}
 
     def stage(self, name: str) -> StageSurvey:
         """What is known of stage `name`."""
@@ -70,12 +77,16 @@ class Survey:
         dataset = (self.config.name, self.config.version, self.config.seed)
         while True:
             surveyed.shards = surveyed.stage.plan(surveyed.view)
+            surveyed.recipes.clear()
             known: dict[str, str] = {}
             for shard in surveyed.shards:
                 if not _SHARD_NAME.fullmatch(shard.name) or shard.name in known:
                     raise ValueError(f"plan of {name}: shard name {shard.name!r} is malformed or stands twice")
                 inputs = {each: self._input_fingerprint(name, known, shard, each) for each in shard.inputs}
-                known[shard.name] = fingerprint(surveyed.stage, section, dataset, shard, inputs)
+                code = self._code(surveyed.stage, shard)
+                surveyed.code.update(code)
+                surveyed.recipes[shard.name] = recipe(name, shard, code_digest(code), section, dataset, inputs)
+                known[shard.name] = fingerprint(surveyed.recipes[shard.name])
             surveyed.fingerprints = known
             news = self._read_records(surveyed)
             if not news:
@@ -88,9 +99,40 @@ class Survey:
         if record is not None and record.fingerprint == surveyed.fingerprints[shard]:
             surveyed.records[shard] = record
 
+    def forget(self) -> None:
+        """Read plans and records anew when next asked: those of any stage may be others now."""
+        self._surveyed.clear()
+
+    def job(self, name: str, shard: Shard) -> Job:
+        """What a worker must know to make a shard of stage `name` whose inputs are all there."""
+        surveyed = self._surveyed[name]
+        inputs = {
+            f"{stage}/{file}": noted["sha256"]
+            for stage, _, other in (each.partition("/") for each in shard.inputs)
+            for file, noted in self.stage(stage).records[other].files.items()
+        }
+        return Job(
+            stage=name,
+            run_shard=surveyed.stage.run_shard,
+            shard=shard,
+            config=surveyed.config,
+            places=self._places,
+            recipe=surveyed.recipes[shard.name],
+            inputs=inputs,
+            starts=starts_of(surveyed.stage.module, shard.code),
+            code=self._code(surveyed.stage, shard),
+        )
+
     def complete(self, name: str) -> bool:
         """Whether stage `name` and every stage it reads is done."""
         return all(not self.stage(each).missing for each in upstream(self._stages, name))
+
+    def _code(self, stage: Stage, shard: Shard) -> dict[str, str]:
+        """The code of a shard, as it was when first asked for: a run is of one state of the code."""
+        key = (stage.module, *shard.code)
+        if key not in self._reached:
+            self._reached[key] = reached(starts_of(stage.module, shard.code))
+        return self._reached[key]
 
     def _input_fingerprint(self, name: str, known: Mapping[str, str], shard: Shard, wanted: str) -> str:
         stage, _, other = wanted.partition("/")
@@ -101,18 +143,34 @@ class Survey:
             raise ValueError(f"plan of {name}: shard {shard.name} reads {wanted}, which is not planned before it")
         return fingerprints[other]
 
-    @staticmethod
-    def _read_records(surveyed: StageSurvey) -> bool:
+    def _read_records(self, surveyed: StageSurvey) -> bool:
         before = set(surveyed.records)
         matching: dict[str, ShardRecord] = {}
+        surveyed.outdated.clear()
         for name, wanted in surveyed.fingerprints.items():
             record = surveyed.records.get(name)
             if record is None or record.fingerprint != wanted:
                 record = read_record(surveyed.places.records / f"{name}.json")
-            if record is not None and record.fingerprint == wanted and record.is_whole(surveyed.places):
+            if record is None:
+                continue
+            whole = record.fingerprint == wanted and record.is_whole(surveyed.places)
+            if whole and self._read_what_is_there(surveyed.stage.name, matching, record):
                 matching[name] = record
+            else:
+                surveyed.outdated[name] = record
         surveyed.records = matching
         return set(matching) != before
+
+    def _read_what_is_there(self, name: str, own: Mapping[str, ShardRecord], record: ShardRecord) -> bool:
+        """Whether a shard of stage `name` was made of the bytes that its inputs have now, by their records; `own` are
+        those of its own stage that are good. An input that was made again with the same bytes changes nothing."""
+        for read, digest in record.inputs.items():
+            stage, _, file = read.partition("/")
+            records = own if stage == name else self.stage(stage).records
+            source = records.get(file.partition(".")[0])
+            if source is None or source.files.get(file, {}).get("sha256") != digest:
+                return False
+        return True
 
 
 class _View:

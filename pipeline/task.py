@@ -8,18 +8,19 @@ import resource
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, Literal
 
 import numpy as np
 
+from pipeline.code import reached
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
 from pipeline.places import Places, StagePlaces, file_digest, stops_everything, sync_folder, temporary, write_whole
 from pipeline.randomness import decision_rng
-from pipeline.records import ShardRecord, read_record
+from pipeline.records import ShardRecord, fingerprint, read_record
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
 
@@ -31,27 +32,36 @@ _PROGRESS_EVERY = 0.5
 
 @dataclass(frozen=True)
 class Job:
-    """All that a worker must know to make one shard; small, because it is sent to another process."""
+    """All that a worker must know to make one shard; small, because it is sent to another process.
+
+    inputs: `{stage/file: sha256}` of all files of its input shards, from their records.
+    starts, code: where the code of the shard begins, and the digests of what was reached from there when the run began.
+    """
 
     stage: str
     run_shard: Callable[[Task], Outcome]
     shard: Shard
     config: Config
     places: Places
-    fingerprint: str
+    recipe: Mapping[str, str]
+    inputs: Mapping[str, str]
+    starts: tuple[str, ...] = ()
+    code: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Report:
     """How a shard ended.
 
-    done: committed; failed: may be tried again; refused: would fail again; fatal: nothing else may start.
+    done: committed; failed: may be tried again; refused: would fail again; fatal: nothing else may start; damaged: a
+    file of the input `damaged`, `stage/shard`, is not what its record says.
     """
 
     shard: str
-    status: Literal["done", "failed", "refused", "fatal"]
+    status: Literal["done", "failed", "refused", "fatal", "damaged"]
     message: str = ""
     trace: str = ""
+    damaged: str = ""
 
 
 def make_shard(job: Job) -> Report:
@@ -59,11 +69,14 @@ def make_shard(job: Job) -> Report:
     task = _ShardTask(job)
     try:
         outcome = job.run_shard(task)
+        _check_code(job)
         task.commit(outcome)
         return Report(job.shard.name, "done")
     except BaseException as error:
         task.withdraw()
         trace = traceback.format_exc()
+        if task.damage is not None:
+            return task.damage
         culprit = stops_everything(error)
         if culprit is not None:
             return Report(job.shard.name, "fatal", str(culprit), trace)
@@ -75,6 +88,14 @@ def make_shard(job: Job) -> Report:
         return Report(job.shard.name, "failed", message, trace)
 
 
+def _check_code(job: Job) -> None:
+    """Raises Fatal where the code is not what it was when the run began: workers import late, and fresh ones anew."""
+    now = reached(job.starts)
+    edited = sorted(module for module, _ in set(now.items()) ^ set(job.code.items()))
+    if edited:
+        raise Fatal(f"the code was edited while stage {job.stage} ran ({', '.join(dict.fromkeys(edited))})")
+
+
 class _ShardTask:
     """The Task that `run_shard` sees."""
 
@@ -82,10 +103,12 @@ class _ShardTask:
         self._job = job
         self._places: StagePlaces = job.places.stage(job.stage)
         self._streams: dict[str, BinaryIO] = {}
+        self._read: dict[str, str] = {}
         self._rejects: Counter[str] = Counter()
         self._reject_stream: BinaryIO | None = None
         self._start = time.perf_counter()
         self._noted = 0.0
+        self.damage: Report | None = None
 
     @property
     def shard(self) -> Shard:
@@ -99,13 +122,27 @@ class _ShardTask:
         return decision_rng(self.config.seed, self._job.stage, self.shard.name, *decision)
 
     def input(self, stage: str, file: str) -> Path:
-        source = f"{stage}/{file.partition('.')[0]}"
+        source, name = f"{stage}/{file.partition('.')[0]}", f"{stage}/{file}"
         path = self._job.places.stage(stage).root / file
         if source not in self.shard.inputs:
             raise ShardFailed(f"{self._job.stage}/{self.shard.name} reads {file}, but {source} is not among its inputs")
-        if not path.is_file():
+        if name not in self._job.inputs:
             raise ShardFailed(f"{source} has no file {file}")
+        if name not in self._read:
+            self._check(path, name, source)
+            self._read[name] = self._job.inputs[name]
         return path
+
+    def _check(self, path: Path, name: str, source: str) -> None:
+        """Raises ShardFailed, and notes the damage, where an input is not what its record says."""
+        try:
+            wrong = "its sha256 is not the one in its record" if file_digest(path) != self._job.inputs[name] else ""
+        except FileNotFoundError:
+            wrong = "the file is gone"
+        if wrong:
+            message = f"{name} is damaged: {wrong}"
+            self.damage = Report(self.shard.name, "damaged", message, damaged=source)
+            raise ShardFailed(message)
 
     def output(self, file: str) -> BinaryIO:
         if "/" in file or not file.startswith(f"{self.shard.name}."):
@@ -133,7 +170,12 @@ class _ShardTask:
         return self._places.rejects / f"{self.shard.name}.jsonl"
 
     def commit(self, outcome: Outcome) -> None:
-        """Bring the files to disk under their names, then the record that makes them count."""
+        """Bring the files to disk under their names, then the record that makes them count.
+
+        Raises ShardFailed where an input was damaged and the stage went on all the same.
+        """
+        if self.damage is not None:
+            raise ShardFailed(self.damage.message)
         record_path = self._places.records / f"{self.shard.name}.json"
         old = read_record(record_path)
         files = {name: self._finish(stream, self._places.root / name) for name, stream in self._streams.items()}
@@ -142,7 +184,9 @@ class _ShardTask:
         record = ShardRecord(
             stage=self._job.stage,
             shard=self.shard.name,
-            fingerprint=self._job.fingerprint,
+            fingerprint=fingerprint(self._job.recipe),
+            recipe=dict(self._job.recipe),
+            inputs=self._read,
             files=files,
             samples=outcome.samples,
             rejects=dict(self._rejects),

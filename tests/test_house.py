@@ -96,6 +96,11 @@ def test_bytes_depend_on_no_global_randomness_no_clock_no_uuid(path: Path) -> No
             assert ".".join(tail[-2:]) not in CLOCKS, f"line {call.lineno}: {name} is a clock"
 
 
+def test_bytes_depend_on_no_file_that_a_fingerprint_does_not_know() -> None:
+    files = (path for path in (ROOT / "stages").rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    assert {path.suffix for path in files} <= {".py", ".md"}, "pipeline/code.py digests Python alone"
+
+
 @pytest.mark.parametrize("path", CODE, ids=relative)
 def test_nothing_executes_what_it_reads(path: Path) -> None:
     tree = ast.parse(path.read_text())

@@ -69,7 +69,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 STAGE = Stage(
     name="exemplars",
-    version=1,
+    module=__name__,
     config=ExemplarsConfig,
     inputs=(),
     plan=plan,

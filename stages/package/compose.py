@@ -25,8 +25,7 @@ def compose_dataset(task: Task) -> Outcome:
 
     The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
     shards); `members` (what is to say of each); `made`, `splits`, `apart`, `story`, `variety`, `rejects` and `measures`
-    (what there is to say of how it was made); `preview` (the shard with the picture) and `package` (the version of
-    this stage).
+    (what there is to say of how it was made); `preview` (the shard with the picture).
     """
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
@@ -48,9 +47,7 @@ def compose_dataset(task: Task) -> Outcome:
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))
-    described = manifest(
-        facts, params["sections"], shards, members, digests, indexed, params["measures"], params["package"]
-    )
+    described = manifest(facts, params["sections"], shards, members, digests, indexed, params["measures"])
     files[MANIFEST] = _text({**described, "apart": params["apart"]})
     digests[MANIFEST] = hashlib.sha256(files[MANIFEST]).hexdigest()
     digests.update({shard["path"]: shard["sha256"] for shard in shards})

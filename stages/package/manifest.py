@@ -26,7 +26,6 @@ def manifest(
     files: Mapping[str, str],
     index: Mapping[str, Any],
     measures: Mapping[str, Mapping[str, Any]],
-    package_version: int,
 ) -> dict[str, Any]:
     """What `manifest.json` holds. `shards` are the summaries of the package's shards; `members` says name, sentence,
     dtype and shape of each; `files` are the digests of the files about the whole but this one; `index` has `path`
@@ -40,7 +39,6 @@ def manifest(
         "name": facts["name"],
         "version": facts["version"],
         "seed": facts["seed"],
-        "package": package_version,
         "samples": sum(splits.values()),
         "splits": dict(splits),
         "kits": dict(kits),

@@ -26,7 +26,6 @@ from stages.shape.collection.shards import (
 
 __all__ = ["STAGE"]
 
-VERSION = 4
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
@@ -72,7 +71,6 @@ def plan(plan: Plan) -> list[Shard]:
         "rejects": _rejects(plan, producer),
         "measures": dict(declared.measures(plan)),
         "preview": PICTURE,
-        "package": VERSION,
     }
     inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
     return [*merged, picture, Shard(WHOLE, params, inputs)]
@@ -154,7 +152,7 @@ def _facts(plan: Plan) -> dict[str, Any]:
 
 STAGE = Stage(
     name="package",
-    version=VERSION,
+    module=__name__,
     config=PackageConfig,
     inputs=(PRODUCERS, MEMBERS),
     plan=plan,

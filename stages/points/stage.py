@@ -52,7 +52,7 @@ def estimate_bytes(plan: Plan) -> int:
 
 STAGE = Stage(
     name="points",
-    version=2,
+    module=__name__,
     config=PointsConfig,
     inputs=(PRODUCERS,),
     plan=collection_shards,

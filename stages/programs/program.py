@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import re
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,8 +25,8 @@ __all__ = [
     "Constraint",
     "Program",
     "find_program",
+    "program_module",
     "program_names",
-    "program_source",
     "shape_of",
     "shape_of_parts",
     "shape_of_text",
@@ -132,7 +131,7 @@ def find_program(name: str) -> Program:
 
     Raises ConfigError if there is none.
     """
-    module = _module(name)
+    module = program_module(name)
     try:
         found: Any = getattr(importlib.import_module(module), "PROGRAM", None)
     except ModuleNotFoundError as error:
@@ -142,13 +141,8 @@ def find_program(name: str) -> Program:
     return found
 
 
-def program_source(name: str) -> Path:
-    """The file of the program that `find_program` finds."""
-    find_program(name)
-    return Path(str(sys.modules[_module(name)].__file__))
-
-
-def _module(name: str) -> str:
+def program_module(name: str) -> str:
+    """The module in which `find_program` finds a program. Raises ConfigError for a name without a dot that is none."""
     names = program_names()
     if name in names:
         return f"{__package__}.library.{name}"

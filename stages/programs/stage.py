@@ -5,17 +5,15 @@ A sample carries no meshes: its text is its parameters, and `stages.programs.pro
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.programs.draws import Interval, Share
 from stages.programs.parameters import Value
-from stages.programs.program import Program, find_program, program_source
+from stages.programs.program import Program, find_program, program_module
 from stages.programs.sampling import Sampler, cells, structure_digest
 from stages.programs.settings import ProgramsConfig
 from stages.shape.sample import Sample, write_sample
@@ -32,7 +30,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
     if not config.program:
         return []
     program = find_program(config.program)
-    sizes, source = _split_sizes(program, config), _source_digest(config.program)
+    sizes, code = _split_sizes(program, config), (program_module(config.program),)
     shards: list[Shard] = []
     first = 0
     for split, size in sizes.items():
@@ -45,9 +43,8 @@ def planned_shards(plan: Plan) -> list[Shard]:
                 "samples": end - start,
                 "first_key": first + start,
                 "share": _share(config, sizes, split, start, end),
-                "program": source,
             }
-            shards.append(Shard(f"{plan.config.name}-{split}-{number:06d}", params))
+            shards.append(Shard(f"{plan.config.name}-{split}-{number:06d}", params, code=code))
         first += size
     return shards
 
@@ -112,14 +109,6 @@ def _share(config: ProgramsConfig, sizes: dict[str, int], split: str, start: int
     return [(0.0, 1.0), ((before + start) / total, (before + end) / total)]
 
 
-def _source_digest(name: str) -> str:
-    """Hex sha256 of what shapes are made with, the program's file and this folder: an edited program is another."""
-    digest = hashlib.sha256(program_source(name).read_bytes())
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 def report(plan: Plan) -> Sequence[str]:
     """How many draws there were for each sample, and why the others were refused."""
     counts: Counter[str] = Counter()
@@ -137,7 +126,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 STAGE = Stage(
     name="programs",
-    version=1,
+    module=__name__,
     config=ProgramsConfig,
     inputs=(),
     plan=planned_shards,

@@ -197,7 +197,7 @@ def estimate_bytes(plan: Plan) -> int:
 
 STAGE = Stage(
     name="shapeassembly",
-    version=1,
+    module=__name__,
     config=ShapeAssemblyConfig,
     inputs=(),
     plan=planned_shards,

@@ -59,7 +59,7 @@ def estimate_bytes(plan: Plan) -> int:
 
 STAGE = Stage(
     name="sketches",
-    version=1,
+    module=__name__,
     config=SketchesConfig,
     inputs=(PRODUCERS,),
     plan=collection_shards,

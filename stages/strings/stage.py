@@ -127,7 +127,7 @@ def _stands_for(encoded: Encoded, assembly: Assembly, alphabet: Alphabet) -> boo
 
 STAGE = Stage(
     name="strings",
-    version=1,
+    module=__name__,
     config=StringsConfig,
     inputs=(PRODUCERS,),
     plan=plan,

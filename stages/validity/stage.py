@@ -56,7 +56,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 STAGE = Stage(
     name="validity",
-    version=3,
+    module=__name__,
     config=PhysicsConfig,
     inputs=(PRODUCERS,),
     plan=collection_shards,

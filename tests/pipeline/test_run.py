@@ -11,7 +11,8 @@ import pytest
 from pipeline.config import Config, StrictModel
 from pipeline.errors import ConfigError
 from pipeline.places import Places
-from pipeline.run import Slice, run_stage
+from pipeline.run import run_stage
+from pipeline.slices import Slice
 from pipeline.stage import Outcome, Shard, Stage, Task
 from tests.pipeline.conftest import WriteConfig, made, record_times
 from tests.pipeline.turn import turn
@@ -170,7 +171,7 @@ def write_nothing(task: Task) -> Outcome:
 def test_plan_that_answers_differently_each_time_is_refused(tmp_path: Path) -> None:
     ticks = itertools.count()
     restless = Stage(
-        "restless", 1, StrictModel, (), lambda _: [Shard("a", {"tick": next(ticks)})], write_nothing, lambda _: 0
+        "restless", __name__, StrictModel, (), lambda _: [Shard("a", {"tick": next(ticks)})], write_nothing, lambda _: 0
     )
     config = Config("mill", "1.0.0", 0, {"restless": StrictModel()}, tmp_path / "mill.yaml")
     with pytest.raises(ValueError, match="shard a was made just now, and is planned otherwise since"):

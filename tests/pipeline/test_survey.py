@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pipeline.config import Config, StrictModel
 from pipeline.places import Places
-from pipeline.records import ShardRecord, fingerprint, read_record
+from pipeline.records import ShardRecord, fingerprint, read_record, recipe
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from pipeline.survey import Survey
 
@@ -27,7 +28,7 @@ def nothing(task: Task) -> Outcome:
 
 
 def stage(name: str, *shards: Shard, inputs: tuple[str, ...] = (), config: type[StrictModel] = Empty) -> Stage:
-    return Stage(name, 1, config, inputs, lambda _: list(shards), nothing, lambda _: 0)
+    return Stage(name, __name__, config, inputs, lambda _: list(shards), nothing, lambda _: 0)
 
 
 def survey(out: Path, *stages: Stage) -> Survey:
@@ -48,23 +49,27 @@ FIRST = stage("first", Shard("a", {"size": 1}), Shard("b", {"size": 1}))
 SECOND = stage("second", Shard("c", {}, ("first/a",)), Shard("d", {}, ("second/c",)), inputs=("first",))
 
 
-def test_fingerprint_depends_on_each_thing_that_bytes_depend_on(tmp_path: Path) -> None:
+def test_fingerprint_depends_on_each_thing_that_bytes_depend_on() -> None:
     shard = Shard("a", {"size": 1})
-    base = fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"})
+
+    def of(stage: str = "s", shard: Shard = shard, code: str = "c", key: int = 1, **other: Any) -> str:
+        dataset, inputs = other.get("dataset", ("n", "1.0.0", 0)), other.get("inputs", {"x/y": "0"})
+        return fingerprint(recipe(stage, shard, code, {"k": key}, dataset, inputs))
+
     others = {
-        fingerprint(replace(FIRST, version=2), {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"}),
-        fingerprint(replace(FIRST, name="z"), {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"}),
-        fingerprint(FIRST, {"k": 2}, ("n", "1.0.0", 0), shard, {"x/y": "0"}),
-        fingerprint(FIRST, {"k": 1}, ("m", "1.0.0", 0), shard, {"x/y": "0"}),
-        fingerprint(FIRST, {"k": 1}, ("n", "1.0.1", 0), shard, {"x/y": "0"}),
-        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 1), shard, {"x/y": "0"}),
-        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), replace(shard, name="b"), {"x/y": "0"}),
-        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), replace(shard, params={"size": 2}), {"x/y": "0"}),
-        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "1"}),
-        fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/z": "0"}),
+        of(stage="z"),
+        of(shard=replace(shard, name="b")),
+        of(shard=replace(shard, params={"size": 2})),
+        of(code="d"),
+        of(key=2),
+        of(dataset=("m", "1.0.0", 0)),
+        of(dataset=("n", "1.0.1", 0)),
+        of(dataset=("n", "1.0.0", 1)),
+        of(inputs={"x/y": "1"}),
+        of(inputs={"x/z": "0"}),
     }
-    assert len(others | {base}) == 11
-    assert fingerprint(FIRST, {"k": 1}, ("n", "1.0.0", 0), shard, {"x/y": "0"}) == base
+    assert len(others | {of()}) == 11
+    assert of() == of()
 
 
 def test_changed_shard_changes_what_reads_it_and_nothing_else(tmp_path: Path) -> None:
@@ -112,7 +117,27 @@ def test_plan_sees_only_the_stages_and_sections_that_it_reads(tmp_path: Path) ->
 
 
 def test_record_survives_its_way_to_disk_and_back(tmp_path: Path) -> None:
-    record = ShardRecord("s", "a", "f" * 64, {"a.tar": {"sha256": "0", "bytes": 3}}, 2, {"odd": 1}, 0.5, 9, {"k": [1]})
+    record = ShardRecord(
+        "s",
+        "a",
+        "f" * 64,
+        {"code": "c"},
+        {"r/b.tar": "1"},
+        {"a.tar": {"sha256": "0", "bytes": 3}},
+        2,
+        {"odd": 1},
+        0.5,
+        9,
+        {"k": [1]},
+    )
     (tmp_path / "a.json").write_bytes(record.to_bytes())
     assert read_record(tmp_path / "a.json") == record
     assert read_record(tmp_path / "none.json") is None
+
+
+def test_record_with_a_flipped_byte_counts_as_none(tmp_path: Path) -> None:
+    record = ShardRecord("s", "a", "f" * 64, {}, {}, {"a.tar": {"sha256": "0", "bytes": 3}}, 2, {}, 0.5, 9, {"k": 10})
+    path, content = tmp_path / "a.json", record.to_bytes()
+    for place in range(len(content) - 1):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+        assert read_record(path) is None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,10 +13,13 @@ import pytest
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
 from pipeline.places import Places
+from pipeline.records import read_record
 from pipeline.stage import Outcome, Shard, Task
 from pipeline.task import Job, Report, make_shard
 
 Body = Callable[[Task], Outcome]
+
+FLOUR_DIGEST = hashlib.sha256(b"flour").hexdigest()
 
 
 @pytest.fixture
@@ -25,8 +30,8 @@ def make(tmp_path: Path) -> Callable[[Body], Report]:
     (places.stage("earlier").root / "in.txt").write_text("flour")
 
     def run(body: Body) -> Report:
-        shard = Shard("shard", {}, ("earlier/in",))
-        return make_shard(Job("own", body, shard, Config("toy", "1.0.0", 5, {}, Path("t.yaml")), places, "f"))
+        shard, config = Shard("shard", {}, ("earlier/in",)), Config("toy", "1.0.0", 5, {}, Path("t.yaml"))
+        return make_shard(Job("own", body, shard, config, places, {}, {"earlier/in.txt": FLOUR_DIGEST}))
 
     return run
 
@@ -63,6 +68,35 @@ def test_file_that_the_shard_writes_no_more_is_removed(make: Callable[[Body], Re
     make(both)
     make(one)
     assert sorted(path.name for path in own(tmp_path).rglob("*") if path.is_file()) == ["shard.b", "shard.json"]
+
+
+def test_record_names_the_bytes_that_were_read(make: Callable[[Body], Report], tmp_path: Path) -> None:
+    make(lambda task: Outcome(len(task.input("earlier", "in.txt").read_bytes())))
+    record = read_record(own(tmp_path) / "records/shard.json")
+    assert record is not None
+    assert record.inputs == {"earlier/in.txt": FLOUR_DIGEST}
+
+
+def test_damaged_input_is_named_and_nothing_is_committed_whatever_the_stage_makes_of_it(
+    make: Callable[[Body], Report], tmp_path: Path
+) -> None:
+    def reads(task: Task) -> Outcome:
+        return Outcome(len(task.input("earlier", "in.txt").read_bytes()))
+
+    def goes_on(task: Task) -> Outcome:
+        with contextlib.suppress(ShardFailed):
+            reads(task)
+        return Outcome(0)
+
+    source = tmp_path / ".work/toy/earlier/in.txt"
+    source.write_text("floor")
+    for body in (reads, goes_on):
+        report = make(body)
+        assert (report.status, report.damaged) == ("damaged", "earlier/in")
+        assert report.message == "earlier/in.txt is damaged: its sha256 is not the one in its record"
+    source.unlink()
+    assert make(reads).message == "earlier/in.txt is damaged: the file is gone"
+    assert not [path for path in own(tmp_path).rglob("*") if path.is_file()]
 
 
 @pytest.mark.parametrize("name", ["other.txt", "shard", "shardx.txt", "../shard.txt", "shard./../../x", "shard.a/b"])

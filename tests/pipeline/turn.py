@@ -8,7 +8,8 @@ from pipeline.cli import main
 from pipeline.config import Config, load_config
 from pipeline.places import Places
 from pipeline.registry import find_stages
-from pipeline.run import WHOLE, RunResult, Slice, run_stage
+from pipeline.run import RunResult, run_stage
+from pipeline.slices import WHOLE, Slice
 
 __all__ = ["STAGES", "load", "turn"]
 

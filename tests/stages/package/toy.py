@@ -164,12 +164,12 @@ def _no_bytes(_: Plan) -> int:
 TOY_STAGES: Mapping[str, Stage] = named_inputs(
     [
         *ABSENT_STAGES.values(),
-        Stage("exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
-        Stage("variations", 1, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
-        Stage("strings", 1, OtherNoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
+        Stage("exemplars", __name__, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
+        Stage("variations", __name__, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
+        Stage("strings", __name__, OtherNoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
         POINTS,
         VALIDITY,
-        Stage("sketches", 1, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
+        Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
         replace(PACKAGE, check=lambda _: None),
     ]
 )

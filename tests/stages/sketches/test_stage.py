@@ -66,8 +66,8 @@ def small(plan: Plan) -> int:
 STAGES = named_inputs(
     [
         *ABSENT_STAGES.values(),
-        Stage("exemplars", 1, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
-        Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
+        Stage("exemplars", __name__, KitsConfig, (), lambda plan: [Shard("solids")], make_kit, small),
+        Stage("variations", __name__, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
         STAGE,
     ]
 )

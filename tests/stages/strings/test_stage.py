@@ -16,7 +16,7 @@ from pipeline.run import RunResult, run_stage
 from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from pipeline.survey import Survey
-from pipeline.task import Job, make_shard
+from pipeline.task import make_shard
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
@@ -96,8 +96,8 @@ def small(plan: Plan) -> int:
 STAGES: Mapping[str, Stage] = named_inputs(
     [
         *ABSENT_STAGES.values(),
-        Stage("exemplars", 1, KitsConfig, (), plan_kits, make_kit, small),
-        Stage("variations", 1, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
+        Stage("exemplars", __name__, KitsConfig, (), plan_kits, make_kit, small),
+        Stage("variations", __name__, ShapesConfig, ("exemplars",), plan_shapes, make_shapes, small),
         STAGE,
     ]
 )
@@ -118,13 +118,11 @@ def make_here(wanted: Config, out: Path, stages: Sequence[str] = tuple(STAGES)) 
     places, failed = Places(out, wanted.name), {}
     survey = Survey(wanted, STAGES, places)
     for name in stages:
-        stage = STAGES[name]
         places.stage(name).make()
         surveyed = survey.stage(name)
         while fresh := [each for each in surveyed.missing if each.name not in failed]:
             for shard in fresh:
-                mark = surveyed.fingerprints[shard.name]
-                report = make_shard(Job(name, stage.run_shard, shard, surveyed.config, places, mark))
+                report = make_shard(survey.job(name, shard))
                 if report.status != "done":
                     failed[shard.name] = report.message
             survey.refresh(name)

@@ -60,12 +60,12 @@ def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict
 
     producer = samples[0].producer
     stages: dict[str, Stage] = {
-        "exemplars": Stage("exemplars", 1, KitsConfig, (), lambda _: [Shard("solids")], make_kit, small),
-        "variations": Stage("variations", 1, SamplesConfig, ("exemplars",), lambda _: [], make_samples, small),
+        "exemplars": Stage("exemplars", __name__, KitsConfig, (), lambda _: [Shard("solids")], make_kit, small),
+        "variations": Stage("variations", __name__, SamplesConfig, ("exemplars",), lambda _: [], make_samples, small),
         **ABSENT_STAGES,
     }
     config_of = {"programs": ProgramsConfig}.get(producer, SamplesConfig)
-    stages[producer] = Stage(producer, 1, config_of, stages[producer].inputs, plan, make_samples, small)
+    stages[producer] = Stage(producer, __name__, config_of, stages[producer].inputs, plan, make_samples, small)
     stages = named_inputs([*stages.values(), STAGE])
     sections = {
         "exemplars": KitsConfig(),

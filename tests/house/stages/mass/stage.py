@@ -34,4 +34,6 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(add_members(task, masses))
 
 
-STAGE = Stage("mass", 1, MassConfig, (PRODUCERS,), collection_shards, run_shard, lambda plan: 1000 * sample_count(plan))
+STAGE = Stage(
+    "mass", __name__, MassConfig, (PRODUCERS,), collection_shards, run_shard, lambda plan: 1000 * sample_count(plan)
+)

@@ -38,4 +38,4 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(count, {"split": split, "samples": count})
 
 
-STAGE = Stage("pebbles", 1, PebblesConfig, (), plan, run_shard, lambda _: 1000)
+STAGE = Stage("pebbles", __name__, PebblesConfig, (), plan, run_shard, lambda _: 1000)

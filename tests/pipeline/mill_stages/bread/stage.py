@@ -46,5 +46,13 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 
 STAGE = Stage(
-    "bread", 1, BreadConfig, ("flour", "salt"), plan, run_shard, lambda _: 100_000, report=report, publish=publish
+    "bread",
+    __name__,
+    BreadConfig,
+    ("flour", "salt"),
+    plan,
+    run_shard,
+    lambda _: 100_000,
+    report=report,
+    publish=publish,
 )

@@ -70,4 +70,4 @@ def _meet(config: FlourConfig, task: Task) -> None:
                 stream.write(b"\0" * 1_000_000)
 
 
-STAGE = Stage("flour", 1, FlourConfig, ("grain",), plan, run_shard, lambda _: 100_000)
+STAGE = Stage("flour", __name__, FlourConfig, ("grain",), plan, run_shard, lambda _: 100_000)

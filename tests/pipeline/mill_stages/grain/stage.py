@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydantic import Field
 
 from pipeline.config import StrictModel
-from pipeline.shards import ShardWriter, array_bytes
+from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
 __all__ = ["STAGE", "GrainConfig"]
@@ -35,15 +36,18 @@ def plan(plan: Plan) -> list[Shard]:
 
 
 def run_shard(task: Task) -> Outcome:
-    """Random grains; every third is rejected."""
-    rng = task.rng("grains")
+    """Random grains, each larger by the first grain of the harvest before; every third is rejected."""
+    rng, seed = task.rng("grains"), np.zeros(100)
+    for name in task.shard.inputs:
+        _, members = next(read_shard(task.input("grain", f"{name.partition('/')[2]}.tar")))
+        seed += bytes_array(members["size.npy"])
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for index in range(6):
             if index % 3 == 2:
                 task.reject(f"{task.shard.name}-{index}", "hollow", detail=f"grain {index}")
             else:
-                writer.write(f"{task.shard.name}-{index}", {"size.npy": array_bytes(rng.random(100))})
+                writer.write(f"{task.shard.name}-{index}", {"size.npy": array_bytes(seed + rng.random(100))})
     return Outcome(samples=writer.samples, summary={"grains": writer.samples})
 
 
-STAGE = Stage("grain", 1, GrainConfig, (), plan, run_shard, lambda _: 100_000)
+STAGE = Stage("grain", __name__, GrainConfig, (), plan, run_shard, lambda _: 100_000)

@@ -34,4 +34,4 @@ def estimate_bytes(plan: Plan) -> int:
     return plan.config.section(SaltConfig).spoons * 1_000_000_000
 
 
-STAGE = Stage("salt", 1, SaltConfig, (), plan, run_shard, estimate_bytes)
+STAGE = Stage("salt", __name__, SaltConfig, (), plan, run_shard, estimate_bytes)

@@ -17,7 +17,7 @@ class NothingConfig(StrictModel):
 
 
 ABSENT_STAGES: Mapping[str, Stage] = {
-    name: Stage(name, 1, NothingConfig, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
+    name: Stage(name, __name__, NothingConfig, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
     for name in producers()
     if name != "variations"
 }

@@ -1,0 +1,188 @@
+"""What code counts as a shard's own: an edit that may change bytes makes shards again, and no other edit does."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from pipeline.code import reached, starts_of
+from pipeline.config import Config
+from pipeline.errors import Fatal
+from pipeline.places import Places
+from pipeline.registry import find_stages
+from pipeline.run import RunResult, run_stage
+
+MILL = '''
+"""Millstones."""
+from __future__ import annotations
+from pipeline.config import StrictModel
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+
+class StoneConfig(StrictModel):
+    """How it is ground."""
+    sharpens: bool = False
+
+def plan(plan: Plan) -> list[Shard]:
+    return [Shard("coarse"), Shard("fine", code=("house.sieves.fine",))]
+
+def run_shard(task: Task) -> Outcome:
+    """Grinds."""
+    from house.stone.grit import GRIT
+    if task.config.section(StoneConfig).sharpens:
+        from pathlib import Path
+        import house.stone.grit
+        Path(house.stone.grit.__file__).write_text("GRIT = 8")
+    with task.output(f"{task.shard.name}.txt") as stream:
+        stream.write(b"dust" * GRIT)
+    return Outcome(1)
+
+STAGE = Stage("stone", __name__, StoneConfig, (), plan, run_shard, lambda _: 0)
+'''
+
+Write = Callable[[str, str], None]
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
+    """Writes a file of a project that can be imported, and the `__init__.py` of every folder on the way."""
+    monkeypatch.syspath_prepend(tmp_path / "src")
+
+    def write(name: str, text: str) -> None:
+        path = tmp_path / "src" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for folder in path.parents:
+            if folder == tmp_path / "src":
+                break
+            (folder / "__init__.py").touch()
+        path.write_text(text)
+
+    yield write
+    for module in [each for each in sys.modules if each.partition(".")[0] in {"house", "yard"}]:
+        del sys.modules[module]
+
+
+def names(*starts: str) -> set[str]:
+    return {each for each in reached(starts) if not each.startswith("pipeline")}
+
+
+def test_every_way_of_importing_is_followed_wherever_it_stands(write: Write) -> None:
+    write(
+        "house/hall.py", "import house.stairs.steps\nfrom house import cellar\ndef late():\n    from . import attic\n"
+    )
+    write("house/stairs/steps.py", "from ..garden import *\nfrom yard.gate import Hinge as latch\n")
+    write("house/garden.py", "import numpy, json, nowhere\nif True:\n    import yard.shed as shed\n")
+    for name in ("house/cellar.py", "house/attic.py", "house/unused.py", "yard/gate.py", "yard/shed.py"):
+        write(name, "")
+    rooms = {"hall", "stairs", "stairs.steps", "cellar", "attic", "garden"}
+    assert names("house.hall") == {"house", "yard", "yard.gate", "yard.shed", *(f"house.{room}" for room in rooms)}
+    assert names("yard.gate") == {"yard", "yard.gate"}
+
+
+def test_package_may_lie_in_several_folders(write: Write, tmp_path: Path) -> None:
+    write("house/__init__.py", f"__path__.append({str(tmp_path / 'annex')!r})")
+    write("house/hall.py", "import house.guests")
+    (tmp_path / "annex").mkdir()
+    (tmp_path / "annex/guests.py").write_text("BEDS = 2")
+    __import__("house")
+    assert names("house.hall") == {"house", "house.hall", "house.guests"}
+
+
+def test_start_that_is_not_there_is_told(write: Write) -> None:
+    with pytest.raises(ValueError, match=r"no Python file of module house\.none"):
+        reached(["house.none"])
+
+
+PLAIN = "import os\n\ndef height(steps):\n    return 0.5 * steps\n"
+
+
+@pytest.mark.parametrize(
+    "edited",
+    [
+        "# stairs\nimport os  # needed\n\n\ndef height(steps):\n    # half a metre\n    return 0.5*steps\n",
+        '"""Stairs."""\nimport os\ndef height(steps):\n    """m."""\n    return (\n  0.5 * steps)\n"""So."""\n',
+    ],
+)
+def test_comment_docstring_and_format_change_nothing(write: Write, edited: str) -> None:
+    write("house/stairs.py", PLAIN)
+    before = reached(["house.stairs"])
+    write("house/stairs.py", edited)
+    assert reached(["house.stairs"]) == before
+
+
+def test_import_for_types_alone_does_not_count(write: Write) -> None:
+    text = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from house.hall import Hall\nelse:\n    Hall = 1\n"
+    write("house/stairs.py", text)
+    write("house/hall.py", "")
+    before = reached(["house.stairs"])
+    assert set(before) == {"house", "house.stairs"}
+    write("house/stairs.py", text.replace("import Hall", "import Hall, Door"))
+    assert reached(["house.stairs"]) == before
+
+
+@pytest.mark.parametrize("edited", ["0.25 * steps", "0.5 * -steps", "'0.5' * steps", "0.5 * step"])
+def test_each_word_of_code_counts(write: Write, edited: str) -> None:
+    write("house/stairs.py", PLAIN)
+    before = reached(["house.stairs"])
+    write("house/stairs.py", PLAIN.replace("0.5 * steps", edited))
+    after = reached(["house.stairs"])
+    assert {module for module in before if before[module] != after[module]} == {"house.stairs"}
+
+
+def test_what_a_folder_declares_beside_its_stage_counts(write: Write) -> None:
+    write("house/stone/stage.py", "")
+    write("house/stone/language.py", "import house.words")
+    write("house/stone/other.py", "")
+    write("house/words.py", "")
+    start = starts_of("house.stone.stage")
+    assert names(*start) == {"house", "house.stone", "house.stone.stage", "house.stone.language", "house.words"}
+
+
+def grind(out: Path, sharpens: bool = False) -> RunResult:
+    stages = find_stages("house")
+    section = stages["stone"].config.model_validate({"sharpens": sharpens})
+    return run_stage("stone", stages, Config("mill", "1.0.0", 0, {"stone": section}, out), Places(out, "mill"), 1)
+
+
+@pytest.fixture
+def mill(write: Write) -> Write:
+    write("house/stone/stage.py", MILL)
+    write("house/stone/grit.py", "GRIT = 2")
+    write("house/sieves/fine.py", "MESH = 1")
+    return write
+
+
+def test_edit_makes_again_what_it_reaches_and_the_log_says_so(mill: Write, tmp_path: Path) -> None:
+    assert grind(tmp_path).made == 2
+    mill("house/stone/grit.py", "GRIT = 2  # rough")
+    assert grind(tmp_path).made == 0
+    mill("house/sieves/fine.py", "MESH = 3")
+    assert grind(tmp_path).made == 1
+    mill("house/stone/grit.py", "GRIT = 4")
+    assert grind(tmp_path).made == 2
+    assert (tmp_path / ".work/mill/stone/coarse.txt").read_bytes() == b"dust" * 4
+    log = (tmp_path / ".work/mill/log.txt").read_text()
+    assert "1 shard is made again: changed: code (house.sieves.fine)" in log
+    assert "2 shards are made again: changed: code (house.stone.grit)" in log
+
+
+def test_edit_while_a_stage_runs_stops_it_before_a_shard_is_committed(mill: Write, tmp_path: Path) -> None:
+    with pytest.raises(Fatal, match=r"the code was edited while stage stone ran \(house\.stone\.grit\)"):
+        grind(tmp_path, sharpens=True)
+    assert not list((tmp_path / ".work/mill/stone").glob("*.txt"))
+
+
+def test_of_the_mill_only_what_makes_bytes_counts() -> None:
+    for name, stage in find_stages().items():
+        mill = {each for each in reached(starts_of(stage.module)) if each.partition(".")[0] == "pipeline"}
+        assert mill == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"}, name
+
+
+def test_chair_does_not_know_the_vase() -> None:
+    library = {f"stages.programs.library.{each}" for each in ("cabinet", "ceiling_lamp", "chair", "table", "vase")}
+    assert not library & names(*starts_of("stages.programs.stage"))
+    chair = names(*starts_of("stages.programs.stage", ["stages.programs.library.chair"]))
+    assert library & chair == {"stages.programs.library.chair"}
+    assert {"stages.programs.curves.part", "stages.programs.sampling"} <= chair

@@ -1,0 +1,137 @@
+"""A flipped byte is found when it is read, named and mended: the run ends with the bytes of an undisturbed one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pipeline.config import Config, StrictModel
+from pipeline.errors import Fatal
+from pipeline.places import Places, file_digest
+from pipeline.records import read_record
+from pipeline.run import run_stage
+from pipeline.stage import Outcome, Shard, Stage, Task
+from tests.pipeline.conftest import WriteConfig, made, record_times
+from tests.pipeline.turn import turn
+
+WORK = Path(".work/mill")
+
+
+def flip(path: Path, place: int = 700) -> None:
+    """Change one bit in place, as a disk does: no size, no time of a record and no link changes."""
+    content = bytearray(path.read_bytes())
+    content[place] ^= 1
+    with open(path, "r+b") as stream:
+        stream.write(content)
+
+
+def again(before: dict[str, int], out: Path) -> set[str]:
+    """The shards whose records were written since `before`."""
+    return {name for name, time in record_times(out).items() if before.get(name) != time}
+
+
+@pytest.mark.parametrize(
+    ("workers", "damaged", "edited", "remade"),
+    [
+        # read by the next stage; and by shards of its own stage, which were made of the good bytes and stay
+        (1, ["grain/harvest0-0", "grain/harvest2-1"], {"flour": {"fineness": 3.0}}, ("flour", "bread")),
+        # the first is read two stages on; the second is found when the first is made again
+        (2, ["flour/harvest1-0", "grain/harvest1-0"], {"salt": {"spoons": 2}}, ("salt", "bread")),
+    ],
+)
+def test_damage_is_named_and_mended_and_the_bytes_are_those_of_an_undisturbed_run(
+    tmp_path: Path,
+    write_config: WriteConfig,
+    workers: int,
+    damaged: list[str],
+    edited: dict[str, object],
+    remade: tuple[str, ...],
+) -> None:
+    out = tmp_path / "out"
+    turn(write_config(), out, workers=workers)
+    before = dict(record_times(out))
+    config = write_config(**edited)
+    for shard in damaged:
+        flip(next((out / WORK).glob(f"{shard}.*")), 3)
+    turn(config, out, workers=workers)
+    log = (out / WORK / "log.txt").read_text()
+    for shard in damaged:
+        named = next((out / WORK).glob(f"{shard}.*")).relative_to(out / WORK)
+        assert f"{named} is damaged: its sha256 is not the one in its record; {named.stem} is made again" in log
+    assert again(before, out) == {*damaged, *(name for name in before if name.startswith(remade))}
+    turn(config, tmp_path / "calm")
+    assert made(out) == made(tmp_path / "calm")
+
+
+def test_damage_in_the_running_stage_itself_is_mended(tmp_path: Path, write_config: WriteConfig) -> None:
+    out = tmp_path / "out"
+    turn(write_config(), out, "grain")
+    whole, before = made(out), dict(record_times(out))
+    flip(out / WORK / "grain/harvest1-0.tar")
+    (out / WORK / "grain/harvest2-1.tar").unlink()
+    turn(write_config(), out, "grain")
+    assert again(before, out) == {"grain/harvest1-0", "grain/harvest2-1"}
+    assert made(out) == whole
+
+
+def test_input_that_comes_back_with_other_bytes_is_read_again(tmp_path: Path, write_config: WriteConfig) -> None:
+    out = tmp_path / "out"
+    turn(write_config(), out)
+    before = dict(record_times(out))
+    path = out / WORK / "salt/records/bag-0.json"
+    flip(out / WORK / "salt/bag-0.txt", 0)
+    path.unlink()
+    turn(write_config(), out)
+    assert again(before, out) == {"salt/bag-0"}, "the same bytes came back"
+
+    record = read_record(path)
+    assert record is not None
+    flip(out / WORK / "salt/bag-0.txt", 0)
+    files = {"bag-0.txt": {"sha256": file_digest(out / WORK / "salt/bag-0.txt"), "bytes": 5}}
+    path.write_bytes(replace(record, files=files).to_bytes())
+    assert turn(write_config(), out)["bread"].made == 6
+    assert "6 shards are made again: what it is made from has other bytes" in (out / WORK / "log.txt").read_text()
+
+
+def test_record_with_a_flipped_byte_has_its_shard_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
+    out = tmp_path / "out"
+    turn(write_config(), out)
+    whole = made(out)
+    path = out / WORK / "grain/records/harvest0-1.json"
+    path.write_bytes(path.read_bytes().replace(b'"grains":4', b'"grains":5'))
+    assert json.loads(path.read_bytes())["summary"] == {"grains": 5}
+    results = turn(write_config(), out)
+    assert {name: result.made for name, result in results.items()} == {"salt": 0, "grain": 1, "flour": 0, "bread": 0}
+    assert made(out) == whole
+
+
+def write_file(task: Task) -> Outcome:
+    with task.output(f"{task.shard.name}.txt") as stream:
+        stream.write(b"a" * 1000)
+    return Outcome(1)
+
+
+def rot_and_read(task: Task) -> Outcome:
+    path = Path(task.config.path).parent / ".work/mill/first/a.txt"
+    flip(path)
+    return Outcome(len(task.input("first", "a.txt").read_bytes()))
+
+
+class Other(StrictModel):
+    """Nothing to say."""
+
+
+def test_disk_that_damages_what_was_made_again_just_now_stops_everything(tmp_path: Path) -> None:
+    stages = {
+        "first": Stage("first", __name__, StrictModel, (), lambda _: [Shard("a")], write_file, lambda _: 0),
+        "second": Stage(
+            "second", __name__, Other, ("first",), lambda _: [Shard("b", {}, ("first/a",))], rot_and_read, lambda _: 0
+        ),
+    }
+    config = Config("mill", "1.0.0", 0, {"first": StrictModel(), "second": Other()}, tmp_path / "mill.yaml")
+    run_stage("first", stages, config, Places(tmp_path, "mill"), workers=1)
+    with pytest.raises(Fatal, match=r"first/a\.txt is damaged: .*, and a was made again just now: disk or memory"):
+        run_stage("second", stages, config, Places(tmp_path, "mill"), workers=1)
