@@ -22,8 +22,8 @@ from pipeline.shards import json_bytes
 
 __all__ = ["code_digest", "reached", "starts_of"]
 
-_DECLARATIONS = ("producer", "language", "members")
-"""Files beside a `stage.py` in which its folder declares itself; others find them at run time."""
+_DECLARATIONS = ("language",)
+"""Files beside a `stage.py` that others find at run time when they read what the stage has made."""
 
 _CONTRACT = {"pipeline.stage", "pipeline.config", "pipeline.places", "pipeline.registry"}
 """What stages see of the mill itself. It changes bytes through the config and the plan alone, which the fingerprint

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,14 +10,14 @@ import numpy as np
 from pipeline.places import Places
 from pipeline.stage import Plan
 from stages.shape.arrays import IntArray
-from stages.shape.collection.language import Anew, Faults, Language, Source
+from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import load_kit
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, part_count
 
-__all__ = ["LANGUAGE", "Kits"]
+__all__ = ["LANGUAGE", "Kits", "made_kits"]
 
 
 class Kits:
@@ -68,7 +67,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def _made_kits(places: Places) -> dict[str, Kit]:
+def made_kits(places: Places) -> dict[str, Kit]:
     """The kits of a dataset out of the mill's folder."""
     made = places.stage("exemplars").root
     return {
@@ -80,7 +79,7 @@ def _made_kits(places: Places) -> dict[str, Kit]:
 
 def _anew(places: Places) -> Anew:
     """The kit's meshes at the poses of the record."""
-    kits = _made_kits(places)
+    kits = made_kits(places)
 
     def shape(record: Mapping[str, Any], contacts: IntArray) -> Shape:
         if record["kit"] not in kits:
@@ -97,19 +96,6 @@ def _anew(places: Places) -> Anew:
     return shape
 
 
-def _faults(places: Places) -> Faults:
-    """Contacts, grammar and penetration of a sample."""
-    from stages.exemplars.faults import geometry_faults
-
-    kits = _made_kits(places)
-
-    def faults(members: Mapping[str, bytes]) -> Sequence[str]:
-        name = json.loads(members["json"])["kit"]
-        return geometry_faults(kits[name], members) if name in kits else []
-
-    return faults
-
-
 LANGUAGE = Language(
     name="kit",
     reads=_reads,
@@ -117,5 +103,4 @@ LANGUAGE = Language(
     graphs=True,
     text="Its shape graph as strings, SMILES-like, one a line, the first canonical.",
     anew=_anew,
-    faults=_faults,
 )

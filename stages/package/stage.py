@@ -14,7 +14,7 @@ from stages.package.manifest import config_sections
 from stages.package.merge import merge_shard
 from stages.package.preview import draw_preview
 from stages.package.settings import PackageConfig
-from stages.shape.collection.declared import language_of, members, producers
+from stages.shape.collection.declared import language_of, member_modules, members, producers
 from stages.shape.collection.shards import (
     MEMBERS,
     PRODUCERS,
@@ -55,7 +55,8 @@ def plan(plan: Plan) -> list[Shard]:
         "shards": shown,
         "rows": rows,
     }
-    picture = Shard(PICTURE, pictured, (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows))))
+    drawn = (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows)))
+    picture = Shard(PICTURE, pictured, drawn, member_modules())
     declared = producers()[producer]
     params = {
         "facts": _facts(plan),
@@ -73,7 +74,7 @@ def plan(plan: Plan) -> list[Shard]:
         "preview": PICTURE,
     }
     inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
-    return [*merged, picture, Shard(WHOLE, params, inputs)]
+    return [*merged, picture, Shard(WHOLE, params, inputs, member_modules())]
 
 
 def _merged(plan: Plan) -> list[Shard]:
@@ -83,7 +84,8 @@ def _merged(plan: Plan) -> list[Shard]:
     for shard in collection_shards(plan):
         stages = [stage for stage, names in planned.items() if shard.name in names]
         params = {**shard.params, "stages": stages}
-        shards.append(Shard(shard.name, params, (*shard.inputs, *(f"{stage}/{shard.name}" for stage in stages))))
+        inputs = (*shard.inputs, *(f"{stage}/{shard.name}" for stage in stages))
+        shards.append(Shard(shard.name, params, inputs, member_modules()))
     return shards
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from pipeline.shards import bytes_array
 from stages.package.glb import glb_bytes
 from stages.package.record import cycle_count, rounded
-from stages.shape.collection.declared import members as declared_members
+from stages.shape.collection.declared import audits
 from stages.shape.collection.language import Anew
 from stages.shape.collection.packaged import Packaged
 from stages.shape.geometry.bounds import shape_bounds
@@ -62,7 +63,8 @@ def read_packaged(
         shape = anew[record["language"]](record, packaged.contacts)
         parts = record["parts"]
         first = parts[0]["class"] - int(shape.part_labels[0])
-        shape = Shape(shape.meshes, shape.assembly, "y", shape.labels, shape.own_names, first)
+        assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
+        shape = replace(shape, assembly=assembly, first_class=first)
         return Packaged(key, record, members, arrays, shape, sections)
     except LookupError as error:
         if isinstance(error, KeyError | IndexError):
@@ -94,8 +96,8 @@ def sample_faults(sample: Packaged) -> Iterator[str]:
         yield "its bounds are not those of its parts"
     if not sample.members["txt"].decode().startswith(record["text"]):
         yield "its txt and its json hold different texts"
-    for stage in declared_members().values():
-        yield from _asked(stage.faults, sample)
+    for each in audits().values():
+        yield from _asked(each.faults, sample)
 
 
 def array_faults(sample: Packaged, described: list[dict[str, Any]]) -> Iterator[str]:

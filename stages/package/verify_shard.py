@@ -24,7 +24,7 @@ from stages.package.verify_samples import (
     record_faults,
     sample_faults,
 )
-from stages.shape.collection.declared import languages
+from stages.shape.collection.declared import audits, languages
 from stages.shape.collection.declared import members as declared_members
 from stages.shape.collection.packaged import Packaged
 
@@ -108,10 +108,8 @@ def _faults(sample: Packaged, manifest: Mapping[str, Any], places: Places | None
         yield from (("samples", what) for what in array_faults(sample, manifest["members"]))
         yield from (("samples", what) for what in sample_faults(sample))
         if places is not None:
-            spoken = languages()[sample.record["language"]].faults(places)
-            yield from (("geometry", what) for what in spoken(sample.members))
-            for stage in declared_members().values():
-                yield from (("geometry", what) for what in stage.anew(sample))
+            for each in audits().values():
+                yield from (("geometry", what) for what in each.anew(sample, places))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         yield "samples", f"its json cannot be meant: {type(error).__name__}: {error}"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from pipeline.shards import bytes_array
 from stages.points.settings import PointsConfig
 from stages.shape.arrays import ByteArray
 from stages.shape.collection.members import Field, Member, Members, Row
-from stages.shape.collection.packaged import Packaged
 from stages.shape.views.camera import Camera
 
 __all__ = ["MEMBERS"]
@@ -61,10 +60,4 @@ def _draw(members: Mapping[str, bytes], camera: Camera, size: int) -> ByteArray:
     return points_portrait(points.astype(np.float64), labels.astype(np.int32), camera, (size, size), "y")
 
 
-def _faults(sample: Packaged) -> Iterator[str]:
-    from stages.points.faults import point_faults
-
-    yield from point_faults(sample)
-
-
-MEMBERS = Members(of=_members, fields=_fields, faults=_faults, row=Row("Points", _caption, _draw))
+MEMBERS = Members(of=_members, fields=_fields, row=Row("Points", _caption, _draw))

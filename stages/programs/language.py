@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
 from stages.programs.program import find_program, shape_of_text
 from stages.programs.settings import ProgramsConfig
-from stages.shape.collection.language import Anew, Faults, Language, Source
+from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
@@ -44,16 +43,6 @@ def _anew(_: Places) -> Anew:
     return lambda record, _: upright(shape_of_text(record["kit"], record["text"]))
 
 
-def _faults(_: Places) -> Faults:
-    from stages.shape.collection.text_faults import text_faults
-
-    def faults(members: Mapping[str, bytes]) -> Sequence[str]:
-        record = json.loads(members["json"])
-        return text_faults(shape_of_text(record["kit"], record["text"]), members)
-
-    return faults
-
-
 LANGUAGE = Language(
     name="program",
     reads=_reads,
@@ -61,5 +50,4 @@ LANGUAGE = Language(
     graphs=False,
     text="Its parameters as JSON.",
     anew=_anew,
-    faults=_faults,
 )

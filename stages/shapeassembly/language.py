@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
-from stages.shape.collection.language import Anew, Faults, Language, Source
+from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 from stages.shapeassembly.shape import shape_of_text
@@ -48,15 +48,6 @@ def _anew(_: Places) -> Anew:
     return lambda record, _: upright(shape_of_text(record["text"]))
 
 
-def _faults(_: Places) -> Faults:
-    from stages.shape.collection.text_faults import text_faults
-
-    def faults(members: Mapping[str, bytes]) -> Sequence[str]:
-        return text_faults(shape_of_text(json.loads(members["json"])["text"]), members)
-
-    return faults
-
-
 LANGUAGE = Language(
     name="shapeassembly",
     reads=_reads,
@@ -64,5 +55,4 @@ LANGUAGE = Language(
     graphs=False,
     text="Its ShapeAssembly program.",
     anew=_anew,
-    faults=_faults,
 )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from pipeline.config import Config
 from stages.shape.collection.members import Column, Field, Members
-from stages.shape.collection.packaged import Packaged
 
 __all__ = ["MEMBERS"]
 
@@ -57,23 +56,9 @@ def _fields(_: Config) -> Mapping[str, Field]:
     }
 
 
-def _faults(sample: Packaged) -> Iterator[str]:
-    from stages.validity.faults import contradictions
-
-    yield from contradictions(sample)
-
-
-def _anew(sample: Packaged) -> Iterator[str]:
-    from stages.validity.faults import judged_anew
-
-    yield from judged_anew(sample)
-
-
 MEMBERS = Members(
     of=lambda _: (),
     fields=_fields,
-    faults=_faults,
-    anew=_anew,
     columns={
         "rooted": Column("bool", ("physics", "rooted")),
         "stable": Column("bool", ("physics", "stable")),

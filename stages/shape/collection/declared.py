@@ -1,4 +1,4 @@
-"""Finds what the folders of the house declare: producers, languages, members."""
+"""Finds what the folders of the house declare: producers, languages, members, audits."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from typing import TypeVar
 import stages
 from pipeline.errors import ConfigError
 from pipeline.registry import folders_with
+from stages.shape.collection.audit import Audit
 from stages.shape.collection.language import Language
 from stages.shape.collection.members import Members
 from stages.shape.collection.producer import Producer
 
-__all__ = ["language_of", "languages", "members", "producers"]
+__all__ = ["audits", "language_of", "languages", "member_modules", "members", "producers"]
 
 Declared = TypeVar("Declared")
 
@@ -31,6 +32,16 @@ def languages() -> dict[str, Language]:
 def members() -> dict[str, Members]:
     """What is added to every sample, by the stage that adds it."""
     return _declared("members", Members)
+
+
+def member_modules() -> tuple[str, ...]:
+    """The modules in which members are declared: what reads them at run time names them as its code."""
+    return tuple(f"{stages.__name__}.{folder}.members" for folder in members())
+
+
+def audits() -> dict[str, Audit]:
+    """How finished samples are looked at, by the folder that does."""
+    return _declared("audit", Audit)
 
 
 def language_of(producer: str) -> Language:

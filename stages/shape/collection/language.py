@@ -12,13 +12,10 @@ from stages.shape.arrays import IntArray
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
-__all__ = ["Anew", "Faults", "Language", "Source", "Speaker"]
+__all__ = ["Anew", "Language", "Source", "Speaker"]
 
 Anew = Callable[[Mapping[str, Any], IntArray], Shape]
 """The shape of a record and its contacts, int32 (m, 2)."""
-
-Faults = Callable[[Mapping[str, bytes]], Sequence[str]]
-"""What is wrong with the sample of which these are the members: a sentence for each fault."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +56,6 @@ class Language:
     text: what the member `txt` of its samples is, for the card.
     anew: the shape that the record of a packaged sample says, made anew and upright, given the mill's folders of its
     dataset; raises LookupError where what it is made from is not there, ValueError where the record cannot be meant.
-    faults: how a packaged sample is held against what it was made from, by other means than it was made, for some
-    samples.
     """
 
     name: str
@@ -69,4 +64,3 @@ class Language:
     graphs: bool
     text: str
     anew: Callable[[Places], Anew]
-    faults: Callable[[Places], Faults]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from pipeline.config import Config
 from stages.shape.arrays import ByteArray
-from stages.shape.collection.packaged import Packaged
 from stages.shape.views.camera import Camera
 
 __all__ = ["TEXT", "Column", "Field", "Member", "Members", "Row"]
@@ -63,10 +62,6 @@ def _no_fields(_: Config) -> Mapping[str, Field]:
     return {}
 
 
-def _no_faults(_: Packaged) -> Iterator[str]:
-    return iter(())
-
-
 @dataclass(frozen=True)
 class Members:
     """What a stage adds. `MEMBERS = Members(...)` stands in `stages/<stage>/members.py`.
@@ -75,14 +70,10 @@ class Members:
     with the declared fields, which package merges into the record.
 
     of: the members, given the config; fields: of the record, by name; columns: of the index, by name.
-    faults: what is wrong with a finished sample, cheap enough to be asked of every sample; anew: the same, by making
-    again what the stage made, which is asked of some.
     row: how the preview shows it, or None.
     """
 
     of: Callable[[Config], tuple[Member, ...]]
     fields: Callable[[Config], Mapping[str, Field]] = _no_fields
     columns: Mapping[str, Column] = field(default_factory=dict)
-    faults: Callable[[Packaged], Iterator[str]] = _no_faults
-    anew: Callable[[Packaged], Iterator[str]] = _no_faults
     row: Row | None = None

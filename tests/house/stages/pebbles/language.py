@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from pipeline.places import Places
-from stages.shape.collection.language import Anew, Faults, Language, Source
-from stages.shape.collection.text_faults import text_faults
+from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
@@ -50,8 +48,4 @@ def _anew(_: Places) -> Anew:
     return lambda record, _: upright(heap(record["text"]))
 
 
-def _faults(_: Places) -> Faults:
-    return lambda members: text_faults(heap(json.loads(members["json"])["text"]), members)
-
-
-LANGUAGE = Language("heap", lambda _: (), lambda _: Heaps(), False, "Heights of the pebbles.", _anew, _faults)
+LANGUAGE = Language("heap", lambda _: (), lambda _: Heaps(), False, "Heights of the pebbles.", _anew)

@@ -15,6 +15,7 @@ import yaml
 
 from pipeline.places import Places
 from pipeline.shards import bytes_array
+from stages.package.verify_samples import read_packaged, read_record, sample_faults
 from stages.package.verify_shard import shard_samples
 from stages.programs.language import LANGUAGE
 
@@ -97,11 +98,18 @@ def test_the_card_explains_every_parameter(made: tuple[Path, tuple[str, ...]]) -
 
 
 def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tuple[str, ...]]) -> None:
-    samples, text_faults = list(samples_of(made[0]).values()), LANGUAGE.faults(Places(made[0], "toy"))
-    assert text_faults(samples[0]) == []
-    other = next(each for each in samples if each["txt"] != samples[0]["txt"])
-    assert text_faults({**samples[0], "glb": other["glb"]})
-    assert text_faults({**samples[0], "txt": other["txt"]}) == ["its txt and its json hold different texts"]
+    samples, anew = samples_of(made[0]), {"program": LANGUAGE.anew(Places(made[0], "toy"))}
+    manifest = json.loads((made[0] / "toy" / "manifest.json").read_text())
+    key, members = next(iter(samples.items()))
+    other = next(each for each in samples.values() if each["txt"] != members["txt"])
+
+    def faults(members: dict[str, bytes]) -> list[str]:
+        record = read_record(members["json"])
+        return list(sample_faults(read_packaged(key, record, members, anew, manifest["config"])))
+
+    assert faults(members) == []
+    assert any("another surface in its glb" in each for each in faults({**members, "glb": other["glb"]}))
+    assert faults({**members, "txt": other["txt"]}) == ["its txt and its json hold different texts"]
 
 
 def test_records_index_card_and_table_say_the_same_of_physics(made: tuple[Path, tuple[str, ...]]) -> None:

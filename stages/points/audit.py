@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["point_faults"]
+__all__ = ["AUDIT", "point_faults"]
 
 NEAR = 1e-5
 """Points are 32-bit numbers: as a share of the shape's size they lie as near to its surface as this."""
@@ -111,3 +112,6 @@ def _segment_distances(points: FloatArray, start: FloatArray, end: FloatArray) -
     away = points[:, None] - start[None]
     share = np.einsum("ntj,tj->nt", away, along) / np.where(length > 0, length, 1.0)
     return np.linalg.norm(away - np.clip(share, 0, 1)[:, :, None] * along[None], axis=2)
+
+
+AUDIT = Audit(faults=point_faults)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pipeline.places import Places
+from stages.shape.collection.audit import Audit
 from stages.shape.collection.declared import languages
 from stages.shape.collection.packaged import Packaged
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 
-__all__ = ["contradictions", "judged_anew"]
+__all__ = ["AUDIT", "contradictions", "judged_anew"]
 
 ROUNDED = 2e-6
 """Numbers of a record are rounded to so many."""
@@ -31,7 +33,7 @@ def contradictions(sample: Packaged) -> Iterator[str]:
         yield "its json names a weakest part that is not there"
 
 
-def judged_anew(sample: Packaged) -> Iterator[str]:
+def judged_anew(sample: Packaged, _: Places) -> Iterator[str]:
     """A sentence for each field that statics finds otherwise, and for contacts that are none."""
     shape, recorded = sample.shape, sample.record["physics"]
     judge = judge_of(shape.meshes, shape.up, _config(sample))
@@ -53,3 +55,6 @@ def judged_anew(sample: Packaged) -> Iterator[str]:
 
 def _config(sample: Packaged) -> PhysicsConfig:
     return PhysicsConfig.model_validate(sample.sections["validity"])
+
+
+AUDIT = Audit(faults=contradictions, anew=judged_anew)

@@ -6,17 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.declared import languages
 from stages.shape.collection.packaged import Packaged
 from stages.shape.graphs.canonical import graph_digest
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.tokens import StringError
 
-__all__ = ["string_faults"]
+__all__ = ["AUDIT", "string_faults"]
 
 
 def string_faults(sample: Packaged) -> Iterator[str]:
     """A sentence for a shape graph that is not the record's, and for strings that stand for another graph."""
+    if not languages()[sample.record["language"]].graphs:
+        return
     types = sample.shape.assembly.types
     if graph_digest(types, sample.contacts) != sample.record["graph"]:
         yield "its parts and contacts are another graph than its json names"
@@ -36,3 +40,6 @@ def string_faults(sample: Packaged) -> Iterator[str]:
         if number == 0 and graph_digest(decoded.types, decoded.edges) != sample.record["graph"]:
             yield "the first line of its txt stands for another graph"
             return
+
+
+AUDIT = Audit(faults=string_faults)

@@ -1,0 +1,22 @@
+"""How `make verify` looks at samples that are assemblies of a kit's parts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pipeline.places import Places
+from stages.exemplars.faults import geometry_faults
+from stages.exemplars.language import LANGUAGE, made_kits
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.packaged import Packaged
+
+__all__ = ["AUDIT"]
+
+
+def _anew(sample: Packaged, places: Places) -> Iterator[str]:
+    """Contacts, grammar and penetration, from the mesh as it stands in the file."""
+    if sample.record["language"] == LANGUAGE.name:
+        yield from geometry_faults(made_kits(places)[sample.record["kit"]], sample.members)
+
+
+AUDIT = Audit(anew=_anew)
