@@ -36,7 +36,8 @@ class Flat:
     their program.
     block_rows, block_parts: int64 (b + 1,), where the rows and the cuboids of each assembly start;
     program_blocks: int64 (p + 1,), where the assemblies of each program start;
-    names: of each assembly the names of its cuboids, the bounding box first.
+    names: of each assembly the names of its cuboids, the bounding box first; originals: the names of what these are
+    copies of, or their own.
     """
 
     rows: FloatArray
@@ -44,6 +45,7 @@ class Flat:
     block_parts: Indices
     program_blocks: Indices
     names: tuple[tuple[str, ...], ...]
+    originals: tuple[tuple[str, ...], ...]
 
 
 def flatten(programs: Sequence[Program]) -> Flat:
@@ -56,12 +58,13 @@ def flatten(programs: Sequence[Program]) -> Flat:
     """
     rows: list[float] = []
     block_rows, block_parts, program_blocks = [0], [0], [0]
-    names = []
+    names, originals = [], []
     for program in programs:
         assemblies = {block.name: index for index, block in enumerate(program.blocks)}
         for block in program.blocks:
-            places = _flatten_block(block, assemblies, rows)
+            places, copied = _flatten_block(block, assemblies, rows)
             names.append(tuple(places))
+            originals.append(copied)
             block_rows.append(len(rows) // 10)
             block_parts.append(block_parts[-1] + len(places))
         program_blocks.append(len(names))
@@ -71,12 +74,16 @@ def flatten(programs: Sequence[Program]) -> Flat:
         block_parts=np.array(block_parts),
         program_blocks=np.array(program_blocks),
         names=tuple(names),
+        originals=tuple(originals),
     )
 
 
-def _flatten_block(block: Block, assemblies: dict[str, int], rows: list[float]) -> dict[str, int]:
-    """Append the rows of one assembly; its cuboids by name."""
+def _flatten_block(
+    block: Block, assemblies: dict[str, int], rows: list[float]
+) -> tuple[dict[str, int], tuple[str, ...]]:
+    """Append the rows of one assembly; its cuboids by name, and the original of each."""
     places: dict[str, int] = {}
+    originals: list[str] = []
     if len(block.lines) > MAX_LINES:
         raise ProgramError(
             "too many lines", f"{block.name} has {len(block.lines)}; an assembly has at most {MAX_LINES}"
@@ -93,6 +100,7 @@ def _flatten_block(block: Block, assemblies: dict[str, int], rows: list[float]) 
                     raise _refused(block, line, places)
                 expanded_by = assemblies.get(line.name, -1) if places else -1
                 places[line.name] = len(places)
+                originals.append(line.name)
                 rows += (DECLARE, expanded_by, line.aligned, 0, *line.dims, 0, 0, 0)
             elif isinstance(line, Squeeze):
                 moved, first, second = places[line.moved], places[line.first], places[line.second]
@@ -105,17 +113,19 @@ def _flatten_block(block: Block, assemblies: dict[str, int], rows: list[float]) 
                     raise _refused(block, line, places)
                 if isinstance(line, Reflect):
                     rows += (REFLECT, moved, _AXIS[line.axis], 0, 0, 0, 0, 0, 0, 0)
-                    places[copy_name(places)] = len(places)
+                    copies = 1
                 else:
                     if not 1 <= line.copies <= MAX_PARTS - len(places):
                         raise ProgramError("too many cuboids", f"{_where(block, line)}; at most {MAX_PARTS} are made")
                     rows += (TRANSLATE, moved, _AXIS[line.axis], line.copies, line.distance, 0, 0, 0, 0, 0)
-                    for _ in range(line.copies):
-                        places[copy_name(places)] = len(places)
+                    copies = line.copies
+                for _ in range(copies):
+                    places[copy_name(places)] = len(places)
+                    originals.append(originals[moved])
         except KeyError as missing:
             detail = f"{_where(block, line)}: no line before it makes {missing.args[0]!r}"
             raise ProgramError("unknown name", detail) from None
-    return places
+    return places, tuple(originals)
 
 
 def copy_name(places: Mapping[str, int]) -> str:

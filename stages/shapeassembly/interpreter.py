@@ -44,29 +44,36 @@ class Execution:
     _tree: Indices
     _root: str
     _names: tuple[tuple[str, ...], ...]
+    _originals: tuple[tuple[str, ...], ...]
 
     def __len__(self) -> int:
         return len(self.corners)
 
-    @property
-    def blocks(self) -> Indices:
-        """Which assembly of the text each leaf is a line of, int64 (n,); copies of an assembly share it."""
-        blocks: Indices = self._tree[self.nodes, 0]
-        return blocks
-
     @cached_property
     def node_names(self) -> tuple[str, ...]:
         """The assemblies by path, the root first: `Program_0`, `Program_0/Program_1`, `Program_0/cube3` (a copy)."""
-        names = [self._root]
-        for _, parent, part in self._tree[1:].tolist():
-            names.append(f"{names[parent]}/{self._names[self._tree[parent, 0]][part]}")
-        return tuple(names)
+        return self._node_paths(self._names)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The leaves by path: `Program_0/Program_1/cube0`."""
+        """The leaves by path: `Program_0/Program_1/cube0`. No two are alike."""
+        return self._leaf_paths(self._names)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """What each leaf is: its path, where a copy is called like what it is a copy of: `Armchair/arm`."""
+        return self._leaf_paths(self._originals)
+
+    def _node_paths(self, called: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
+        paths = [self._root]
+        for _, parent, part in self._tree[1:].tolist():
+            paths.append(f"{paths[parent]}/{called[self._tree[parent, 0]][part]}")
+        return tuple(paths)
+
+    def _leaf_paths(self, called: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
+        nodes, blocks = self._node_paths(called), self._tree[:, 0].tolist()
         return tuple(
-            f"{self.node_names[node]}/{self._names[self._tree[node, 0]][part]}"
+            f"{nodes[node]}/{called[blocks[node]][part]}"
             for node, part in zip(self.nodes.tolist(), self._parts.tolist(), strict=True)
         )
 
@@ -107,6 +114,7 @@ def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
                 done.node[node_starts[index] : node_starts[index + 1]],
                 program.root.name,
                 flat.names[blocks[index] : blocks[index + 1]],
+                flat.originals[blocks[index] : blocks[index + 1]],
             )
         )
     return executions

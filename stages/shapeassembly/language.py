@@ -10,7 +10,7 @@ from pipeline.stage import Plan, Task
 from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
-from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.shape import label_colors, shape_of_text
 
 __all__ = ["LANGUAGE", "assignment_name"]
 
@@ -19,15 +19,20 @@ class Programs:
     """The categories of programs that the assignment has listed with the labels of their parts."""
 
     def __init__(self, listed: Mapping[str, Sequence[str]]) -> None:
-        self.sources = {kit: Source(tuple(labels)) for kit, labels in listed.items()}
+        self.sources = {kit: _source(tuple(labels)) for kit, labels in listed.items()}
 
     def shape(self, sample: Sample) -> Shape:
-        """The executed program. Raises ProgramError for a text that is none."""
-        return shape_of_text(sample.text)
+        """The executed program, its labels those of its category. Raises ProgramError for a text that is none."""
+        return shape_of_text(sample.text, self.sources[sample.kit].labels)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """Nothing: a program begins with a text."""
         return ()
+
+
+def _source(labels: tuple[str, ...]) -> Source:
+    colors = tuple((red, green, blue) for red, green, blue in label_colors(len(labels)).tolist())
+    return Source(labels, colors, f"{len(labels)} part labels")
 
 
 def assignment_name(dataset: str) -> str:

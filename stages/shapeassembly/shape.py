@@ -1,18 +1,18 @@
-"""An executed program as a shape: one box a leaf cuboid, named by its path."""
+"""An executed program as a shape: one box a leaf cuboid, named by its path, labelled by its place in the hierarchy."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from stages.shape.arrays import ByteArray
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 from stages.shapeassembly.interpreter import Execution, execute
 from stages.shapeassembly.parser import parse
 
-__all__ = ["LABELS", "shape_of_execution", "shape_of_text"]
-
-LABELS = ("cuboid",)
-"""Programs say nothing about what their cuboids are: all have one label."""
+__all__ = ["label_colors", "shape_of_execution", "shape_of_text"]
 
 _FACES = np.array(
     [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
@@ -20,27 +20,39 @@ _FACES = np.array(
 )  # fmt: skip
 """Triangles of a box over corners in the order of `Execution.corners`, seen from outside counter-clockwise."""
 
-_COLORS = np.array(
-    [[190, 140, 92], [126, 158, 171], [205, 178, 128], [136, 152, 106], [164, 114, 104], [150, 150, 156]], np.uint8
-)
-"""One colour after the other for the assemblies of a program, sRGB."""
+_TONES = np.array(
+    [[190, 140, 92], [126, 158, 171], [205, 178, 128], [136, 152, 106], [176, 112, 96], [150, 150, 156],
+     [222, 204, 174], [104, 128, 150], [158, 118, 84], [172, 178, 150], [142, 110, 122]], np.uint8,
+)  # fmt: skip
+"""One tone after the other for the labels, sRGB: woods, cloths and paints."""
 
 
-def shape_of_text(text: str) -> Shape:
-    """The shape of a program's text, y up. Raises ProgramError where it cannot be read or executed."""
-    return shape_of_execution(execute(parse(text)))
+def shape_of_text(text: str, labels: Sequence[str] = ()) -> Shape:
+    """The shape of a program's text, as `shape_of_execution`. Raises ProgramError where it cannot be read or
+    executed."""
+    return shape_of_execution(execute(parse(text)), labels)
 
 
-def shape_of_execution(execution: Execution) -> Shape:
-    """One mesh a leaf cuboid, centred, with its pose, `own_names` being the paths; cuboids of one assembly of
-    the text share a colour."""
+def shape_of_execution(execution: Execution, labels: Sequence[str] = ()) -> Shape:
+    """One mesh a leaf cuboid, centred, with its pose, y up; `own_names` are the paths.
+
+    labels: those of all programs of a category; without them the shape has its own, sorted. The place of a label among
+    them decides its colour.
+    """
+    known = tuple(labels) or tuple(sorted(set(execution.labels)))
+    color_of = dict(zip(known, label_colors(len(known)), strict=True))
     halves = np.array([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)])
     meshes = tuple(
-        PartMesh(LABELS[0], halves * size, _FACES, np.tile(_COLORS[block % len(_COLORS)], (len(_FACES), 1)))
-        for size, block in zip(execution.sizes, execution.blocks.tolist(), strict=True)
+        PartMesh(label, halves * size, _FACES, np.tile(color_of[label], (len(_FACES), 1)))
+        for size, label in zip(execution.sizes, execution.labels, strict=True)
     )
     poses = np.tile(np.eye(4), (len(meshes), 1, 1))
     poses[:, :3, :3] = execution.frames
     poses[:, :3, 3] = execution.centres
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, np.empty((0, 2), np.int32))
-    return Shape(meshes, assembly, "y", LABELS, execution.names)
+    return Shape(meshes, assembly, "y", known, execution.names)
+
+
+def label_colors(count: int) -> ByteArray:
+    """The colours of the first `count` labels of a category, sRGB uint8 (count, 3)."""
+    return _TONES[np.arange(count) % len(_TONES)]

@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.shape.collection.classes import Classes
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
@@ -24,11 +25,11 @@ from stages.shapeassembly.checks import overflow, violations
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
 from stages.shapeassembly.interpreter import execute
-from stages.shapeassembly.language import assignment_name
+from stages.shapeassembly.language import Programs, assignment_name
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig
-from stages.shapeassembly.shape import LABELS, shape_of_execution
+from stages.shapeassembly.shape import shape_of_execution
 from stages.shapeassembly.sources import program_texts, source_digest
 from stages.shapeassembly.structure import signature
 
@@ -76,12 +77,20 @@ def run_assignment(task: Task) -> Outcome:
     """Read and check all programs, and share them out; programs of one signature stand in one split.
 
     Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line, and `.labels.json`,
-    the part labels of each category.
+    the part labels of all programs of each category, sorted. Raises ShardFailed for no program, or too many labels.
     """
     config = task.config.section(ShapeAssemblyConfig)
     rows = list(_accepted(task, config))
     if not rows:
         raise ShardFailed("no program was accepted; the rejects of this shard say why")
+    found: dict[str, set[str]] = {}
+    for row in rows:
+        found.setdefault(row["kit"], set()).update(row.pop("labels"))
+    labels = {kit: sorted(found[kit]) for kit in sorted(found)}
+    try:
+        Classes.of(Programs(labels).sources)
+    except ValueError as error:
+        raise ShardFailed(f"{error}; the names in the programs make them") from error
     groups: dict[str, list[int]] = {}
     for index, row in enumerate(rows):
         groups.setdefault(row["graph"], []).append(index)
@@ -97,7 +106,7 @@ def run_assignment(task: Task) -> Outcome:
                 stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
     counts = dict(sorted(Counter(row["kit"] for row in rows).items()))
     with task.output(f"{task.shard.name}.labels.json") as stream:
-        stream.write(json_bytes(dict.fromkeys(counts, LABELS)))
+        stream.write(json_bytes(labels))
     parts = float(np.mean([row["parts"] for row in rows]))
     return Outcome(0, {"shards": shards, "programs": counts, "structures": len(groups), "parts": round(parts, 2)})
 
@@ -147,7 +156,12 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
     weak = unmet(config.require, shape_of_execution(execution))
     if weak is not None:
         raise Rejected(weak)
-    return {"text": print_program(program), "graph": signature(program), "parts": len(execution)}
+    return {
+        "text": print_program(program),
+        "graph": signature(program),
+        "parts": len(execution),
+        "labels": set(execution.labels),
+    }
 
 
 def run_collection(task: Task) -> Outcome:

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from stages.shape.sample import Sample, read_samples
-from stages.shapeassembly import parse
+from stages.shapeassembly import execute, parse
 from stages.shapeassembly.shape import shape_of_text
 from stages.shapeassembly.structure import signature
 
@@ -87,6 +87,13 @@ def test_samples_are_canonical_programs_shared_out_by_structure(made: tuple[str,
     assert {split for each in splits.values() for split in each} == {"train", "val", "test"}
     assert len({sample.key for sample in found}) == len(found)
     assert "12 structures" in made[0]
+
+
+def test_the_labels_of_a_category_are_those_of_all_its_programs_in_order(made: tuple[str, Path]) -> None:
+    listed = json.loads((made[1] / "toy-assignment.labels.json").read_text())
+    labels = {label for path in EXAMPLES for label in execute(parse(path.read_text())).labels}
+    assert listed == {"good": sorted(labels)}
+    assert {"Armchair/arm", "Desk/Drawers/Front/panel"} <= labels
 
 
 def test_what_is_no_good_program_is_refused_with_its_reason(made: tuple[str, Path]) -> None:
