@@ -59,6 +59,7 @@ def _source(kit: Kit) -> Source:
         kit.type_names(),
         tuple((red, green, blue) for red, green, blue in colors),
         f"{count} exemplar{'' if count == 1 else 's'}, {len(kit.types)} part types",
+        kit.contact_tolerance,
     )
 
 

@@ -13,7 +13,7 @@ from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
 from stages.package.croissant import croissant
 from stages.package.index import read_rows, write_index
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
+from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
 from stages.package.manifest import checksums, manifest
 from stages.shape.collection.declared import language_of
 
@@ -21,12 +21,12 @@ __all__ = ["compose_dataset"]
 
 
 def compose_dataset(task: Task) -> Outcome:
-    """Write card, Croissant, manifest, checksums and index.
+    """Write card, Croissant, schema, manifest, checksums and index.
 
     The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
-    shards); `members` (what is to say of each); `made`, `splits`, `story`, `variety`, `rejects` and `measures` (what
-    there is to say of how it was made); `preview` (the shard with the picture) and `package` (the version of this
-    stage).
+    shards); `members` (what is to say of each); `schema` (of the records); `made`, `splits`, `story`, `variety`,
+    `rejects` and `measures` (what there is to say of how it was made); `preview` (the shard with the picture) and
+    `package` (the version of this stage).
     """
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
@@ -45,6 +45,7 @@ def compose_dataset(task: Task) -> Outcome:
     files = {
         CARD: card(facts, shards, members, rows, sources, story).encode(),
         CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
+        SCHEMA: _text(params["schema"]),
         MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["measures"], params["package"])),
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}

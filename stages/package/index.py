@@ -20,6 +20,7 @@ COLUMNS = {
     "producer": Column("string", ("producer",)),
     "parts": Column("int32", ("counts", "parts")),
     "contacts": Column("int32", ("counts", "contacts")),
+    "pieces": Column("int32", ("counts", "pieces")),
     "cycles": Column("int32", ("counts", "cycles")),
     "types": Column("int32", ("counts", "types")),
     "text": Column("string", ("text",)),

@@ -9,10 +9,11 @@ from typing import Any
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
 from stages.package.described import described_members
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
+from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
 from stages.package.manifest import config_sections
 from stages.package.merge import merge_shard
 from stages.package.preview import draw_preview
+from stages.package.schema import record_schema
 from stages.package.settings import PackageConfig
 from stages.shape.collection.declared import language_of, members, producers
 from stages.shape.collection.shards import (
@@ -26,7 +27,7 @@ from stages.shape.collection.shards import (
 
 __all__ = ["STAGE"]
 
-VERSION = 4
+VERSION = 5
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
@@ -64,6 +65,7 @@ def plan(plan: Plan) -> list[Shard]:
         "sections": config_sections(plan.config),
         "shards": filled,
         "members": described_members(plan.config, filled[0]["members"], language_of(producer).text),
+        "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
         "made": declared.sentence,
         "splits": declared.splits,
         "story": list(declared.card(plan)),
@@ -102,7 +104,7 @@ def publish(plan: Plan) -> Mapping[str, str]:
     name = plan.config.name
     if WHOLE not in plan.shards("package"):
         return {}
-    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, MANIFEST, CHECKSUMS)}
+    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, SCHEMA, MANIFEST, CHECKSUMS)}
     files[f"{name}/{PREVIEW}"] = f"{PICTURE}.png"
     files[index_path(plan.config)] = f"{WHOLE}.parquet"
     for shard in plan.shards("package"):

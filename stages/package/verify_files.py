@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.places import file_digest
 from pipeline.shards import bytes_array
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST
+from stages.shape.collection.pairs import CONTACTS, pairs_of
 
 __all__ = ["FileFindings", "check_files", "empty_values", "shard_samples"]
 
@@ -201,7 +202,7 @@ def _sample_faults(key: str, split: str, members: Mapping[str, bytes]) -> Iterat
     empty = list(empty_values(record))
     if empty:
         yield f"its json has nothing at {', '.join(empty[:3])}"
-    counts = {"parts": len(record["parts"]), "contacts": len(json.loads(record["contacts"]))}
+    counts = {"parts": len(record["parts"]), "contacts": len(pairs_of(members[CONTACTS]))}
     for name, count in counts.items():
         if record["counts"][name] != count:
             yield f"its json counts {record['counts'][name]} {name} and lists {count}"

@@ -168,7 +168,7 @@ def _sample(row: dict[str, Any], split: str) -> Sample:
         producer="shapeassembly",
         kit=row["kit"],
         graph=row["graph"],
-        lineage={"file": row["file"]},
+        lineage={"method": "executed", "parents": [row["file"]]},
         text=row["text"],
     )
 

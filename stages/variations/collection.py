@@ -138,6 +138,7 @@ def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, in
         graph=graph_digest(assembly.types, assembly.edges) if added else found.digest(index),
         assembly=assembly,
         lineage={
+            "method": "exchange",
             "name": f"{found.name}-{index}",
             **found.described(index),
             "backdrop": added,

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pipeline.config import Config
 from pipeline.stage import Plan
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
 from stages.variations.measures import measure_table
 
@@ -35,6 +37,35 @@ def _endings(plan: Plan) -> Sequence[str]:
     return ["\n".join(ended)] if ended else []
 
 
+def _lineage(_: Config) -> Mapping[str, Field]:
+    whole = {"type": "integer", "minimum": 0}
+    places = {"type": "array", "items": whole, "minItems": 1}
+    row = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+    return {
+        "name": Field({"type": "string", "minLength": 1, "description": "what the sample's own children call it"}),
+        "parts_from": Field(
+            {**places, "maxItems": 2, "description": "how many parts came from the first parent and from the second"}
+        ),
+        "boundary": Field(
+            {**places, "description": "parts of the first parent along which it was cut, by their places there"}
+        ),
+        "images": Field(
+            {**places, "description": "parts of the second parent that each part of the boundary came to lie on"}
+        ),
+        "motion": Field(
+            {
+                "type": "array",
+                "items": row,
+                "minItems": 4,
+                "maxItems": 4,
+                "description": "moved the piece of the first parent to the second: the rows of a rotation, then a "
+                "translation, in the coordinates of the model files",
+            }
+        ),
+        "backdrop": Field({**whole, "description": "parts at the end of the list that were put back behind it"}),
+    }
+
+
 PRODUCER = Producer(
     language="kit",
     keys="exemplars.kits",
@@ -43,6 +74,7 @@ PRODUCER = Producer(
     "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's `parents` are "
     "exemplars, or variants by the `name` in their own `lineage`.",
     splits="Samples whose shape graphs are equal stand in one split.",
+    lineage=_lineage,
     card=_endings,
     variety=_variety,
     measures=_measures,

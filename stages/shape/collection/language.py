@@ -23,11 +23,13 @@ class Source:
 
     labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none;
     sentence: what a card says of it, in a few words.
+    contact_tolerance: of shape graphs the largest distance of parts in contact, in the units of the shapes.
     """
 
     labels: tuple[str, ...]
     colors: tuple[tuple[int, int, int], ...] = ()
     sentence: str = ""
+    contact_tolerance: float = 0.0
 
 
 class Speaker(Protocol):

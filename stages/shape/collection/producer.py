@@ -8,12 +8,17 @@ from typing import Any
 
 from pipeline.config import Config
 from pipeline.stage import Plan
+from stages.shape.collection.members import Field
 
 __all__ = ["Producer"]
 
 
 def _nothing_to_add(_: Plan) -> Sequence[str]:
     return ()
+
+
+def _no_lineage(_: Config) -> Mapping[str, Field]:
+    return {}
 
 
 def _no_measures(_: Plan) -> Mapping[str, Any]:
@@ -30,6 +35,8 @@ class Producer:
     language: the name of the language that its samples are in; keys: the keys of a config that ask for it, for
     messages; asked: whether a config does.
     sentence: how its samples come about; splits: what keeps its splits apart; both for the card.
+    lineage: what `Sample.lineage` of its samples holds beside `method` and `parents`, by name; the same fields of the
+    same types in all samples of a dataset, and no value empty.
     card: paragraphs and tables for the card's section on how the dataset was made, from finished records.
     variety: Markdown for the card's section on how different the samples are.
     measures: figures for the manifest.
@@ -40,6 +47,7 @@ class Producer:
     asked: Callable[[Config], bool]
     sentence: str
     splits: str
+    lineage: Callable[[Config], Mapping[str, Field]] = _no_lineage
     card: Callable[[Plan], Sequence[str]] = _nothing_to_add
     variety: Callable[[Plan], Sequence[str]] = _nothing_to_add
     measures: Callable[[Plan], Mapping[str, Any]] = _no_measures

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.shards import bytes_array, read_shard
 from tests.stages.package.toy import SPLITS, toy_keys
 
 POINTS = 16 + 64
@@ -46,6 +47,7 @@ def test_webdataset_yields_each_sample_once_and_decoded(toy_folder: Path, split:
         assert sample["points.npy"].shape == sample["normals.npy"].shape == (POINTS, 3)
         assert sample["points.npy"].dtype == np.float32
         assert sample["labels.npy"].dtype == sample["instances.npy"].dtype == np.int16
+        assert sample["contacts.npy"].shape == (2, sample["json"]["counts"]["contacts"])
         assert sample["json"]["key"] == sample["__key__"]
         assert sample["txt"].split()[0] == sample["json"]["text"]
 
@@ -80,6 +82,10 @@ print(json.dumps({
     "parts": [part["name"] for part in first["json"]["parts"]],
     "size": first["sketch0.png"].size,
     "points": [len(each["points.npy"]) for each in loaded["val"]],
+    "contacts": {
+        each["__key__"]: each["contacts.npy"] for kind in (loaded, streamed) for split in kind for each in kind[split]
+    },
+    "types": str(streamed["train"].features["contacts.npy"]),
 }))
 """
 
@@ -92,6 +98,10 @@ def test_hugging_face_datasets_loads_every_split_with_typed_members(toy_folder: 
     assert features["sketch0.png"].startswith("Image")
     assert features["points.npy"] == features["normals.npy"] == "List(List(Value('float32')))"
     assert features["labels.npy"] == features["instances.npy"] == "List(Value('int16'))"
+    assert features["contacts.npy"] == found["types"] == "List(List(Value('int32')))"
+    stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
+    assert found["contacts"] == {key: bytes_array(each["contacts.npy"]).tolist() for key, each in stored.items()}
+    assert [[], []] in found["contacts"].values()
     assert features["txt"] == "Value('string')"
     assert "null" not in features["json"]
     assert found["nodes"] == sorted(found["parts"])
@@ -120,8 +130,6 @@ print(json.dumps(found))
 def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
     toy_folder: Path, tmp_path: Path
 ) -> None:
-    from pipeline.shards import read_shard
-
     (line,) = outside(CROISSANT, str(toy_folder / "croissant.json"), cache=tmp_path).splitlines()
     found = json.loads(line)
     assert found["issues"] == []

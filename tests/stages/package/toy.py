@@ -57,7 +57,7 @@ def toy_kit(name: str) -> Kit:
     beside = [np.eye(4), np.eye(4)]
     beside[0][0, 3], beside[1][0, 3] = 1.0, -1.0
     dockings = tuple(Docking(0, 1, pose, "face", count, 0.0) for pose, count in zip(beside, (3, 2), strict=True))
-    rules = {kind: {((1 - kind, 1),): 1, ((1 - kind, 2),): 4} for kind in (0, 1)}
+    rules = {kind: {(): 1, ((1 - kind, 1),): 1, ((1 - kind, 2),): 4} for kind in (0, 1)}
     return Kit(
         name=name,
         types=types,
@@ -76,8 +76,9 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
     for item in range(count):
         number = (SPLITS.index(split) * 100 + index) * 10 + item
         kit = list(KITS)[number % 2]
-        assembly = chain(2 + number % 5, number % 2)
-        lineage: dict[str, Any] = {"parents": ["row"]} if item else {}
+        # loaders take types from what they see first: shapes of one part, in which nothing touches
+        assembly = chain(2 + number % 5 if index else 1, number % 2)
+        lineage: dict[str, Any] = {"method": "toy", "parents": ["row"]}
         samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, f"{number:032x}", lineage, assembly))
     return samples
 
