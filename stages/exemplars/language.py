@@ -94,4 +94,7 @@ LANGUAGE = Language(
     graphs=True,
     text="Its shape graph as strings, SMILES-like, one a line, the first canonical.",
     faults=_faults,
+    coordinates="The unit is that of the model files. The origin of a mesh is the middle of the box around the part as "
+    "its model file has it; the origin of a shape is that of the exemplar that most of it stands in, and may lie "
+    "anywhere.",
 )

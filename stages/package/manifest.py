@@ -24,10 +24,12 @@ def manifest(
     shards: Sequence[Mapping[str, Any]],
     index: Mapping[str, Any],
     measures: Mapping[str, Mapping[str, Any]],
-    package_version: int,
+    made_with: Mapping[str, Any],
+    origins: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """What `manifest.json` holds. `shards` are the summaries of the package's shards; `index` has `path` (relative
-    to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit."""
+    to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit; `made_with` versions of
+    code and libraries; `origins` the files that the samples were made from, and whose they are."""
     kits: Counter[str] = Counter()
     splits: Counter[str] = Counter()
     for shard in shards:
@@ -37,7 +39,7 @@ def manifest(
         "name": facts["name"],
         "version": facts["version"],
         "seed": facts["seed"],
-        "package": package_version,
+        "made_with": dict(made_with),
         "samples": sum(splits.values()),
         "splits": dict(splits),
         "kits": dict(kits),
@@ -45,7 +47,8 @@ def manifest(
         "shards": [
             {name: shard[name] for name in ("path", "split", "samples", "bytes", "sha256", "kits")} for shard in shards
         ],
-        "index": dict(index),
+        "index": {name: index[name] for name in ("path", "bytes", "sha256")},
+        "origins": [dict(each) for each in origins],
         "measures": dict(measures),
         "config": dict(sections),
     }

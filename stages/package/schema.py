@@ -6,6 +6,7 @@ Put together of package's own fields, those that stages declare in `members.py`,
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -43,8 +44,6 @@ def record_schema(config: Config, producer: str, stages: Iterable[str]) -> dict[
 @lru_cache(maxsize=4)
 def validator_of(schema: str) -> Validator:
     """The validator of a schema given as JSON. Raises jsonschema.SchemaError for what is none."""
-    import json
-
     from jsonschema import Draft202012Validator
 
     loaded = json.loads(schema)

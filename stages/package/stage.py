@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
 from stages.package.described import described_members
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
+from stages.package.made_with import code_version, library_versions
 from stages.package.manifest import config_sections
 from stages.package.merge import merge_shard
 from stages.package.preview import draw_preview
 from stages.package.schema import record_schema
 from stages.package.settings import PackageConfig
 from stages.shape.collection.declared import language_of, members, producers
+from stages.shape.collection.origin import unstated
 from stages.shape.collection.shards import (
     MEMBERS,
     PRODUCERS,
@@ -58,22 +61,29 @@ def plan(plan: Plan) -> list[Shard]:
         "rows": rows,
     }
     picture = Shard(PICTURE, pictured, (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows))))
-    declared = producers()[producer]
+    declared, language = producers()[producer], language_of(producer)
+    origins = declared.origins(plan.config)
     params = {
         "facts": _facts(plan),
         "producer": producer,
         "sections": config_sections(plan.config),
         "shards": filled,
-        "members": described_members(plan.config, filled[0]["members"], language_of(producer).text),
+        "members": described_members(plan.config, filled[0]["members"], language.text),
         "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
-        "made": declared.sentence,
-        "splits": declared.splits,
-        "story": list(declared.card(plan)),
-        "variety": list(declared.variety(plan)),
-        "rejects": _rejects(plan, producer),
+        "story": {
+            "made": declared.sentence,
+            "splits": declared.splits,
+            "coordinates": language.coordinates,
+            "limits": list(declared.limits),
+            "paragraphs": list(declared.card(plan)),
+            "variety": list(declared.variety(plan)),
+            "rejects": _rejects(plan, producer),
+            "unstated": unstated(origins),
+        },
         "measures": dict(declared.measures(plan)),
         "preview": PICTURE,
-        "package": VERSION,
+        "made_with": {"shapemill": code_version(), "libraries": library_versions()},
+        "origins": [asdict(each) for each in origins],
     }
     inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
     return [*merged, picture, Shard(WHOLE, params, inputs)]

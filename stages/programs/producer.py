@@ -39,5 +39,6 @@ PRODUCER = Producer(
     "their continuous parameters stand in one split; where every value of every parameter is sampled, all splits have "
     "all values, as published.",
     lineage=_lineage,
+    limits=("All shapes are values of the same parameters; what the program cannot say is not there.",),
     card=_recipe,
 )

@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.shape.collection.origin import unstated
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
@@ -25,6 +26,7 @@ from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
 from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.language import assignment_name
+from stages.shapeassembly.origins import program_origins
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig
@@ -186,7 +188,8 @@ def report(plan: Plan) -> Sequence[str]:
     for shard in (*extraction, name):
         refused.update(plan.rejects("shapeassembly", shard))
     why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
-    return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}"]
+    asked = [f"warning: {sentence}" for sentence in unstated(program_origins(plan.config))]
+    return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}", *asked]
 
 
 def estimate_bytes(plan: Plan) -> int:

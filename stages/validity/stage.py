@@ -40,12 +40,13 @@ def run_shard(task: Task) -> Outcome:
         touching, connected = judge.tolerances(shape.assembly)
         if graphs:
             touching = collection.speaker.sources[sample.kit].contact_tolerance
+        physics = physical_fields(validity)
         fields = {
-            "physics": physical_fields(validity),
+            "physics": physics,
             "contact_tolerance": _short(touching),
             "joint_tolerance": _short(connected),
         }
-        counts.update(each for each in COUNTED if fields["physics"][each])
+        counts.update(each for each in COUNTED if physics[each])
         return {
             CONTACTS: pair_bytes(known),
             JOINTS: pair_bytes(validity.joints),

@@ -141,6 +141,7 @@ def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, in
             "method": "exchange",
             "name": f"{found.name}-{index}",
             **found.described(index),
+            "made_of": found.described(index)["parents"],
             "backdrop": added,
         },
     )

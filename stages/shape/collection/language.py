@@ -54,7 +54,7 @@ class Language:
     speaker: the language inside a task whose shard has those among its inputs.
     graphs: whether its samples are shape graphs, with contacts of their own and strings; else they have a text, and
     contacts are found by whoever asks.
-    text: what the member `txt` of its samples is, for the card.
+    text: what the member `txt` of its samples is; coordinates: their unit, and where their origin is; for the card.
     faults: how a packaged sample is held against what it was made from, given the mill's folders of its dataset.
     """
 
@@ -64,3 +64,4 @@ class Language:
     graphs: bool
     text: str
     faults: Callable[[Places], Faults]
+    coordinates: str = ""

@@ -9,6 +9,7 @@ from typing import Any
 from pipeline.config import Config
 from pipeline.stage import Plan
 from stages.shape.collection.members import Field
+from stages.shape.collection.origin import Origin
 
 __all__ = ["Producer"]
 
@@ -19,6 +20,10 @@ def _nothing_to_add(_: Plan) -> Sequence[str]:
 
 def _no_lineage(_: Config) -> Mapping[str, Field]:
     return {}
+
+
+def _no_origins(_: Config) -> Sequence[Origin]:
+    return ()
 
 
 def _no_measures(_: Plan) -> Mapping[str, Any]:
@@ -34,9 +39,11 @@ class Producer:
 
     language: the name of the language that its samples are in; keys: the keys of a config that ask for it, for
     messages; asked: whether a config does.
-    sentence: how its samples come about; splits: what keeps its splits apart; both for the card.
+    sentence: how its samples come about; splits: what keeps its splits apart; limits: what not to expect of them, in
+    sentences; all for the card.
     lineage: what `Sample.lineage` of its samples holds beside `method` and `parents`, by name; the same fields of the
     same types in all samples of a dataset, and no value empty.
+    origins: the files that its samples are made from, and whose they are.
     card: paragraphs and tables for the card's section on how the dataset was made, from finished records.
     variety: Markdown for the card's section on how different the samples are.
     measures: figures for the manifest.
@@ -47,7 +54,9 @@ class Producer:
     asked: Callable[[Config], bool]
     sentence: str
     splits: str
+    limits: tuple[str, ...] = ()
     lineage: Callable[[Config], Mapping[str, Field]] = _no_lineage
+    origins: Callable[[Config], Sequence[Origin]] = _no_origins
     card: Callable[[Plan], Sequence[str]] = _nothing_to_add
     variety: Callable[[Plan], Sequence[str]] = _nothing_to_add
     measures: Callable[[Plan], Mapping[str, Any]] = _no_measures

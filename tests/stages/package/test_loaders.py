@@ -7,8 +7,10 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 
 from pipeline.shards import bytes_array, read_shard
@@ -115,29 +117,56 @@ logging.basicConfig(stream=sys.stdout, level=logging.WARNING)
 import mlcroissant
 dataset = mlcroissant.Dataset(sys.argv[1])
 issues = dataset.metadata.ctx.issues
-found = {"issues": sorted(map(str, [*issues.errors, *issues.warnings])), "records": {}, "lengths": {}}
+found = {"issues": sorted(map(str, [*issues.errors, *issues.warnings])), "records": {}, "shapes": {}}
+def plain(value):
+    if isinstance(value, bytes):
+        return value.decode() if len(value) < 60 and value.isascii() else len(value)
+    return list(value.size) if hasattr(value, "mode") else value
 for record_set in dataset.metadata.record_sets:
     name = record_set.uuid
-    records = list(dataset.records(name))
-    found["records"][name] = [record[f"{name}/key"].decode() for record in records]
-    contents = [record[f"{name}/content"] for record in records]
-    found["lengths"][name] = [len(each) if isinstance(each, bytes) else list(each.size) for each in contents]
+    # a join of mlcroissant's does not run on a Dataset whose record sets have been read already
+    records = mlcroissant.Dataset(sys.argv[1]).records(name)
+    found["records"][name] = [{each.rpartition("/")[2]: plain(record[each]) for each in record} for record in records]
+    found["shapes"] |= {f.uuid: [f.array_shape_tuple, f.data_types] for f in record_set.fields if f.is_array}
 found["version"] = str(dataset.metadata.ctx.conforms_to)
 print(json.dumps(found))
 """
 
 
+@pytest.fixture(scope="module")
+def croissant(toy_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What mlcroissant says of the toy dataset: issues, records of every record set, shapes of arrays."""
+    cache = tmp_path_factory.mktemp("croissant")
+    (line,) = outside(CROISSANT, str(toy_folder / "croissant.json"), cache=cache).splitlines()
+    found: dict[str, Any] = json.loads(line)
+    return found
+
+
 def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
-    toy_folder: Path, tmp_path: Path
+    toy_folder: Path, croissant: dict[str, Any]
 ) -> None:
-    (line,) = outside(CROISSANT, str(toy_folder / "croissant.json"), cache=tmp_path).splitlines()
-    found = json.loads(line)
-    assert found["issues"] == []
-    assert found["version"].endswith("V_1_1")
+    assert croissant["issues"] == []
+    assert croissant["version"].endswith("V_1_1")
     stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
     members = {member.partition(".")[0]: member for member in next(iter(stored.values()))}
-    assert set(found["records"]) == set(members)
+    assert set(croissant["records"]) == {"splits", "samples", *members, *(f"{name}-of-samples" for name in members)}
     for name, member in members.items():
-        assert sorted(found["records"][name]) == sorted(stored)
-        for key, length in zip(found["records"][name], found["lengths"][name], strict=True):
-            assert length == ([24, 24] if member.endswith(".png") else len(stored[key][member]))
+        records = {each["key"]: each["content"] for each in croissant["records"][name]}
+        assert set(records) == set(stored)
+        for key, content in records.items():
+            size = len(stored[key][member])
+            assert content in ([24, 24], size, stored[key][member].decode("latin-1"))
+
+
+def test_mlcroissant_knows_splits_types_and_shapes(toy_folder: Path, croissant: dict[str, Any]) -> None:
+    records = croissant["records"]
+    assert {each["name"] for each in records["splits"]} == set(SPLITS)
+    split_of = {key: split for split in SPLITS for key in toy_keys(split)}
+    assert {each["key"]: each["split"] for each in records["samples"]} == split_of
+    rows = pyarrow.parquet.read_table(toy_folder.parent / "toy-index" / "toy.parquet").to_pylist()
+    assert {each["key"]: each["rooted"] for each in records["samples"]} == {row["key"]: row["rooted"] for row in rows}
+    for joined in ("points-of-samples", "sketch0-of-samples", "json-of-samples"):
+        assert {each["key"]: each["split"] for each in records[joined]} == split_of
+    shape, (text, element) = croissant["shapes"]["points/content"]
+    assert (shape, text.rpartition("/")[2], element.rpartition("/")[2]) == ([POINTS, 3], "Text", "Float32")
+    assert croissant["shapes"]["contacts-of-samples/content"][0] == [2, -1]

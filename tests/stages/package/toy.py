@@ -15,6 +15,7 @@ from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.exemplars.settings import ExemplarsConfig
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
 from stages.points.settings import PointsConfig
@@ -78,7 +79,17 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
         kit = list(KITS)[number % 2]
         # loaders take types from what they see first: shapes of one part, in which nothing touches
         assembly = chain(2 + number % 5 if index else 1, number % 2)
-        lineage: dict[str, Any] = {"method": "toy", "parents": ["row"]}
+        lineage: dict[str, Any] = {
+            "method": "toy",
+            "parents": ["row"],
+            "name": f"toy-{number}",
+            "made_of": ["row", "row"],
+            "parts_from": [1, len(assembly) - 1],
+            "boundary": [0],
+            "images": [0],
+            "motion": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]],
+            "backdrop": 0,
+        }
         samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, f"{number:032x}", lineage, assembly))
     return samples
 
@@ -99,10 +110,6 @@ class ToyConfig(StrictModel):
 
 
 class NoConfig(StrictModel):
-    """Nothing to set."""
-
-
-class OtherNoConfig(StrictModel):
     """Nothing to set."""
 
 
@@ -163,9 +170,9 @@ def _no_bytes(_: Plan) -> int:
 TOY_STAGES: Mapping[str, Stage] = named_inputs(
     [
         *ABSENT_STAGES.values(),
-        Stage("exemplars", 1, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
+        Stage("exemplars", 1, ExemplarsConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
         Stage("variations", 1, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
-        Stage("strings", 1, OtherNoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
+        Stage("strings", 1, NoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
         POINTS,
         VALIDITY,
         Stage("sketches", 1, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
@@ -178,9 +185,9 @@ def toy_config(shards: int = 8) -> Config:
     """The config of the toy dataset of so many shards a split."""
     sections = {
         **ABSENT_SECTIONS,
-        "exemplars": NoConfig(),
+        "exemplars": ExemplarsConfig(),
         "variations": ToyConfig(shards=shards),
-        "strings": OtherNoConfig(),
+        "strings": NoConfig(),
         "validity": PhysicsConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right"))),
