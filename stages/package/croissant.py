@@ -119,13 +119,13 @@ def _license(spdx: str) -> str:
 def _work(origin: Mapping[str, Any]) -> dict[str, Any]:
     """A file that the dataset was made from, as a schema.org CreativeWork."""
     work = {"@type": "sc:CreativeWork", "name": origin["file"], "identifier": f"sha256:{origin['sha256']}"}
-    if origin.get("author"):
+    if origin["author"]:
         work["author"] = {"@type": "sc:Person", "name": origin["author"]}
-    if origin.get("source"):
+    if origin["source"]:
         work["url"] = origin["source"]
-    if origin.get("license"):
+    if origin["license"]:
         work["license"] = origin["license"]
-    if origin.get("notice"):
+    if origin["notice"]:
         work["creditText"] = origin["notice"]
     return work
 

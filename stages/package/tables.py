@@ -55,9 +55,10 @@ def origin_table(origins: Sequence[Mapping[str, Any]]) -> str:
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for each in origins:
-        said = " | ".join(_cell(each[name]) or "not stated" for name in ("author", "source", "license"))
-        notice = _cell(each["notice"])
-        lines.append(f"| {each['file']} | {each['kit']} | {said} | {notice} | `{each['sha256'][:12]}…` |")
+        author, source, notice = (_cell(each[name]) for name in ("author", "source", "notice"))
+        license = _cell(each["license"]) or "not stated"
+        digest = f"`{each['sha256'][:12]}…`"
+        lines.append(f"| {each['file']} | {each['kit']} | {author} | {source} | {license} | {notice} | {digest} |")
     return "\n".join(lines)
 
 
