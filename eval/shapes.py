@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ from pipeline.errors import ConfigError
 from pipeline.shards import read_shard
 from stages.exemplars.build import observe_models
 from stages.exemplars.read import read_model
-from stages.exemplars.settings import KitConfig
+from stages.exemplars.settings import KitConfig, ShapeFile
 from stages.shape.arrays import FloatArray
+from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 
@@ -42,14 +43,14 @@ def dataset_shapes(folder: Path, most: int) -> Iterator[tuple[str, Shape]]:
         for _, members in read_shard(shard):
             if number % step == 0:
                 record = json.loads(members["json"])
-                yield str(record["kit"]), _sample_shape(members["glb"], record)
+                yield str(record["kit"]), _sample_shape(record, members)
             number += 1
 
 
 def model_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:
     """The shape in a model file, with the file's name, or its folder's where the file is just called `model`."""
     name = path.parent.name if path.stem == "model" else path.stem
-    config = KitConfig(name="model", shapes=(path,), up="z" if up == "z" else "y")
+    config = KitConfig(name="model", shapes=(ShapeFile(path=path),), up="z" if up == "z" else "y")
     kit = observe_models(config, [read_model(path, config.parts)]).kit
     yield name, Shape(kit.types, kit.exemplars[0].assembly, kit.up, kit.type_names())
 
@@ -89,11 +90,11 @@ def box_shape(corners: FloatArray, up: str) -> Shape:
     return Shape(meshes, assembly, "z" if up == "z" else "y", ("box",))
 
 
-def _sample_shape(content: bytes, record: dict[str, Any]) -> Shape:
+def _sample_shape(record: Mapping[str, Any], members: Mapping[str, bytes]) -> Shape:
     """A sample of a dataset; its GLB stands upright, y up."""
     import trimesh
 
-    scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
+    scene = trimesh.load_scene(io.BytesIO(members["glb"]), file_type="glb", process=False)
     placed = [scene.graph.get(part["name"]) for part in record["parts"]]
     names = [part["label"] for part in record["parts"]]
     geometries = list(dict.fromkeys(geometry for _, geometry in placed))
@@ -101,7 +102,7 @@ def _sample_shape(content: bytes, record: dict[str, Any]) -> Shape:
     assembly = Assembly(
         types=np.array([geometries.index(geometry) for _, geometry in placed], dtype=np.int16),
         poses=np.array([pose for pose, _ in placed], dtype=np.float64),
-        edges=np.array(json.loads(record["contacts"]), dtype=np.int32).reshape(-1, 2),
+        edges=pairs_of(members[CONTACTS]),
     )
     meshes = tuple(_welded(label_of[geometry], scene.geometry[geometry]) for geometry in geometries)
     return Shape(meshes, assembly, "y", tuple(dict.fromkeys(names)))

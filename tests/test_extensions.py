@@ -79,7 +79,8 @@ def test_samples_of_a_new_producer_have_what_all_stages_add(made: tuple[Path, st
         np.testing.assert_allclose(bytes_array(members["mass.npy"]), 2.5 * np.array(heights), rtol=1e-6)
         assert record["total_mass"] == pytest.approx(2.5 * sum(heights), abs=1e-3)
         assert {"glb", "points.npy", "labels.npy", "sketch0.png"} <= set(members)
-        assert record["contacts"]
+        assert bytes_array(members["contacts.npy"]).shape == (2, record["counts"]["contacts"])
+        assert record["lineage"]["parents"] == ["heap"]
         assert record["physics"]["rooted"]
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.contact import ContactTest, overlapping_boxes
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.geometry.pose import invert
@@ -40,7 +41,7 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     meshes, poses = _parts_of(members["glb"], names)
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
-    stored = {tuple(sorted(pair)) for pair in json.loads(record["contacts"])}
+    stored = {(i, j) for i, j in pairs_of(members[CONTACTS]).tolist()}
     found, doubtful = _contacts(meshes, poses, pairs, kit.contact_tolerance)
     contact = ContactTest(kit.types, kit.contact_tolerance)
     faults: list[str] = []

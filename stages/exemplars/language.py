@@ -60,6 +60,7 @@ def _source(kit: Kit) -> Source:
         kit.type_names(),
         tuple((red, green, blue) for red, green, blue in colors),
         f"{count} exemplar{'' if count == 1 else 's'}, {len(kit.types)} part types",
+        kit.contact_tolerance,
     )
 
 
@@ -103,4 +104,7 @@ LANGUAGE = Language(
     graphs=True,
     text="Its shape graph as strings, SMILES-like, one a line, the first canonical.",
     anew=_anew,
+    coordinates="The unit is that of the model files. The origin of a mesh is the middle of the box around the part as "
+    "its model file has it; the origin of a shape is that of the exemplar that most of it stands in, and may lie "
+    "anywhere.",
 )

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from pipeline.config import ExistingFile, StrictModel
+from stages.shape.collection.origin import Credit
 from stages.shape.kit import ContactKind, Strictness
 
-__all__ = ["ContactConfig", "ExemplarsConfig", "HubConfig", "KitConfig"]
+__all__ = ["ContactConfig", "ExemplarsConfig", "HubConfig", "KitConfig", "ShapeFile"]
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components"]
 
@@ -43,12 +44,33 @@ class HubConfig(StrictModel):
     )
 
 
+class ShapeFile(StrictModel):
+    """One model file."""
+
+    path: ExistingFile = Field(description="The file, from the run's folder.")
+    credit: Credit | None = Field(
+        None, exclude=True, description="Whose the model is, where it is not what the kit says."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _a_path_is_enough(cls, said: Any) -> Any:
+        """Of most files the path is all there is to say."""
+        return said if isinstance(said, dict) else {"path": said}
+
+
 class KitConfig(StrictModel):
     """One kit: exemplar shapes that share part types."""
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$", description="Name of the kit; starts the keys of its samples.")
-    shapes: tuple[ExistingFile, ...] = Field(
-        min_length=1, description="Model files (GLB, glTF, OBJ, PLY, STL, OFF, DAE), from the run's folder."
+    shapes: tuple[ShapeFile, ...] = Field(
+        min_length=1,
+        description="Model files (GLB, glTF, OBJ, PLY, STL, OFF, DAE), from the run's folder: their paths, or the keys "
+        "below.",
+    )
+    # excluded from what the stage's fingerprint sees: a mended licence makes the card anew and no shape
+    credit: Credit = Field(
+        default_factory=Credit, exclude=True, description="Whose the models are; card and manifest say it."
     )
     parts: Segmentation = Field("auto", description="What makes a part; `auto` picks and says what it picked.")
     types: Literal["congruence", "labels"] = Field(

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.build import build_kit
+from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.portrait import kit_sheet
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection.origin import unstated
 from stages.shape.kit_files import write_kit
 
 __all__ = ["STAGE"]
@@ -20,14 +22,16 @@ BYTES_A_KIT = 8_000_000
 def plan(plan: Plan) -> list[Shard]:
     """One shard a kit; the digests of its model files make it anew when they change."""
     kits = plan.config.section(ExemplarsConfig).kits
-    return [Shard(kit.name, {"kit": kit.name, "digests": [file_digest(shape) for shape in kit.shapes]}) for kit in kits]
+    return [
+        Shard(kit.name, {"kit": kit.name, "digests": [file_digest(shape.path) for shape in kit.shapes]}) for kit in kits
+    ]
 
 
 def run_shard(task: Task) -> Outcome:
     """Read, repair, identify, observe, write."""
     kits = task.config.section(ExemplarsConfig).kits
     config = next(kit for kit in kits if kit.name == task.shard.params["kit"])
-    models = [read_model(shape, config.parts) for shape in config.shapes]
+    models = [read_model(shape.path, config.parts) for shape in config.shapes]
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
         write_kit(kit, text, arrays)
@@ -64,6 +68,7 @@ def report(plan: Plan) -> Sequence[str]:
             )
             lines.extend(f"{name}: {kind} is also {', '.join(words)}" for kind, words in seen["aliases"].items())
             lines.extend(f"{name}: warning: {warning}" for warning in seen["warnings"])
+    lines.extend(f"warning: {sentence}" for sentence in unstated(exemplar_origins(plan.config)))
     return lines
 
 

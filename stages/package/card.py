@@ -4,31 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any
 
 import yaml
 
-from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW
+from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA
+from stages.package.tables import member_table, origin_table, reject_table, source_table, split_table
 
 __all__ = ["Story", "card", "citation", "size_category"]
 
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 
+USES = (
+    "For training and measuring models that generate, complete, segment or reconstruct shapes made of parts, and for "
+    "work on shape grammars, shape programs and physical validity. Not for conclusions about how real things look or "
+    "are built, nor for deciding whether a real thing is safe."
+)
+LIMITS = (
+    "The shapes are synthetic. They are not a sample of real things, and no person has judged them.",
+    "Whether a shape stands is computed by statics with one density everywhere. Nothing was simulated or built.",
+    "Meshes have one colour a face at most, and no textures, materials or normals.",
+    "Points lie on the whole surface of every part, also where it is hidden inside another part: no scanner sees that.",
+)
+
+
 @dataclass(frozen=True)
 class Story:
-    """How a dataset was made, in the words of its producer.
+    """How a dataset was made, in the words of its producer and its language.
 
-    made: how its samples come about; splits: what keeps the splits apart; paragraphs, variety: Markdown; rejects:
-    refused items by reason.
+    made: how its samples come about; splits: what keeps the splits apart; coordinates: their units and their origin;
+    limits: what not to expect; paragraphs, variety: Markdown; rejects: refused items by reason; origins: what it was
+    made from, and whose that is; unstated: a sentence for each of these without a licence.
     """
 
     made: str
     splits: str
+    coordinates: str
+    limits: Sequence[str]
     paragraphs: Sequence[str]
     variety: Sequence[str]
     rejects: Mapping[str, int]
+    origins: Sequence[Mapping[str, Any]]
+    unstated: Sequence[str]
 
 
 def citation(facts: Mapping[str, Any]) -> str:
@@ -78,75 +96,43 @@ def card(
         f"![Shapes, their points and their sketches]({PREVIEW})",
         str(facts["description"]),
         "## What is in it",
-        _split_table(splits, shards),
-        _source_table(sources, rows),
+        split_table(splits, shards),
+        source_table(sources, rows),
+        "## How the splits are kept apart",
         story.splits,
         *(["## How different they are", *story.variety] if story.variety else []),
         "## A sample",
-        _member_table(members),
-        "All coordinates are in the units of the kit or program and upright: y points up, in the mesh, the points and "
-        "the poses alike. "
-        "Points lie on every part's whole surface, also where it is hidden inside another part. Vertex colours of the "
-        "mesh are linear, as glTF asks. No key holds a dot, no value is null, and each sample has all members.",
+        member_table(members),
+        f"`{SCHEMA}` says what each field of the JSON means. No key holds a dot, no value is null or empty, and each "
+        "sample has all members and all fields. A part is named by its place in the record's `parts`: instances of "
+        "points, and the two rows of `contacts.npy` and `joints.npy`, are such places. `lineage.parents` says what a "
+        "sample was made from.",
+        "## Coordinates",
+        f"Right-handed, y up; mesh, poses, bounds and contacts have one frame. {story.coordinates} The ground of a "
+        "shape is the plane through its lowest point, `bounds[0][1]` in the record. A part's `pose` moves its mesh "
+        "from the part's own coordinates into those of the shape, and is the matrix of its node in the GLB. The points "
+        "are in the coordinates of the mesh, or moved and scaled as `points.centre` and `points.scale` say. Vertex "
+        "colours are linear, as glTF asks.",
+        "## What it is for, and what not",
+        USES,
+        "\n".join(f"- {each}" for each in (*LIMITS, *story.limits)),
         "## Loading it",
         _loading(facts, splits, shards),
         "## How it was made",
-        f"By Shapemill: {story.made} `{MANIFEST}` holds the whole config.",
-        *([_reject_table(story.rejects)] if story.rejects else []),
+        f"By Shapemill: {story.made} `{MANIFEST}` holds the whole config and the versions of code and libraries.",
+        *([reject_table(story.rejects)] if story.rejects else []),
         *story.paragraphs,
         "## Checking it",
-        f"`sha256sum -c {CHECKSUMS}` compares every file; `make verify` also computes contacts anew from the meshes.",
+        f"`sha256sum -c {CHECKSUMS}` compares every file; `make verify` also holds every sample against what it "
+        "says of itself, and computes contacts anew from meshes.",
         "## Licence and citation",
         f"{facts['license']}.",
+        *(["What it was made from, and whose that is:", origin_table(story.origins)] if story.origins else []),
+        *(["\n".join(f"- {each}" for each in story.unstated)] if story.unstated else []),
         f"```bibtex\n{citation(facts)}\n```",
     ]
     front = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=1000)
     return f"---\n{front}---\n\n" + "\n\n".join(sections) + "\n"
-
-
-def _split_table(splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> str:
-    lines = ["| split | samples | shards | MB |", "| --- | ---: | ---: | ---: |"]
-    for split in [*splits, "all"]:
-        own = [shard for shard in shards if split in ("all", shard["split"])]
-        size = sum(shard["bytes"] for shard in own) / 1e6
-        lines.append(f"| {split} | {sum(shard['samples'] for shard in own):,} | {len(own)} | {size:,.1f} |")
-    return "\n".join(lines)
-
-
-def _source_table(sources: Mapping[str, str], rows: Sequence[Mapping[str, Any]]) -> str:
-    lines = [
-        "| made of | samples | distinct structures | parts | contacts | cycles | rooted | stable |",
-        "| --- | ---: | ---: | --- | --- | --- | ---: | ---: |",
-    ]
-    for name, described in sources.items():
-        own = [row for row in rows if row["kit"] == name]
-        spans = " | ".join(_span([row[each] for row in own]) for each in ("parts", "contacts", "cycles"))
-        structures = len({row["graph"] for row in own})
-        title = f"{name} ({described})" if described else name
-        shares = " | ".join(f"{sum(row[each] for row in own) / len(own):.1%}" for each in ("rooted", "stable"))
-        lines.append(f"| {title} | {len(own):,} | {structures:,} | {spans} | {shares} |")
-    return (
-        "\n".join(lines) + "\n\nParts, contacts and independent cycles: least, median, most. Rooted: every part is "
-        "connected to the ground. Stable: the shape stands and bears small pushes, by statics on its geometry."
-    )
-
-
-def _span(numbers: Sequence[int]) -> str:
-    return f"{min(numbers)} / {median(numbers):g} / {max(numbers)}" if numbers else "-"
-
-
-def _member_table(members: Sequence[Mapping[str, Any]]) -> str:
-    lines = ["| member | array | what it is |", "| --- | --- | --- |"]
-    for each in members:
-        array = f"{each['dtype']} ({', '.join(map(str, each['shape']))})" if each["dtype"] else ""
-        lines.append(f"| `<key>.{each['name']}` | {array} | {each['sentence']} |")
-    return "\n".join(lines)
-
-
-def _reject_table(rejects: Mapping[str, int]) -> str:
-    lines = ["| refused because | tries |", "| --- | ---: |"]
-    lines += [f"| {reason} | {count:,} |" for reason, count in sorted(rejects.items(), key=lambda each: -each[1])]
-    return "\n".join(lines)
 
 
 def _loading(facts: Mapping[str, Any], splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> str:
@@ -169,9 +155,10 @@ loader = DataLoader(samples.to_tuple("points.npy", "labels.npy").batched(16), ba
 import datasets
 samples = datasets.load_dataset("{name}", split="{split}")
 
-# Croissant: each member is a record set of `key` and `content`
+# Croissant: each member is a record set of `key` and `content`, an array being the bytes of its .npy;
+# with "-of-samples" behind its name it has `split` and `kit` too; `samples` is the index
 import mlcroissant
-records = mlcroissant.Dataset("{name}/{CROISSANT}").records("points")
+records = mlcroissant.Dataset("{name}/{CROISSANT}").records("points-of-samples")
 
 # the mesh of a sample
 import io, trimesh

@@ -12,8 +12,8 @@ from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
 from stages.package.croissant import croissant
-from stages.package.index import read_rows, write_index
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
+from stages.package.index import column_kinds, read_rows, write_index
+from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
 from stages.package.manifest import checksums, manifest
 from stages.shape.collection.declared import language_of
 
@@ -21,33 +21,46 @@ __all__ = ["compose_dataset"]
 
 
 def compose_dataset(task: Task) -> Outcome:
-    """Write card, Croissant, manifest, checksums and index.
+    """Write card, Croissant, schema, manifest, checksums and index.
 
     The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
-    shards); `members` (what is to say of each); `made`, `splits`, `apart`, `story`, `variety`, `rejects` and `measures`
-    (what there is to say of how it was made); `preview` (the shard with the picture).
+    shards); `members` (what is to say of each); `schema` (of the records); `apart` (whether graphs keep the splits
+    apart); `origins` (what the dataset was made from); `story` (the other fields of the card's `Story`); `measures`
+    (figures for the manifest); `preview` (the shard with the picture) and `made_with` (versions of code and libraries).
     """
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)
     index = io.BytesIO()
     write_index(rows, index)
-    indexed = {
+    indexed: dict[str, Any] = {
         "path": f"../{index_path(task.config)}",
         "bytes": len(index.getvalue()),
         "sha256": hashlib.sha256(index.getvalue()).hexdigest(),
+        "columns": column_kinds(),
     }
     known = language_of(params["producer"]).speaker(task).sources
     used = {row["kit"] for row in rows}
     sources = {name: each.sentence for name, each in known.items() if name in used}
-    story = Story(params["made"], params["splits"], params["story"], params["variety"], params["rejects"])
+    story = Story(**params["story"], origins=params["origins"])
     files = {
         CARD: card(facts, shards, members, rows, sources, story).encode(),
-        CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
+        CROISSANT: _text(croissant(facts, shards, members, indexed, params["origins"], citation(facts))),
+        SCHEMA: _text(params["schema"]),
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))
-    described = manifest(facts, params["sections"], shards, members, digests, indexed, params["measures"])
+    described = manifest(
+        facts,
+        params["sections"],
+        shards,
+        members,
+        digests,
+        indexed,
+        params["measures"],
+        params["made_with"],
+        params["origins"],
+    )
     files[MANIFEST] = _text({**described, "apart": params["apart"]})
     digests[MANIFEST] = hashlib.sha256(files[MANIFEST]).hexdigest()
     digests.update({shard["path"]: shard["sha256"] for shard in shards})

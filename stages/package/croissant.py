@@ -1,7 +1,11 @@
 """`croissant.json`: the dataset in Croissant 1.1 (MLCommons), for loaders that know no WebDataset.
 
-Each member is a record set of its own, with the sample's key and the member's content: mlcroissant joins two
-sources at most, and when both are contents of files it reads the first one's for both. Equal keys belong together.
+Each member is a record set of its own, with the sample's key and the member's content. `samples` are the rows of the
+index, typed, with the split of each. `<member>-of-samples` joins the two. Measured with mlcroissant: it joins two
+sources and no more, and only fields of record sets (a file set in a tar is lost to a join when the tar has others);
+what lies in a tar it reads as it is, so fields of the JSON member cannot be had by their paths, nor arrays as arrays.
+An array is therefore declared twice: as text, the bytes of an `.npy` that come out, and by the type and shape of what
+they hold.
 """
 
 from __future__ import annotations
@@ -62,14 +66,25 @@ FORMATS = {
     "txt": "text/plain",
     "json": "application/json",
 }
+ELEMENTS = {"float32": "cr:Float32", "float64": "cr:Float64", "int16": "cr:Int16", "int32": "cr:Int32"}
+ELEMENTS |= {"uint8": "cr:UInt8"}
+KINDS = {"string": "sc:Text", "bool": "sc:Boolean", "int32": "sc:Integer", "int64": "sc:Integer", "float64": "sc:Float"}
+URLS = {"train": "cr:TrainingSplit", "val": "cr:ValidationSplit", "test": "cr:TestSplit"}
+INDEX = "index"
 
 
 def croissant(
-    facts: Mapping[str, Any], shards: Sequence[Mapping[str, Any]], members: Sequence[Mapping[str, Any]], citation: str
+    facts: Mapping[str, Any],
+    shards: Sequence[Mapping[str, Any]],
+    members: Sequence[Mapping[str, Any]],
+    index: Mapping[str, Any],
+    origins: Sequence[Mapping[str, Any]],
+    citation: str,
 ) -> dict[str, Any]:
     """The document. `facts` has name, version, title, description, license, creator and published; `shards` are the
-    summaries of the package's shards; `members` has name, sentence, dtype and shape of each."""
-    spdx = str(facts["license"])
+    summaries of the package's shards; `members` has name, sentence, dtype and shape of each; `index` has path, bytes,
+    sha256 and columns (their Arrow types by name); `origins` are what the dataset was made from."""
+    splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     return {
         "@context": VOCABULARY,
         "@type": "sc:Dataset",
@@ -77,14 +92,42 @@ def croissant(
         "name": facts["name"],
         "description": facts["description"],
         "version": facts["version"],
-        "license": spdx if spdx == "unknown" else f"https://spdx.org/licenses/{spdx}.html",
+        "license": _license(str(facts["license"])),
         "creator": {"@type": "sc:Organization", "name": facts["creator"]},
         "datePublished": facts["published"],
         "citeAs": citation,
         "keywords": list(facts["tags"]),
-        "distribution": [*map(_shard, shards), *(_files(each["name"], each["sentence"], shards) for each in members)],
-        "recordSet": [_records(each["name"], each["sentence"]) for each in members],
+        **({"isBasedOn": [_work(each) for each in origins]} if origins else {}),
+        "distribution": [
+            *map(_shard, shards),
+            _index(index),
+            *(_files(each["name"], each["sentence"], shards) for each in members),
+        ],
+        "recordSet": [
+            _split_records(splits),
+            _sample_records(index["columns"]),
+            *map(_member_records, members),
+            *map(_joined_records, members),
+        ],
     }
+
+
+def _license(spdx: str) -> str:
+    return spdx if spdx == "unknown" else f"https://spdx.org/licenses/{spdx}.html"
+
+
+def _work(origin: Mapping[str, Any]) -> dict[str, Any]:
+    """A file that the dataset was made from, as a schema.org CreativeWork."""
+    work = {"@type": "sc:CreativeWork", "name": origin["file"], "identifier": f"sha256:{origin['sha256']}"}
+    if origin["author"]:
+        work["author"] = {"@type": "sc:Person", "name": origin["author"]}
+    if origin["source"]:
+        work["url"] = origin["source"]
+    if origin["license"]:
+        work["license"] = origin["license"]
+    if origin["notice"]:
+        work["creditText"] = origin["notice"]
+    return work
 
 
 def _shard(shard: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,6 +143,19 @@ def _shard(shard: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def _index(index: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "@type": "cr:FileObject",
+        "@id": INDEX,
+        "name": str(index["path"]).rpartition("/")[2],
+        "description": "One row a sample. It stands in a folder beside that of the dataset.",
+        "contentUrl": index["path"],
+        "contentSize": f"{index['bytes']} B",
+        "encodingFormat": "application/x-parquet",
+        "sha256": index["sha256"],
+    }
+
+
 def _files(member: str, text: str, shards: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "@type": "cr:FileSet",
@@ -112,37 +168,96 @@ def _files(member: str, text: str, shards: Sequence[Mapping[str, Any]]) -> dict[
     }
 
 
-def _records(member: str, text: str) -> dict[str, Any]:
-    name = _identifier(member)
+def _split_records(splits: Sequence[str]) -> dict[str, Any]:
+    return {
+        "@type": "cr:RecordSet",
+        "@id": "splits",
+        "name": "splits",
+        "description": "The splits of the dataset.",
+        "dataType": "cr:Split",
+        "key": {"@id": "splits/name"},
+        "field": [
+            _field("splits/name", "Name of the split.", "sc:Text"),
+            _field("splits/url", "What the split is for.", "sc:URL"),
+        ],
+        "data": [{"splits/name": split, "splits/url": URLS[split]} for split in splits],
+    }
+
+
+def _sample_records(columns: Mapping[str, str]) -> dict[str, Any]:
+    fields = []
+    for name, kind in columns.items():
+        source = {"fileObject": {"@id": INDEX}, "extract": {"column": name}}
+        joined = {"references": {"field": {"@id": "splits/name"}}} if name == "split" else {}
+        fields.append(_field(f"samples/{name}", f"Column {name} of the index.", KINDS[kind], source=source, **joined))
+    return _record_set("samples", "One record a sample: the rows of the index.", fields)
+
+
+def _member_records(member: Mapping[str, Any]) -> dict[str, Any]:
+    name, files = _identifier(member["name"]), {"@id": f"files-{_identifier(member['name'])}"}
+    key = {
+        "fileSet": files,
+        "extract": {"fileProperty": "filename"},
+        "transform": {"regex": r"^([^.]+)\."},
+    }
+    content = {"fileSet": files, "extract": {"fileProperty": "content"}}
+    fields = [
+        _field(f"{name}/key", "The sample's key.", "sc:Text", source=key),
+        _field(f"{name}/content", member["sentence"], source=content, **_content_type(member)),
+    ]
+    return _record_set(name, member["sentence"], fields)
+
+
+def _joined_records(member: Mapping[str, Any]) -> dict[str, Any]:
+    """The member with the split and the kit of its sample."""
+    own = _identifier(member["name"])
+    name = f"{own}-of-samples"
+    fields = [
+        _field(
+            f"{name}/key",
+            "The sample's key.",
+            "sc:Text",
+            source={"field": {"@id": f"{own}/key"}},
+            references={"field": {"@id": "samples/key"}},
+        ),
+        *(
+            _field(f"{name}/{each}", f"The sample's {each}.", "sc:Text", source={"field": {"@id": f"samples/{each}"}})
+            for each in ("split", "kit")
+        ),
+        _field(
+            f"{name}/content",
+            member["sentence"],
+            source={"field": {"@id": f"{own}/content"}},
+            **_content_type(member),
+        ),
+    ]
+    return _record_set(name, f"{member['sentence']} With the split and the kit of its sample.", fields)
+
+
+def _content_type(member: Mapping[str, Any]) -> dict[str, Any]:
+    if member["name"].endswith(".png"):
+        return {"dataType": "sc:ImageObject"}
+    if not member["name"].endswith(".npy"):
+        return {"dataType": "sc:Text"}
+    lengths = ",".join(str(each) if isinstance(each, int) else "-1" for each in member["shape"])
+    return {"dataType": ["sc:Text", ELEMENTS[member["dtype"]]], "isArray": True, "arrayShape": lengths}
+
+
+def _record_set(name: str, description: str, fields: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "@type": "cr:RecordSet",
         "@id": name,
         "name": name,
-        "description": text,
+        "description": description,
         "key": {"@id": f"{name}/key"},
-        "field": [
-            {
-                "@type": "cr:Field",
-                "@id": f"{name}/key",
-                "name": "key",
-                "description": "The sample's key.",
-                "dataType": "sc:Text",
-                "source": {
-                    "fileSet": {"@id": f"files-{name}"},
-                    "extract": {"fileProperty": "filename"},
-                    "transform": {"regex": r"^([^.]+)\."},
-                },
-            },
-            {
-                "@type": "cr:Field",
-                "@id": f"{name}/content",
-                "name": "content",
-                "description": text,
-                "dataType": "sc:ImageObject" if member.endswith(".png") else "sc:Text",
-                "source": {"fileSet": {"@id": f"files-{name}"}, "extract": {"fileProperty": "content"}},
-            },
-        ],
+        "field": list(fields),
     }
+
+
+def _field(identifier: str, description: str, data_type: str = "", **more: Any) -> dict[str, Any]:
+    typed = {"dataType": data_type} if data_type else {}
+    name = identifier.rpartition("/")[2]
+    return {"@type": "cr:Field", "@id": identifier, "name": name, "description": description, **typed, **more}
 
 
 def _identifier(member: str) -> str:

@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 from stages.shape.collection.declared import members
 from stages.shape.collection.members import Column
 
-__all__ = ["columns", "index_row", "read_rows", "tar_bytes", "write_index"]
+__all__ = ["column_kinds", "columns", "index_row", "read_rows", "tar_bytes", "write_index"]
 
 COLUMNS = {
     "key": Column("string", ("key",)),
@@ -20,6 +20,7 @@ COLUMNS = {
     "producer": Column("string", ("producer",)),
     "parts": Column("int32", ("counts", "parts")),
     "contacts": Column("int32", ("counts", "contacts")),
+    "pieces": Column("int32", ("counts", "pieces")),
     "cycles": Column("int32", ("counts", "cycles")),
     "types": Column("int32", ("counts", "types")),
     "text": Column("string", ("text",)),
@@ -34,6 +35,11 @@ the sample's members as a tar."""
 def columns() -> dict[str, Column]:
     """All columns that come from a record, by name."""
     return COLUMNS | {name: column for each in members().values() for name, column in each.columns.items()}
+
+
+def column_kinds() -> dict[str, str]:
+    """The Arrow type of every column of the index, by name."""
+    return {name: column.kind for name, column in columns().items()} | PLACE
 
 
 def index_row(record: Mapping[str, Any], path: str, offset: int, size: int) -> dict[str, Any]:
@@ -62,7 +68,7 @@ def write_index(rows: list[dict[str, Any]] | list[Mapping[str, Any]], stream: Bi
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    kinds = {name: column.kind for name, column in columns().items()} | PLACE
+    kinds = column_kinds()
     schema = pa.schema([(name, pa.type_for_alias(kind)) for name, kind in kinds.items()])
     table = pa.table({name: pa.array([row[name] for row in rows], schema.field(name).type) for name in kinds})
     pq.write_table(table, stream, compression="zstd", row_group_size=65_536)

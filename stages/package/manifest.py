@@ -26,10 +26,13 @@ def manifest(
     files: Mapping[str, str],
     index: Mapping[str, Any],
     measures: Mapping[str, Mapping[str, Any]],
+    made_with: Mapping[str, Any],
+    origins: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """What `manifest.json` holds. `shards` are the summaries of the package's shards; `members` says name, sentence,
     dtype and shape of each; `files` are the digests of the files about the whole but this one; `index` has `path`
-    (relative to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit."""
+    (relative to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit; `made_with`
+    versions of code and libraries; `origins` the files that the samples were made from, and whose they are."""
     kits: Counter[str] = Counter()
     splits: Counter[str] = Counter()
     for shard in shards:
@@ -39,6 +42,7 @@ def manifest(
         "name": facts["name"],
         "version": facts["version"],
         "seed": facts["seed"],
+        "made_with": dict(made_with),
         "samples": sum(splits.values()),
         "splits": dict(splits),
         "kits": dict(kits),
@@ -47,7 +51,8 @@ def manifest(
         "shards": [
             {name: shard[name] for name in ("path", "split", "samples", "bytes", "sha256", "kits")} for shard in shards
         ],
-        "index": dict(index),
+        "index": {name: index[name] for name in ("path", "bytes", "sha256")},
+        "origins": [dict(each) for each in origins],
         "measures": dict(measures),
         "config": dict(sections),
     }

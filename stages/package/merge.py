@@ -43,7 +43,7 @@ def merge_shard(task: Task) -> Outcome:
                 shape = collection.shape(sample)
                 shape = replace(shape, assembly=replace(shape.assembly, poses=rounded(shape.assembly.poses)))
                 members = {"glb": glb_bytes(shape), TEXT: sample.text.encode(), **added}
-                record = describe_sample(sample, collection.language.name, shape, members[TEXT].decode(), fields)
+                record = describe_sample(sample, collection.language.name, shape, members, fields)
                 members["json"] = json_bytes(record)
                 if members_of_all and list(members) != members_of_all:
                     raise ShardFailed(f"{sample.key} has members {list(members)}, others have {members_of_all}")

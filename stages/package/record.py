@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,24 +9,28 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.kit import Assembly
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
-__all__ = ["cycle_count", "describe_sample", "rounded"]
+__all__ = ["describe_sample", "piece_count", "rounded"]
 
 DECIMALS = 12
 
 
-def describe_sample(sample: Sample, language: str, shape: Shape, text: str, added: Mapping[str, Any]) -> dict[str, Any]:
-    """What the JSON says. `text` is the member of that name, of which the record has the first line where it is a
-    list of strings; `added` are the fields of the stages that add some, `contacts` among them.
+def describe_sample(
+    sample: Sample, language: str, shape: Shape, members: Mapping[str, bytes], added: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What the JSON says; `stages.package.schema` says what each field means. `members` are the sample's others, of
+    which contacts and text are looked at; `added` are the fields of the stages that add some.
 
-    Nothing is null or empty: loaders guess a field's type from the first samples they see. The lineage differs from
-    sample to sample, so it stands as a text that is JSON itself; the names of the parents stand beside it.
+    Nothing is null or empty, and no field differs in type from sample to sample: loaders guess a field's type from
+    the first samples they see. So pairs of parts stand in arrays of their own: a shape of one part has none.
     """
-    parts = replace(shape.assembly, edges=np.array(added["contacts"], dtype=np.int32).reshape(-1, 2))
+    parts = replace(shape.assembly, edges=pairs_of(members[CONTACTS]))
+    pieces = piece_count(parts)
     return {
         "key": sample.key,
         "split": sample.split,
@@ -35,8 +38,7 @@ def describe_sample(sample: Sample, language: str, shape: Shape, text: str, adde
         "language": language,
         "kit": sample.kit,
         "graph": sample.graph,
-        "parents": list(sample.lineage.get("parents", ())) or [sample.kit],
-        "lineage": json.dumps(sample.lineage, sort_keys=True, allow_nan=False),
+        "lineage": {"method": sample.producer, "parents": [sample.kit], **sample.lineage},
         "parts": [
             {"name": name, "label": shape.labels[label], "class": number, "instance": instance, "pose": pose}
             for instance, (name, label, number, pose) in enumerate(
@@ -49,17 +51,17 @@ def describe_sample(sample: Sample, language: str, shape: Shape, text: str, adde
                 )
             )
         ],
-        # a list of pairs would be empty for a shape of one part
-        "contacts": json.dumps(parts.edges.tolist()),
         "counts": {
             "parts": len(parts),
             "contacts": len(parts.edges),
-            "cycles": cycle_count(parts),
+            "pieces": pieces,
+            "cycles": len(parts.edges) - len(parts) + pieces,
             "types": len(set(shape.part_labels.tolist())),
         },
         "bounds": rounded(shape_bounds(shape)).tolist(),
-        "text": sample.text or text.split("\n", 1)[0],
-        **{name: value for name, value in added.items() if name != "contacts"},
+        # strings are a list, of which the first is the canonical one
+        "text": sample.text or members["txt"].decode().split("\n", 1)[0],
+        **added,
     }
 
 
@@ -68,17 +70,17 @@ def rounded(numbers: FloatArray) -> FloatArray:
     return np.round(numbers, DECIMALS) + 0.0
 
 
-def cycle_count(assembly: Assembly) -> int:
-    """Number of independent cycles of the shape graph: contacts that close a ring."""
+def piece_count(assembly: Assembly) -> int:
+    """Number of pieces that the contacts of an assembly make."""
     neighbours = assembly.neighbours()
     seen = [False] * len(assembly)
-    components = 0
+    pieces = 0
     for start in range(len(assembly)):
-        components += not seen[start]
+        pieces += not seen[start]
         waiting = [start]
         while waiting:
             part = waiting.pop()
             if not seen[part]:
                 seen[part] = True
                 waiting.extend(neighbours[part])
-    return len(assembly.edges) - len(assembly) + components
+    return pieces

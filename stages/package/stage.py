@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
 from stages.package.described import described_members
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
+from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
+from stages.package.made_with import code_version, library_versions
 from stages.package.manifest import config_sections
 from stages.package.merge import merge_shard
 from stages.package.preview import draw_preview
+from stages.package.schema import record_schema
 from stages.package.settings import PackageConfig
 from stages.shape.collection.declared import language_of, member_modules, members, producers
+from stages.shape.collection.origin import unstated
 from stages.shape.collection.shards import (
     MEMBERS,
     PRODUCERS,
@@ -57,21 +61,30 @@ def plan(plan: Plan) -> list[Shard]:
     }
     drawn = (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows)))
     picture = Shard(PICTURE, pictured, drawn, member_modules())
-    declared = producers()[producer]
+    declared, language = producers()[producer], language_of(producer)
+    origins = declared.origins(plan.config)
     params = {
         "facts": _facts(plan),
         "producer": producer,
         "sections": config_sections(plan.config),
         "shards": filled,
-        "members": described_members(plan.config, filled[0]["members"], language_of(producer).text),
-        "made": declared.sentence,
-        "splits": declared.splits,
+        "members": described_members(plan.config, filled[0]["members"], language.text),
+        "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
         "apart": declared.apart,
-        "story": list(declared.card(plan)),
-        "variety": list(declared.variety(plan)),
-        "rejects": _rejects(plan, producer),
+        "story": {
+            "made": declared.sentence,
+            "splits": declared.splits,
+            "coordinates": language.coordinates,
+            "limits": list(declared.limits),
+            "paragraphs": list(declared.card(plan)),
+            "variety": list(declared.variety(plan)),
+            "rejects": _rejects(plan, producer),
+            "unstated": unstated(origins),
+        },
         "measures": dict(declared.measures(plan)),
         "preview": PICTURE,
+        "made_with": {"shapemill": code_version(), "libraries": library_versions()},
+        "origins": [asdict(each) for each in origins],
     }
     inputs = (*read, *(f"package/{shard['name']}" for shard in filled), f"package/{PICTURE}")
     return [*merged, picture, Shard(WHOLE, params, inputs, member_modules())]
@@ -103,7 +116,7 @@ def publish(plan: Plan) -> Mapping[str, str]:
     name = plan.config.name
     if WHOLE not in plan.shards("package"):
         return {}
-    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, MANIFEST, CHECKSUMS)}
+    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, SCHEMA, MANIFEST, CHECKSUMS)}
     files[f"{name}/{PREVIEW}"] = f"{PICTURE}.png"
     files[index_path(plan.config)] = f"{WHOLE}.parquet"
     for shard in plan.shards("package"):

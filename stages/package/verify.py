@@ -23,7 +23,7 @@ from pipeline.randomness import decision_rng
 from pipeline.yaml_text import read_yaml
 from stages.package.findings import Findings
 from stages.package.layout import MANIFEST
-from stages.package.verify_files import Row, check_files, check_index, check_splits
+from stages.package.verify_files import Row, check_files, check_index, check_splits, read_schema
 from stages.package.verify_shard import check_shard
 
 __all__ = ["main", "verify_dataset"]
@@ -55,11 +55,12 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
     if samples is not None and samples < total:
         chosen = np.sort(decision_rng(seed, "verify").choice(total, size=samples, replace=False)).tolist()
     index = check_index(folder, manifest, findings)
+    schema = read_schema(folder, findings)
     work, first = [], 0
     for shard in manifest["shards"]:
         if shard["path"] in whole:
             anew = {each - first for each in chosen if first <= each < first + shard["samples"]}
-            work.append((folder, shard, manifest, index, anew))
+            work.append((folder, shard, manifest, schema, index, anew))
         first += shard["samples"]
     rows: list[Row] = []
     for found, of_shard in _side_by_side(work, workers):

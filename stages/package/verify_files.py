@@ -12,9 +12,9 @@ from jsonschema.exceptions import best_match
 
 from pipeline.places import file_digest
 from stages.package.findings import Findings
-from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST
+from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, SCHEMA
 
-__all__ = ["Row", "check_files", "check_index", "check_splits", "read_document"]
+__all__ = ["Row", "check_files", "check_index", "check_splits", "read_document", "read_schema"]
 
 Row = tuple[str, str, str, str, str]
 """Key, shard, split, kit and graph of a sample."""
@@ -29,7 +29,7 @@ def _object(properties: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "object", "properties": dict(properties), "required": list(properties)}
 
 
-SCHEMA = _object(
+NEEDED = _object(
     {
         "samples": {"type": "integer", "minimum": 1},
         "splits": _COUNTS,
@@ -52,7 +52,7 @@ def check_files(folder: Path, findings: Findings) -> tuple[dict[str, Any], set[s
     manifest = read_document(folder / MANIFEST, findings)
     if manifest is None:
         return None
-    error = best_match(Draft202012Validator(SCHEMA).iter_errors(manifest))
+    error = best_match(Draft202012Validator(NEEDED).iter_errors(manifest))
     if error is not None:
         findings.fault("manifest", MANIFEST, f"cannot be meant: {error.json_path}: {error.message}")
         return None
@@ -71,6 +71,21 @@ def read_document(path: Path, findings: Findings) -> dict[str, Any] | None:
         findings.fault("manifest", path.name, "is no JSON object")
         return None
     return document
+
+
+def read_schema(folder: Path, findings: Findings) -> str:
+    """The schema of the records as text; one that allows everything, with a fault, where it cannot be read."""
+    from jsonschema import SchemaError
+
+    document = read_document(folder / SCHEMA, findings)
+    if document is None:
+        return "{}"
+    try:
+        Draft202012Validator.check_schema(document)
+    except SchemaError as error:
+        findings.fault("manifest", SCHEMA, f"is no JSON schema: {error.message}")
+        return "{}"
+    return json.dumps(document)
 
 
 def check_splits(manifest: Mapping[str, Any], rows: Sequence[Row], findings: Findings) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.shards import bytes_array
 from stages.package.glb import glb_bytes
-from stages.package.record import cycle_count, rounded
+from stages.package.record import piece_count, rounded
 from stages.shape.collection.declared import audits
 from stages.shape.collection.language import Anew
 from stages.shape.collection.packaged import Packaged
@@ -170,10 +170,12 @@ def _count_faults(sample: Packaged) -> Iterator[str]:
         yield "its contacts are no pairs of its parts, the lower one first"
         return
     assembly = sample.shape.assembly
+    pieces = piece_count(Assembly(assembly.types, assembly.poses, pairs))
     counted = {
         "parts": parts,
         "contacts": len(pairs),
-        "cycles": cycle_count(Assembly(assembly.types, assembly.poses, pairs)),
+        "pieces": pieces,
+        "cycles": len(pairs) - parts + pieces,
         "types": len(set(sample.shape.part_labels.tolist())),
     }
     for name, count in counted.items():

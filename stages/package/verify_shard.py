@@ -15,6 +15,7 @@ from pipeline.places import Places
 from pipeline.shards import read_shard
 from stages.package.findings import Findings
 from stages.package.index import index_row, tar_bytes
+from stages.package.schema import schema_faults, validator_of
 from stages.package.verify_files import Row
 from stages.package.verify_samples import (
     SampleError,
@@ -32,16 +33,22 @@ __all__ = ["check_shard", "shard_samples"]
 
 
 def check_shard(
-    folder: Path, shard: Mapping[str, Any], manifest: Mapping[str, Any], index: Path | None, anew: Collection[int]
+    folder: Path,
+    shard: Mapping[str, Any],
+    manifest: Mapping[str, Any],
+    schema: str,
+    index: Path | None,
+    anew: Collection[int],
 ) -> tuple[Findings, list[Row]]:
     """What is found in one whole shard of the dataset in `folder`, and what all its samples together are held against.
 
-    shard: its entry in the manifest; index: the index, if it can be read; anew: the places of the samples that are held
-    against what they were made from by other means, which takes long.
+    shard: its entry in the manifest; schema: of the records, as JSON; index: the index, if it can be read; anew: the
+    places of the samples that are held against what they were made from by other means, which takes long.
     """
     findings, rows, path = Findings(), list[Row](), str(shard["path"])
     places = Places(folder.resolve().parent, folder.resolve().name)
     spoken = {name: each.anew(places) for name, each in languages().items()}
+    validator = validator_of(schema)
     wanted = [each["name"] for each in manifest["members"]]
     made, indexed = _made(places, path), _indexed(index, path)
     try:
@@ -58,6 +65,7 @@ def check_shard(
                 record = read_record(members["json"])
                 for what in (
                     *record_faults(record, key, shard["split"], manifest["kits"]),
+                    *schema_faults(validator, record),
                     *_altered(key, record, made),
                 ):
                     findings.fault("samples", where, what)
@@ -184,6 +192,5 @@ def _altered(key: str, record: Mapping[str, Any], made: Mapping[str, Mapping[str
     for stage, samples in made.items():
         fields = samples[key].fields if key in samples else {}
         for name, value in fields.items():
-            found = json.loads(record[name]) if name == "contacts" else record.get(name, value)
-            if found != value:
+            if record.get(name, value) != value:
                 yield f"{name} in its json is not what stage {stage} has made for it"

@@ -46,17 +46,17 @@ def random_shapes(program: Program, count: int, seed: int) -> list[dict[str, Val
 
 
 def shape_glb(program: Program, values: Values) -> bytes:
-    """The shape at `values` as GLB: a node a part, named by label and number, in its colour."""
+    """The shape at `values` as GLB: a node a part at its pose, named by label and number, in its colour."""
     import trimesh
 
     shape = shape_of(program, values)
     scene = trimesh.Scene()
-    for name, mesh in zip(shape.part_names, shape.meshes, strict=True):
+    for name, mesh, pose in zip(shape.part_names, shape.meshes, shape.assembly.poses, strict=True):
         color = np.append(srgb_to_linear(mesh.face_colors[0]), 1.0)
         material = trimesh.visual.material.PBRMaterial(baseColorFactor=color, metallicFactor=0.0, roughnessFactor=0.7)
         visual = trimesh.visual.TextureVisuals(material=material)
         part = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, visual=visual)
-        scene.add_geometry(part, node_name=name, geom_name=name)
+        scene.add_geometry(part, node_name=name, geom_name=name, transform=pose)
     glb: bytes = scene.export(file_type="glb")
     return glb
 

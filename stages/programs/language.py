@@ -50,4 +50,7 @@ LANGUAGE = Language(
     graphs=False,
     text="Its parameters as JSON.",
     anew=_anew,
+    coordinates="The unit is about a metre. Shapes stand on the plane y = 0 around the y axis with their front to +z; "
+    "what hangs from a ceiling hangs from that plane. The origin of a mesh is the middle of the box around the part, "
+    "and poses turn nothing.",
 )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from pipeline.config import Config
 from pipeline.stage import Plan
 from stages.programs.program import find_program
 from stages.programs.recipe import recipe_markdown
 from stages.programs.settings import ProgramsConfig
+from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
 
 __all__ = ["PRODUCER"]
@@ -15,6 +17,17 @@ __all__ = ["PRODUCER"]
 
 def _recipe(plan: Plan) -> Sequence[str]:
     return [recipe_markdown(find_program(plan.config.section(ProgramsConfig).program)).rstrip()]
+
+
+def _lineage(config: Config) -> Mapping[str, Field]:
+    if config.section(ProgramsConfig).mode == "sweep":
+        return {}
+    return {
+        "parameter": Field(
+            {"type": "string", "minLength": 1, "description": "the parameter whose value was asked for"}
+        ),
+        "class": Field({"type": "integer", "minimum": 0, "description": "place of that value among the parameter's"}),
+    }
 
 
 PRODUCER = Producer(
@@ -26,5 +39,7 @@ PRODUCER = Producer(
     "their continuous parameters stand in one split; where every value of every parameter is sampled, all splits have "
     "all values, as published.",
     apart=False,
+    lineage=_lineage,
+    limits=("All shapes are values of the same parameters; what the program cannot say is not there.",),
     card=_recipe,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -101,14 +101,18 @@ class Program:
 
 
 def shape_of(program: Program, values: Values) -> Shape:
-    """The shape at `values`: one mesh a part, y up, at identity poses, without contacts."""
+    """The shape at `values`: one mesh a part, y up, without contacts."""
     return shape_of_parts(program, program.parts(values))
 
 
 def shape_of_parts(program: Program, parts: Sequence[Part]) -> Shape:
-    """The shape of parts that `program` has made."""
-    meshes = tuple(part.part_mesh() for part in parts)
-    poses = np.tile(np.eye(4), (len(meshes), 1, 1))
+    """The shape of parts that `program` has made. The origin of each mesh is the middle of the box around it, and the
+    pose says where that is in the world; it turns nothing."""
+    placed = [part.part_mesh() for part in parts]
+    poses = np.tile(np.eye(4), (len(placed), 1, 1))
+    poses[:, :3, 3] = [mesh.bounds.mean(axis=0) for mesh in placed]
+    centred = zip(placed, poses[:, :3, 3], strict=True)
+    meshes = tuple(replace(mesh, vertices=mesh.vertices - centre) for mesh, centre in centred)
     assembly = Assembly(np.arange(len(meshes), dtype=np.int16), poses, np.empty((0, 2), np.int32))
     return Shape(meshes=meshes, assembly=assembly, up="y", labels=program.labels)
 

@@ -68,7 +68,7 @@ def run_shard(task: Task) -> Outcome:
             cell = None if config.mode == "sweep" else every[(params["start"] + number) % len(every)]
             values = sampler.find(cell, task.rng("shape", number))
             key = f"{program.name}-{params['first_key'] + place:06d}"
-            lineage: dict[str, Any] = {"mode": config.mode}
+            lineage: dict[str, Any] = {"method": config.mode}
             if cell is not None:
                 lineage |= {"parameter": cell[0], "class": cell[1]}
             write_sample(writer, _sample(program, key, params["split"], config.program, values, lineage))

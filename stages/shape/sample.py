@@ -22,7 +22,10 @@ class Sample:
     kit: name of the kit that its assembly refers to, or of the program or category that its text belongs to;
     graph: hex digest of its structure, for a kit that of its canonical type-coloured shape graph (equal exactly for
     isomorphic graphs of one kit), for a program that of its discrete part;
-    lineage: JSON, how it was made (parents, cut, transform); assembly: its parts, for a kit;
+    lineage: JSON, how it was made: `method`, without which the record has the producer's name; `parents`, what it was
+    made from (keys of samples, names of exemplars or files), without which it has `kit`; and what its producer
+    declares;
+    assembly: its parts, for a kit;
     text: the producer's own text that the shape is made from (a program, its parameters); empty for a kit.
     """
 

@@ -60,4 +60,6 @@ LANGUAGE = Language(
     graphs=False,
     text="Its ShapeAssembly program.",
     anew=_anew,
+    coordinates="The unit is that of the program. The middle of its bounding box is the origin, and the middle of each "
+    "cuboid is the origin of its mesh.",
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from stages.shape.collection.producer import Producer
+from stages.shapeassembly.origins import program_origins
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 
 __all__ = ["PRODUCER"]
@@ -12,6 +13,8 @@ PRODUCER = Producer(
     keys="shapeassembly.programs or hierarchies",
     asked=lambda config: config.section(ShapeAssemblyConfig).has_sources,
     sentence="ShapeAssembly programs are executed; a shape's program is its `txt`.",
+    origins=program_origins,
+    limits=("All parts are cuboids.",),
     splits="Samples of programs that are alike up to their numbers stand in one split.",
     apart=True,
 )

@@ -18,6 +18,7 @@ from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.classes import Classes
+from stages.shape.collection.origin import unstated
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
@@ -26,6 +27,7 @@ from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
 from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.language import Programs, assignment_name
+from stages.shapeassembly.origins import program_origins
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig
@@ -182,7 +184,7 @@ def _sample(row: dict[str, Any], split: str) -> Sample:
         producer="shapeassembly",
         kit=row["kit"],
         graph=row["graph"],
-        lineage={"file": row["file"]},
+        lineage={"method": "executed", "parents": [row["file"]]},
         text=row["text"],
     )
 
@@ -200,7 +202,8 @@ def report(plan: Plan) -> Sequence[str]:
     for shard in (*extraction, name):
         refused.update(plan.rejects("shapeassembly", shard))
     why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
-    return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}"]
+    asked = [f"warning: {sentence}" for sentence in unstated(program_origins(plan.config))]
+    return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}", *asked]
 
 
 def estimate_bytes(plan: Plan) -> int:

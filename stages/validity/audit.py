@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from pipeline.places import Places
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.declared import languages
 from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.pairs import CONTACTS, JOINTS
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
+from stages.shape.physics.stability import components
 
 __all__ = ["AUDIT", "contradictions", "judged_anew"]
 
@@ -21,6 +25,7 @@ SLACK = 1e-3
 
 def contradictions(sample: Packaged) -> Iterator[str]:
     """A sentence for each two fields that cannot both be true."""
+    yield from _pair_faults(sample)
     physics, parts = sample.record["physics"], len(sample.shape)
     push = _config(sample).push
     if physics["rooted"] != (physics["floating"] == 0):
@@ -37,7 +42,10 @@ def judged_anew(sample: Packaged, _: Places) -> Iterator[str]:
     """A sentence for each field that statics finds otherwise, and for contacts that are none."""
     shape, recorded = sample.shape, sample.record["physics"]
     judge = judge_of(shape.meshes, shape.up, _config(sample))
-    found = physical_fields(judge.validity(shape.assembly))
+    validity = judge.validity(shape.assembly)
+    if validity.joints.tolist() != sample.arrays[JOINTS].T.tolist():
+        yield "its joints are not the pairs that statics counts as connected"
+    found = physical_fields(validity)
     for name, value in found.items():
         if isinstance(value, float):
             wrong = abs(value - recorded[name]) > max(ROUNDED, SLACK * abs(value))
@@ -51,6 +59,24 @@ def judged_anew(sample: Packaged, _: Places) -> Iterator[str]:
             missing = [pair for pair in touching if pair not in sample.contacts.tolist()]
             named = f"parts {missing[0]} touch and are not" if missing else "parts that do not touch are"
             yield f"{named} recorded as neighbours"
+
+
+def _pair_faults(sample: Packaged) -> Iterator[str]:
+    """Contacts and joints are pairs of parts, in order, and the joints make the components."""
+    parts, physics = len(sample.record["parts"]), sample.record["physics"]
+    for member in (CONTACTS, JOINTS):
+        pairs = sample.arrays[member]
+        if pairs.ndim != 2 or len(pairs) != 2 or pairs.dtype != np.int32:
+            yield f"{member} is no array int32 (2, m)"
+            return
+        if (pairs[0] >= pairs[1]).any() or (pairs < 0).any() or (pairs >= parts).any():
+            yield f"{member} holds what is no pair of its parts"
+            return
+        places = pairs[0].astype(np.int64) * parts + pairs[1]
+        if (np.diff(places) <= 0).any():
+            yield f"{member} is not in order, or has a pair twice"
+    if components(parts, sample.arrays[JOINTS].T).max() + 1 != physics["components"]:
+        yield "its joints do not make as many components as physics says"
 
 
 def _config(sample: Packaged) -> PhysicsConfig:

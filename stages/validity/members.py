@@ -1,4 +1,4 @@
-"""What stage `validity` adds to every sample: no member of its own, but fields of the record."""
+"""What stage `validity` adds to every sample: which parts touch, which hang together, and whether it stands."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipeline.config import Config
-from stages.shape.collection.members import Column, Field, Members
+from stages.shape.collection.members import Column, Field, Member, Members
+from stages.shape.collection.pairs import CONTACTS, JOINTS
 
 __all__ = ["MEMBERS"]
 
@@ -20,44 +21,76 @@ def _count(description: str) -> dict[str, Any]:
 
 
 PHYSICS: Mapping[str, Mapping[str, Any]] = {
-    "rooted": {"type": "boolean", "description": "every part is connected to the ground"},
+    "rooted": {"type": "boolean", "description": "every part is connected to the ground by a chain of joints"},
     "stable": {"type": "boolean", "description": "the shape stands and bears small pushes"},
     "margin": _number("largest push that it bears, in weights; -1: it does not stand"),
-    "weakest": {"type": "integer", "description": "place of the part that gives way first; -1: none"},
+    "weakest": {
+        "type": "integer",
+        "minimum": -1,
+        "description": "place of the part that gives way first; -1: none",
+    },
     "tipping_degrees": _number("by how much the ground may tilt; negative: it tips over on level ground"),
-    "components": {"type": "integer", "minimum": 1, "description": "pieces that are not connected with each other"},
-    "floating": _count("parts that nothing connects to the ground"),
+    "components": {
+        "type": "integer",
+        "minimum": 1,
+        "description": "pieces that its joints make; fewer than counts.pieces where parts that do not touch are near "
+        "enough to count as connected",
+    },
+    "floating": _count("parts that no chain of joints connects to the ground"),
     "penetration": _number("volume that lies in two parts, as a share of all", minimum=0),
     "ground": _number("area stood on, as a share of the outline from above", minimum=0),
     "symmetry": _number("share of the weight that an upright mirror maps to its like", minimum=0),
-    "weighed": {"type": "string", "description": "whether parts weigh by volume or, where they are open, by area"},
+    "weighed": {
+        "enum": ["volume", "area"],
+        "description": "whether parts weigh by volume or, where they are open, by area",
+    },
 }
+
+
+def _members(_: Config) -> tuple[Member, ...]:
+    return (
+        Member(
+            CONTACTS,
+            "Contact graph: pairs of parts at most `contact_tolerance` apart, by their places in the record, one a "
+            "column, the lower place first.",
+            "int32",
+            (2, "contacts"),
+        ),
+        Member(
+            JOINTS,
+            "Pairs of parts that count as connected in `physics`: those that overlap, are in contact, or are at most "
+            "`joint_tolerance` apart. Written as the contacts are.",
+            "int32",
+            (2, "joints"),
+        ),
+    )
 
 
 def _fields(_: Config) -> Mapping[str, Field]:
     return {
         "physics": Field(
             {
-                "description": "does it stand? By statics on its geometry, its parts being one rigid body where they "
-                "are connected",
+                "description": "does it stand? By statics on its geometry; the pairs of joints.npy hold together",
                 "type": "object",
                 "properties": PHYSICS,
                 "required": list(PHYSICS),
                 "additionalProperties": False,
             }
         ),
-        "contacts": Field(
-            {
-                "description": "pairs of parts that touch, by their places, the lower one first",
-                "type": "array",
-                "items": {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2, "maxItems": 2},
-            }
+        "contact_tolerance": Field(
+            _number("largest distance of parts in contact, in the units of the shape", exclusiveMinimum=0)
+        ),
+        "joint_tolerance": Field(
+            _number(
+                "largest distance of parts that count as connected in physics, and of parts that stand from the ground",
+                minimum=0,
+            )
         ),
     }
 
 
 MEMBERS = Members(
-    of=lambda _: (),
+    of=_members,
     fields=_fields,
     columns={
         "rooted": Column("bool", ("physics", "rooted")),

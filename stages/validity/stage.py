@@ -1,4 +1,4 @@
-"""Stage `validity`: the physical validity of each sample of the collection, and which of its parts touch."""
+"""Stage `validity`: which parts of each sample touch, and whether it stands."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
+from stages.shape.collection.pairs import CONTACTS, JOINTS, pair_bytes
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
@@ -30,17 +31,36 @@ def run_shard(task: Task) -> Outcome:
         shape = collection.shape(sample)
         judge = judge_of(shape.meshes, shape.up, config)
         # a shape graph says itself what counts as contact; of parts made from a text nobody has asked yet
-        known = shape.assembly.edges if collection.language.graphs else judge.contacts(shape.assembly)
+        graphs = collection.language.graphs
+        known = shape.assembly.edges if graphs else judge.contacts(shape.assembly)
         try:
-            fields = physical_fields(judge.validity(shape.assembly))
+            validity = judge.validity(shape.assembly)
         except ValueError as error:
             raise Rejected("no body to judge", str(error)) from error
-        counts.update(each for each in COUNTED if fields[each])
-        return {"json": json_bytes({"physics": fields, "contacts": known.tolist()})}
+        touching, connected = judge.tolerances(shape.assembly)
+        if graphs:
+            touching = collection.speaker.sources[sample.kit].contact_tolerance
+        physics = physical_fields(validity)
+        fields = {
+            "physics": physics,
+            "contact_tolerance": _short(touching),
+            "joint_tolerance": _short(connected),
+        }
+        counts.update(each for each in COUNTED if physics[each])
+        return {
+            CONTACTS: pair_bytes(known),
+            JOINTS: pair_bytes(validity.joints),
+            "json": json_bytes(fields),
+        }
 
     samples = add_members(task, judged)
     summary = {"split": task.shard.params["split"], **{each: counts[each] for each in COUNTED}}
     return Outcome(samples, {**summary, "samples": samples})
+
+
+def _short(length: float) -> float:
+    """A length without the noise of its last digits."""
+    return float(f"{length:.9g}")
 
 
 def report(plan: Plan) -> Sequence[str]:

@@ -138,8 +138,10 @@ def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, in
         graph=graph_digest(assembly.types, assembly.edges) if added else found.digest(index),
         assembly=assembly,
         lineage={
+            "method": "exchange",
             "name": f"{found.name}-{index}",
             **found.described(index),
+            "made_of": found.described(index)["parents"],
             "backdrop": added,
         },
     )

@@ -91,11 +91,21 @@ def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
         )
     lines += [
         "",
-        "Graphs, histograms: distinct ones, of types of parts. Cells: filled ones of the archive of sizes, cycles, "
-        "mixture and distance. Mixed: with at least a tenth of material of other exemplars than the main one. Blended: "
-        "with neighbourhoods that different exemplars alone show. E: mean histogram distance to the nearest exemplar, "
-        "0 to 1. Edits: bounds of the mean number of edits of the shape graph to the nearest exemplar, on a sample. "
-        "Parts: a tenth, half and nine tenths have at most so many.",
+        "- Found, chosen: valid shapes that the search found, and those of them that the dataset has.",
+        "- Graphs: different shape graphs, that is, which types of parts touch which.",
+        "- Histograms: different parts lists, that is, how many parts there are of each type.",
+        "- Cells: shapes are sorted into a grid by size, cycles, mixture and distance from the exemplars; so many of "
+        "its cells have a shape.",
+        "- Mixed: shapes of which at least a tenth of the parts comes from other exemplars than the main one.",
+        "- Blended: shapes with a part whose neighbours only one exemplar shows, and another whose neighbours only "
+        "another exemplar shows.",
+        "- E: how far parts lists are from that of the nearest exemplar, on average; 0 is the same list, 1 has no type "
+        "in common.",
+        "- Edits: how many parts and contacts must be added or taken away to come to the nearest exemplar, on average; "
+        "from at least to at most, on a few shapes.",
+        "- Parts: a tenth, half and nine tenths of the shapes have at most so many parts.",
+        "",
+        "How the search went:",
         "",
     ]
     lines += [f"- {kit}: histograms found: {growth(each['curve'])}" for kit, each in measures.items()]

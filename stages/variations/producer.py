@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pipeline.config import Config
 from pipeline.stage import Plan
+from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
 from stages.variations.measures import measure_table
 
@@ -35,15 +38,64 @@ def _endings(plan: Plan) -> Sequence[str]:
     return ["\n".join(ended)] if ended else []
 
 
+def _lineage(_: Config) -> Mapping[str, Field]:
+    whole = {"type": "integer", "minimum": 0}
+    places = {"type": "array", "items": whole, "minItems": 1}
+    row = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+    return {
+        "name": Field({"type": "string", "minLength": 1, "description": "what the search calls it"}),
+        "made_of": Field(
+            {
+                "type": "array",
+                "items": {"type": "string", "minLength": 1},
+                "minItems": 2,
+                "maxItems": 2,
+                "description": "the two shapes that pieces were exchanged of: exemplars, or what the search calls them",
+            }
+        ),
+        "parts_from": Field(
+            {
+                **places,
+                "maxItems": 2,
+                "description": "how many parts came from each of made_of",
+            }
+        ),
+        "boundary": Field(
+            {**places, "description": "parts of the first of made_of along which it was cut, by their places there"}
+        ),
+        "images": Field(
+            {**places, "description": "parts of the second of made_of that each part of the boundary came to lie on"}
+        ),
+        "motion": Field(
+            {
+                "type": "array",
+                "items": row,
+                "minItems": 4,
+                "maxItems": 4,
+                "description": "moved the piece of the first of made_of to the second: the rows of a rotation, then a "
+                "translation, in the coordinates of the model files",
+            }
+        ),
+        "backdrop": Field({**whole, "description": "parts at the end of the list that were put back behind it"}),
+    }
+
+
 PRODUCER = Producer(
     language="kit",
     keys="exemplars.kits",
     asked=lambda config: bool(config.section(ExemplarsConfig).kits),
     sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
-    "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's `parents` are "
-    "exemplars, or variants by the `name` in their own `lineage`.",
+    "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's "
+    "`lineage.parents` are exemplars, or variants by the `name` in their own `lineage`.",
     splits="Samples whose shape graphs are equal stand in one split.",
     apart=True,
+    lineage=_lineage,
+    origins=exemplar_origins,
+    limits=(
+        "All parts are those of the exemplars, and they meet only as parts meet there. What is learnt of these kits "
+        "need not hold for other castles, temples or tracks.",
+        "A variant is made of pieces of its parents and resembles them.",
+    ),
     card=_endings,
     variety=_variety,
     measures=_measures,

@@ -24,11 +24,13 @@ class Source:
 
     labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none;
     sentence: what a card says of it, in a few words.
+    contact_tolerance: of shape graphs the largest distance of parts in contact, in the units of the shapes.
     """
 
     labels: tuple[str, ...]
     colors: tuple[tuple[int, int, int], ...] = ()
     sentence: str = ""
+    contact_tolerance: float = 0.0
 
 
 class Speaker(Protocol):
@@ -53,7 +55,7 @@ class Language:
     speaker: the language inside a task whose shard has those among its inputs.
     graphs: whether its samples are shape graphs, with contacts of their own and strings; else they have a text, and
     contacts are found by whoever asks.
-    text: what the member `txt` of its samples is, for the card.
+    text: what the member `txt` of its samples is; coordinates: their unit, and where their origin is; for the card.
     anew: the shape that the record of a packaged sample says, made anew and upright, given the mill's folders of its
     dataset; raises LookupError where what it is made from is not there, ValueError where the record cannot be meant.
     """
@@ -64,3 +66,4 @@ class Language:
     graphs: bool
     text: str
     anew: Callable[[Places], Anew]
+    coordinates: str = ""

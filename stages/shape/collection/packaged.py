@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.shape import Shape
 
@@ -36,7 +36,7 @@ class Packaged:
     @cached_property
     def contacts(self) -> IntArray:
         """The pairs of parts that touch, int32 (m, 2), as recorded."""
-        return np.array(json.loads(self.record["contacts"]), dtype=np.int32).reshape(-1, 2)
+        return pairs_of(self.members[CONTACTS])
 
     @cached_property
     def size(self) -> float:

@@ -8,11 +8,21 @@ from typing import Any
 
 from pipeline.config import Config
 from pipeline.stage import Plan
+from stages.shape.collection.members import Field
+from stages.shape.collection.origin import Origin
 
 __all__ = ["Producer"]
 
 
 def _nothing_to_add(_: Plan) -> Sequence[str]:
+    return ()
+
+
+def _no_lineage(_: Config) -> Mapping[str, Field]:
+    return {}
+
+
+def _no_origins(_: Config) -> Sequence[Origin]:
     return ()
 
 
@@ -29,8 +39,11 @@ class Producer:
 
     language: the name of the language that its samples are in; keys: the keys of a config that ask for it, for
     messages; asked: whether a config does.
-    sentence: how its samples come about; splits: what keeps its splits apart; both for the card.
-    apart: whether samples of one graph always stand in one split.
+    sentence: how its samples come about; splits: what keeps its splits apart; limits: what not to expect of them, in
+    sentences; all for the card. apart: whether samples of one graph always stand in one split.
+    lineage: what `Sample.lineage` of its samples holds beside `method` and `parents`, by name; the same fields of the
+    same types in all samples of a dataset, and no value empty.
+    origins: the files that its samples are made from, and whose they are.
     card: paragraphs and tables for the card's section on how the dataset was made, from finished records.
     variety: Markdown for the card's section on how different the samples are.
     measures: figures for the manifest.
@@ -42,6 +55,9 @@ class Producer:
     sentence: str
     splits: str
     apart: bool
+    limits: tuple[str, ...] = ()
+    lineage: Callable[[Config], Mapping[str, Field]] = _no_lineage
+    origins: Callable[[Config], Sequence[Origin]] = _no_origins
     card: Callable[[Plan], Sequence[str]] = _nothing_to_add
     variety: Callable[[Plan], Sequence[str]] = _nothing_to_add
     measures: Callable[[Plan], Mapping[str, Any]] = _no_measures

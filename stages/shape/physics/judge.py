@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from typing import Any, Literal
 
@@ -34,7 +34,7 @@ class Validity:
     floating: parts that no chain of connected parts leads to the ground; penetration: volume that parts share, by
     pairs, as a share of the volume of all parts; ground: area that it stands on, as a share of its outline from above;
     symmetry: share of the weight that an upright mirror maps to its like; weighed: by volume, or by area where a part
-    is open.
+    is open; joints: the connected pairs, int32 (m, 2), i < j in lexicographic order.
     """
 
     rooted: bool
@@ -48,6 +48,7 @@ class Validity:
     ground: float
     symmetry: float
     weighed: Literal["volume", "area"]
+    joints: IntArray = field(compare=False, repr=False)
 
 
 class Judge:
@@ -108,7 +109,14 @@ class Judge:
             ground=ground_share(placed, standing),
             symmetry=mirror_score(placed),
             weighed=placed.weighed,
+            joints=connected,
         )
+
+    def tolerances(self, assembly: Assembly) -> tuple[float, float]:
+        """The largest distance of parts in contact and that of connected parts, `config.touching` and
+        `config.connected`, in the units of the shape."""
+        diagonal = self._placed(assembly).diagonal
+        return self.config.touching * diagonal, self.config.connected * diagonal
 
     def _placed(self, assembly: Assembly) -> Placed:
         return Placed.of(self._meshes, self._solids, assembly, self._up)
@@ -138,9 +146,8 @@ def judge_shape(shape: Shape, config: PhysicsConfig) -> Validity:
 
 def physical_fields(validity: Validity) -> dict[str, Any]:
     """What a sample's record says under `physics`: rounded, so that the noise of last digits changes no bytes."""
-    return {
-        name: round(value, 6) + 0.0 if isinstance(value, float) else value for name, value in asdict(validity).items()
-    }
+    values = {each.name: getattr(validity, each.name) for each in fields(validity) if each.name != "joints"}
+    return {name: round(value, 6) + 0.0 if isinstance(value, float) else value for name, value in values.items()}
 
 
 def unmet(requirements: Requirements, shape: Shape) -> str | None:

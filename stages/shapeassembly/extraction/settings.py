@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from pipeline.config import StrictModel
+from stages.shape.collection.origin import Credit
 from stages.shapeassembly.extraction.files import HierarchyKind, HierarchySource
 from stages.shapeassembly.extraction.rules import RULES, Rules
 
@@ -29,6 +30,10 @@ class NamedFiles(StrictModel):
         pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
         max_length=64,
         description="What the shapes are, such as chair; the keys of the samples begin with it.",
+    )
+    # excluded from what the stage's fingerprint sees, as the credit of exemplars is
+    credit: Credit = Field(
+        default_factory=Credit, exclude=True, description="Whose they are; card and manifest say it."
     )
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from stages.exemplars.faults import geometry_faults
 from stages.package.glb import glb_bytes
+from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from tests.stages.variations.toy import ROAD, kit_of, ring
@@ -24,8 +25,8 @@ def faults(kit: Kit, assembly: Assembly) -> list[str]:
         {"name": name, "label": kit.types[index].name}
         for name, index in zip(kit_shape(kit, assembly).part_names, assembly.types.tolist(), strict=True)
     ]
-    record = json.dumps({"parts": parts, "contacts": json.dumps(assembly.edges.tolist())}).encode()
-    return geometry_faults(kit, {"json": record, "glb": glb_bytes(kit_shape(kit, assembly))})
+    record, contacts = json.dumps({"parts": parts}).encode(), pair_bytes(assembly.edges)
+    return geometry_faults(kit, {"json": record, CONTACTS: contacts, "glb": glb_bytes(kit_shape(kit, assembly))})
 
 
 def test_exemplars_have_no_faults(kit: Kit) -> None:

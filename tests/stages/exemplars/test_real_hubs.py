@@ -44,7 +44,7 @@ def test_every_config_that_comes_with_the_project_is_valid(path: Path, monkeypat
 
 
 def kit_of(config: KitConfig) -> Kit:
-    return build_kit(config, [read_model(shape, config.parts) for shape in config.shapes])[0]
+    return build_kit(config, [read_model(shape.path, config.parts) for shape in config.shapes])[0]
 
 
 @needs_models

@@ -73,7 +73,7 @@ def test_the_files_hold_the_kit_of_its_shapes(made: tuple[Path, Config]) -> None
     folder, config = made
     root = folder / "out" / ".work" / "toy" / "exemplars"
     settings = config.section(ExemplarsConfig).kits[0]
-    kit, _ = build_kit(settings, [read_model(path) for path in settings.shapes])
+    kit, _ = build_kit(settings, [read_model(shape.path) for shape in settings.shapes])
     assert describe_kit(load_kit(root / "row.json", root / "row.tar")) == describe_kit(kit)
     assert kit.grammar.neighbourhoods == {0: {((0, 1),): 4, ((0, 2),): 4}}
 

@@ -27,6 +27,8 @@ from stages.package.index import index_row, tar_bytes, write_index
 from stages.package.manifest import checksums
 from stages.package.verify import verify_dataset
 from stages.package.verify_shard import shard_samples
+from stages.shape.collection.pairs import CONTACTS, pair_bytes, pairs_of
+from stages.shape.physics.stability import components
 
 Members = dict[str, bytes]
 
@@ -450,9 +452,11 @@ def _write(folder: Path, shards: Mapping[str, Mapping[str, Members]]) -> None:
 
 def _contacts(it: Forged, change: Callable[[list[list[int]]], list[list[int]]]) -> None:
     record = it.record
-    pairs = change(json.loads(record["contacts"]))
-    record["contacts"] = json.dumps(pairs)
-    record["counts"]["cycles"] += len(pairs) - record["counts"]["contacts"]
+    pairs = change(pairs_of(it.members[CONTACTS]).tolist())
+    it.members[CONTACTS] = pair_bytes(np.array(pairs, dtype=np.int32).reshape(-1, 2))
+    pieces = components(len(record["parts"]), np.array(pairs).reshape(-1, 2)).max() + 1
+    record["counts"]["pieces"] = int(pieces)
+    record["counts"]["cycles"] = len(pairs) - len(record["parts"]) + int(pieces)
     record["counts"]["contacts"] = len(pairs)
     it.write(record)
 

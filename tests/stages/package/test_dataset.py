@@ -19,6 +19,7 @@ from pipeline.places import Places, file_digest
 from pipeline.run import run_stage
 from pipeline.shards import bytes_array, read_shard
 from stages.package.verify_samples import empty_values
+from stages.shape.collection.pairs import pairs_of
 from stages.shape.geometry.pose import invert, transform_points
 from tests.stages.package.toy import (
     REFUSED,
@@ -32,7 +33,7 @@ from tests.stages.package.toy import (
 )
 
 MEMBERS = ["glb", "txt", "points.npy", "normals.npy", "labels.npy", "instances.npy", "sketch0.png", "sketch1.png"]
-MEMBERS += ["json"]
+MEMBERS += ["contacts.npy", "joints.npy", "json"]
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -80,18 +81,19 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
         *(sample.key, "val", sample.kit),
         sample.graph,
     )
-    assert json.loads(record["contacts"]) == sample.assembly.edges.tolist()
+    assert pairs_of(samples[sample.key]["contacts.npy"]).tolist() == sample.assembly.edges.tolist()
     first = {"blocks": 0, "planks": 2}[sample.kit]
     assert [part["class"] for part in record["parts"]] == (sample.assembly.types + first).tolist()
     assert [part["label"] for part in record["parts"]] == [("tower", "long.wall")[k] for k in sample.assembly.types]
     assert record["counts"] == {
         "parts": len(sample.assembly),
         "contacts": len(sample.assembly) - 1,
+        "pieces": 1,
         "cycles": 0,
         "types": 2,
     }
-    assert record["parents"] == ["row"]
-    assert json.loads(record["lineage"]) == {"parents": ["row"]}
+    assert record["lineage"] == sample.lineage
+    assert record["contact_tolerance"] == toy_kit(sample.kit).contact_tolerance
     assert record["points"] == {"farthest": 16, "uniform": 64, "centre": [0, 0, 0], "scale": 1.0}
 
 
@@ -105,8 +107,10 @@ def test_mesh_points_poses_and_bounds_share_upright_coordinates(toy_folder: Path
         scene = trimesh.load(io.BytesIO(members["glb"]), file_type="glb", process=False)
         points, instances = bytes_array(members["points.npy"]), bytes_array(members["instances.npy"])
         assert np.allclose(scene.bounds, record["bounds"], atol=1e-6)
-        assert np.allclose(np.asarray(record["bounds"])[1, 1], {"blocks": 1.0, "planks": 3.0}[record["kit"]])
         boxes = [part_type.bounds for part_type in toy_kit(record["kit"]).types]
+        up = {"blocks": 1, "planks": 2}[record["kit"]]
+        heights = [boxes[("tower", "long.wall").index(part["label"])][1, up] for part in record["parts"]]
+        assert np.allclose(np.asarray(record["bounds"])[1, 1], max(heights))
         for part in record["parts"]:
             pose = np.array(part["pose"])
             assert np.array_equal(scene.graph.get(part["name"])[0], pose)

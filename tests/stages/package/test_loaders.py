@@ -7,10 +7,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 
+from pipeline.shards import bytes_array, read_shard
 from tests.stages.package.toy import SPLITS, toy_keys
 
 POINTS = 16 + 64
@@ -46,6 +49,7 @@ def test_webdataset_yields_each_sample_once_and_decoded(toy_folder: Path, split:
         assert sample["points.npy"].shape == sample["normals.npy"].shape == (POINTS, 3)
         assert sample["points.npy"].dtype == np.float32
         assert sample["labels.npy"].dtype == sample["instances.npy"].dtype == np.int16
+        assert sample["contacts.npy"].shape == (2, sample["json"]["counts"]["contacts"])
         assert sample["json"]["key"] == sample["__key__"]
         assert sample["txt"].split()[0] == sample["json"]["text"]
 
@@ -80,6 +84,10 @@ print(json.dumps({
     "parts": [part["name"] for part in first["json"]["parts"]],
     "size": first["sketch0.png"].size,
     "points": [len(each["points.npy"]) for each in loaded["val"]],
+    "contacts": {
+        each["__key__"]: each["contacts.npy"] for kind in (loaded, streamed) for split in kind for each in kind[split]
+    },
+    "types": str(streamed["train"].features["contacts.npy"]),
 }))
 """
 
@@ -92,6 +100,10 @@ def test_hugging_face_datasets_loads_every_split_with_typed_members(toy_folder: 
     assert features["sketch0.png"].startswith("Image")
     assert features["points.npy"] == features["normals.npy"] == "List(List(Value('float32')))"
     assert features["labels.npy"] == features["instances.npy"] == "List(Value('int16'))"
+    assert features["contacts.npy"] == found["types"] == "List(List(Value('int32')))"
+    stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
+    assert found["contacts"] == {key: bytes_array(each["contacts.npy"]).tolist() for key, each in stored.items()}
+    assert [[], []] in found["contacts"].values()
     assert features["txt"] == "Value('string')"
     assert "null" not in features["json"]
     assert found["nodes"] == sorted(found["parts"])
@@ -105,31 +117,56 @@ logging.basicConfig(stream=sys.stdout, level=logging.WARNING)
 import mlcroissant
 dataset = mlcroissant.Dataset(sys.argv[1])
 issues = dataset.metadata.ctx.issues
-found = {"issues": sorted(map(str, [*issues.errors, *issues.warnings])), "records": {}, "lengths": {}}
+found = {"issues": sorted(map(str, [*issues.errors, *issues.warnings])), "records": {}, "shapes": {}}
+def plain(value):
+    if isinstance(value, bytes):
+        return value.decode() if len(value) < 60 and value.isascii() else len(value)
+    return list(value.size) if hasattr(value, "mode") else value
 for record_set in dataset.metadata.record_sets:
     name = record_set.uuid
-    records = list(dataset.records(name))
-    found["records"][name] = [record[f"{name}/key"].decode() for record in records]
-    contents = [record[f"{name}/content"] for record in records]
-    found["lengths"][name] = [len(each) if isinstance(each, bytes) else list(each.size) for each in contents]
+    # a join of mlcroissant's does not run on a Dataset whose record sets have been read already
+    records = mlcroissant.Dataset(sys.argv[1]).records(name)
+    found["records"][name] = [{each.rpartition("/")[2]: plain(record[each]) for each in record} for record in records]
+    found["shapes"] |= {f.uuid: [f.array_shape_tuple, f.data_types] for f in record_set.fields if f.is_array}
 found["version"] = str(dataset.metadata.ctx.conforms_to)
 print(json.dumps(found))
 """
 
 
-def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
-    toy_folder: Path, tmp_path: Path
-) -> None:
-    from pipeline.shards import read_shard
+@pytest.fixture(scope="module")
+def croissant(toy_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What mlcroissant says of the toy dataset: issues, records of every record set, shapes of arrays."""
+    cache = tmp_path_factory.mktemp("croissant")
+    (line,) = outside(CROISSANT, str(toy_folder / "croissant.json"), cache=cache).splitlines()
+    found: dict[str, Any] = json.loads(line)
+    return found
 
-    (line,) = outside(CROISSANT, str(toy_folder / "croissant.json"), cache=tmp_path).splitlines()
-    found = json.loads(line)
-    assert found["issues"] == []
-    assert found["version"].endswith("V_1_1")
+
+def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
+    toy_folder: Path, croissant: dict[str, Any]
+) -> None:
+    assert croissant["issues"] == []
+    assert croissant["version"].endswith("V_1_1")
     stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
     members = {member.partition(".")[0]: member for member in next(iter(stored.values()))}
-    assert set(found["records"]) == set(members)
+    assert set(croissant["records"]) == {"splits", "samples", *members, *(f"{name}-of-samples" for name in members)}
     for name, member in members.items():
-        assert sorted(found["records"][name]) == sorted(stored)
-        for key, length in zip(found["records"][name], found["lengths"][name], strict=True):
-            assert length == ([24, 24] if member.endswith(".png") else len(stored[key][member]))
+        records = {each["key"]: each["content"] for each in croissant["records"][name]}
+        assert set(records) == set(stored)
+        for key, content in records.items():
+            size = len(stored[key][member])
+            assert content in ([24, 24], size, stored[key][member].decode("latin-1"))
+
+
+def test_mlcroissant_knows_splits_types_and_shapes(toy_folder: Path, croissant: dict[str, Any]) -> None:
+    records = croissant["records"]
+    assert {each["name"] for each in records["splits"]} == set(SPLITS)
+    split_of = {key: split for split in SPLITS for key in toy_keys(split)}
+    assert {each["key"]: each["split"] for each in records["samples"]} == split_of
+    rows = pyarrow.parquet.read_table(toy_folder.parent / "toy-index" / "toy.parquet").to_pylist()
+    assert {each["key"]: each["rooted"] for each in records["samples"]} == {row["key"]: row["rooted"] for row in rows}
+    for joined in ("points-of-samples", "sketch0-of-samples", "json-of-samples"):
+        assert {each["key"]: each["split"] for each in records[joined]} == split_of
+    shape, (text, element) = croissant["shapes"]["points/content"]
+    assert (shape, text.rpartition("/")[2], element.rpartition("/")[2]) == ([POINTS, 3], "Text", "Float32")
+    assert croissant["shapes"]["contacts-of-samples/content"][0] == [2, -1]

@@ -130,6 +130,7 @@ def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_pa
 
     from pipeline.shards import read_shard
     from stages.exemplars.faults import geometry_faults
+    from stages.shape.collection.pairs import CONTACTS, pair_bytes, pairs_of
     from tests.stages.package.toy import toy_kit
 
     samples = [members for path in toy_folder.rglob("*.tar") for _, members in read_shard(path)]
@@ -137,8 +138,8 @@ def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_pa
     record = json.loads(members["json"])
     kit = toy_kit(record["kit"])
     assert geometry_faults(kit, members) == []
-    record["contacts"] = json.dumps([*json.loads(record["contacts"]), [0, 2]])
-    faults = geometry_faults(kit, {**members, "json": json.dumps(record).encode()})
+    more = np.concatenate([pairs_of(members[CONTACTS]), [[0, 2]]]).astype(np.int32)
+    faults = geometry_faults(kit, {**members, CONTACTS: pair_bytes(more)})
     ends = (record["parts"][0]["name"], record["parts"][2]["name"])
     assert f"{ends[0]} and {ends[1]} are recorded as neighbours and do not touch" in faults
 

@@ -15,6 +15,7 @@ from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.exemplars.settings import ExemplarsConfig
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
 from stages.points.settings import PointsConfig
@@ -58,7 +59,7 @@ def toy_kit(name: str) -> Kit:
     beside = [np.eye(4), np.eye(4)]
     beside[0][0, 3], beside[1][0, 3] = 1.0, -1.0
     dockings = tuple(Docking(0, 1, pose, "face", count, 0.0) for pose, count in zip(beside, (3, 2), strict=True))
-    rules = {kind: {((1 - kind, 1),): 1, ((1 - kind, 2),): 4} for kind in (0, 1)}
+    rules = {kind: {(): 1, ((1 - kind, 1),): 1, ((1 - kind, 2),): 4} for kind in (0, 1)}
     return Kit(
         name=name,
         types=types,
@@ -77,8 +78,20 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
     for item in range(count):
         number = (SPLITS.index(split) * 100 + index) * 10 + item
         kit = list(KITS)[number % 2]
-        assembly = chain({"train": 2, "val": 4, "test": 5}[split] + number % 2 * (split != "val"), number % 2)
-        lineage: dict[str, Any] = {"parents": ["row"]} if item else {}
+        # loaders take types from what they see first: shapes of one part, in which nothing touches
+        length = {"train": 2, "val": 4, "test": 5}[split] + number % 2 * (split != "val")
+        assembly = chain(length if index else 1, number % 2)
+        lineage: dict[str, Any] = {
+            "method": "toy",
+            "parents": ["row"],
+            "name": f"toy-{number}",
+            "made_of": ["row", "row"],
+            "parts_from": [1, len(assembly) - 1],
+            "boundary": [0],
+            "images": [0],
+            "motion": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]],
+            "backdrop": 0,
+        }
         graph = graph_digest(assembly.types, assembly.edges)
         samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, graph, lineage, assembly))
     return samples
@@ -100,10 +113,6 @@ class ToyConfig(StrictModel):
 
 
 class NoConfig(StrictModel):
-    """Nothing to set."""
-
-
-class OtherNoConfig(StrictModel):
     """Nothing to set."""
 
 
@@ -164,9 +173,11 @@ def _no_bytes(_: Plan) -> int:
 TOY_STAGES: Mapping[str, Stage] = named_inputs(
     [
         *ABSENT_STAGES.values(),
-        Stage("exemplars", __name__, NoConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes),
+        Stage(
+            "exemplars", __name__, ExemplarsConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes
+        ),
         Stage("variations", __name__, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
-        Stage("strings", __name__, OtherNoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
+        Stage("strings", __name__, NoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
         POINTS,
         VALIDITY,
         Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
@@ -179,9 +190,9 @@ def toy_config(shards: int = 8) -> Config:
     """The config of the toy dataset of so many shards a split."""
     sections = {
         **ABSENT_SECTIONS,
-        "exemplars": NoConfig(),
+        "exemplars": ExemplarsConfig(),
         "variations": ToyConfig(shards=shards),
-        "strings": OtherNoConfig(),
+        "strings": NoConfig(),
         "validity": PhysicsConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right"))),

@@ -38,7 +38,10 @@ def test_a_glb_has_the_parts_of_the_shape_by_name_in_their_places(tmp_path: Path
     scene = trimesh.load_scene(tmp_path / "base.glb")
     shape = shape_of(PROGRAM, PROGRAM.schema.base)
     assert set(scene.graph.nodes_geometry) == {"seat.000", "leg.000", "leg.001", "rail.000"}
-    for name, mesh in zip(shape.part_names, shape.meshes, strict=True):
+    for name, mesh, pose in zip(shape.part_names, shape.meshes, shape.assembly.poses, strict=True):
+        placed, geometry = scene.graph.get(name)
+        assert geometry == name
+        np.testing.assert_allclose(placed, pose, atol=1e-6)
         np.testing.assert_allclose(scene.geometry[name].bounds, mesh.bounds, atol=1e-6)
         assert len(scene.geometry[name].faces) == len(mesh.faces)
 

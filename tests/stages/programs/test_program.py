@@ -10,18 +10,26 @@ from stages.programs.curves import Part, box
 from stages.programs.parameters import ParameterError
 from stages.programs.program import Constraint, find_program, shape_of, shape_of_text
 from stages.programs.rules import Rule
+from stages.shape.geometry.pose import transform_points
 from tests.stages.programs.stool import PROGRAM
 
 STOOL = "tests.stages.programs.stool"
 
 
-def test_shape_has_a_mesh_a_part_at_identity_poses_labelled_by_name() -> None:
+def test_shape_has_a_mesh_a_part_labelled_by_name() -> None:
     shape = shape_of(PROGRAM, PROGRAM.schema.base)
     assert [mesh.name for mesh in shape.meshes] == ["seat", "leg", "leg", "rail"]
     assert shape.label_of.tolist() == [0, 1, 1, 2]
     assert shape.assembly.types.tolist() == [0, 1, 2, 3]
     assert shape.up == "y"
-    np.testing.assert_array_equal(shape.assembly.poses, np.tile(np.eye(4), (4, 1, 1)))
+
+
+def test_a_pose_says_where_the_middle_of_its_part_is() -> None:
+    shape = shape_of(PROGRAM, PROGRAM.schema.base)
+    for part, mesh, pose in zip(PROGRAM.parts(PROGRAM.schema.base), shape.meshes, shape.assembly.poses, strict=True):
+        np.testing.assert_allclose(mesh.bounds.sum(axis=0), 0.0, atol=1e-12)
+        np.testing.assert_array_equal(pose[:3, :3], np.eye(3))
+        np.testing.assert_allclose(transform_points(pose, mesh.vertices), part.mesh.vertices, atol=1e-12)
 
 
 def test_hidden_parameters_have_no_say() -> None:

@@ -124,7 +124,7 @@ def test_an_archive_is_read_like_a_folder(folder: Path, tmp_path: Path) -> None:
     code, printed, out = make(tmp_path, section)
     assert code == 0, printed
     found = [sample for shard in samples(out).values() for sample in shard]
-    assert sorted(str(sample.lineage["file"]) for sample in found) == [f"data/furniture/{e.name}" for e in EXAMPLES]
+    assert sorted(sample.lineage["parents"][0] for sample in found) == [f"data/furniture/{e.name}" for e in EXAMPLES]
 
 
 def test_a_source_that_is_not_there_is_said_before_anything_starts(tmp_path: Path) -> None:

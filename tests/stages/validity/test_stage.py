@@ -16,10 +16,13 @@ from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.programs.program import find_program
 from stages.programs.settings import ProgramsConfig
+from stages.shape.collection.members import Packaged
+from stages.shape.collection.pairs import CONTACTS, JOINTS, pairs_of
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, write_sample
+from stages.validity.members import MEMBERS
 from stages.validity.stage import STAGE
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.shape.views.solids import box, kit_of, part_type, posed
@@ -47,7 +50,8 @@ def small(_: Plan) -> int:
 
 
 def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
-    """The json of each sample and the rejects by reason, of a collection of `samples` of one producer."""
+    """The fields of each sample, with its arrays by their names, and the rejects by reason, of a collection of
+    `samples` of one producer."""
 
     def make_samples(task: Task) -> Outcome:
         with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
@@ -80,7 +84,10 @@ def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict
         assert not run_stage(name, stages, config, Places(out, "toys"), workers=1).failed
     found = read_shard(next(out.rglob("validity/**/toys-train-000000.tar")))
     record = json.loads(next(out.rglob("validity/**/records/toys-train-000000.json")).read_text())
-    return {key: json.loads(members["json"]) for key, members in found}, record["rejects"]
+    return {
+        key: {**json.loads(members["json"]), **{name: pairs_of(members[name]).tolist() for name in (CONTACTS, JOINTS)}}
+        for key, members in found
+    }, record["rejects"]
 
 
 def boxes(key: str, *offsets: tuple[float, float, float], kind: int = 0) -> Sample:
@@ -109,8 +116,35 @@ def test_parts_that_a_program_makes_are_asked_whether_they_touch(tmp_path: Path)
     found, _ = judged(
         tmp_path, Sample("stool", "train", "programs", STOOL, "0" * 64, {}, text=schema.text(schema.base))
     )
-    assert found["stool"]["contacts"] == [[0, 1], [0, 2], [1, 3], [2, 3]]
+    assert found["stool"][CONTACTS] == [[0, 1], [0, 2], [1, 3], [2, 3]]
     assert found["stool"]["physics"]["stable"]
+
+
+def test_parts_that_are_near_and_do_not_touch_are_joints_and_no_contacts(tmp_path: Path) -> None:
+    """The kit says that parts touch at most 0.001 apart; physics connects what is at most 2 % of the diagonal apart."""
+    found, _ = judged(tmp_path, boxes("gap", (0, 0, 0), (0, 1.02, 0)))
+    assert found["gap"][CONTACTS] == []
+    assert found["gap"][JOINTS] == [[0, 1]]
+    assert found["gap"]["physics"]["components"] == 1
+    assert found["gap"]["contact_tolerance"] < 0.02 < found["gap"]["joint_tolerance"]
+    assert found["gap"]["joint_tolerance"] == pytest.approx(0.02 * np.hypot(2.02, np.sqrt(2)))
+
+
+def test_contradictions_between_joints_and_physics_are_found() -> None:
+    joints = np.array([[0, 1]], dtype=np.int32)
+    physics = {"components": 1, "floating": 0, "rooted": True}
+
+    def faults(pairs: np.ndarray = joints, **changed: object) -> list[str]:
+        arrays = {CONTACTS: np.empty((2, 0), np.int32), JOINTS: pairs.T}
+        record = {"parts": [{}, {}], "physics": {**physics, **changed}}
+        return list(MEMBERS.faults(Packaged("key", record, {}, arrays)))
+
+    assert faults() == []
+    assert faults(components=2) == ["its joints do not make as many components as physics says"]
+    assert faults(joints[:0]) == ["its joints do not make as many components as physics says"]
+    assert faults(rooted=False) == ["rooted and floating in its physics contradict each other"]
+    assert faults(joints[:, ::-1]) == [f"{JOINTS} holds what is no pair of its parts"]
+    assert faults(joints.astype(np.int64)) == [f"{JOINTS} is no array int32 (2, m)"]
 
 
 @pytest.mark.parametrize("friction", [-0.1, 11.0])

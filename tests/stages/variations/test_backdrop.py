@@ -11,6 +11,7 @@ from trimesh.transformations import translation_matrix
 from stages.exemplars.faults import geometry_faults
 from stages.exemplars.settings import HubConfig
 from stages.package.glb import glb_bytes
+from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
@@ -94,8 +95,9 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
         names = kit_shape(kit, whole).part_names
         labels = [kit.types[index].name for index in whole.types]
         parts = [{"name": name, "label": label} for name, label in zip(names, labels, strict=True)]
-        record = json.dumps({"parts": parts, "contacts": json.dumps(whole.edges.tolist())}).encode()
-        assert geometry_faults(kit, {"json": record, "glb": glb_bytes(kit_shape(kit, whole))}) == []
+        record, contacts = json.dumps({"parts": parts}).encode(), pair_bytes(whole.edges)
+        members = {"json": record, CONTACTS: contacts, "glb": glb_bytes(kit_shape(kit, whole))}
+        assert geometry_faults(kit, members) == []
         string = canonical_string(whole.types, whole.edges, alphabet).string
         assert len(check(string, alphabet, kit.grammar).types) == len(whole)
     link, plate = (alphabet.tokens[kit.type_names().index(name)] for name in ("link", "plate"))

@@ -62,7 +62,7 @@ def samples(folder: Path) -> list[Sample]:
 
 def test_every_table_becomes_a_sample_whose_text_is_its_program(toy: tuple[Path, str, Path]) -> None:
     found = samples(toy[2])
-    assert sorted(sample.lineage["file"] for sample in found) == [f"{number}.json" for number in range(10)]
+    assert sorted(sample.lineage["parents"][0] for sample in found) == [f"{number}.json" for number in range(10)]
     assert len({sample.key for sample in found}) == 10
     for sample in found:
         assert len(execute(parse(sample.text))) == 5

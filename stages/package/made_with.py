@@ -1,0 +1,51 @@
+"""What a dataset was made with: the version of this code, and those of the libraries that it needs."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tomllib
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import pipeline
+import stages
+
+__all__ = ["code_version", "library_versions"]
+
+PROJECT = Path(pipeline.__file__).parent.parent / "pyproject.toml"
+
+
+@cache
+def code_version() -> str:
+    """The project's version and a digest of its code, `0.1.0+3f2a9c01d4e7`.
+
+    It is a function of the code alone, so that the same code says the same in a checkout, in a fresh clone and in a
+    copy without history, and an edited file says so by itself.
+    """
+    digest = hashlib.sha256()
+    for package in (pipeline, stages):
+        for root in sorted(package.__path__):
+            for path in sorted(Path(root).rglob("*.py")):
+                digest.update(f"{package.__name__}/{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes())
+    return f"{_project()['version']}+{digest.hexdigest()[:12]}"
+
+
+@cache
+def library_versions() -> dict[str, str]:
+    """The versions of the libraries that pyproject.toml lists, by name; those that are not installed are left out."""
+    found = {}
+    for asked in sorted(_project()["dependencies"], key=str.lower):
+        name = re.split(r"[^\w.-]", asked, maxsplit=1)[0]
+        try:
+            found[name] = version(name).partition("+")[0]  # +cpu says where it came from, not what it is
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _project() -> dict[str, Any]:
+    project: dict[str, Any] = tomllib.loads(PROJECT.read_text())["project"]
+    return project

@@ -1,0 +1,78 @@
+"""The tables of a dataset's card, as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Any
+
+__all__ = ["member_table", "origin_table", "reject_table", "source_table", "split_table"]
+
+
+def split_table(splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> str:
+    """Samples, shards and size of each split."""
+    lines = ["| split | samples | shards | MB |", "| --- | ---: | ---: | ---: |"]
+    for split in [*splits, "all"]:
+        own = [shard for shard in shards if split in ("all", shard["split"])]
+        size = sum(shard["bytes"] for shard in own) / 1e6
+        lines.append(f"| {split} | {sum(shard['samples'] for shard in own):,} | {len(own)} | {size:,.1f} |")
+    return "\n".join(lines)
+
+
+def source_table(sources: Mapping[str, str], rows: Sequence[Mapping[str, Any]]) -> str:
+    """What the samples of each kit or program are like, from the rows of the index."""
+    lines = [
+        "| made of | samples | distinct structures | parts | contacts | cycles | rooted | stable |",
+        "| --- | ---: | ---: | --- | --- | --- | ---: | ---: |",
+    ]
+    for name, described in sources.items():
+        own = [row for row in rows if row["kit"] == name]
+        spans = " | ".join(_span([row[each] for row in own]) for each in ("parts", "contacts", "cycles"))
+        structures = len({row["graph"] for row in own})
+        title = f"{name} ({described})" if described else name
+        shares = " | ".join(f"{sum(row[each] for row in own) / len(own):.1%}" for each in ("rooted", "stable"))
+        lines.append(f"| {title} | {len(own):,} | {structures:,} | {spans} | {shares} |")
+    return (
+        "\n".join(lines) + "\n\nParts, contacts and cycles: least / median / most in a shape. Contacts: pairs of parts "
+        "that touch. Cycles: independent rings that the contacts close. Rooted: every part is connected to the ground. "
+        "Stable: the shape stands and bears small pushes, by statics on its geometry."
+    )
+
+
+def member_table(members: Sequence[Mapping[str, Any]]) -> str:
+    """What each sample holds: name, type and shape, and a sentence."""
+    lines = ["| member | array | what it is |", "| --- | --- | --- |"]
+    for each in members:
+        array = f"{each['dtype']} ({', '.join(map(str, each['shape']))})" if each["dtype"] else ""
+        lines.append(f"| `<key>.{each['name']}` | {array} | {each['sentence']} |")
+    return "\n".join(lines)
+
+
+def origin_table(origins: Sequence[Mapping[str, Any]]) -> str:
+    """Of each file that the dataset was made from whose it is, and what its licence asks to be said."""
+    lines = [
+        "| made from | of | author | source | licence | notice | sha256 |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for each in origins:
+        author, source, notice = (_cell(each[name]) for name in ("author", "source", "notice"))
+        license = _cell(each["license"]) or "not stated"
+        digest = f"`{each['sha256'][:12]}…`"
+        lines.append(f"| {each['file']} | {each['kit']} | {author} | {source} | {license} | {notice} | {digest} |")
+    return "\n".join(lines)
+
+
+def reject_table(rejects: Mapping[str, int]) -> str:
+    """How many tries were refused, by reason."""
+    lines = ["| refused because | tries |", "| --- | ---: |"]
+    lines += [f"| {reason} | {count:,} |" for reason, count in sorted(rejects.items(), key=lambda each: -each[1])]
+    return "\n".join(lines)
+
+
+def _span(numbers: Sequence[int]) -> str:
+    return f"{min(numbers)} / {median(numbers):g} / {max(numbers)}" if numbers else "-"
+
+
+def _cell(text: str) -> str:
+    """A text in one cell of a table."""
+    return " ".join(text.split()).replace("|", "\\|")

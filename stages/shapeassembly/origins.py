@@ -1,0 +1,34 @@
+"""Where the programs and part hierarchies of a dataset come from, and whose they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.config import Config
+from stages.shape.collection.origin import Origin
+from stages.shapeassembly.extraction.settings import NamedFiles
+from stages.shapeassembly.settings import ShapeAssemblyConfig
+from stages.shapeassembly.sources import source_digest
+
+__all__ = ["program_origins"]
+
+
+def program_origins(config: Config) -> list[Origin]:
+    """The folders and archives of the config, in its order. The digest of a folder is of the names and bytes of the
+    files in it that count."""
+    section = config.section(ShapeAssemblyConfig)
+    programs = [_origin("programs", each, each.path, source_digest(each.path)) for each in section.programs]
+    hierarchies = [
+        _origin("hierarchies", each, each.path, each.source.digest(0, len(each.source))) for each in section.hierarchies
+    ]
+    return [*programs, *hierarchies]
+
+
+def _origin(key: str, files: NamedFiles, path: Path, digest: str) -> Origin:
+    return Origin(
+        kit=files.name,
+        file="/".join(path.parts[-2:]),
+        sha256=digest,
+        key=f"shapeassembly.{key}[{files.name}].credit",
+        **files.credit.model_dump(),
+    )
