@@ -141,7 +141,7 @@ def _kept_parts(
     identified: Identified,
     assemblies: Sequence[Assembly],
     hubs: Sequence[int],
-) -> tuple[list[IntArray], list[str]]:
+) -> tuple[list[np.ndarray], list[str]]:
     """The parts of each of `assemblies`, ascending, that are no hubs and in no piece that the config leaves out; and
     the warnings of the models and of what is left out. Raises ConfigError where nothing is kept of a model."""
     types = identified.types

@@ -6,10 +6,10 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["turn_outward", "turned_faces"]
+__all__ = ["face_outward", "flipped_faces"]
 
 
-def turn_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> IntArray:
+def face_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> IntArray:
     """`faces` int32 (f, 3), one orientation in each sheet already, with whole sheets turned around where needed.
 
     original: int32 (f, 3), the same faces as the file had them. An open sheet shows the side that most of its faces
@@ -19,22 +19,22 @@ def turn_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> I
     if not len(faces):
         return faces
     sheet, closed = _sheets(faces)
-    turn = np.bincount(sheet, np.where(turned_faces(faces, original), 1.0, -1.0)) > 0
+    flip = np.bincount(sheet, np.where(flipped_faces(faces, original), 1.0, -1.0)) > 0
     corners = vertices[faces] - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     parts = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-    volume = np.bincount(sheet, parts) * np.where(turn, -1.0, 1.0)
+    volume = np.bincount(sheet, parts) * np.where(flip, -1.0, 1.0)
     solid = closed & (volume != 0)
     around = _outermost(vertices, faces, sheet, solid)
-    turn ^= solid & (volume[around] < 0)
-    return np.where(turn[sheet][:, None], faces[:, ::-1], faces)
+    flip ^= solid & (volume[around] < 0)
+    return np.where(flip[sheet][:, None], faces[:, ::-1], faces)
 
 
-def turned_faces(faces: IntArray, original: IntArray) -> BoolArray:
+def flipped_faces(faces: IntArray, original: IntArray) -> BoolArray:
     """Whether each face runs around its corners the other way than in `original`; both int32 (f, 3)."""
     first = (original == faces[:, :1]).argmax(axis=1)
     following = np.take_along_axis(original, (first[:, None] + 1) % 3, axis=1)[:, 0]
-    turned: BoolArray = following != faces[:, 1]
-    return turned
+    flipped: BoolArray = following != faces[:, 1]
+    return flipped
 
 
 def _sheets(faces: IntArray) -> tuple[IntArray, BoolArray]:

@@ -94,7 +94,7 @@ def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
             raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
     parted = segment(scene, source)
     surfaces, placements = bake(*centre(parted.surfaces, parted.placements))
-    shift = _shift_to_origin(surfaces, placements, warnings)
+    offset = _off_origin(surfaces, placements, warnings)
     names: set[str] = set()
     parts = []
     for placement in placements:
@@ -102,7 +102,7 @@ def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
         name = unique_name(placement.name, names)
         names.add(name)
         pose = placement.pose.copy()
-        pose[:3, 3] -= shift
+        pose[:3, 3] -= offset
         parts.append(
             RawPart(name, surface.name, placement.label, pose, surface.vertices, surface.faces, surface.face_colors)
         )
@@ -174,7 +174,7 @@ def _solid_placements(path: Path, scene: Scene) -> Scene:
     )
 
 
-def _shift_to_origin(surfaces: list[Surface], placements: list[Placement], warnings: list[str]) -> FloatArray:
+def _off_origin(surfaces: list[Surface], placements: list[Placement], warnings: list[str]) -> FloatArray:
     """What is to be taken off all poses, float64 (3,): zero unless the model stands far from the origin."""
     middle, diagonal = distance_from_origin(surfaces, placements)
     distance = float(np.linalg.norm(middle))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stages.exemplars.components import connected_corners, connected_faces
-from stages.exemplars.orientation import turn_outward, turned_faces
+from stages.exemplars.orientation import face_outward, flipped_faces
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 __all__ = ["Repair", "repair_mesh"]
@@ -47,7 +47,7 @@ def repair_mesh(
     solid_of = np.full(len(faces), -1, dtype=np.int32)
     solid_of[whole] = solid
     points, manifold = _cut_apart(vertices, faces[unique], solid_of[unique])
-    oriented = turn_outward(points, _coherent(points, manifold), manifold)
+    oriented = face_outward(points, _coherent(points, manifold), manifold)
     high = _heights(points, oriented) > FLAT * np.linalg.norm(np.ptp(vertices[used], axis=0))
     kept, renumbered = np.unique(oriented[high], return_inverse=True)
     changes = {
@@ -56,7 +56,7 @@ def repair_mesh(
         "duplicate_faces": len(whole) - len(unique),
         "zero_area_faces": len(faces) - len(whole) + int(np.count_nonzero(~high)),
         "nonmanifold_edges": _crowded_edges(faces[unique]),
-        "flipped_faces": int(np.count_nonzero(turned_faces(oriented, manifold)[high])),
+        "flipped_faces": int(np.count_nonzero(flipped_faces(oriented, manifold)[high])),
     }
     return (
         points[kept],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -104,40 +105,58 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
 def load_kit(text: Path, arrays: Path) -> Kit:
     """The kit that `write_kit` wrote to these two files."""
     described = json.loads(text.read_text())
-    names = [each["name"] for each in described["types"]]
-    index_of = {name: index for index, name in enumerate(names)}
+    names = iter([each["name"] for each in described["types"]])
     types: list[PartType] = []
     exemplars: list[Exemplar] = []
     for key, members in read_shard(arrays):
         if key.startswith("type-"):
-            types.append(
-                PartType(
-                    name=names[len(types)],
-                    vertices=bytes_array(members["vertices.npy"]),
-                    faces=bytes_array(members["faces.npy"]),
-                    face_colors=bytes_array(members["colors.npy"]),
-                    frame=bytes_array(members["frame.npy"]),
-                    symmetries=bytes_array(members["symmetries.npy"]),
-                )
-            )
+            types.append(_part_type(next(names), members))
         else:
-            header = json.loads(members["json"])
-            exemplars.append(
-                Exemplar(
-                    name=header["name"],
-                    part_names=tuple(header["part_names"]),
-                    assembly=Assembly(
-                        types=bytes_array(members["types.npy"]),
-                        poses=bytes_array(members["poses.npy"]),
-                        edges=bytes_array(members["edges.npy"]),
-                    ),
-                    backdrop=Assembly(
-                        types=bytes_array(members["hub-types.npy"]),
-                        poses=bytes_array(members["hub-poses.npy"]),
-                        edges=np.empty((0, 2), dtype=np.int32),
-                    ),
-                )
-            )
+            exemplars.append(_exemplar(members))
+    return Kit(
+        name=described["kit"],
+        types=tuple(types),
+        exemplars=tuple(exemplars),
+        grammar=_grammar(described),
+        contact_tolerance=described["contact_tolerance"],
+        pose_tolerance=described["pose_tolerance"],
+        contact_kinds=tuple(described["contact_kinds"]),
+        up=described["up"],
+    )
+
+
+def _part_type(name: str, members: Mapping[str, bytes]) -> PartType:
+    return PartType(
+        name=name,
+        vertices=bytes_array(members["vertices.npy"]),
+        faces=bytes_array(members["faces.npy"]),
+        face_colors=bytes_array(members["colors.npy"]),
+        frame=bytes_array(members["frame.npy"]),
+        symmetries=bytes_array(members["symmetries.npy"]),
+    )
+
+
+def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
+    header = json.loads(members["json"])
+    return Exemplar(
+        name=header["name"],
+        part_names=tuple(header["part_names"]),
+        assembly=Assembly(
+            types=bytes_array(members["types.npy"]),
+            poses=bytes_array(members["poses.npy"]),
+            edges=bytes_array(members["edges.npy"]),
+        ),
+        backdrop=Assembly(
+            types=bytes_array(members["hub-types.npy"]),
+            poses=bytes_array(members["hub-poses.npy"]),
+            edges=np.empty((0, 2), dtype=np.int32),
+        ),
+    )
+
+
+def _grammar(described: Mapping[str, Any]) -> Grammar:
+    """The grammar of a kit that `describe_kit` described."""
+    index_of = {each["name"]: index for index, each in enumerate(described["types"])}
     neighbourhoods = {
         index_of[name]: {
             tuple(sorted((index_of[other], count) for other, count in rule["neighbours"].items())): rule["seen"]
@@ -156,20 +175,10 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         )
         for each in described["dockings"]
     )
-    nested = {(index_of[each["a"]], index_of[each["b"]]): each["depth"] for each in described["nested"]}
-    return Kit(
-        name=described["kit"],
-        types=tuple(types),
-        exemplars=tuple(exemplars),
-        grammar=Grammar(
-            neighbourhoods=neighbourhoods,
-            dockings=dockings,
-            nested=nested,
-            strictness=described["strictness"],
-            hubs=tuple(index_of[name] for name in described["hubs"]),
-        ),
-        contact_tolerance=described["contact_tolerance"],
-        pose_tolerance=described["pose_tolerance"],
-        contact_kinds=tuple(described["contact_kinds"]),
-        up=described["up"],
+    return Grammar(
+        neighbourhoods=neighbourhoods,
+        dockings=dockings,
+        nested={(index_of[each["a"]], index_of[each["b"]]): each["depth"] for each in described["nested"]},
+        strictness=described["strictness"],
+        hubs=tuple(index_of[name] for name in described["hubs"]),
     )

@@ -84,7 +84,7 @@ def _nearest_straight(box, target, near, far, gap):
 
 
 @numba.njit(cache=True)
-def _nearest_turned(box, target, near, far, gap):
+def _nearest_tilted(box, target, near, far, gap):
     """The nearest grid points of two cuboids of which `box` is upright: the target's is found by rounding."""
     p, g, q, h = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     best = np.finfo(np.float64).max
@@ -115,7 +115,7 @@ def grow(box, target, decision):
     if abs(target[6] - 1.0) + abs(target[10] - 1.0) + abs(target[14] - 1.0) < 1e-12:
         _nearest_straight(box, target, near, far, gap)
     else:
-        _nearest_turned(box, target, near, far, gap)
+        _nearest_tilted(box, target, near, far, gap)
     largest = max(max(box[3], box[4], box[5]), max(target[3], target[4], target[5]))
     if _norm(gap) < _NEAR * largest:
         return
@@ -129,8 +129,8 @@ def grow(box, target, decision):
 
 
 @numba.njit(cache=True)
-def _turn_about(box, pivot, u, cosine, sine):
-    """Turn a cuboid about the axis through `pivot` along the unit vector `u`."""
+def _rotate_about(box, pivot, u, cosine, sine):
+    """Rotate a cuboid about the axis through `pivot` along the unit vector `u`."""
     for start in range(0, 15, 3):
         if start == 3:
             continue
@@ -146,8 +146,8 @@ def _turn_about(box, pivot, u, cosine, sine):
 
 
 @numba.njit(cache=True)
-def _turn_onto(box, pivot, source, goal):
-    """Turn a cuboid about `pivot` so that `source` comes to lie towards `goal`, by the smallest angle.
+def _rotate_onto(box, pivot, source, goal):
+    """Rotate a cuboid about `pivot` so that `source` comes to lie towards `goal`, by the smallest angle.
 
     Whether that was half a turn, which is about any axis across (`across` of the arm).
     """
@@ -157,12 +157,12 @@ def _turn_onto(box, pivot, source, goal):
     sine, cosine = _norm(u) / lengths, _dot(a, b) / lengths
     if sine >= _TINY:
         u /= sine * lengths
-        _turn_about(box, pivot, u, cosine, sine)
+        _rotate_about(box, pivot, u, cosine, sine)
         return False
     if cosine > 0:
         return False
     across(a, u)
-    _turn_about(box, pivot, u, -1.0, 0.0)
+    _rotate_about(box, pivot, u, -1.0, 0.0)
     return True
 
 
@@ -204,7 +204,7 @@ def hinge(box, prior, p, goal, decision):
         box[3 + k] *= np.sqrt(1 + (wanted - has) / arm[k] ** 2)
     hold(box, prior, pivot)
     point(box, p, source)
-    decision[2] = _turn_onto(box, pivot, source, goal)
+    decision[2] = _rotate_onto(box, pivot, source, goal)
 
 
 @numba.njit(cache=True)
@@ -256,7 +256,7 @@ def swing(box, priors, p, goal, decision):
         lengths = _norm(s) * _norm(t)
         if lengths > _TINY:
             _cross(s, t, normal)
-            _turn_about(box, pivot, u, _dot(s, t) / lengths, _dot(u, normal) / lengths)
+            _rotate_about(box, pivot, u, _dot(s, t) / lengths, _dot(u, normal) / lengths)
             decision[2] = 1
     point(box, p, source)
     _push(box, priors, p, goal - source, decision)

@@ -172,11 +172,11 @@ def _hinge(box: _Box, prior: Tensor, p: Tensor, goal: Tensor, axis: int, half_tu
         axis_across = np.empty(3)
         across(a.detach().numpy(), axis_across)
         u = torch.from_numpy(axis_across)
-        _turn(box, pivot, 2 * torch.outer(u, u) - _UPRIGHT)
+        _rotate(box, pivot, 2 * torch.outer(u, u) - _UPRIGHT)
         return
     length = (a @ a).sqrt() * wanted.sqrt()
     cross = _skew(torch.linalg.cross(a, way) / length)
-    _turn(box, pivot, _UPRIGHT + cross + cross @ cross / (1 + a @ way / length))
+    _rotate(box, pivot, _UPRIGHT + cross + cross @ cross / (1 + a @ way / length))
 
 
 def _swing(box: _Box, priors: list[Tensor], p: Tensor, goal: Tensor, axis: int, turned: bool) -> None:
@@ -188,7 +188,7 @@ def _swing(box: _Box, priors: list[Tensor], p: Tensor, goal: Tensor, axis: int, 
         s, t = s - u * (u @ s), t - u * (u @ t)
         lengths = ((s @ s) * (t @ t)).sqrt()
         cosine, sine = s @ t / lengths, u @ torch.linalg.cross(s, t) / lengths
-        _turn(box, pivot, cosine * _UPRIGHT + sine * _skew(u) + (1 - cosine) * torch.outer(u, u))
+        _rotate(box, pivot, cosine * _UPRIGHT + sine * _skew(u) + (1 - cosine) * torch.outer(u, u))
     if axis >= 0:
         face = _UPRIGHT[axis] if box.frame is None else box.frame[:, axis]
         # Towards either side: both signs cancel.
@@ -203,9 +203,9 @@ def _skew(u: Tensor) -> Tensor:
     return torch.linalg.cross(u.expand(3, 3), _UPRIGHT).T
 
 
-def _turn(box: _Box, pivot: Tensor, turn: Tensor) -> None:
-    box.centre = pivot + turn @ (box.centre - pivot)
-    box.frame = turn if box.frame is None else turn @ box.frame
+def _rotate(box: _Box, pivot: Tensor, rotation: Tensor) -> None:
+    box.centre = pivot + rotation @ (box.centre - pivot)
+    box.frame = rotation if box.frame is None else rotation @ box.frame
 
 
 def _placed(blocks: list[list[_Box]], node: np.ndarray) -> Tensor:
@@ -214,21 +214,22 @@ def _placed(blocks: list[list[_Box]], node: np.ndarray) -> Tensor:
     corners = []
     for index, (block, parent, part) in enumerate(node.tolist()):
         if index == 0:
-            turn, place, scale, hand = _UPRIGHT, torch.zeros(3, dtype=torch.float64), torch.ones_like(_UPRIGHT[0]), 1.0
+            rotation, translation = _UPRIGHT, torch.zeros(3, dtype=torch.float64)
+            scale, hand = torch.ones_like(_UPRIGHT[0]), 1.0
         else:
             box = blocks[node[parent, 0]][part]
-            above, at, scale_above, hand = placed[parent]
-            turn = above if box.frame is None else above @ box.frame
+            above, translation_above, scale_above, hand = placed[parent]
+            rotation = above if box.frame is None else above @ box.frame
             if box.mirror is not None:
-                turn = turn * box.mirror
+                rotation = rotation * box.mirror
                 hand *= float(box.mirror.prod())
-            place = at + above @ box.centre
+            translation = translation_above + above @ box.centre
             scale = box.sizes * scale_above / blocks[block][0].sizes
-        placed.append((turn, place, scale, hand))
+        placed.append((rotation, translation, scale, hand))
         leaves = [box for box in blocks[block][1:] if box.child < 0]
         if leaves:
             centres, sizes = torch.stack([box.centre for box in leaves]), torch.stack([box.sizes for box in leaves])
             frames = torch.stack([_UPRIGHT if box.frame is None else box.frame for box in leaves])
             arms = (_CORNERS * (sizes * (scale * hand))[:, None]) @ frames.transpose(1, 2)
-            corners.append((centres[:, None] + arms) @ turn.T + place)
+            corners.append((centres[:, None] + arms) @ rotation.T + translation)
     return torch.cat(corners) if corners else torch.zeros(0, 8, 3, dtype=torch.float64)

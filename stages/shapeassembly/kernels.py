@@ -209,37 +209,37 @@ def _count_nodes(child, block_parts):
 @numba.njit(cache=True)
 def _place(boxes, child, mirrored, block_parts, node, leaves, corners, leaf_node, leaf_part):
     """Put the assemblies of one program within each other, breadth first: OK or TOO_FAR."""
-    turns, places, scales = np.empty((len(node), 3, 3)), np.zeros((len(node), 3)), np.ones((len(node), 3))
-    turns[0] = np.eye(3)
+    rotations, translations, scales = np.empty((len(node), 3, 3)), np.zeros((len(node), 3)), np.ones((len(node), 3))
+    rotations[0] = np.eye(3)
     first = block_parts[0]
     node[0, 0], node[0, 1], node[0, 2] = 0, -1, 0
     nodes, found = 1, 0
-    world, turn = np.empty(15), np.empty((3, 3))
+    world, rotation = np.empty(15), np.empty((3, 3))
     for current in range(len(node)):
         block = node[current, 0]
         start = block_parts[block] - first
-        m = turns[current]
+        m = rotations[current]
         handed = np.linalg.det(m) > 0
         for part in range(start + 1, block_parts[block + 1] - first):
             box = boxes[part]
             for k in range(3):
-                world[k] = places[current, k] + m[k, 0] * box[0] + m[k, 1] * box[1] + m[k, 2] * box[2]
+                world[k] = translations[current, k] + m[k, 0] * box[0] + m[k, 1] * box[1] + m[k, 2] * box[2]
                 # Sizes follow the size that the assembly really has, places do not.
                 world[3 + k] = box[3 + k] * scales[current, k]
                 for j in range(3):
-                    turn[k, j] = m[k, 0] * box[6 + 3 * j] + m[k, 1] * box[7 + 3 * j] + m[k, 2] * box[8 + 3 * j]
+                    rotation[k, j] = m[k, 0] * box[6 + 3 * j] + m[k, 1] * box[7 + 3 * j] + m[k, 2] * box[8 + 3 * j]
             if child[part] >= 0:
                 below = child[part]
                 node[nodes, 0], node[nodes, 1], node[nodes, 2] = below, current, part - start
                 for j in range(3):
                     sign = -1.0 if (mirrored[part] >> j) & 1 else 1.0
-                    turns[nodes, :, j] = sign * turn[:, j]
-                places[nodes] = world[:3]
+                    rotations[nodes, :, j] = sign * rotation[:, j]
+                translations[nodes] = world[:3]
                 scales[nodes] = world[3:6] / boxes[block_parts[below] - first, 3:6]
                 nodes += 1
                 continue
             for j in range(3):
-                world[6 + 3 * j : 9 + 3 * j] = turn[:, j] if handed else -turn[:, j]
+                world[6 + 3 * j : 9 + 3 * j] = rotation[:, j] if handed else -rotation[:, j]
             leaves[found] = world
             p = np.empty(3)
             for corner in range(8):

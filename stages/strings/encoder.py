@@ -90,9 +90,9 @@ def canonical_string(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> E
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     pairs = np.sort(rank[np.asarray(edges).reshape(-1, 2)], axis=1)
-    turn = np.argsort(pairs[:, 0] * len(order) + pairs[:, 1])
-    tree = depth_first_tree(len(order), pairs, turn, 0)
-    encoded = _write(letters[order], pairs, tree, turn, 0, alphabet)
+    edge_order = np.argsort(pairs[:, 0] * len(order) + pairs[:, 1])
+    tree = depth_first_tree(len(order), pairs, edge_order, 0)
+    encoded = _write(letters[order], pairs, tree, edge_order, 0, alphabet)
     return Encoded(encoded.string, order[encoded.nodes])
 
 
@@ -110,12 +110,12 @@ def _checked(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> tuple[Ind
 
 
 def _write(
-    types: Indices, pairs: Indices, tree: npt.NDArray[np.bool_], turn: Indices, root: int, alphabet: Alphabet
+    types: Indices, pairs: Indices, tree: npt.NDArray[np.bool_], edge_order: Indices, root: int, alphabet: Alphabet
 ) -> Encoded:
     from stages.strings.traversal import walk
 
     letters = len(alphabet.tokens)
-    codes, nodes = walk(types, pairs, tree, turn, root, letters)
+    codes, nodes = walk(types, pairs, tree, edge_order, root, letters)
     if len(nodes) < len(types):
         raise NotConnectedError(f"{len(nodes)} of {len(types)} nodes are in reach of node {root}")
     texts = _texts(alphabet, max(int(codes.max()) - letters, 0) // 64)

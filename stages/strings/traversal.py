@@ -12,8 +12,8 @@ __all__ = ["depth_first_tree", "first_edges_tree", "walk"]
 
 
 @numba.njit(cache=True)
-def _arcs(n, edges, turn):  # type: ignore[no-untyped-def]
-    """The arcs out of each node, those of edges that come first in `turn` first: `(first, target, edge)`."""
+def _arcs(n, edges, edge_order):  # type: ignore[no-untyped-def]
+    """The arcs out of each node, those of edges that come first in `edge_order` first: `(first, target, edge)`."""
     first = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(edges)):
         first[edges[k, 0] + 1] += 1
@@ -23,7 +23,7 @@ def _arcs(n, edges, turn):  # type: ignore[no-untyped-def]
     fill = first[:n].copy()
     target = np.empty(2 * len(edges), dtype=np.int64)
     edge = np.empty(2 * len(edges), dtype=np.int64)
-    for k in turn:
+    for k in edge_order:
         for side in range(2):
             v = edges[k, side]
             target[fill[v]], edge[fill[v]] = edges[k, 1 - side], k
@@ -32,11 +32,11 @@ def _arcs(n, edges, turn):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def first_edges_tree(n, edges, turn):  # type: ignore[no-untyped-def]
-    """The spanning forest of the edges that close no cycle when taken in the order `turn`, bool (m,)."""
+def first_edges_tree(n, edges, edge_order):  # type: ignore[no-untyped-def]
+    """The spanning forest of the edges that close no cycle when taken in the order `edge_order`, bool (m,)."""
     leader = np.arange(n)
     tree = np.zeros(len(edges), dtype=np.bool_)
-    for k in turn:
+    for k in edge_order:
         i, j = edges[k, 0], edges[k, 1]
         while leader[i] != i:
             leader[i] = leader[leader[i]]
@@ -51,9 +51,9 @@ def first_edges_tree(n, edges, turn):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def depth_first_tree(n, edges, turn, root):  # type: ignore[no-untyped-def]
-    """The spanning tree of a depth-first search from `root` that tries edges in the order `turn`, bool (m,)."""
-    first, target, edge = _arcs(n, edges, turn)
+def depth_first_tree(n, edges, edge_order, root):  # type: ignore[no-untyped-def]
+    """The spanning tree of a depth-first search from `root` that tries edges in the order `edge_order`, bool (m,)."""
+    first, target, edge = _arcs(n, edges, edge_order)
     following = first[:n].copy()
     seen = np.zeros(n, dtype=np.bool_)
     tree = np.zeros(len(edges), dtype=np.bool_)
@@ -76,23 +76,29 @@ def depth_first_tree(n, edges, turn, root):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def walk(types, edges, tree, turn, root, letters):  # type: ignore[no-untyped-def]
+def walk(types, edges, tree, edge_order, root, letters):  # type: ignore[no-untyped-def]
     """The tokens of a graph, walked along `tree` from `root`: `(codes, nodes)`, both int64.
 
     codes: a type below `letters`, `letters` for `(`, `letters` + 1 for `)`, `letters` + 2 + k for cycle number k.
     nodes: the nodes in the order of their codes; fewer than there are if the graph is not connected.
 
-    Children come in the order of their edges in `turn`. Behind a node stand the numbers that end there, ascending,
-    then those that begin there, the one that ends soonest first. A number that begins is the lowest that is free,
-    counting as free what ended at an earlier node.
+    Children come in the order of their edges in `edge_order`. Behind a node stand the numbers that end there,
+    ascending, then those that begin there, the one that ends soonest first. A number that begins is the lowest that is
+    free, counting as free what ended at an earlier node.
     """
-    n, m = len(types), len(edges)
-    first, target, edge = _arcs(n, edges, turn)
+    first, target, edge = _arcs(len(types), edges, edge_order)
+    events, nodes = _tree_walk(first, target, edge, tree, root)
+    return _written(types, events, nodes, first, target, edge, tree, letters), nodes
 
-    # the walk: nodes, and -1 and -2 for the parentheses around every subtree but a node's last
+
+@numba.njit(cache=True)
+def _tree_walk(first, target, edge, tree, root):  # type: ignore[no-untyped-def]
+    """The nodes in the order of a walk along `tree`; and the same with -1 and -2 for the parentheses around every
+    subtree but a node's last."""
+    n = len(first) - 1
     events = np.empty(3 * n, dtype=np.int64)
     nodes = np.empty(n, dtype=np.int64)
-    rank = np.full(n, -1, dtype=np.int64)
+    seen = np.zeros(n, dtype=np.bool_)
     stack = np.empty(3 * n, dtype=np.int64)
     stack[0], size, written, reached = root, 1, 0, 0
     while size > 0:
@@ -102,11 +108,11 @@ def walk(types, edges, tree, turn, root, letters):  # type: ignore[no-untyped-de
         written += 1
         if event < 0:
             continue
-        nodes[reached], rank[event] = event, reached
+        nodes[reached], seen[event] = event, True
         reached += 1
         is_last = True
         for arc in range(first[event + 1] - 1, first[event] - 1, -1):
-            if not tree[edge[arc]] or rank[target[arc]] >= 0:
+            if not tree[edge[arc]] or seen[target[arc]]:
                 continue
             if is_last:
                 stack[size] = target[arc]
@@ -115,14 +121,23 @@ def walk(types, edges, tree, turn, root, letters):  # type: ignore[no-untyped-de
             else:
                 stack[size], stack[size + 1], stack[size + 2] = -2, target[arc], -1
                 size += 3
+    return events[:written], nodes[:reached]
 
-    codes = np.empty(written + 2 * m, dtype=np.int64)
+
+@numba.njit(cache=True)
+def _written(types, events, nodes, first, target, edge, tree, letters):  # type: ignore[no-untyped-def]
+    """The codes of a walk: types, parentheses, and the numbers of the edges that are not in `tree`."""
+    m = len(tree)
+    rank = np.full(len(types), -1, dtype=np.int64)
+    for k in range(len(nodes)):
+        rank[nodes[k]] = k
+    codes = np.empty(len(events) + 2 * m, dtype=np.int64)
     number = np.full(m, -1, dtype=np.int64)
     taken = np.zeros(m + 1, dtype=np.bool_)
     ending = np.empty(m, dtype=np.int64)
     partner = np.empty(m, dtype=np.int64)
     length = 0
-    for event in events[:written]:
+    for event in events:
         if event < 0:
             codes[length] = letters - 1 - event
             length += 1
@@ -155,4 +170,4 @@ def walk(types, edges, tree, turn, root, letters):  # type: ignore[no-untyped-de
             length += 1
         for each in ending[:ends]:
             taken[each] = False
-    return codes[:length], nodes[:reached]
+    return codes[:length]

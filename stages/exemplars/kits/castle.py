@@ -94,14 +94,16 @@ def _roof_spire() -> Solid:
     window = arch(0.22, 0.56, 0.14, 4, y=-0.26)
     spire = spire.inset((0.72, 0.5, 0.0), window, 0.1, STONE_DARK, SLIT, copies=8)
     # Four dormers keep the spire from turning by an eighth.
-    dormer = box((0.3, 0.26, 0.3), (0.78, 1.2, 0.0), PLASTER) + _gable(0.4, 0.2, 0.4, SLATE_DARK).moved(0.8, 1.46, 0.0)
+    dormer = box((0.3, 0.26, 0.3), (0.78, 1.2, 0.0), PLASTER) + _gable(0.4, 0.2, 0.4, SLATE_DARK).translated(
+        0.8, 1.46, 0.0
+    )
     return spire + dormer.around(4)
 
 
 def _gable(width: float, height: float, length: float, color: Color) -> Solid:
     """A small roof with its ridge along x."""
     outline = np.array([[-width / 2, 0.0], [width / 2, 0.0], [0.0, height]])
-    return extruded(outline, -length / 2, length / 2, color).turned(90.0)
+    return extruded(outline, -length / 2, length / 2, color).rotated(90.0)
 
 
 def _flag() -> Solid:
@@ -119,13 +121,13 @@ def _turret() -> Solid:
     colors = [STONE_DARK, STONE_DARK, STONE_LIGHT, PLASTER, TIMBER, SLATE_DARK, SLATE]
     turret = revolved([*foot, (0.34, 0.84), (0.44, 0.82), (0.45, 0.88), (0.0, 1.4)], 8, colors)
     turret = turret.inset((0.34, 0.64, 0.0), rectangle(0.12, 0.2), 0.06, TIMBER, SLIT)
-    return turret.moved(1.27)
+    return turret.translated(1.27)
 
 
 def _wall() -> Solid:
     half = PITCH / 2 - 1.0 + BITE
     plinth, parapet = ((0.43, 0.0), (0.43, 0.3), (0.35, 0.38)), ((0.43, 1.7), (0.43, 2.06), (0.25, 2.06), (0.25, 1.82))
-    wall = extruded(mirrored(*plinth, (0.35, 1.6), *parapet), -half, half, STONE).turned(90.0)
+    wall = extruded(mirrored(*plinth, (0.35, 1.6), *parapet), -half, half, STONE).rotated(90.0)
     wall = wall.tinted(STONE_DARK, lambda _, corners: bool(corners[:, 1].max() < 0.39))
     for x in (-1.1, -0.66, -0.22, 0.22, 0.66, 1.1):
         wall = wall.inset((x, 2.06, 0.34), rectangle(0.26, 0.14), -0.26, STONE, STONE_LIGHT, shrink=0.015, copies=2)
@@ -166,7 +168,7 @@ def _hall() -> Solid:
     for x in (-1.34, -0.66, 0.0, 0.66, 1.34):
         upper = upper.inset((x, 1.0, 0.65), rectangle(0.1, 0.92), -0.03, TIMBER, copies=2)
     roof = mirrored((0.82, 1.42), (0.82, 1.5), (0.42, 1.96), (0.44, 2.02), (0.06, 2.42))
-    tiles = extruded(roof, -half + 0.005, half - 0.005, TILE).turned(90.0)
+    tiles = extruded(roof, -half + 0.005, half - 0.005, TILE).rotated(90.0)
     chimney = [box((0.2, 0.7, 0.2), (x, 1.94, z), STONE_LIGHT, 0.03) for x, z in ((0.8, 0.36), (-0.8, -0.36))]
     return joined(hall, upper, tiles, *chimney)
 
@@ -191,12 +193,12 @@ def _bridge_span() -> Solid:
     half = 2.0 + BITE
     under = arch(2.8, 0.46, 0.4, 8, y=-0.12)[2:]
     outline = np.concatenate([mirrored((1.4, -0.1), (half, -0.1), (half, 0.38)), under[-2:0:-1]])
-    span = extruded(outline, -0.42, 0.42, STONE).turned(90.0)
+    span = extruded(outline, -0.42, 0.42, STONE).rotated(90.0)
     rail = box((0.12, 0.26, 2 * half - 0.02), (0.0, 0.36, 0.0), STONE_LIGHT, 0.03)
-    span = span + rail.moved(-0.36) + rail.moved(0.36)
+    span = span + rail.translated(-0.36) + rail.translated(0.36)
     for z in (-1.2, 0.0, 1.2):
         post = box((0.2, 0.36, 0.2), (0.0, 0.34, z), STONE, 0.05)
-        span = span + post.moved(-0.36) + post.moved(0.36)
+        span = span + post.translated(-0.36) + post.translated(0.36)
     return span
 
 
@@ -204,7 +206,7 @@ def _bridge_pier() -> Solid:
     levels = [(0.16, -0.1), (0.16, 0.06), (0.0, 0.16), (0.0, 0.42)]
     pier = stacked(chamfered(1.0, 1.0, 0.16), levels, [STONE_DARK, STONE_DARK, STONE])
     pier = pier.inset((0.0, 0.42, 0.0), regular(8, 0.22), 0.03, STONE_DARK, STONE_LIGHT)
-    lamp = revolved([(0.0, 0.84), (0.08, 0.9), (0.09, 0.98), (0.0, 1.1)], 6, GOLD).moved(0.36, 0.0, 0.36)
+    lamp = revolved([(0.0, 0.84), (0.08, 0.9), (0.09, 0.98), (0.0, 1.1)], 6, GOLD).translated(0.36, 0.0, 0.36)
     post = box((0.15, 0.46, 0.15), (0.36, 0.4, 0.36), STONE_LIGHT, 0.02)
     return pier + (post + lamp).around(4)
 
@@ -212,12 +214,14 @@ def _bridge_pier() -> Solid:
 def _bridge_ramp() -> Solid:
     """Comes down from a gate or a pier: its face is the plane z = 0, the ramp runs towards positive z."""
     outline = np.array([(BITE, -0.1), (BITE, 0.38), (-0.3, 0.38), (-1.6, -0.04), (-1.6, -0.1)])
-    ramp = extruded(outline, -0.42, 0.42, STONE).turned(90.0)
+    ramp = extruded(outline, -0.42, 0.42, STONE).rotated(90.0)
     for t in (0.2, 0.4, 0.6, 0.8):
         tread = box((0.7, 0.05, 0.1), (0.0, 0.35 - 0.42 * t, 0.3 + 1.3 * t), STONE_LIGHT)
         ramp = ramp + tread
-    post = stacked(rectangle(0.2, 0.2), [(0.0, -0.1), (0.0, 0.42), (-0.05, 0.5)], STONE_LIGHT).moved(0.36, 0.0, 1.46)
-    return ramp + post + post.moved(-0.72)
+    post = stacked(rectangle(0.2, 0.2), [(0.0, -0.1), (0.0, 0.42), (-0.05, 0.5)], STONE_LIGHT).translated(
+        0.36, 0.0, 1.46
+    )
+    return ramp + post + post.translated(-0.72)
 
 
 class _Castle(Layout):

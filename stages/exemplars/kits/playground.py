@@ -71,15 +71,15 @@ def _types() -> dict[str, Solid]:
 def _posts(low: float, high: float, color: Color) -> Solid:
     """Eight posts at the corners of a deck."""
     reach = APOTHEM / np.cos(np.pi / 8) - 0.03
-    return revolved([(0.06, low), (0.06, high)], 6, color).moved(reach).turned(22.5).around(8)
+    return revolved([(0.06, low), (0.06, high)], 6, color).translated(reach).rotated(22.5).around(8)
 
 
 def _deck() -> Solid:
     planks = stacked(regular(8, APOTHEM), [(-0.04, FLOOR - 0.16), (0.0, FLOOR - 0.12), (0.0, FLOOR)], [WOOD_DARK, WOOD])
     planks = planks.inset((0.0, FLOOR, 0.0), regular(8, 0.8), -0.02, WOOD_LIGHT, WOOD_LIGHT)
     planks = planks.inset((0.0, FLOOR + 0.02, 0.0), regular(8, 0.34), -0.015, YELLOW_DARK, YELLOW)
-    feet = revolved([(0.13, 0.0), (0.13, 0.06), (0.08, 0.12)], 6, STEEL).moved(APOTHEM / np.cos(np.pi / 8) - 0.03)
-    return planks + _posts(0.05, POSTS, WOOD_DARK) + feet.turned(22.5).around(8)
+    feet = revolved([(0.13, 0.0), (0.13, 0.06), (0.08, 0.12)], 6, STEEL).translated(APOTHEM / np.cos(np.pi / 8) - 0.03)
+    return planks + _posts(0.05, POSTS, WOOD_DARK) + feet.rotated(22.5).around(8)
 
 
 def _gate() -> Solid:
@@ -88,9 +88,9 @@ def _gate() -> Solid:
     opening = arch(0.52, 0.94, 0.26, 6, y=FLOOR + 0.02)[2:]
     low, high = FLOOR - 0.14, FLOOR + 0.98
     outline = mirrored((0.26, low), (half, low), (half, high), (0.2, high + 0.14))
-    frame = extruded(np.concatenate([outline, opening[::-1]]), -BITE, GATE, GREEN).turned(90.0)
+    frame = extruded(np.concatenate([outline, opening[::-1]]), -BITE, GATE, GREEN).rotated(90.0)
     sill = box((GATE + BITE - 0.01, 0.15, 0.56), ((GATE - BITE) / 2, FLOOR - 0.145, 0.0), WOOD_LIGHT)
-    star = revolved([(0.06, 0.0), (0.05, 0.03)], 6, YELLOW).turned(-90.0, "z").moved(GATE - 0.01, FLOOR + 1.03)
+    star = revolved([(0.06, 0.0), (0.05, 0.03)], 6, YELLOW).rotated(-90.0, "z").translated(GATE - 0.01, FLOOR + 1.03)
     return frame + sill + star
 
 
@@ -107,7 +107,7 @@ def _storey() -> Solid:
     floor = floor.inset((0.0, 0.12, 0.0), regular(8, 0.9), -0.5, WOOD, WOOD_LIGHT)
     floor = floor.inset((0.0, 0.62, 0.0), regular(8, 0.8), 0.44, WOOD_DARK, WOOD_LIGHT)
     for color in (RED, YELLOW):
-        floor = floor.inset((0.9, 0.37, 0.0), regular(8, 0.13), 0.06, WOOD_DARK, color, copies=4).turned(45.0)
+        floor = floor.inset((0.9, 0.37, 0.0), regular(8, 0.13), 0.06, WOOD_DARK, color, copies=4).rotated(45.0)
     return floor + _posts(0.02, STOREY, WOOD_DARK)
 
 
@@ -160,11 +160,11 @@ def _bridge_tube() -> Solid:
     rims = [(0.35, 0.04), (0.31, 0.06), (0.31, half - 0.12), (0.36, half - 0.1), (0.36, half)]
     left = [(apothem, -x) for apothem, x in rims[::-1]]
     ribs = [YELLOW_DARK, YELLOW_DARK, YELLOW, YELLOW_DARK]
-    tube = revolved([*left, *rims], 8, [*ribs, YELLOW_DARK, *ribs[::-1]]).turned(-90.0, "z")
+    tube = revolved([*left, *rims], 8, [*ribs, YELLOW_DARK, *ribs[::-1]]).rotated(-90.0, "z")
     for x in (-0.46, 0.46):
         tube = tube.inset((x, 0.0, 0.31), regular(8, 0.1), 0.06, BLUE_DARK, BLUE, copies=2)
     handle = box((0.4, 0.08, 0.08), (0.46, 0.29, 0.0), RED, 0.02)
-    return (tube + handle + handle.moved(-0.92)).moved(0.0, FLOOR + 0.36)
+    return (tube + handle + handle.translated(-0.92)).translated(0.0, FLOOR + 0.36)
 
 
 def _bridge_bars() -> Solid:
@@ -193,7 +193,7 @@ def _slide() -> Solid:
     leg = bar((1.0, 0.04, 0.2), (1.0, FLOOR - 0.64, 0.2), 0.045, STEEL)
     bow = mirrored((0.27, 0.1), (0.27, 0.56), (0.1, 0.72))
     hoop = swept([(0.12, FLOOR + y, -z) for z, y in bow.tolist()], regular(6, 0.035), RED)
-    return slide + leg + leg.moved(z=-0.4) + hoop
+    return slide + leg + leg.translated(z=-0.4) + hoop
 
 
 def _ladder() -> Solid:
@@ -210,7 +210,7 @@ def _pole() -> Solid:
     pole = bar((0.46, 0.02, 0.0), (0.46, FLOOR + 0.98, 0.0), 0.05, STEEL, 8)
     bow = mirrored((0.28, -BITE), (0.28, 0.3), (0.16, 0.46))
     arm = swept([(x, FLOOR + 0.98, z) for z, x in bow.tolist()], regular(6, 0.045), RED)
-    foot = revolved([(0.3, 0.0), (0.3, 0.05), (0.1, 0.1)], 8, RED_DARK).moved(0.46)
+    foot = revolved([(0.3, 0.0), (0.3, 0.05), (0.1, 0.1)], 8, RED_DARK).translated(0.46)
     return pole + arm + foot
 
 
@@ -236,7 +236,7 @@ def _balance_beam() -> Solid:
     half = PITCH / 2 - SAND + BITE
     log = bar((-half, 0.14, 0.0), (half, 0.14, 0.0), 0.09, WOOD_DARK, 8)
     for x in (-0.7, 0.0, 0.7):
-        log = log + revolved([(0.22, 0.0), (0.22, 0.26), (0.18, 0.3)], 8, [WOOD_DARK, WOOD_LIGHT]).moved(x)
+        log = log + revolved([(0.22, 0.0), (0.22, 0.26), (0.18, 0.3)], 8, [WOOD_DARK, WOOD_LIGHT]).translated(x)
     return log
 
 

@@ -44,18 +44,18 @@ class Solid:
     faces: tuple[Face, ...]
 
     def __add__(self, other: Solid) -> Solid:
-        shift = len(self.points)
-        moved = tuple(
-            Face(tuple(tuple(i + shift for i in loop) for loop in face.loops), face.color) for face in other.faces
+        first = len(self.points)
+        joined = tuple(
+            Face(tuple(tuple(i + first for i in loop) for loop in face.loops), face.color) for face in other.faces
         )
-        return Solid(np.concatenate([self.points, other.points]), self.faces + moved)
+        return Solid(np.concatenate([self.points, other.points]), self.faces + joined)
 
-    def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Solid:
+    def translated(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Solid:
         """The solid moved by (x, y, z)."""
         return Solid(self.points + np.array([x, y, z]), self.faces)
 
-    def turned(self, degrees: float, axis: str = "y") -> Solid:
-        """The solid turned about a coordinate axis."""
+    def rotated(self, degrees: float, axis: str = "y") -> Solid:
+        """The solid rotated about a coordinate axis."""
         return Solid(self.points @ rotation(degrees, axis).T, self.faces)
 
     def tinted(self, color: Color, where: Callable[[int, FloatArray], bool]) -> Solid:
@@ -67,10 +67,10 @@ class Solid:
         return Solid(self.points, faces)
 
     def around(self, count: int) -> Solid:
-        """`count` copies of the solid, evenly turned about the up axis."""
+        """`count` copies of the solid, evenly rotated about the up axis."""
         copies = self
         for k in range(1, count):
-            copies = copies + self.turned(360.0 * k / count)
+            copies = copies + self.rotated(360.0 * k / count)
         return copies
 
     def inset(
@@ -202,7 +202,7 @@ def box(size: Point, at: Point, color: Color, bevel: float = 0.0) -> Solid:
     levels = [(0.0, 0.0), (0.0, size[1])]
     if bevel:
         levels = [(0.0, 0.0), (0.0, size[1] - bevel), (-bevel, size[1])]
-    return stacked(outline, levels, color).moved(*at)
+    return stacked(outline, levels, color).translated(*at)
 
 
 def bar(start: Point, end: Point, radius: float, color: Color, sides: int = 6) -> Solid:

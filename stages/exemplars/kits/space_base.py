@@ -76,17 +76,17 @@ def _hub() -> Solid:
     levels = [(-0.4, 0.3), (-0.08, 0.52), (-0.08, 0.6), (0.0, 0.66), (0.0, 1.94), (-0.06, 2.0), (-0.42, DECK)]
     hub = stacked(outline, levels, [GREY, DARK, PALE, WHITE, ORANGE, WHITE])
     hub = hub.inset((APOTHEM, AXIS, 0.0), chamfered(1.16, 1.04, 0.24), 0.06, GREY, PALE, copies=6)
-    shoe = revolved([(0.2, 0.0), (0.2, 0.08), (0.1, 0.14)], 8, DARK).moved(1.38)
+    shoe = revolved([(0.2, 0.0), (0.2, 0.08), (0.1, 0.14)], 8, DARK).translated(1.38)
     leg = bar((1.02, 0.62, 0.0), (1.34, 0.1, 0.0), 0.07, GREY) + shoe
     lamp = box((0.1, 0.7, 0.24), (1.46, 0.86, 0.0), ORANGE)
-    return hub + (leg + lamp).turned(30.0).around(6)
+    return hub + (leg + lamp).rotated(30.0).around(6)
 
 
 def _port() -> Solid:
     """Leads from a hub at x = 0 outward along x; its own middle is on the ground below its axis."""
     ring = chamfered(1.1, 1.1, 0.3)
     stations = [(0.86, -0.09), (0.86, 0.06), (1.0, 0.08), (1.0, 0.26), (0.9, 0.28), (0.9, PORT)]
-    port = _along_x(ring, stations, [DARK, GREY, ORANGE, GREY, DARK]).moved(0.0, AXIS)
+    port = _along_x(ring, stations, [DARK, GREY, ORANGE, GREY, DARK]).translated(0.0, AXIS)
     light = box((0.14, 0.1, 0.2), (0.17, AXIS + 0.54, 0.0), LAMP, 0.02)
     strut = box((0.12, 0.2, 0.5), (0.17, AXIS - 0.73, 0.0), DARK)
     return port + light + strut
@@ -103,31 +103,33 @@ def _tunnel() -> Solid:
     tunnel = _along_x(ring, ribs, colors)
     for x in (-0.9, 0.0, 0.9):
         tunnel = tunnel.inset((x, 0.0, 0.432), chamfered(0.34, 0.26, 0.08), 0.05, GREY, GLASS_DARK, copies=2)
-    tunnel = tunnel.moved(0.0, AXIS)
+    tunnel = tunnel.translated(0.0, AXIS)
     pipe = bar((-half + 0.06, AXIS + 0.5, 0.14), (half - 0.06, AXIS + 0.5, 0.14), 0.06, ORANGE)
     pipe = pipe + bar((half - 0.06, AXIS + 0.5, -0.14), (-half + 0.06, AXIS + 0.5, -0.14), 0.06, ORANGE)
     shoe = stacked(rectangle(0.5, 0.7), [(0.0, 0.0), (0.0, 0.07), (-0.06, 0.12)], DARK)
     foot = box((0.16, 0.84, 0.3), (0.0, 0.08, 0.0), GREY) + shoe
-    return tunnel + pipe + foot.moved(0.5) + foot.moved(-0.5)
+    return tunnel + pipe + foot.translated(0.5) + foot.translated(-0.5)
 
 
 def _greenhouse() -> Solid:
     """As long as a tunnel, with beds under a vault of glass."""
     half = BETWEEN / 2 + BITE
     end = chamfered(0.96, 0.96, 0.3)
-    collar = _along_x(end, [(1.0, -half), (1.0, -half + 0.3)], GREY).moved(0.0, AXIS)
+    collar = _along_x(end, [(1.0, -half), (1.0, -half + 0.3)], GREY).translated(0.0, AXIS)
     vault = arch(1.7, 1.5, 0.92, 6, y=-0.62)
     shell = _along_x(vault, [(1.0, -1.16), (1.0, 1.16)], GLASS)
-    shell = shell.moved(0.0, AXIS)
+    shell = shell.translated(0.0, AXIS)
     for x in (-0.72, 0.0, 0.72):
         shell = shell.inset((x, AXIS - 0.32, 0.85), rectangle(0.58, 0.34), 0.06, WHITE, LEAF, copies=2)
     for x in (-1.16, -0.39, 0.39, 1.16):
-        shell = shell + _along_x(arch(1.8, 1.56, 0.96, 6, y=-0.64), [(1.0, -0.05), (1.0, 0.05)], WHITE).moved(x, AXIS)
+        shell = shell + _along_x(arch(1.8, 1.56, 0.96, 6, y=-0.64), [(1.0, -0.05), (1.0, 0.05)], WHITE).translated(
+            x, AXIS
+        )
     plinth = stacked(rectangle(2.5, 1.86), [(-0.1, 0.16), (0.0, 0.3), (0.0, 0.78), (-0.04, 0.82)], [DARK, PALE, PALE])
     ridge = box((2.36, 0.1, 0.16), (0.0, AXIS + 0.86, 0.0), WHITE)
     feet = box((0.4, 0.2, 0.4), (0.9, 0.0, 0.6), DARK)
-    feet = feet + feet.moved(z=-1.2)
-    return joined(collar, collar.turned(180.0), shell, plinth, ridge, feet, feet.moved(-1.8))
+    feet = feet + feet.translated(z=-1.2)
+    return joined(collar, collar.rotated(180.0), shell, plinth, ridge, feet, feet.translated(-1.8))
 
 
 def _airlock() -> Solid:
@@ -137,7 +139,7 @@ def _airlock() -> Solid:
     lock = lock.inset((0.94, 0.0, 0.0), chamfered(0.68, 0.76, 0.2), 0.1, DARK, PALE)
     lock = lock.inset((0.84, 0.16, 0.0), rectangle(0.3, 0.16), 0.04, DARK, GLASS_DARK)
     lock = lock.inset((0.5, 0.0, 0.5568), chamfered(0.4, 0.3, 0.08), 0.05, GREY, GLASS_DARK)
-    lock = lock.moved(0.0, AXIS)
+    lock = lock.translated(0.0, AXIS)
     step = box((0.62, 0.1, 0.9), (1.14, AXIS - 0.56, 0.0), GREY)
     slope = np.array([(1.4, AXIS - 0.58), (2.2, 0.0), (2.4, 0.0), (2.4, 0.06), (1.4, AXIS - 0.42)])
     ramp = extruded(slope, -0.4, 0.4, PALE)
@@ -148,18 +150,18 @@ def _airlock() -> Solid:
 
 def _tank() -> Solid:
     """A round tank on a port: the port's outer face is the plane x = 0."""
-    neck = _along_x(chamfered(0.7, 0.7, 0.22), [(1.0, -BITE), (1.0, 0.36)], GREY).moved(0.0, AXIS)
+    neck = _along_x(chamfered(0.7, 0.7, 0.22), [(1.0, -BITE), (1.0, 0.36)], GREY).translated(0.0, AXIS)
     angles = np.radians([-66.0, -40.0, -12.0, 12.0, 40.0, 66.0])
     ball = [(0.92 * float(np.cos(a)), AXIS + 0.92 * float(np.sin(a))) for a in angles]
     colors = [WHITE, WHITE, ORANGE, WHITE, WHITE, PALE, GREY]
-    tank = revolved([*ball, (0.22, AXIS + 0.86), (0.22, AXIS + 1.02)], 12, colors).moved(1.12)
+    tank = revolved([*ball, (0.22, AXIS + 0.86), (0.22, AXIS + 1.02)], 12, colors).translated(1.12)
     legs = bar((0.72, AXIS - 0.3, 0.0), (1.0, 0.08, 0.0), 0.06, GREY) + box((0.26, 0.1, 0.26), (1.0, 0.0, 0.0), DARK)
-    return neck + tank + legs.turned(45.0).around(4).moved(1.12)
+    return neck + tank + legs.rotated(45.0).around(4).translated(1.12)
 
 
 def _pad() -> Solid:
     """A landing pad at the end of a port: the port's outer face is the plane x = 0."""
-    neck = _along_x(chamfered(0.7, 0.7, 0.22), [(1.0, -BITE), (1.0, 0.5)], GREY).moved(0.0, AXIS)
+    neck = _along_x(chamfered(0.7, 0.7, 0.22), [(1.0, -BITE), (1.0, 0.5)], GREY).translated(0.0, AXIS)
     office = box((0.84, 1.16, 0.96), (0.64, AXIS - 0.6, 0.0), WHITE, 0.1)
     office = office.inset((1.06, AXIS + 0.06, 0.0), rectangle(0.66, 0.34), 0.05, GREY, GLASS_DARK)
     office = office.inset((0.7, AXIS, 0.48), rectangle(0.34, 0.3), 0.05, GREY, GLASS_DARK)
@@ -169,7 +171,7 @@ def _pad() -> Solid:
     plate = plate.inset((0.0, 0.9, 0.0), regular(8, 0.6), -0.02, DARK, WHITE)
     leg = box((0.22, 0.5, 0.22), (1.0, 0.0, 0.0), GREY)
     plate = plate + leg.around(6)
-    return neck + office + plate.moved(PAD)
+    return neck + office + plate.translated(PAD)
 
 
 def _rocket() -> Solid:
@@ -178,7 +180,7 @@ def _rocket() -> Solid:
     rocket = revolved([(0.2, 0.26), (0.26, 0.42), *hull], 8, [DARK, DARK, GREY, WHITE, ORANGE, WHITE, WHITE, RED])
     rocket = rocket.inset((0.52, 1.6, 0.0), regular(8, 0.13), 0.05, GOLD, GLASS_DARK, copies=4)
     fin = extruded(np.array([(0.38, 0.56), (0.8, 0.0), (0.96, 0.0), (0.86, 0.5), (0.4, 1.2)]), -0.06, 0.06, RED)
-    return rocket + fin.turned(45.0).around(4)
+    return rocket + fin.rotated(45.0).around(4)
 
 
 def _collar() -> Solid:
@@ -203,7 +205,7 @@ def _dome() -> Solid:
         12,
         [GREY, WHITE, WHITE, GLASS, GLASS, GLASS, WHITE, WHITE],
     )
-    return dome + _dome_rib().turned(15.0).around(6)
+    return dome + _dome_rib().rotated(15.0).around(6)
 
 
 def _dome_rib() -> Solid:
@@ -221,7 +223,7 @@ def _antenna() -> Solid:
     dish = revolved(bowl, 12, [GREY, WHITE, WHITE, ORANGE, PALE, PALE])
     feed = bar((0.0, -0.1, 0.0), (0.0, 0.66, 0.0), 0.035, GREY)
     tip = revolved([(0.0, 0.6), (0.1, 0.66), (0.1, 0.76), (0.0, 0.82)], 6, RED)
-    return foot + (dish + feed + tip).turned(-40.0, "z").moved(0.0, 1.06)
+    return foot + (dish + feed + tip).rotated(-40.0, "z").translated(0.0, 1.06)
 
 
 def _mast() -> Solid:

@@ -94,7 +94,7 @@ def _span() -> Solid:
     """Lies along x between the feet of two columns."""
     half = PITCH / 2 - 0.5 + BITE
     section = mirrored((0.4, 0.0), (0.4, 0.16), (0.36, 0.2), (0.36, 0.32), (0.32, 0.36))
-    span = extruded(section, -half, half, MARBLE_WARM).turned(90.0)
+    span = extruded(section, -half, half, MARBLE_WARM).rotated(90.0)
     for x in (-0.5, 0.5):
         span = span.inset((x, 0.08, 0.4), rectangle(0.03, 0.15), 0.03, MARBLE_SHADE, copies=2)
     return span
@@ -105,7 +105,7 @@ def _beam() -> Solid:
     half = PITCH / 2 - 0.4 + BITE
     frieze, cornice = ((0.25, 0.0), (0.25, 0.2), (0.28, 0.22)), ((0.32, 0.58), (0.32, 0.63), (0.29, 0.66))
     lintel = mirrored(*frieze, (0.28, 0.54), *cornice)
-    beam = extruded(lintel, -half, half, MARBLE).turned(90.0)
+    beam = extruded(lintel, -half, half, MARBLE).rotated(90.0)
     for x in (-0.8, -0.4, 0.0, 0.4, 0.8):
         beam = beam.inset((x, 0.38, 0.28), rectangle(0.2, 0.26), -0.03, MARBLE_WARM, BLUE, shrink=0.02, copies=2)
     return beam
@@ -118,7 +118,7 @@ def _balustrade() -> Solid:
     rail = box((2 * half, 0.12, 0.3), (0.0, 0.44, 0.0), MARBLE, 0.03)
     baluster = revolved([(0.07, 0.1), (0.1, 0.2), (0.05, 0.36), (0.08, 0.46)], 6, MARBLE)
     for x in (-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9):
-        foot = foot + baluster.moved(x)
+        foot = foot + baluster.translated(x)
     return foot + rail
 
 
@@ -126,7 +126,7 @@ def _screen() -> Solid:
     """A wall that closes a bay: it stands on the span and reaches the beam, clear of the columns."""
     wall = box((1.84, 3.06, 0.3), (0.0, 0.0, 0.0), MARBLE_WARM)
     for side in (0.0, 180.0):
-        wall = wall.turned(side)
+        wall = wall.rotated(side)
         wall = wall.inset((0.0, 0.44, 0.15), rectangle(1.6, 0.6), -0.05, MARBLE_SHADE, RED, shrink=0.03)
         wall = wall.inset((0.0, 1.96, 0.15), rectangle(0.9, 1.5), -0.05, MARBLE)
         wall = wall.inset((0.0, 1.96, 0.2), rectangle(0.7, 1.3), 0.1, MARBLE_SHADE, SHADOW)
@@ -141,7 +141,7 @@ def _portal() -> Solid:
     lintel = mirrored((0.8, -0.28), (0.8, -0.12), (0.0, 0.24))[[0, 1, 2, 4, 5]]
     frame = extruded(np.array(outline), -0.15, 0.15, MARBLE_WARM)
     for side in (0.0, 180.0):
-        frame = frame.turned(side)
+        frame = frame.rotated(side)
         for x in (-0.62, 0.62):
             frame = frame.inset((x, 1.12, 0.15), rectangle(0.24, 2.16), -0.06, MARBLE, shrink=0.02)
         frame = frame.inset((0.0, 2.62, 0.15), lintel, -0.08, MARBLE, BLUE, shrink=0.05)
@@ -159,7 +159,7 @@ def _gable(reach: float, eave: float, ridge: float) -> FloatArray:
 def _roof() -> Solid:
     """Covers one cell, ridge along x; rests on the beams at z = -1.5 and z = 1.5 and ends flush with the cell."""
     half = PITCH / 2
-    vault = extruded(_gable(2.05, 0.24, 1.28), -half, half, TILE).turned(90.0)
+    vault = extruded(_gable(2.05, 0.24, 1.28), -half, half, TILE).rotated(90.0)
     slope = np.hypot(1.95, 1.04)
     for x in (-1.2, -0.6, 0.0, 0.6, 1.2):
         rib = rectangle(0.12, slope - 0.16)
@@ -234,9 +234,11 @@ def _statue() -> Solid:
     robe = revolved(profile, 8, [GOLD, GOLD, BRONZE, GOLD, GOLD])
     head = revolved([(0.06, 1.86), (0.13, 1.98), (0.12, 2.12), (0.0, 2.24)], 8, GOLD)
     plume = np.array([(-0.16, 2.0), (0.02, 2.2), (0.14, 2.2), (0.12, 2.34), (-0.08, 2.36), (-0.2, 2.2)])
-    crest = extruded(plume, -0.03, 0.03, RED).turned(90.0)
-    spear = revolved([(0.025, 0.64), (0.025, 2.3), (0.06, 2.34), (0.0, 2.56)], 5, BRONZE).moved(0.27, 0.0, 0.12)
-    shield = revolved([(0.22, 0.0), (0.22, 0.05), (0.0, 0.1)], 10, BRONZE).turned(90.0, "x").moved(-0.2, 1.3, 0.18)
+    crest = extruded(plume, -0.03, 0.03, RED).rotated(90.0)
+    spear = revolved([(0.025, 0.64), (0.025, 2.3), (0.06, 2.34), (0.0, 2.56)], 5, BRONZE).translated(0.27, 0.0, 0.12)
+    shield = (
+        revolved([(0.22, 0.0), (0.22, 0.05), (0.0, 0.1)], 10, BRONZE).rotated(90.0, "x").translated(-0.2, 1.3, 0.18)
+    )
     arm = box((0.16, 0.12, 0.2), (0.23, 1.56, 0.1), GOLD)
     return joined(pedestal, robe, head, crest, spear, shield, arm)
 
@@ -245,9 +247,9 @@ def _stairs() -> Solid:
     """Leads up to a span: its face is the plane z = 0, the stairs come down towards positive z."""
     treads = [(-0.14 * k, 0.32 - 0.08 * (k - side)) for k in (1, 2, 3) for side in (1, 0)]
     outline = [(BITE, 0.0), (BITE, 0.32), *treads, (-0.6, 0.08), (-0.6, 0.0)]
-    flight = extruded(np.array(outline), -0.58, 0.58, MARBLE).turned(90.0)
+    flight = extruded(np.array(outline), -0.58, 0.58, MARBLE).rotated(90.0)
     cheek = box((0.2, 0.42, 0.52), (0.67, 0.0, 0.25), MARBLE_WARM, 0.03)
-    return flight + cheek + cheek.moved(-1.34)
+    return flight + cheek + cheek.translated(-1.34)
 
 
 def _path() -> Solid:

@@ -69,15 +69,15 @@ class Profile:
             raise ValueError(f"a profile's scale is above 0, not {factors.tolist()}")
         return Profile(self.points * factors)
 
-    def moved(self, x: float, y: float) -> Profile:
+    def translated(self, x: float, y: float) -> Profile:
         """Moved away from the rail."""
         return Profile(self.points + np.array([x, y]))
 
-    def turned(self, degrees: float) -> Profile:
-        """Turned counter-clockwise about the rail."""
+    def rotated(self, degrees: float) -> Profile:
+        """Rotated counter-clockwise about the rail."""
         angle = np.radians(degrees)
-        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        return Profile(self.points @ turn)
+        rotation = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        return Profile(self.points @ rotation)
 
     def inset(self, width: float) -> Profile:
         """The profile with each side moved inwards by `width` (outwards where it is negative), as many points.

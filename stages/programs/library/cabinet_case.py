@@ -68,7 +68,7 @@ def top_parts(cabinet: CabinetDimensions) -> list[Part]:
     out = values["top_overhang"] + flare
     depth = cabinet.face + out - cabinet.back
     bevel = 0.45 * thick * values["edge_roundness"]
-    outline = rectangle(2.0 * (cabinet.half + out), depth).moved(0.0, (cabinet.face + out + cabinet.back) / 2.0)
+    outline = rectangle(2.0 * (cabinet.half + out), depth).translated(0.0, (cabinet.face + out + cabinet.back) / 2.0)
     mesh = extrude(outline, thick, base=values["height"] - thick, bevel=bevel, steps=3)
     parts = [Part("top", mesh, OAK)]
     if cabinet.crown:

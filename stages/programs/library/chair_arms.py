@@ -83,6 +83,6 @@ def _pad(chair: ChairDimensions, arm: Curve, state: int, width: float, height: f
     cover = float(chair.values["handles_cusion_cover_pct"])
     middle, half = (0.53, 0.11 + 0.31 * cover) if state == 1 else (0.36, 0.08 + 0.19 * cover)
     start, end = middle - half, middle + half
-    profile = square_circle(0.6, 1.2 * width, 0.7 * chair.unit, 12).moved(0.0, 0.5 * height + 0.1 * chair.unit)
+    profile = square_circle(0.6, 1.2 * width, 0.7 * chair.unit, 12).translated(0.0, 0.5 * height + 0.1 * chair.unit)
     lean = arm.frames(start, up=UP)[:3, 1]
     return Part("arm pad", sweep(arm.part(start, end), profile, up=lean, caps="round"), LEATHER)

@@ -49,7 +49,7 @@ class _Frame:
     def __init__(self, table: TableDimensions) -> None:
         values = table.values
         angle = 90.0 * values["std_legs_rotation"]
-        self.section = square_circle(values["legs_bevel"], 0.94 * table.stick, 1.14 * table.stick).turned(-angle)
+        self.section = square_circle(values["legs_bevel"], 0.94 * table.stick, 1.14 * table.stick).rotated(-angle)
         self.table = table
         sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
         self.way = np.array([sine, cosine])

@@ -117,10 +117,10 @@ class Placed:
         if not len(types):
             raise ValueError("a shape without parts has no statics")
         # y up: x, y, z become x, -z, y, a rotation.
-        turn = np.eye(3) if up == "z" else np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+        rotation = np.eye(3) if up == "z" else np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
         poses = assembly.poses.copy()
-        poses[:, :3, :3] = turn @ assembly.poses[:, :3, :3]
-        poses[:, :3, 3] = assembly.poses[:, :3, 3] @ turn.T
+        poses[:, :3, :3] = rotation @ assembly.poses[:, :3, :3]
+        poses[:, :3, 3] = assembly.poses[:, :3, 3] @ rotation.T
         rotations = poses[:, :3, :3]
         boxes = solids.boxes[types]
         centres = np.einsum("nij,nj->ni", rotations, solids.centres[types]) + poses[:, :3, 3]

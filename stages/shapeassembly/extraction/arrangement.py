@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import around, box_corners, nearest_axes, turn_between
+from stages.shapeassembly.extraction.boxes import angle_between, around, box_corners, nearest_axes
 from stages.shapeassembly.extraction.hierarchy import Box, Part
 from stages.shapeassembly.extraction.rules import Rules
 
@@ -97,7 +97,7 @@ def frame_parts(root: Part) -> Part:
 
 def _framed(part: Part, frame: FloatArray, *, root_of_all: bool = False) -> Part:
     box = nearest_axes(part.box, frame)
-    if turn_between(box.axes, frame) < ALIGNED_DEGREES or (
+    if angle_between(box.axes, frame) < ALIGNED_DEGREES or (
         part.children and (root_of_all or _prefers(part, frame, box))
     ):
         box = Box(box.center, box.size, frame)
@@ -112,7 +112,7 @@ def _prefers(part: Part, frame: FloatArray, box: Box) -> bool:
     """Whether more leaves of `part` stand along `frame` than along its own box."""
 
     def aligned(axes: FloatArray) -> int:
-        turns = [turn_between(nearest_axes(leaf.box, axes).axes, axes) for leaf in part.leaves()]
-        return sum(turn < ALIGNED_DEGREES for turn in turns)
+        angles = [angle_between(nearest_axes(leaf.box, axes).axes, axes) for leaf in part.leaves()]
+        return sum(angle < ALIGNED_DEGREES for angle in angles)
 
     return aligned(frame) >= aligned(box.axes)

@@ -1,4 +1,4 @@
-"""Geometry of oriented boxes: corners, places within them, how they turn, how far apart they are."""
+"""Geometry of oriented boxes: corners, places within them, the angles between them, how far apart they are."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shapeassembly.extraction.hierarchy import Box
 
 __all__ = [
+    "angle_between",
     "around",
     "box_corners",
     "gap",
@@ -20,17 +21,16 @@ __all__ = [
     "point_at",
     "same_box",
     "surface_distance",
-    "turn_between",
 ]
 
 UNIT_CORNERS = np.array(list(product((0.0, 1.0), repeat=3)))
 
-_TURNS = np.array(
+_ROTATIONS = np.array(
     [
-        turn
+        rotation
         for order in permutations(range(3))
         for signs in product((1.0, -1.0), repeat=3)
-        if np.linalg.det(turn := np.eye(3)[list(order)] * np.array(signs)[:, None]) > 0
+        if np.linalg.det(rotation := np.eye(3)[list(order)] * np.array(signs)[:, None]) > 0
     ]
 )
 """The 24 rotations that map coordinate axes onto coordinate axes, float64 (24, 3, 3)."""
@@ -78,12 +78,12 @@ def mirrored(points: FloatArray, center: FloatArray, axis: int) -> FloatArray:
 
 def nearest_axes(box: Box, frame: FloatArray) -> Box:
     """The same box with its axes renamed so that right, top and front are nearest those of `frame`, (3, 3)."""
-    traces = np.einsum("kij,jl,il->k", _TURNS, box.axes, frame)
-    turn = _TURNS[int(traces.argmax())]
-    return Box(box.center, np.abs(turn) @ box.size, turn @ box.axes)
+    traces = np.einsum("kij,jl,il->k", _ROTATIONS, box.axes, frame)
+    rotation = _ROTATIONS[int(traces.argmax())]
+    return Box(box.center, np.abs(rotation) @ box.size, rotation @ box.axes)
 
 
-def turn_between(axes: FloatArray, frame: FloatArray) -> float:
+def angle_between(axes: FloatArray, frame: FloatArray) -> float:
     """The angle in degrees by which `axes` (3, 3) are turned against `frame` (3, 3)."""
     return float(np.degrees(np.arccos(np.clip(((axes * frame).sum() - 1) / 2, -1.0, 1.0))))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import place_in, turn_between
+from stages.shapeassembly.extraction.boxes import angle_between, place_in
 from stages.shapeassembly.extraction.contacts import Contact, bottom_or_top, contact_of
 from stages.shapeassembly.extraction.hierarchy import Box, Part
 
@@ -43,7 +43,7 @@ class Layout:
 
     def aligned(self, part: int) -> bool:
         """Whether a part stands along the node's frame."""
-        return turn_between(self.parts[part].box.axes, np.eye(3)) < 1e-3
+        return angle_between(self.parts[part].box.axes, np.eye(3)) < 1e-3
 
     def neighbours(self, part: int) -> list[int]:
         """The parts that touch `part`, ascending."""

@@ -36,24 +36,26 @@ def read_glb(path: Path, up: Literal["y", "z"]) -> PartHierarchy:
         children, root = scene.graph.transforms.children, str(scene.graph.base_frame)
     except Exception as error:  # trimesh lets through whatever a malformed file makes numpy and json raise
         raise Rejected(UNREADABLE, f"{path.name}: not a GLB file that can be read ({error})") from None
-    turn = _Z_UP_TO_Y_UP if up == "z" else np.eye(3)
-    found = _part(scene, children, root, turn, path.name, 0)
+    rotation = _Z_UP_TO_Y_UP if up == "z" else np.eye(3)
+    found = _part(scene, children, root, rotation, path.name, 0)
     if found is None:
         raise Rejected(UNREADABLE, f"{path.name}: no node has a mesh; export the meshes with the scene")
     return PartHierarchy(path.stem, bounded(found[0], path.name))
 
 
-def _part(scene: Any, tree: Any, node: str, turn: FloatArray, place: str, depth: int) -> tuple[Part, FloatArray] | None:
+def _part(
+    scene: Any, tree: Any, node: str, rotation: FloatArray, place: str, depth: int
+) -> tuple[Part, FloatArray] | None:
     """The part of a node and its points, float64 (n, 3) y up; None where no mesh is below it."""
     if depth > MAX_DEPTH:
         raise Rejected(UNREADABLE, f"{place}: more than {MAX_DEPTH} levels; simplify the scene")
     label = _NUMBER.sub("", node.rsplit("/", 1)[-1]) or "part"
-    found = [_part(scene, tree, child, turn, place, depth + 1) for child in sorted(tree.get(node, []))]
+    found = [_part(scene, tree, child, rotation, place, depth + 1) for child in sorted(tree.get(node, []))]
     below = [each for each in found if each is not None]
     matrix, geometry = scene.graph.get(node)
     if geometry is not None:
         vertices = np.asarray(scene.geometry[geometry].vertices, dtype=np.float64)
-        points = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ turn.T
+        points = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ rotation.T
         if not len(points) or not np.isfinite(points).all():
             raise Rejected(UNREADABLE, f"{place}: node {node!r} has no vertices, or some that are not finite")
         below.insert(0, (Part(label, minimum_box(points)), points))

@@ -88,7 +88,7 @@ def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int
     groups: list[Group] = []
     while left:
         first = bodies[left[0]]
-        row = [i for i in left if _shifted_alike(first, bodies[i], axis, tolerance)]
+        row = [i for i in left if _alike_translated(first, bodies[i], axis, tolerance)]
         row = _evenly_spaced([i for i in row if i != left[0]], left[0], bodies, axis, tolerance)
         members = [bodies[i] for i in row]
         common = _common([body.touches for body in members], members)
@@ -123,13 +123,13 @@ def _same_size(first: FloatArray, second: FloatArray, tolerance: float) -> bool:
     return bool((np.abs(one - two) <= np.maximum(0.1 * one, tolerance)).all())
 
 
-def _shifted_alike(first: Body, second: Body, axis: int, tolerance: float) -> bool:
+def _alike_translated(first: Body, second: Body, axis: int, tolerance: float) -> bool:
     away = second.center - first.center
     if np.abs(np.delete(away, axis)).max() > tolerance:
         return False
-    shift = np.zeros(3)
-    shift[axis] = away[axis]
-    return _alike([corners + shift for corners in first.boxes], second.boxes, tolerance)
+    translation = np.zeros(3)
+    translation[axis] = away[axis]
+    return _alike([corners + translation for corners in first.boxes], second.boxes, tolerance)
 
 
 def _evenly_spaced(row: list[int], first: int, bodies: Sequence[Body], axis: int, tolerance: float) -> list[int]:

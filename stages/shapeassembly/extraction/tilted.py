@@ -110,8 +110,8 @@ def _in_turning_plane(layout: Layout, part: int, other: int) -> FloatArray:
     perpendicular to the axis about which it is tilted."""
     box = layout.parts[part].box
     region = layout.contacts[min(part, other), max(part, other)].region
-    turn = box.axes
-    axis = np.array([turn[1, 2] - turn[2, 1], turn[2, 0] - turn[0, 2], turn[0, 1] - turn[1, 0]])
+    axes = box.axes
+    axis = np.array([axes[1, 2] - axes[2, 1], axes[2, 0] - axes[0, 2], axes[0, 1] - axes[1, 0]])
     axis /= max(float(np.linalg.norm(axis)), 1e-12)
     away = np.abs((region - box.center) @ axis)
     near = region[away <= away.min() + 1e-3 * layout.diagonal]

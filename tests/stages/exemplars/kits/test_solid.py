@@ -106,7 +106,7 @@ def test_quarter_turns_are_exact_and_turn_to_the_left() -> None:
 
 
 def test_copies_around_the_axis_keep_every_shell_closed() -> None:
-    post = revolved([(0.1, 0.0), (0.1, 1.0)], 6, RED).moved(2.0)
+    post = revolved([(0.1, 0.0), (0.1, 1.0)], 6, RED).translated(2.0)
     ring = joined(post.around(6), loft([np.zeros((1, 3)), regular_ring(1.0), np.array([[0.0, 2.0, 0.0]])], BLUE))
     assert is_closed(ring)
     assert volume(ring) == pytest.approx(6 * volume(post) + 8 / 3, abs=1e-5)

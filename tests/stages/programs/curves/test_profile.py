@@ -71,8 +71,8 @@ def test_inset_moves_every_side() -> None:
 
 
 def test_moves() -> None:
-    assert rectangle(2, 4).turned(90).size.tolist() == pytest.approx([4, 2])
-    assert rectangle(2).moved(3, 1).points.mean(axis=0).tolist() == [3, 1]
+    assert rectangle(2, 4).rotated(90).size.tolist() == pytest.approx([4, 2])
+    assert rectangle(2).translated(3, 1).points.mean(axis=0).tolist() == [3, 1]
     assert rectangle(2).scaled(2, 3).size.tolist() == [4, 6]
 
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stages.shapeassembly.extraction.boxes import (
+    angle_between,
     box_corners,
     gap,
     mirrored,
@@ -14,7 +15,6 @@ from stages.shapeassembly.extraction.boxes import (
     point_at,
     same_box,
     surface_distance,
-    turn_between,
 )
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.minimum_box import minimum_box
@@ -41,7 +41,7 @@ def test_renaming_the_axes_keeps_the_box_and_turns_it_less_than_half_the_cube_al
     renamed = nearest_axes(some, np.eye(3))
     assert same_box(box_corners(some), box_corners(renamed), 1e-9)
     assert np.linalg.det(renamed.axes) == pytest.approx(1.0)
-    assert turn_between(renamed.axes, np.eye(3)) <= 62.8 + 1e-6, "the farthest rotation from the 24 of the cube"
+    assert angle_between(renamed.axes, np.eye(3)) <= 62.8 + 1e-6, "the farthest rotation from the 24 of the cube"
 
 
 @given(boxes, boxes)
