@@ -9,10 +9,12 @@ from typing import Any
 
 import yaml
 
-from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW
+from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW
 
 __all__ = ["Story", "card", "citation", "size_category"]
 
+LISTED_CLASSES = 60
+"""Of more classes than these, the card lists the first."""
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 
@@ -51,13 +53,14 @@ def card(
     members: Sequence[Mapping[str, Any]],
     rows: Sequence[Mapping[str, Any]],
     sources: Mapping[str, str],
+    classes: Sequence[Mapping[str, Any]],
     story: Story,
 ) -> str:
     """The card's text.
 
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
     of the package's shards; members: name, sentence, dtype and shape of each; rows: those of the index; sources: the
-    kits or programs by name, with what there is to say of them in short.
+    kits or programs by name, with what there is to say of them in short; classes: the rows of `classes.json`.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
@@ -81,6 +84,8 @@ def card(
         _split_table(splits, shards),
         _source_table(sources, rows),
         story.splits,
+        "## Part labels",
+        _class_table(classes, splits),
         *(["## How different they are", *story.variety] if story.variety else []),
         "## A sample",
         _member_table(members),
@@ -129,6 +134,20 @@ def _source_table(sources: Mapping[str, str], rows: Sequence[Mapping[str, Any]])
         "\n".join(lines) + "\n\nParts, contacts and independent cycles: least, median, most. Rooted: every part is "
         "connected to the ground. Stable: the shape stands and bears small pushes, by statics on its geometry."
     )
+
+
+def _class_table(classes: Sequence[Mapping[str, Any]], splits: Sequence[str]) -> str:
+    lines = [
+        f"A label has one id, its class, in all members and splits. `{CLASSES}` lists them all; shapes and parts that "
+        f"have a label: {' / '.join(splits)}.\n",
+        "| class | label | of | color | shapes | parts |",
+        "| ---: | --- | --- | --- | ---: | ---: |",
+    ]
+    for each in classes[:LISTED_CLASSES]:
+        counts = (" / ".join(f"{each[what][split]:,}" for split in splits) for what in ("shapes", "parts"))
+        lines.append(f"| {each['id']} | {each['name']} | {each['kit']} | `{each['color']}` | {' | '.join(counts)} |")
+    more = len(classes) - LISTED_CLASSES
+    return "\n".join([*lines, *([f"\nAnd {more:,} more."] if more > 0 else [])])
 
 
 def _span(numbers: Sequence[int]) -> str:

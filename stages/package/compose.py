@@ -11,17 +11,19 @@ from typing import Any
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
+from stages.package.classes import class_table, table_bytes
 from stages.package.croissant import croissant
 from stages.package.index import read_rows, write_index
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
+from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import checksums, manifest
+from stages.shape.collection.classes import Classes
 from stages.shape.collection.declared import language_of
 
 __all__ = ["compose_dataset"]
 
 
 def compose_dataset(task: Task) -> Outcome:
-    """Write card, Croissant, manifest, checksums and index.
+    """Write card, Croissant, manifest, classes, checksums and index.
 
     The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
     shards); `members` (what is to say of each); `made`, `splits`, `story`, `variety`, `rejects` and `measures` (what
@@ -39,13 +41,20 @@ def compose_dataset(task: Task) -> Outcome:
         "sha256": hashlib.sha256(index.getvalue()).hexdigest(),
     }
     known = language_of(params["producer"]).speaker(task).sources
+    tallies = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
+    classes = class_table(Classes.of(known), tallies)
+    listed = table_bytes(classes)
+    counted = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(listed).hexdigest()}
     used = {row["kit"] for row in rows}
     sources = {name: each.sentence for name, each in known.items() if name in used}
     story = Story(params["made"], params["splits"], params["story"], params["variety"], params["rejects"])
     files = {
-        CARD: card(facts, shards, members, rows, sources, story).encode(),
-        CROISSANT: _text(croissant(facts, shards, members, citation(facts))),
-        MANIFEST: _text(manifest(facts, params["sections"], shards, indexed, params["measures"], params["package"])),
+        CARD: card(facts, shards, members, rows, sources, classes, story).encode(),
+        CROISSANT: _text(croissant(facts, shards, members, counted, citation(facts))),
+        MANIFEST: _text(
+            manifest(facts, params["sections"], shards, indexed, counted, params["measures"], params["package"])
+        ),
+        CLASSES: listed,
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))
@@ -55,6 +64,10 @@ def compose_dataset(task: Task) -> Outcome:
         with task.output(f"{task.shard.name}.{file}") as stream:
             stream.write(content)
     return Outcome(samples=0, summary={"samples": len(rows)})
+
+
+def _read(task: Task, file: str) -> Any:
+    return json.loads(task.input("package", file).read_bytes())
 
 
 def _text(document: Mapping[str, Any]) -> bytes:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from stages.package.layout import CLASSES
+
 __all__ = ["croissant"]
 
 VOCABULARY = {
@@ -65,10 +67,15 @@ FORMATS = {
 
 
 def croissant(
-    facts: Mapping[str, Any], shards: Sequence[Mapping[str, Any]], members: Sequence[Mapping[str, Any]], citation: str
+    facts: Mapping[str, Any],
+    shards: Sequence[Mapping[str, Any]],
+    members: Sequence[Mapping[str, Any]],
+    classes: Mapping[str, Any],
+    citation: str,
 ) -> dict[str, Any]:
     """The document. `facts` has name, version, title, description, license, creator and published; `shards` are the
-    summaries of the package's shards; `members` has name, sentence, dtype and shape of each."""
+    summaries of the package's shards; `members` has name, sentence, dtype and shape of each; `classes` has the sha256
+    of the file of that name."""
     spdx = str(facts["license"])
     return {
         "@context": VOCABULARY,
@@ -82,8 +89,12 @@ def croissant(
         "datePublished": facts["published"],
         "citeAs": citation,
         "keywords": list(facts["tags"]),
-        "distribution": [*map(_shard, shards), *(_files(each["name"], each["sentence"], shards) for each in members)],
-        "recordSet": [_records(each["name"], each["sentence"]) for each in members],
+        "distribution": [
+            *map(_shard, shards),
+            *(_files(each["name"], each["sentence"], shards) for each in members),
+            _class_file(classes),
+        ],
+        "recordSet": [*(_records(each["name"], each["sentence"]) for each in members), _class_records()],
     }
 
 
@@ -141,6 +152,45 @@ def _records(member: str, text: str) -> dict[str, Any]:
                 "dataType": "sc:ImageObject" if member.endswith(".png") else "sc:Text",
                 "source": {"fileSet": {"@id": f"files-{name}"}, "extract": {"fileProperty": "content"}},
             },
+        ],
+    }
+
+
+def _class_file(classes: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "@type": "cr:FileObject",
+        "@id": CLASSES,
+        "name": CLASSES,
+        "description": "The part labels of the dataset, and how many shapes and parts of each split have them.",
+        "contentUrl": CLASSES,
+        "encodingFormat": FORMATS["json"],
+        "sha256": classes["sha256"],
+    }
+
+
+def _class_records() -> dict[str, Any]:
+    fields = {
+        "id": ("sc:Integer", "What the labels of points and the classes of parts say."),
+        "name": ("sc:Text", "The part label."),
+        "kit": ("sc:Text", "The kit, program or category that has it."),
+        "color": ("sc:Text", "A colour that stands for it, sRGB."),
+    }
+    return {
+        "@type": "cr:RecordSet",
+        "@id": "classes",
+        "name": "classes",
+        "description": "The part labels of the dataset by id.",
+        "key": {"@id": "classes/id"},
+        "field": [
+            {
+                "@type": "cr:Field",
+                "@id": f"classes/{name}",
+                "name": name,
+                "description": text,
+                "dataType": kind,
+                "source": {"fileObject": {"@id": CLASSES}, "extract": {"jsonPath": f"$[*].{name}"}},
+            }
+            for name, (kind, text) in fields.items()
         ],
     }
 

@@ -17,7 +17,11 @@ OWN = (
         "The mesh: glTF 2.0, one node a part, named by its label (`tower.000`), equal parts sharing one mesh. Node "
         "`extras` hold `class` and `instance`.",
     ),
-    Member("json", "Everything else: parts with label, class and pose (4x4), contacts, counts, bounds, lineage."),
+    Member(
+        "json",
+        "Everything else: parts with label, class and pose (4x4), contacts, counts, bounds, lineage, "
+        "cameras of the drawings.",
+    ),
 )
 
 

@@ -23,11 +23,13 @@ def manifest(
     sections: Mapping[str, Any],
     shards: Sequence[Mapping[str, Any]],
     index: Mapping[str, Any],
+    classes: Mapping[str, Any],
     measures: Mapping[str, Mapping[str, Any]],
     package_version: int,
 ) -> dict[str, Any]:
     """What `manifest.json` holds. `shards` are the summaries of the package's shards; `index` has `path` (relative
-    to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit."""
+    to the dataset's folder), `bytes` and `sha256`, `classes` has `path`, `count` and `sha256`; `measures` of the
+    variants of each kit."""
     kits: Counter[str] = Counter()
     splits: Counter[str] = Counter()
     for shard in shards:
@@ -46,6 +48,7 @@ def manifest(
             {name: shard[name] for name in ("path", "split", "samples", "bytes", "sha256", "kits")} for shard in shards
         ],
         "index": dict(index),
+        "classes": dict(classes),
         "measures": dict(measures),
         "config": dict(sections),
     }

@@ -9,7 +9,7 @@ from typing import Any
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
 from stages.package.described import described_members
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
+from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, index_path
 from stages.package.manifest import config_sections
 from stages.package.merge import merge_shard
 from stages.package.preview import draw_preview
@@ -26,7 +26,7 @@ from stages.shape.collection.shards import (
 
 __all__ = ["STAGE"]
 
-VERSION = 4
+VERSION = 5
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
@@ -102,7 +102,7 @@ def publish(plan: Plan) -> Mapping[str, str]:
     name = plan.config.name
     if WHOLE not in plan.shards("package"):
         return {}
-    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, MANIFEST, CHECKSUMS)}
+    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, MANIFEST, CLASSES, CHECKSUMS)}
     files[f"{name}/{PREVIEW}"] = f"{PICTURE}.png"
     files[index_path(plan.config)] = f"{WHOLE}.parquet"
     for shard in plan.shards("package"):

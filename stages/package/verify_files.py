@@ -123,7 +123,9 @@ def _check_listing(
     digests = {shard["path"]: shard["sha256"] for shard in manifest["shards"]}
     others = {CHECKSUMS: {file: digest for file, digest in listed.items() if file.startswith("data/")}}
     if croissant is not None:
-        others[CROISSANT] = {each["@id"]: each["sha256"] for each in croissant["distribution"] if "sha256" in each}
+        others[CROISSANT] = {
+            each["@id"]: each["sha256"] for each in croissant["distribution"] if each["@id"].startswith("data/")
+        }
     findings.look("manifest", len(digests))
     for name, other in others.items():
         for file in sorted({*digests, *other}):

@@ -21,8 +21,8 @@ Faults = Callable[[Mapping[str, bytes]], Sequence[str]]
 class Source:
     """Where samples come from: a kit, a program, a category of programs. `Sample.kit` names it.
 
-    labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none;
-    sentence: what a card says of it, in a few words.
+    labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none at all: then
+    a class has that of its first part; sentence: what a card says of it, in a few words.
     """
 
     labels: tuple[str, ...]

@@ -108,10 +108,16 @@ issues = dataset.metadata.ctx.issues
 found = {"issues": sorted(map(str, [*issues.errors, *issues.warnings])), "records": {}, "lengths": {}}
 for record_set in dataset.metadata.record_sets:
     name = record_set.uuid
+    if name == "classes":
+        continue
     records = list(dataset.records(name))
     found["records"][name] = [record[f"{name}/key"].decode() for record in records]
     contents = [record[f"{name}/content"] for record in records]
     found["lengths"][name] = [len(each) if isinstance(each, bytes) else list(each.size) for each in contents]
+found["classes"] = [
+    [row["classes/id"], *(row[f"classes/{name}"].decode() for name in ("name", "kit", "color"))]
+    for row in dataset.records("classes")
+]
 found["version"] = str(dataset.metadata.ctx.conforms_to)
 print(json.dumps(found))
 """
@@ -126,6 +132,8 @@ def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
     found = json.loads(line)
     assert found["issues"] == []
     assert found["version"].endswith("V_1_1")
+    listed = json.loads((toy_folder / "classes.json").read_text())
+    assert found["classes"] == [[each[name] for name in ("id", "name", "kit", "color")] for each in listed]
     stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
     members = {member.partition(".")[0]: member for member in next(iter(stored.values()))}
     assert set(found["records"]) == set(members)
