@@ -9,12 +9,12 @@ from typing import Any
 import yaml
 
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA
-from stages.package.tables import member_table, origin_table, reject_table, source_table, split_table
+from stages.package.tables import class_table, member_table, origin_table, reject_table, source_table, split_table
 
 __all__ = ["Story", "card", "citation", "size_category"]
 
-SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
+SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 USES = (
     "For training and measuring models that generate, complete, segment or reconstruct shapes made of parts, and for "
@@ -69,13 +69,14 @@ def card(
     members: Sequence[Mapping[str, Any]],
     rows: Sequence[Mapping[str, Any]],
     sources: Mapping[str, str],
+    classes: Sequence[Mapping[str, Any]],
     story: Story,
 ) -> str:
     """The card's text.
 
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
     of the package's shards; members: name, sentence, dtype and shape of each; rows: those of the index; sources: the
-    kits or programs by name, with what there is to say of them in short.
+    kits or programs by name, with what there is to say of them in short; classes: the rows of `classes.json`.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
@@ -100,6 +101,8 @@ def card(
         source_table(sources, rows),
         "## How the splits are kept apart",
         story.splits,
+        "## Part labels",
+        class_table(classes, splits),
         *(["## How different they are", *story.variety] if story.variety else []),
         "## A sample",
         member_table(members),

@@ -11,17 +11,19 @@ from typing import Any
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
+from stages.package.classes import class_table, table_bytes
 from stages.package.croissant import croissant
 from stages.package.index import column_kinds, read_rows, write_index
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
+from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
 from stages.package.manifest import checksums, manifest
+from stages.shape.collection.classes import Classes
 from stages.shape.collection.declared import language_of
 
 __all__ = ["compose_dataset"]
 
 
 def compose_dataset(task: Task) -> Outcome:
-    """Write card, Croissant, schema, manifest, checksums and index.
+    """Write card, Croissant, schema, classes, manifest, checksums and index.
 
     The shard's params hold `facts`; `producer`; `sections` (the whole config); `shards` (summaries of the package's
     shards); `members` (what is to say of each); `schema` (of the records); `apart` (whether graphs keep the splits
@@ -40,26 +42,24 @@ def compose_dataset(task: Task) -> Outcome:
         "columns": column_kinds(),
     }
     known = language_of(params["producer"]).speaker(task).sources
+    tallies = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
+    classes = class_table(Classes.of(known), tallies)
+    listed = table_bytes(classes)
+    counted = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(listed).hexdigest()}
     used = {row["kit"] for row in rows}
     sources = {name: each.sentence for name, each in known.items() if name in used}
     story = Story(**params["story"], origins=params["origins"])
     files = {
-        CARD: card(facts, shards, members, rows, sources, story).encode(),
-        CROISSANT: _text(croissant(facts, shards, members, indexed, params["origins"], citation(facts))),
+        CARD: card(facts, shards, members, rows, sources, classes, story).encode(),
+        CROISSANT: _text(croissant(facts, shards, members, indexed, counted, params["origins"], citation(facts))),
         SCHEMA: _text(params["schema"]),
+        CLASSES: listed,
     }
     digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     digests[PREVIEW] = file_digest(task.input("package", f"{params['preview']}.png"))
     described = manifest(
-        facts,
-        params["sections"],
-        shards,
-        members,
-        digests,
-        indexed,
-        params["measures"],
-        params["made_with"],
-        params["origins"],
+        *(facts, params["sections"], shards, members, digests, indexed, counted),
+        *(params["measures"], params["made_with"], params["origins"]),
     )
     files[MANIFEST] = _text({**described, "apart": params["apart"]})
     digests[MANIFEST] = hashlib.sha256(files[MANIFEST]).hexdigest()
@@ -69,6 +69,10 @@ def compose_dataset(task: Task) -> Outcome:
         with task.output(f"{task.shard.name}.{file}") as stream:
             stream.write(content)
     return Outcome(samples=0, summary={"samples": len(rows)})
+
+
+def _read(task: Task, file: str) -> Any:
+    return json.loads(task.input("package", file).read_bytes())
 
 
 def _text(document: Mapping[str, Any]) -> bytes:

@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from stages.package.layout import CLASSES
+
 __all__ = ["croissant"]
 
 VOCABULARY = {
@@ -78,12 +80,14 @@ def croissant(
     shards: Sequence[Mapping[str, Any]],
     members: Sequence[Mapping[str, Any]],
     index: Mapping[str, Any],
+    classes: Mapping[str, Any],
     origins: Sequence[Mapping[str, Any]],
     citation: str,
 ) -> dict[str, Any]:
     """The document. `facts` has name, version, title, description, license, creator and published; `shards` are the
     summaries of the package's shards; `members` has name, sentence, dtype and shape of each; `index` has path, bytes,
-    sha256 and columns (their Arrow types by name); `origins` are what the dataset was made from."""
+    sha256 and columns (their Arrow types by name); `classes` has the sha256 of the file of that name; `origins` are
+    what the dataset was made from."""
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     return {
         "@context": VOCABULARY,
@@ -102,12 +106,14 @@ def croissant(
             *map(_shard, shards),
             _index(index),
             *(_files(each["name"], each["sentence"], shards) for each in members),
+            _class_file(classes),
         ],
         "recordSet": [
             _split_records(splits),
             _sample_records(index["columns"]),
             *map(_member_records, members),
             *map(_joined_records, members),
+            _class_records(),
         ],
     }
 
@@ -258,6 +264,45 @@ def _field(identifier: str, description: str, data_type: str = "", **more: Any) 
     typed = {"dataType": data_type} if data_type else {}
     name = identifier.rpartition("/")[2]
     return {"@type": "cr:Field", "@id": identifier, "name": name, "description": description, **typed, **more}
+
+
+def _class_file(classes: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "@type": "cr:FileObject",
+        "@id": CLASSES,
+        "name": CLASSES,
+        "description": "The part labels of the dataset, and how many shapes and parts of each split have them.",
+        "contentUrl": CLASSES,
+        "encodingFormat": FORMATS["json"],
+        "sha256": classes["sha256"],
+    }
+
+
+def _class_records() -> dict[str, Any]:
+    fields = {
+        "id": ("sc:Integer", "What the labels of points and the classes of parts say."),
+        "name": ("sc:Text", "The part label."),
+        "kit": ("sc:Text", "The kit, program or category that has it."),
+        "color": ("sc:Text", "A colour that stands for it, sRGB."),
+    }
+    return {
+        "@type": "cr:RecordSet",
+        "@id": "classes",
+        "name": "classes",
+        "description": "The part labels of the dataset by id.",
+        "key": {"@id": "classes/id"},
+        "field": [
+            {
+                "@type": "cr:Field",
+                "@id": f"classes/{name}",
+                "name": name,
+                "description": text,
+                "dataType": kind,
+                "source": {"fileObject": {"@id": CLASSES}, "extract": {"jsonPath": f"$[*].{name}"}},
+            }
+            for name, (kind, text) in fields.items()
+        ],
+    }
 
 
 def _identifier(member: str) -> str:

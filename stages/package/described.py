@@ -19,8 +19,8 @@ OWN = (
     ),
     Member(
         "json",
-        "Everything else: parts with label, class and pose (4x4), counts, bounds, lineage; field by field in "
-        "`schema.json`.",
+        "Everything else: parts with label, class and pose (4x4), counts, bounds, lineage, cameras of the drawings; "
+        "field by field in `schema.json`.",
     ),
 )
 

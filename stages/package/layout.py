@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from pipeline.config import Config
 
-__all__ = ["CARD", "CHECKSUMS", "CROISSANT", "MANIFEST", "PREVIEW", "SCHEMA", "index_path", "shard_path"]
+__all__ = [
+    "CARD",
+    "CHECKSUMS",
+    "CLASSES",
+    "CROISSANT",
+    "MANIFEST",
+    "PREVIEW",
+    "SCHEMA",
+    "index_path",
+    "shard_path",
+]
 
 CARD = "README.md"
 CROISSANT = "croissant.json"
 MANIFEST = "manifest.json"
 SCHEMA = "schema.json"
+CLASSES = "classes.json"
 CHECKSUMS = "checksums.txt"
 PREVIEW = "preview.png"
 

@@ -25,14 +25,16 @@ def manifest(
     members: Sequence[Mapping[str, Any]],
     files: Mapping[str, str],
     index: Mapping[str, Any],
+    classes: Mapping[str, Any],
     measures: Mapping[str, Mapping[str, Any]],
     made_with: Mapping[str, Any],
     origins: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """What `manifest.json` holds. `shards` are the summaries of the package's shards; `members` says name, sentence,
     dtype and shape of each; `files` are the digests of the files about the whole but this one; `index` has `path`
-    (relative to the dataset's folder), `bytes` and `sha256`; `measures` of the variants of each kit; `made_with`
-    versions of code and libraries; `origins` the files that the samples were made from, and whose they are."""
+    (relative to the dataset's folder), `bytes` and `sha256`, `classes` has `path`, `count` and `sha256`; `measures` of
+    the variants of each kit; `made_with` versions of code and libraries; `origins` the files that the samples were
+    made from, and whose they are."""
     kits: Counter[str] = Counter()
     splits: Counter[str] = Counter()
     for shard in shards:
@@ -52,6 +54,7 @@ def manifest(
             {name: shard[name] for name in ("path", "split", "samples", "bytes", "sha256", "kits")} for shard in shards
         ],
         "index": {name: index[name] for name in ("path", "bytes", "sha256")},
+        "classes": dict(classes),
         "origins": [dict(each) for each in origins],
         "measures": dict(measures),
         "config": dict(sections),

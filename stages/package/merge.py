@@ -12,6 +12,7 @@ from typing import Any, BinaryIO, cast
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes, read_shard
 from pipeline.stage import Outcome, Task
+from stages.package.classes import ClassTally
 from stages.package.glb import glb_bytes
 from stages.package.index import index_row, tar_bytes
 from stages.package.layout import shard_path
@@ -24,7 +25,8 @@ __all__ = ["merge_shard"]
 
 
 def merge_shard(task: Task) -> Outcome:
-    """Files of the shard: `.tar`, the dataset's, and `.jsonl`, its rows of the index. Its params name the `stages`
+    """Files of the shard: `.tar`, the dataset's, `.jsonl`, its rows of the index, and `.classes.json`, what its
+    samples have of each class. Its params name the `stages`
     that add members; fields that these add to the record stand in a member `json` of theirs.
 
     A sample that one of the stages has refused is left out and counted. Raises ShardFailed where samples differ in
@@ -36,6 +38,7 @@ def merge_shard(task: Task) -> Outcome:
     total, rows = int(task.shard.params["samples"]), []
     members_of_all: list[str] = []
     counts: Counter[str] = Counter()
+    tally = ClassTally()
     with task.output(f"{task.shard.name}.tar") as file:
         stream = HashingStream(file)
         with ShardWriter(cast(BinaryIO, stream)) as writer:
@@ -50,10 +53,13 @@ def merge_shard(task: Task) -> Outcome:
                 members_of_all = list(members)
                 writer.write(sample.key, members)
                 counts[sample.kit] += 1
+                tally.add(shape)
                 rows.append(index_row(record, path, writer.offsets[sample.key], tar_bytes(members)))
                 task.progress(writer.samples, total)
     with task.output(f"{task.shard.name}.jsonl") as listing:
         listing.writelines(json_bytes(row) for row in rows)
+    with task.output(f"{task.shard.name}.classes.json") as counted:
+        counted.write(json_bytes(tally.counts()))
     summary = {
         "path": path,
         "split": split,

@@ -10,7 +10,7 @@ from typing import Any
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
 from stages.package.described import described_members
-from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
+from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
 from stages.package.made_with import code_version, library_versions
 from stages.package.manifest import config_sections
 from stages.package.merge import merge_shard
@@ -116,7 +116,7 @@ def publish(plan: Plan) -> Mapping[str, str]:
     name = plan.config.name
     if WHOLE not in plan.shards("package"):
         return {}
-    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, SCHEMA, MANIFEST, CHECKSUMS)}
+    files = {f"{name}/{file}": f"{WHOLE}.{file}" for file in (CARD, CROISSANT, SCHEMA, CLASSES, MANIFEST, CHECKSUMS)}
     files[f"{name}/{PREVIEW}"] = f"{PICTURE}.png"
     files[index_path(plan.config)] = f"{WHOLE}.parquet"
     for shard in plan.shards("package"):

@@ -6,7 +6,13 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-__all__ = ["member_table", "origin_table", "reject_table", "source_table", "split_table"]
+from stages.package.layout import CLASSES
+
+__all__ = ["class_table", "member_table", "origin_table", "reject_table", "source_table", "split_table"]
+
+
+LISTED_CLASSES = 60
+"""So many classes at most stand in the card."""
 
 
 def split_table(splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> str:
@@ -17,6 +23,21 @@ def split_table(splits: Sequence[str], shards: Sequence[Mapping[str, Any]]) -> s
         size = sum(shard["bytes"] for shard in own) / 1e6
         lines.append(f"| {split} | {sum(shard['samples'] for shard in own):,} | {len(own)} | {size:,.1f} |")
     return "\n".join(lines)
+
+
+def class_table(classes: Sequence[Mapping[str, Any]], splits: Sequence[str]) -> str:
+    """The first of the classes, with how many shapes and parts of each split have them."""
+    lines = [
+        f"A label has one id, its class, in all members and splits. `{CLASSES}` lists them all; shapes and parts that "
+        f"have a label: {' / '.join(splits)}.\n",
+        "| class | label | of | color | shapes | parts |",
+        "| ---: | --- | --- | --- | ---: | ---: |",
+    ]
+    for each in classes[:LISTED_CLASSES]:
+        counts = (" / ".join(f"{each[what][split]:,}" for split in splits) for what in ("shapes", "parts"))
+        lines.append(f"| {each['id']} | {each['name']} | {each['kit']} | `{each['color']}` | {' | '.join(counts)} |")
+    more = len(classes) - LISTED_CLASSES
+    return "\n".join([*lines, *([f"\nAnd {more:,} more."] if more > 0 else [])])
 
 
 def source_table(sources: Mapping[str, str], rows: Sequence[Mapping[str, Any]]) -> str:

@@ -32,8 +32,7 @@ def point_faults(sample: Packaged) -> Iterator[str]:
     if (sample.shape.part_classes[instances] != sample.arrays["labels.npy"]).any():
         yield "its point labels are not the classes of their parts"
     near = NEAR * max(sample.size, float(np.abs(sample.record["bounds"]).max()))
-    corners, parts = sample.triangles
-    off, turned = _strangers(points, normals, instances, corners, parts, near)
+    off, turned = _strangers(sample, points, normals, instances, near)
     if off:
         yield f"{off} of its {len(points):,} points are not on the surface of their part"
     if turned:
@@ -41,14 +40,15 @@ def point_faults(sample: Packaged) -> Iterator[str]:
 
 
 def _strangers(
-    points: FloatArray, normals: FloatArray, instances: IntArray, corners: FloatArray, parts: IntArray, near: float
+    sample: Packaged, points: FloatArray, normals: FloatArray, instances: IntArray, near: float
 ) -> tuple[int, int]:
     """How many points are off the surface of their part, and how many of the others have a normal of no triangle there.
 
     The nearest triangle of all answers for nearly all points; the others, where parts meet or at edges, are held
     against each triangle of their part.
     """
-    nearest, distances = _nearest(points, corners)
+    corners, parts = sample.triangles
+    nearest, distances = sample.nearest(points)
     own = parts[nearest] == instances
     along = np.einsum("ij,ij->i", normals, _unit_normals(corners[nearest])) > 1.0 - ALONG
     doubtful = np.flatnonzero(~(own & along & (distances <= near)))
@@ -62,21 +62,6 @@ def _strangers(
         fitting = normals[mine] @ _unit_normals(triangles).T > 1.0 - ALONG
         turned += int((touching.any(axis=1) & ~(touching & fitting).any(axis=1)).sum())
     return off, turned
-
-
-def _nearest(points: FloatArray, corners: FloatArray) -> tuple[IntArray, FloatArray]:
-    """The nearest triangle of each point and how far it is, of triangles float64 (t, 3, 3)."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    middle = corners.reshape(-1, 3).mean(axis=0)
-    vertices = (corners.reshape(-1, 3) - middle).astype(np.float32)
-    numbers = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
-    scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(numbers))
-    asked = o3d.core.Tensor.from_numpy((points - middle).astype(np.float32))
-    found = scene.compute_closest_points(asked, nthreads=1)
-    gaps = np.linalg.norm(found["points"].numpy().astype(np.float64) - (points - middle), axis=1)
-    return found["primitive_ids"].numpy().astype(np.int32), gaps
 
 
 def _unit_normals(corners: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray
 from stages.shape.views.buffers import Backend, visible_triangles
-from stages.shape.views.camera import Camera
+from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 from stages.sketches.settings import SketchView, StrokeOptions
 
@@ -29,8 +29,8 @@ def jittered_camera(view: SketchView, rng: np.random.Generator) -> Camera:
 
 def draw_sketch(
     scene: Scene, camera: Camera, size: int, supersample: int, options: StrokeOptions, backend: Backend
-) -> ByteArray:
-    """Dark lines on white, uint8 (size, size).
+) -> tuple[ByteArray, View]:
+    """Dark lines on white, uint8 (size, size), and the view that they show.
 
     Raises ShardFailed where nothing is seen or nothing would be drawn: a blank drawing is never a sample.
     """
@@ -49,4 +49,4 @@ def draw_sketch(
     drawing = np.rint(255.0 * (1.0 - options.ink * ink)).astype(np.uint8)
     if drawing.min() == drawing.max():
         raise ShardFailed(f"blank drawing: no line of {len(scene)} parts is seen from {camera}")
-    return drawing
+    return drawing, seen.view

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,19 +12,28 @@ from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray
 from stages.sketches.settings import Augmentation
 
-__all__ = ["augment", "dilate", "erode", "flip", "png_array", "png_bytes"]
+__all__ = ["Augmented", "augment", "dilate", "erode", "flip", "png_array", "png_bytes"]
 
 
-def augment(drawing: ByteArray, chances: Augmentation, rng: np.random.Generator) -> ByteArray:
+class Augmented(NamedTuple):
+    """A changed drawing (h, w), whether it is mirrored, and by how many pixels its lines have grown wider at most."""
+
+    drawing: ByteArray
+    flipped: bool
+    thicker: int
+
+
+def augment(drawing: ByteArray, chances: Augmentation, rng: np.random.Generator) -> Augmented:
     """The drawing (h, w), mirrored, thickened or thinned by the chances given; always two draws from `rng`."""
     mirror, morphology = rng.random(2)
-    if mirror < chances.flip:
+    flipped, thicker = bool(mirror < chances.flip), 0
+    if flipped:
         drawing = flip(drawing)
     if morphology < chances.dilate:
-        drawing = dilate(drawing, chances.size)
+        drawing, thicker = dilate(drawing, chances.size), chances.size - 1
     elif morphology < chances.dilate + chances.erode:
         drawing = erode(drawing, chances.size)
-    return drawing
+    return Augmented(drawing, flipped, thicker)
 
 
 def flip(drawing: ByteArray) -> ByteArray:

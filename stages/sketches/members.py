@@ -11,6 +11,7 @@ from pipeline.config import Config
 from stages.shape.arrays import ByteArray
 from stages.shape.collection.members import Field, Member, Members, Row
 from stages.shape.views.camera import Camera
+from stages.sketches.cameras import CAMERA_FIELDS
 from stages.sketches.settings import SketchesConfig
 
 __all__ = ["MEMBERS"]
@@ -21,7 +22,8 @@ def _members(config: Config) -> tuple[Member, ...]:
     return tuple(
         Member(
             f"sketch{index}.png",
-            f"Line drawing of the shape, view `{view.name}`, dark on white, single-channel PNG.",
+            f"Line drawing of the shape, view `{view.name}`: dark ink on white (0 is black, 255 white), "
+            "single-channel PNG. Its camera stands in the record, with OpenCV's axes.",
             "uint8",
             (section.size, section.size),
         )
@@ -30,12 +32,23 @@ def _members(config: Config) -> tuple[Member, ...]:
 
 
 def _fields(_: Config) -> Mapping[str, Field]:
+    properties = {
+        "view": {"description": "its name in the config", "type": "string", "minLength": 1},
+        **CAMERA_FIELDS,
+        "line_width": {"description": "no line is wider; unit: pixels", "type": "number", "exclusiveMinimum": 0},
+    }
     return {
         "sketches": Field(
             {
-                "description": "names of the views, in the order of the drawings",
+                "description": "the drawings in their order, each with its camera, as it stood after it was fitted "
+                "and jittered and the drawing flipped",
                 "type": "array",
-                "items": {"type": "string"},
+                "items": {
+                    "type": "object",
+                    "properties": properties,
+                    "required": list(properties),
+                    "additionalProperties": False,
+                },
                 "minItems": 1,
             }
         )

@@ -13,11 +13,12 @@ from stages.shape.sample import Sample
 from stages.shape.views.buffers import Backend
 from stages.shape.views.probe import backend_for
 from stages.shape.views.scene import Scene, scene_of
+from stages.sketches.cameras import camera_fields
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment, png_bytes
 from stages.sketches.settings import SketchesConfig
 
-__all__ = ["STAGE"]
+__all__ = ["STAGE", "drawings"]
 
 
 def run_shard(task: Task) -> Outcome:
@@ -28,27 +29,33 @@ def run_shard(task: Task) -> Outcome:
     config = task.config.section(SketchesConfig)
     backend = backend_for(config.backend)
 
-    def drawings(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
-        return _drawings(task, config, sample, scene_of(collection.shape(sample)), backend)
+    def made(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
+        return drawings(task, config, sample, scene_of(collection.shape(sample)), backend)
 
-    samples = add_members(task, drawings)
+    samples = add_members(task, made)
     views = [view.name for view in config.views]
     return Outcome(samples, {"split": task.shard.params["split"], "views": views, "backend": backend})
 
 
-def _drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, backend: Backend) -> dict[str, bytes]:
-    members = {"json": json_bytes({"sketches": [view.name for view in config.views]})}
+def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, backend: Backend) -> dict[str, bytes]:
+    """The members of one sample. Raises ShardFailed for a drawing without a line."""
+    strokes = config.strokes
+    widest = max(strokes.outline, strokes.contour, strokes.boundary, strokes.crease, 1.0)
+    members: dict[str, bytes] = {}
+    described = []
     for index, view in enumerate(config.views):
         camera = jittered_camera(view, task.rng(sample.key, view.name, "camera"))
         try:
-            drawing = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, backend)
+            drawing, seen = draw_sketch(scene, camera, config.size, config.supersample, strokes, backend)
         except ShardFailed as error:
             raise ShardFailed(f"sample {sample.key}, view {view.name}: {error}") from error
-        drawing = augment(drawing, config.augment, task.rng(sample.key, view.name, "augment"))
+        drawing, flipped, thicker = augment(drawing, config.augment, task.rng(sample.key, view.name, "augment"))
         if drawing.min() == drawing.max():
             raise ShardFailed(f"sample {sample.key}, view {view.name}: eroding by {config.augment.size} left no line")
         members[f"sketch{index}.png"] = png_bytes(drawing)
-    return members
+        said = camera_fields(seen, config.size, flipped)
+        described.append({"view": view.name, **said, "line_width": float(widest + thicker)})
+    return {"json": json_bytes({"sketches": described}), **members}
 
 
 def estimate_bytes(plan: Plan) -> int:

@@ -36,7 +36,7 @@ def bench() -> Iterator[Measure]:
         def sketches(backend: Backend = backend) -> int:
             scene = _colonnade()
             for view in views:
-                png_bytes(draw_sketch(scene, view, SIZE, SUPERSAMPLE, StrokeOptions(), backend))
+                png_bytes(draw_sketch(scene, view, SIZE, SUPERSAMPLE, StrokeOptions(), backend)[0])
             return len(views)
 
         yield Measure(f"sketches, {backend}", "sketches", rate(sketches), note=note)

@@ -9,17 +9,16 @@ from stages.shape.collection.language import Source
 
 __all__ = ["Classes", "PartClass"]
 
-GREY = (160, 160, 160)
-
 
 @dataclass(frozen=True)
 class PartClass:
-    """One class. id: what labels say; name: the part label; kit: the source it belongs to; color: sRGB."""
+    """One class. id: what labels say; name: the part label; kit: the source it belongs to; color: sRGB, or None
+    where its source has none to say."""
 
     id: int
     name: str
     kit: str
-    color: tuple[int, int, int]
+    color: tuple[int, int, int] | None
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Classes:
         first: dict[str, int] = {}
         for kit, source in sources.items():
             first[kit] = len(found)
-            colors = source.colors or (GREY,) * len(source.labels)
+            colors = source.colors or (None,) * len(source.labels)
             found += [
                 PartClass(len(found) + place, name, kit, color)
                 for place, (name, color) in enumerate(zip(source.labels, colors, strict=True))

@@ -22,8 +22,8 @@ Anew = Callable[[Mapping[str, Any], IntArray], Shape]
 class Source:
     """Where samples come from: a kit, a program, a category of programs. `Sample.kit` names it.
 
-    labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none;
-    sentence: what a card says of it, in a few words.
+    labels: the part labels of its shapes, in a fixed order; colors: one for each label, sRGB, or none at all: then
+    a class has that of its first part; sentence: what a card says of it, in a few words.
     contact_tolerance: of shape graphs the largest distance of parts in contact, in the units of the shapes.
     """
 

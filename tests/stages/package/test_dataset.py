@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 import tarfile
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -97,6 +98,30 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
     assert record["points"] == {"farthest": 16, "uniform": 64, "centre": [0, 0, 0], "scale": 1.0}
 
 
+def test_classes_are_listed_with_what_has_them_by_split(toy_folder: Path) -> None:
+    """Counted anew from the records; the ids are the places in the list, the colours those of the kits' types."""
+    table = json.loads((toy_folder / "classes.json").read_text())
+    assert [each["id"] for each in table] == list(range(4))
+    assert [(each["name"], each["kit"]) for each in table] == [
+        (name, kit) for kit in ("blocks", "planks") for name in ("tower", "long.wall")
+    ]
+    assert [each["color"] for each in table] == ["#c82828", "#2828c8"] * 2
+    shapes, parts = Counter[tuple[int, str]](), Counter[tuple[int, str]]()
+    for members in all_samples(toy_folder).values():
+        record = json.loads(members["json"])
+        own = [part["class"] for part in record["parts"]]
+        assert all(table[number]["kit"] == record["kit"] for number in own)
+        assert [table[number]["name"] for number in own] == [part["label"] for part in record["parts"]]
+        shapes.update((number, record["split"]) for number in set(own))
+        parts.update((number, record["split"]) for number in own)
+        assert set(bytes_array(members["labels.npy"]).tolist()) <= set(own)
+    for each in table:
+        assert each["shapes"] == {split: shapes[each["id"], split] for split in SPLITS}
+        assert each["parts"] == {split: parts[each["id"], split] for split in SPLITS}
+    named = json.loads((toy_folder / "manifest.json").read_text())["classes"]
+    assert named == {"path": "classes.json", "count": 4, "sha256": file_digest(toy_folder / "classes.json")}
+
+
 def test_mesh_points_poses_and_bounds_share_upright_coordinates(toy_folder: Path) -> None:
     """Of a kit whose z points up the boxes' height lies along y, in the mesh, the points and the JSON alike."""
     import trimesh
@@ -120,6 +145,21 @@ def test_mesh_points_poses_and_bounds_share_upright_coordinates(toy_folder: Path
             assert np.abs(outside).max(initial=0.0) < 1e-6
         checked.add(record["kit"])
     assert checked == {"blocks", "planks"}
+
+
+def test_the_camera_of_a_record_sees_the_mesh_file_where_the_ink_is(toy_folder: Path) -> None:
+    import PIL.Image
+    import trimesh
+
+    for members in all_samples(toy_folder).values():
+        vertices = trimesh.load(io.BytesIO(members["glb"]), file_type="glb", process=False).to_mesh().vertices
+        for index, camera in enumerate(json.loads(members["json"])["sketches"]):
+            turned = np.array(camera["world_to_camera"]) @ np.column_stack([vertices, np.ones(len(vertices))]).T
+            across, down, _ = np.array(camera["intrinsics"]) @ (turned[:3] / turned[2])
+            ink = np.nonzero(np.asarray(PIL.Image.open(io.BytesIO(members[f"sketch{index}.png"]))) < 128)
+            for seen, inked in zip((down, across), ink, strict=True):
+                assert abs(seen.min() - (inked.min() + 0.5)) < 1.0
+                assert abs(seen.max() - (inked.max() + 0.5)) < 1.0
 
 
 def test_a_row_of_the_index_leads_to_its_sample(toy_folder: Path) -> None:

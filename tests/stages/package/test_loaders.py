@@ -147,9 +147,18 @@ def test_mlcroissant_validates_without_error_or_warning_and_yields_every_member(
 ) -> None:
     assert croissant["issues"] == []
     assert croissant["version"].endswith("V_1_1")
+    listed = json.loads((toy_folder / "classes.json").read_text())
+    known = [{name: each[name] for name in ("id", "name", "kit", "color")} for each in listed]
+    assert croissant["records"]["classes"] == known
     stored = {key: members for path in toy_folder.rglob("*.tar") for key, members in read_shard(path)}
     members = {member.partition(".")[0]: member for member in next(iter(stored.values()))}
-    assert set(croissant["records"]) == {"splits", "samples", *members, *(f"{name}-of-samples" for name in members)}
+    assert set(croissant["records"]) == {
+        "splits",
+        "samples",
+        "classes",
+        *members,
+        *(f"{name}-of-samples" for name in members),
+    }
     for name, member in members.items():
         records = {each["key"]: each["content"] for each in croissant["records"][name]}
         assert set(records) == set(stored)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,22 +10,26 @@ from typing import Any
 import numpy as np
 
 from pipeline.config import Config, StrictModel
+from pipeline.errors import Rejected
 from pipeline.places import Places
 from pipeline.run import run_stage
-from pipeline.shards import ShardWriter, json_bytes
+from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
 from stages.points.settings import PointsConfig
 from stages.points.stage import STAGE as POINTS
+from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
 from stages.shape.kit_files import write_kit
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, read_samples, write_sample
+from stages.shape.views.scene import scene_of
 from stages.sketches.settings import SketchesConfig, SketchView
+from stages.sketches.stage import drawings
 from stages.validity.stage import STAGE as VALIDITY
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 
@@ -147,23 +150,14 @@ def _make_strings(task: Task) -> Outcome:
 
 
 def _make_sketches(task: Task) -> Outcome:
-    import PIL.Image
+    config = task.config.section(SketchesConfig)
 
-    views = task.config.section(SketchesConfig).views
-    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for sample in read_samples(task.input("variations", f"{task.shard.name}.tar")):
-            if sample.key == REFUSED:
-                task.reject(sample.key, "blank drawing")
-                continue
-            members = {"json": json_bytes({"sketches": [view.name for view in views]})}
-            for view in range(len(views)):
-                pixels = np.full((24, 24), 255, dtype=np.uint8)
-                pixels[4 + view : 8 + view, 2 : 2 + len(sample.assembly)] = 0
-                png = io.BytesIO()
-                PIL.Image.fromarray(pixels).save(png, "png")
-                members[f"sketch{view}.png"] = png.getvalue()
-            writer.write(sample.key, members)
-    return Outcome(writer.samples)
+    def made(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
+        if sample.key == REFUSED:
+            raise Rejected("blank drawing")
+        return drawings(task, config, sample, scene_of(collection.shape(sample)), "raycast")
+
+    return Outcome(add_members(task, made))
 
 
 def _no_bytes(_: Plan) -> int:
@@ -195,7 +189,9 @@ def toy_config(shards: int = 8) -> Config:
         "strings": NoConfig(),
         "validity": PhysicsConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
-        "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right"))),
+        "sketches": SketchesConfig(
+            size=24, backend="raycast", views=(SketchView(name="left"), SketchView(name="right", azimuth=30.0))
+        ),
         "package": PackageConfig(previewed=2),
     }
     return Config(

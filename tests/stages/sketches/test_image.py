@@ -55,7 +55,7 @@ def test_augmentations_come_with_their_probabilities():
     drawing = np.full((9, 9), 255, dtype=np.uint8)
     drawing[4, 1] = 0
     chances = Augmentation(flip=0.5, dilate=0.25, erode=0.25)
-    made = [augment(drawing, chances, np.random.default_rng(seed)) for seed in range(400)]
+    made = [augment(drawing, chances, np.random.default_rng(seed)).drawing for seed in range(400)]
     flipped = np.mean([(each[:, 5:] < 255).any() for each in made if each.min() < 255])
     dark = np.array([(each < 255).sum() for each in made])
     assert abs(flipped - 0.5) < 0.1
@@ -65,4 +65,4 @@ def test_augmentations_come_with_their_probabilities():
 
 def test_without_chances_nothing_changes():
     drawing = noise(8, 8, 1)
-    assert (augment(drawing, Augmentation(), np.random.default_rng(0)) == drawing).all()
+    assert (augment(drawing, Augmentation(), np.random.default_rng(0)).drawing == drawing).all()

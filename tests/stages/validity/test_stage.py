@@ -16,13 +16,14 @@ from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.programs.program import find_program
 from stages.programs.settings import ProgramsConfig
-from stages.shape.collection.members import Packaged
+from stages.shape.collection.packaged import Packaged
 from stages.shape.collection.pairs import CONTACTS, JOINTS, pairs_of
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample, write_sample
-from stages.validity.members import MEMBERS
+from stages.shape.shape import Shape
+from stages.validity.audit import AUDIT
 from stages.validity.stage import STAGE
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 from tests.stages.shape.views.solids import box, kit_of, part_type, posed
@@ -132,17 +133,20 @@ def test_parts_that_are_near_and_do_not_touch_are_joints_and_no_contacts(tmp_pat
 
 def test_contradictions_between_joints_and_physics_are_found() -> None:
     joints = np.array([[0, 1]], dtype=np.int32)
-    physics = {"components": 1, "floating": 0, "rooted": True}
+    physics = {"components": 1, "floating": 0, "rooted": True, "stable": True, "margin": 0.5, "weakest": -1}
+    shape = Shape((), Assembly(np.zeros(2, np.int16), np.tile(np.eye(4), (2, 1, 1)), joints), "y", ())
 
     def faults(pairs: np.ndarray = joints, **changed: object) -> list[str]:
         arrays = {CONTACTS: np.empty((2, 0), np.int32), JOINTS: pairs.T}
         record = {"parts": [{}, {}], "physics": {**physics, **changed}}
-        return list(MEMBERS.faults(Packaged("key", record, {}, arrays)))
+        sections = {"validity": PhysicsConfig().model_dump()}
+        return list(AUDIT.faults(Packaged("key", record, {}, arrays, shape, sections)))
 
     assert faults() == []
     assert faults(components=2) == ["its joints do not make as many components as physics says"]
     assert faults(joints[:0]) == ["its joints do not make as many components as physics says"]
-    assert faults(rooted=False) == ["rooted and floating in its physics contradict each other"]
+    assert faults(rooted=False) == ["its json says rooted: False and counts 0 floating parts"]
+    assert faults(stable=False) == ["its json says stable: False, with a margin of 0.5 for a push of 0.01"]
     assert faults(joints[:, ::-1]) == [f"{JOINTS} holds what is no pair of its parts"]
     assert faults(joints.astype(np.int64)) == [f"{JOINTS} is no array int32 (2, m)"]
 

@@ -1,0 +1,116 @@
+"""How `make verify` looks at sketches: is this a drawing of this shape, by this camera?"""
+
+from __future__ import annotations
+
+import io
+import itertools
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.shape.arrays import FloatArray
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.packaged import Packaged
+from stages.sketches.cameras import projected
+
+__all__ = ["AUDIT", "outline_shares", "sketch_faults"]
+
+INK = (2e-4, 0.9)
+"""How much of a drawing is ink, at least and at most, as a share of a black picture."""
+RIGID = 1e-9
+"""How far the rotation of a camera may be from one."""
+SEEN_FINE = 112
+"""The shape is looked at with so many rays across the picture."""
+DRAWN = 0.75
+"""At least so much of the outline has ink."""
+ASTRAY = 0.02
+"""At most so much of the ink lies off the shape."""
+
+
+def sketch_faults(sample: Packaged) -> Iterator[str]:
+    """A sentence for each drawing that cannot be read, is blank, or shows no shape where its camera sees it."""
+    corners = np.array(list(itertools.product(*np.transpose(sample.record["bounds"]))))
+    for index, camera in enumerate(sample.record["sketches"]):
+        name = f"sketch{index}.png"
+        for what in _drawing_faults(sample.members[name], camera, corners, sample):
+            yield f"{name} {what}"
+
+
+def _drawing_faults(content: bytes, camera: Mapping[str, Any], corners: FloatArray, sample: Packaged) -> Iterator[str]:
+    """What is wrong with one drawing of a sample in a box with these corners, float64 (8, 3)."""
+    from PIL import Image
+
+    pose = np.array(camera["world_to_camera"])
+    turn = pose[:3, :3]
+    if np.abs(turn @ turn.T - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0 or pose[3].tolist() != [0, 0, 0, 1]:
+        yield "has a camera whose world_to_camera is no rigid motion"
+    if (camera["intrinsics"][0][0] < 0) != camera["flipped"]:
+        yield "has a camera whose intrinsics and flipped do not say the same"
+    try:
+        drawing = np.asarray(Image.open(io.BytesIO(content)))
+    except (OSError, SyntaxError, ValueError) as error:
+        yield f"cannot be read: {error}"
+        return
+    if drawing.dtype != np.uint8 or drawing.shape != (camera["height"], camera["width"]):
+        yield f"has pixels {drawing.dtype} {drawing.shape}, not those that its record says"
+        return
+    share = 1.0 - float(drawing.mean()) / 255.0
+    if not INK[0] <= share <= INK[1]:
+        yield f"is blank or full: {share:.2%} of it is ink"
+        return
+    seen = projected(camera, corners)
+    # A corner of the box may be behind the camera although nothing of the shape is.
+    if np.isfinite(seen).all():
+        rows, columns = np.nonzero(drawing < 255)
+        ink = np.array([[columns.min(), rows.min()], [columns.max() + 1, rows.max() + 1]])
+        beyond = max(float((seen.min(axis=0) - ink[0]).max()), float((ink[1] - seen.max(axis=0)).max()))
+        if beyond > camera["line_width"] / 2 + 1.0:
+            yield f"has ink where its camera does not see the shape, {beyond:.0f} pixels beyond"
+            return
+    yield from _outline_faults(drawing < 255, camera, sample)
+
+
+def _outline_faults(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: Packaged) -> Iterator[str]:
+    drawn, astray = outline_shares(inked, camera, sample)
+    if drawn < DRAWN:
+        yield f"draws {drawn:.0%} of the outline that its camera sees"
+    if astray > ASTRAY:
+        yield f"has {astray:.0%} of its ink where its camera does not see the shape"
+
+
+def outline_shares(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], sample: Packaged) -> tuple[float, float]:
+    """How much of the outline that a camera sees has ink near it, and how much of the ink lies off the shape, as
+    shares. inked: bool (h, w), where there is ink."""
+    from scipy.ndimage import binary_erosion, distance_transform_edt
+
+    step = max(1, -(-max(inked.shape) // SEEN_FINE))
+    rows, columns = (np.arange(step // 2, length, step) for length in inked.shape)
+    origins, directions = _rays(camera, columns + 0.5, rows + 0.5)
+    hit = sample.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).reshape(len(rows), len(columns))
+    if not hit.any():
+        return 0.0, 1.0
+    near = camera["line_width"] / 2 + 1.5 * step
+    outline = hit & ~binary_erosion(hit, border_value=0)
+    to_ink = distance_transform_edt(~inked)[np.ix_(rows, columns)]
+    seen = np.zeros(inked.shape, dtype=bool)
+    seen[np.ix_(rows, columns)] = hit
+    off = distance_transform_edt(~seen)[inked] > near + step
+    return float((to_ink[outline] <= near).mean()), float(off.mean())
+
+
+def _rays(camera: Mapping[str, Any], columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Origins and directions, float64 (h, w, 3), of the rays through places of the picture, in the coordinates of the
+    mesh."""
+    intrinsics, pose = np.array(camera["intrinsics"]), np.array(camera["world_to_camera"])
+    turn, place = pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3]
+    x, y = np.meshgrid((columns - intrinsics[0, 2]) / intrinsics[0, 0], (rows - intrinsics[1, 2]) / intrinsics[1, 1])
+    ahead = np.stack([x, y, np.ones_like(x)], axis=-1)
+    if camera["projection"] == "perspective":
+        return np.broadcast_to(place, ahead.shape), ahead @ turn.T
+    beside = np.stack([x, y, np.zeros_like(x)], axis=-1)
+    return beside @ turn.T + place, np.broadcast_to(turn[:, 2], ahead.shape)
+
+
+AUDIT = Audit(faults=sketch_faults)

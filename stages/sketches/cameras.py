@@ -1,0 +1,77 @@
+"""The camera of a drawing as its record has it: how points of the mesh come to stand in the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.views.camera import View
+
+__all__ = ["CAMERA_FIELDS", "camera_fields", "projected"]
+
+OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+DECIMALS = 12
+"""Further digits of a matrix are noise."""
+
+_PIXELS = {"type": "integer", "minimum": 1}
+_ROW = {"type": "array", "items": {"type": "number"}}
+
+CAMERA_FIELDS: Mapping[str, Any] = {
+    "width": {"description": "of the picture; unit: pixels", **_PIXELS},
+    "height": {"description": "of the picture; unit: pixels", **_PIXELS},
+    "projection": {
+        "description": "perspective: a point (x, y, z) of the camera's coordinates is seen at intrinsics * (x/z, y/z, "
+        "1); orthographic: at intrinsics * (x, y, 1)",
+        "enum": ["perspective", "orthographic"],
+    },
+    "intrinsics": {
+        "description": "K, 3x3, to pixels: (0, 0) is the upper left corner of the picture, (0.5, 0.5) the middle of "
+        "its first pixel, x points right, y down. Where the picture is flipped, its first number is negative",
+        "type": "array",
+        "items": {**_ROW, "minItems": 3, "maxItems": 3},
+        "minItems": 3,
+        "maxItems": 3,
+    },
+    "world_to_camera": {
+        "description": "4x4, rigid, from the coordinates of the mesh to the camera's, which are OpenCV's: x points "
+        "right, y down, z into the picture",
+        "type": "array",
+        "items": {**_ROW, "minItems": 4, "maxItems": 4},
+        "minItems": 4,
+        "maxItems": 4,
+    },
+    "flipped": {"description": "whether left and right are changed over; intrinsics know of it", "type": "boolean"},
+}
+"""JSON schema of what `camera_fields` gives, by name."""
+
+
+def camera_fields(view: View, size: int, flipped: bool) -> dict[str, Any]:
+    """What a record says of the camera of a square picture of `size` pixels; a flipped one was mirrored after it was
+    drawn."""
+    half = size / 2
+    across, down = view.projection[0, 0] * half, view.projection[1, 1] * half
+    intrinsics = np.array([[-across if flipped else across, 0.0, half], [0.0, down, half], [0.0, 0.0, 1.0]])
+    # adding zero turns minus zeros into zeros, which read better in text
+    matrices = {"intrinsics": intrinsics, "world_to_camera": OPENGL_TO_OPENCV @ view.eye}
+    return {
+        "width": size,
+        "height": size,
+        "projection": "perspective" if view.perspective else "orthographic",
+        **{name: (np.round(matrix, DECIMALS) + 0.0).tolist() for name, matrix in matrices.items()},
+        "flipped": flipped,
+    }
+
+
+def projected(camera: Mapping[str, Any], points: FloatArray) -> FloatArray:
+    """Where points of the mesh (n, 3) are seen by a camera of a record, in pixels, float64 (n, 2); NaN for what is not
+    in front of it."""
+    intrinsics, pose = np.array(camera["intrinsics"]), np.array(camera["world_to_camera"])
+    seen = points @ pose[:3, :3].T + pose[:3, 3]
+    if camera["projection"] == "perspective":
+        depth = np.where(seen[:, 2:] > 0.0, seen[:, 2:], np.nan)
+        seen = seen / depth
+    pixels: FloatArray = seen[:, :2] @ intrinsics[:2, :2].T + intrinsics[:2, 2]
+    return pixels

@@ -1,0 +1,65 @@
+"""The table of classes: counts by split, colours, and a card that stays short."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from stages.package.card import LISTED_CLASSES, _class_table
+from stages.package.classes import ClassTally, class_table, table_bytes
+from stages.shape.collection.classes import Classes
+from stages.shape.collection.language import Source
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.shape import Shape
+
+CLASSES = Classes.of({"stools": Source(("leg", "seat", "rung")), "lamps": Source(("shade",), ((1, 2, 255),))})
+
+
+def stool(legs: int) -> Shape:
+    """`legs` brown legs, then a seat, mostly green."""
+    face = np.array([[0, 1, 2]], dtype=np.int32)
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    leg = PartMesh("leg", corners, face, np.array([[150, 100, 50]], np.uint8))
+    seat = PartMesh("seat", corners, face.repeat(3, axis=0), np.array([[0, 200, 0]] * 2 + [[255, 0, 0]], np.uint8))
+    poses = np.tile(np.eye(4), (legs + 1, 1, 1))
+    assembly = Assembly(np.array([0] * legs + [1], np.int16), poses, np.empty((0, 2), np.int32))
+    return Shape((leg, seat), assembly, "y", ("leg", "seat", "rung"))
+
+
+def tally(*legs: int) -> dict[str, dict[str, Any]]:
+    counted = ClassTally()
+    for count in legs:
+        counted.add(stool(count))
+    return counted.counts()
+
+
+def test_shapes_and_parts_are_added_up_by_split() -> None:
+    table = class_table(CLASSES, [("train", tally(3, 4)), ("train", tally(3)), ("test", tally(5))])
+    assert [(each["shapes"], each["parts"]) for each in table] == [
+        ({"train": 3, "test": 1}, {"train": 10, "test": 5}),
+        ({"train": 3, "test": 1}, {"train": 3, "test": 1}),
+        ({"train": 0, "test": 0}, {"train": 0, "test": 0}),
+        ({"train": 0, "test": 0}, {"train": 0, "test": 0}),
+    ]
+
+
+def test_a_class_has_the_colour_of_its_source_or_of_its_first_part() -> None:
+    table = class_table(CLASSES, [("train", tally(3))])
+    assert [each["color"] for each in table] == ["#966432", "#00c800", "#a0a0a0", "#0102ff"]
+
+
+def test_the_table_is_json_with_a_line_for_each_class() -> None:
+    table = class_table(CLASSES, [("train", tally(3))])
+    content = table_bytes(table)
+    assert json.loads(content) == table
+    assert len(content.splitlines()) == len(table)
+
+
+def test_a_card_lists_the_first_of_very_many_classes_and_counts_the_others() -> None:
+    many = Classes.of({"words": Source(tuple(f"word{number}" for number in range(1500)))})
+    text = _class_table(class_table(many, [("train", {})]), ["train"])
+    assert f"| {LISTED_CLASSES - 1} | word{LISTED_CLASSES - 1} |" in text
+    assert f"word{LISTED_CLASSES} " not in text
+    assert "And 1,440 more." in text

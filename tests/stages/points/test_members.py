@@ -1,0 +1,69 @@
+"""What `make verify` finds wrong with the points of a sample, and that it finds nothing wrong with good ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+
+from stages.points.cloud import sample_cloud
+from stages.points.frame import NormalizeMode, normalization
+from stages.points.members import MEMBERS
+from stages.shape.collection.members import Packaged
+from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.kit import Assembly
+from stages.shape.shape import kit_shape
+from tests.stages.shape.views.solids import box, cylinder, kit_of, part_type, posed
+
+
+def sample(mode: NormalizeMode = "none") -> Packaged:
+    """A row of parts a hundred away from the origin; the class of a part is its type and 5."""
+    kit = kit_of(part_type("box", box()), part_type("drum", cylinder(24, 0.5, 1.0)))
+    types = np.array([0, 1, 0], np.int16)
+    shape = kit_shape(kit, Assembly(types, posed((99, 0, 0), (100, 0, 0), (101, 0, 0)), np.empty((0, 2), np.int32)))
+    cloud, moved = sample_cloud(shape, 60, 20, 100, np.random.default_rng(1)), normalization(shape, mode)
+    made = {"farthest": 20, "uniform": 60, "centre": list(moved.centre), "scale": moved.scale}
+    parts = [{"class": int(kind) + 5} for kind in types]
+    arrays = {
+        "points.npy": ((cloud.points - moved.centre) * moved.scale).astype(np.float32),
+        "normals.npy": cloud.normals.astype(np.float32),
+        "labels.npy": cloud.labels + np.int16(5),
+        "instances.npy": cloud.instances,
+    }
+    return Packaged("a", {"points": made, "parts": parts, "bounds": shape_bounds(shape).tolist()}, {}, arrays)
+
+
+@pytest.mark.parametrize("mode", get_args(NormalizeMode))
+def test_good_points_have_no_faults(mode: NormalizeMode) -> None:
+    assert list(MEMBERS.faults(sample(mode))) == []
+
+
+def at_first(value: Any) -> Callable[[np.ndarray], np.ndarray]:
+    def change(array: np.ndarray) -> np.ndarray:
+        array = array.copy()
+        array[0] = value
+        return array
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("member", "change", "found"),
+    [
+        ("points.npy", at_first(np.nan), "not finite"),
+        ("points.npy", lambda points: points + np.float32(0.1), "out of its bounds"),
+        ("points.npy", lambda points: points[1:], "other lengths"),
+        ("normals.npy", at_first(np.inf), "not finite"),
+        ("normals.npy", lambda normals: normals * np.float32(1.01), "unit length"),
+        ("labels.npy", lambda labels: labels - np.int16(1), "not the classes of their parts"),
+        ("instances.npy", at_first(3), "not there"),
+        ("instances.npy", at_first(-1), "not there"),
+    ],
+)
+def test_damaged_points_are_found(member: str, change: Callable[[np.ndarray], np.ndarray], found: str) -> None:
+    good = sample()
+    arrays = {**good.arrays, member: change(good.arrays[member])}
+    faults = list(MEMBERS.faults(Packaged("a", good.record, {}, arrays)))
+    assert [found in fault for fault in faults] == [True]
