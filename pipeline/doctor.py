@@ -40,8 +40,7 @@ _NATIVE = {
     "pyrender": "pyrender",
     "OpenImageIO": "OpenImageIO",
     "fcl": "python-fcl",
-    "pynauty": "pynauty",
-    "fpsample": "fpsample",
+    "igraph": "igraph",
     "pyarrow.parquet": "pyarrow",
     "torch": "torch",
 }

@@ -125,7 +125,7 @@ def _stands_for(encoded: Encoded, assembly: Assembly, alphabet: Alphabet) -> boo
 
 STAGE = Stage(
     name="strings",
-    version=1,
+    version=2,
     config=StringsConfig,
     inputs=("exemplars", *PRODUCERS),
     plan=plan,
