@@ -16,10 +16,9 @@ from stages.shape.collection.shapes import Collection
 from stages.shape.kit import Assembly, Kit
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, upright
-from stages.shape.views.buffers import Backend
+from stages.shape.views.buffers import Backend, drawn_by
 from stages.shape.views.camera import Camera
 from stages.shape.views.portrait import points_portrait, portrait
-from stages.shape.views.probe import backend_for
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.sketches.settings import SketchesConfig
@@ -44,10 +43,11 @@ BELOW = replace(ABOVE, elevation=-ABOVE.elevation)
 def draw_preview(task: Task) -> Outcome:
     """File of the shard: `.png`. Its params: `title`, all `samples`, and the `shards` to choose from.
 
-    The first row of shapes, the points and the sketches show the same shapes, one a column.
+    The first row of shapes, the points and the sketches show the same shapes, one a column. The backend that draws the
+    sketches draws this picture too.
     """
     config, sketches = task.config.section(PackageConfig), task.config.section(SketchesConfig)
-    backend = backend_for(sketches.backend)
+    backend = sketches.backend
     camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
     collection, shards = Collection(task), task.shard.params["shards"]
     made = {stage: _members(task, stage, shards) for stage in ("points", "sketches")}
@@ -70,7 +70,7 @@ def draw_preview(task: Task) -> Outcome:
     ]
     with task.output(f"{task.shard.name}.png") as stream:
         stream.write(picture_png(contact_sheet(sections, task.shard.params["title"], CELL)))
-    return Outcome(samples=0)
+    return Outcome(samples=0, summary={"backend": backend, "renderer": drawn_by(backend)})
 
 
 def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:

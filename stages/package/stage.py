@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
 from stages.package.layout import CARD, CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, index_path
@@ -14,10 +15,12 @@ from stages.package.merge import merge_shard, merged_stages
 from stages.package.preview import draw_preview
 from stages.package.settings import PackageConfig
 from stages.shape.collection.shards import PRODUCERS, check_producers, collection_shards, planned_producer
+from stages.shape.views.probe import check_backend
+from stages.sketches.settings import SketchesConfig
 
 __all__ = ["STAGE"]
 
-VERSION = 4
+VERSION = 5
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8
@@ -92,7 +95,16 @@ def report(plan: Plan) -> Sequence[str]:
     summaries = [plan.summary("package", shard) or {} for shard in plan.shards("package")]
     shards = [summary for summary in summaries if summary.get("path")]
     samples, size = sum(shard["samples"] for shard in shards), sum(shard["bytes"] for shard in shards) / 1e6
-    return [f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB"]
+    drawn = plan.summary("package", PICTURE) or {}
+    return [
+        f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB",
+        f"preview drawn by {drawn['backend']}, {drawn['renderer']}",
+    ]
+
+
+def check_machine(config: Config) -> None:
+    """Raises ConfigError where the backend that draws sketches and preview cannot draw."""
+    check_backend(config.section(SketchesConfig).backend, f"{config.path}: sketches.backend")
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -153,4 +165,5 @@ STAGE = Stage(
     report=report,
     publish=publish,
     check=check_producers,
+    check_machine=check_machine,
 )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
+from pipeline.config import Config
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.shapes import Collection
 from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.sample import Sample
-from stages.shape.views.buffers import Backend
-from stages.shape.views.probe import backend_for
+from stages.shape.views.buffers import drawn_by
+from stages.shape.views.probe import check_backend
 from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment, png_bytes
@@ -30,23 +34,27 @@ def run_shard(task: Task) -> Outcome:
     """
     config = task.config.section(SketchesConfig)
     collection = Collection(task)
-    backend = backend_for(config.backend)
     total = int(task.shard.params["samples"])
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for sample in collection.samples():
             scene = scene_of(collection.shape(sample))
-            writer.write(sample.key, _drawings(task, config, sample, scene, backend))
+            writer.write(sample.key, _drawings(task, config, sample, scene))
             task.progress(writer.samples, total)
-    summary = {"split": task.shard.params["split"], "views": [view.name for view in config.views], "backend": backend}
+    summary = {
+        "split": task.shard.params["split"],
+        "views": [view.name for view in config.views],
+        "backend": config.backend,
+        "renderer": drawn_by(config.backend),
+    }
     return Outcome(samples=writer.samples, summary=summary)
 
 
-def _drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, backend: Backend) -> dict[str, bytes]:
+def _drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -> dict[str, bytes]:
     members = {}
     for index, view in enumerate(config.views):
         camera = jittered_camera(view, task.rng(sample.key, view.name, "camera"))
         try:
-            drawing = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, backend)
+            drawing = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, config.backend)
         except ShardFailed as error:
             raise ShardFailed(f"sample {sample.key}, view {view.name}: {error}") from error
         drawing = augment(drawing, config.augment, task.rng(sample.key, view.name, "augment"))
@@ -54,6 +62,18 @@ def _drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, 
             raise ShardFailed(f"sample {sample.key}, view {view.name}: eroding by {config.augment.size} left no line")
         members[f"sketch{index}.png"] = png_bytes(drawing)
     return members
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """What drew the sketches: one line, or several where machines differ."""
+    summaries = (plan.summary("sketches", name) for name in plan.shards("sketches"))
+    drawn = Counter(f"{each['backend']}, {each['renderer']}" for each in summaries if each is not None)
+    return [f"{count} shards drawn by {what}" for what, count in sorted(drawn.items())]
+
+
+def check_machine(config: Config) -> None:
+    """Raises ConfigError where the config's backend cannot draw: no other draws in its place."""
+    check_backend(config.section(SketchesConfig).backend, f"{config.path}: sketches.backend")
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -65,10 +85,12 @@ def estimate_bytes(plan: Plan) -> int:
 
 STAGE = Stage(
     name="sketches",
-    version=1,
+    version=2,
     config=SketchesConfig,
     inputs=("exemplars", *PRODUCERS),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
+    report=report,
+    check_machine=check_machine,
 )
