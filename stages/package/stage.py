@@ -90,12 +90,12 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 def report(plan: Plan) -> Sequence[str]:
     """What the finished dataset holds."""
-    if plan.summary("package", WHOLE) is None:
+    drawn = plan.summary("package", PICTURE)
+    if drawn is None or plan.summary("package", WHOLE) is None:
         return []
     summaries = [plan.summary("package", shard) or {} for shard in plan.shards("package")]
     shards = [summary for summary in summaries if summary.get("path")]
     samples, size = sum(shard["samples"] for shard in shards), sum(shard["bytes"] for shard in shards) / 1e6
-    drawn = plan.summary("package", PICTURE) or {}
     return [
         f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB",
         f"preview drawn by {drawn['backend']}, {drawn['renderer']}",
