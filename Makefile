@@ -80,6 +80,7 @@ lint: setup  ## Check style and types
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
 bench: setup  ## Measure every piece beside a public peer
+	$(PYTHON) -m pip install -q -r tests/bench/peers.txt || echo 'some peers cannot be built here: measured without' >&2
 	$(PYTHON) -m tests.bench
 kits: setup  ## Write the shipped exemplars anew from their source
 	$(PYTHON) -m stages.exemplars.kits
@@ -90,8 +91,9 @@ lock: setup  ## Choose the newest versions of everything and pin them in require
 	$(PYTHON) -m venv --clear .venv/lock
 	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
 	    print(*p["dependencies"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
+	grep '^--' requirements.lock >> .venv/lock/asked.txt
 	.venv/lock/bin/python -m pip install -r .venv/lock/asked.txt
-	{ grep '^#' requirements.lock; .venv/lock/bin/python -m pip freeze --all --exclude pip | sed 's/+.*//'; } > lock.tmp
+	{ grep '^[#-]' requirements.lock; .venv/lock/bin/python -m pip freeze --all --exclude pip | sed 's/+.*//'; } > lock.tmp
 	mv lock.tmp requirements.lock
 
 # The machine --------------------------------------------------------------------------------------------------------

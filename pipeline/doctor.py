@@ -40,16 +40,14 @@ _NATIVE = {
     "pyrender": "pyrender",
     "OpenImageIO": "OpenImageIO",
     "fcl": "python-fcl",
-    "pynauty": "pynauty",
-    "fpsample": "fpsample",
+    "igraph": "igraph",
     "pyarrow.parquet": "pyarrow",
     "torch": "torch",
 }
 """Module to import, and the name under which its version is known."""
 
-_BACKENDS = ("egl", "osmesa", "raycast")
-_LAST_BACKEND = "raycast"
-"""The backend that needs no graphics library: it must work, the others are faster or finer."""
+_BACKENDS = ("raycast", "egl")
+"""What `sketches.backend` may name: the default, which must work, and what a config may ask for."""
 
 # pyrender looks for NumPy names that are gone; the stages give them back before they import it.
 _PRELUDE = {"pyrender": "import numpy; numpy.infty = numpy.inf; "}
@@ -146,11 +144,10 @@ def _draw(backend: str) -> Finding:
     start = time.perf_counter()
     code, said = _try([sys.executable, "-m", "stages.shape.views.probe", backend])
     if code == 0:
-        return Finding(f"draw: {backend}", "ok", f"a triangle in {time.perf_counter() - start:.1f} s")
-    if backend == _LAST_BACKEND:
+        return Finding(f"draw: {backend}", "ok", f"a triangle in {time.perf_counter() - start:.1f} s by {said}")
+    if backend == _BACKENDS[0]:
         return Finding(f"draw: {backend}", "FAILED", said, _mend(said, "open3d"))
-    package = "libosmesa6" if backend == "osmesa" else "libegl1 libegl-mesa0 libgl1-mesa-dri"
-    mend = f"apt-get install {package}; without it another backend draws"
+    mend = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri; configs that ask for this backend do not start"
     return Finding(f"draw: {backend}", "warning", said, mend)
 
 

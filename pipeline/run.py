@@ -112,6 +112,7 @@ class _Run:
         self._take_away(surveyed, surveyed.places.failed, "*")
         self._take_away_unfinished(surveyed)
         if surveyed.missing:
+            self._check_machine()
             for line in reasons(surveyed):
                 self._journal.say(line)
             surveyed.places.manifest.unlink(missing_ok=True)
@@ -133,6 +134,13 @@ class _Run:
                     f"{self._name} reads {each}, and {len(missing)} of its {planned} shards are not made "
                     f"(the first is {missing[0].name}): run stage {each} first"
                 )
+
+    def _check_machine(self) -> None:
+        """Ask the stage; and where it reads none, so that a dataset begins with it, all that come after it too."""
+        begins = not self._stages[self._name].inputs
+        for each, stage in self._stages.items():
+            if each == self._name or (begins and self._name in upstream(self._stages, each)):
+                stage.check_machine(self._survey.config)
 
     def _take_away_unfinished(self, surveyed: StageSurvey) -> None:
         """Take away what this part left half written; a worker that was killed could not do it."""

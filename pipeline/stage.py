@@ -129,7 +129,8 @@ class Stage:
     is done, which files stand in the output folder itself, `{path below OUT: file of a shard}`; the mill links
     them there (or copies, where the disk has no links) and takes away what it published before and no more.
     `check`: asked with the whole config before anything starts; raises ConfigError for sections that do not go
-    together.
+    together. `check_machine`: asked before the stage makes its first shards, and before the stages that everything
+    begins with do; raises ConfigError for what this machine cannot do and the config asks for. May take seconds.
     """
 
     name: str
@@ -142,3 +143,4 @@ class Stage:
     report: Callable[[Plan], Sequence[str]] = _no_report
     publish: Callable[[Plan], Mapping[str, str]] = _nothing_published
     check: Callable[[Config], None] = _nothing_wrong
+    check_machine: Callable[[Config], None] = _nothing_wrong

@@ -51,7 +51,7 @@ def kit_sheet(kit: Kit) -> bytes:
 
 def _exemplar_cell(kit: Kit, exemplar: Exemplar, span: int) -> Cell:
     size = (CELL * span, min(CELL * span * 3 // 4, CELL * 3))
-    picture = portrait(scene_of(kit_shape(kit, exemplar.assembly)), EXEMPLAR, size, backend="raycast")
+    picture = portrait(scene_of(kit_shape(kit, exemplar.assembly)), EXEMPLAR, size)
     parts, contacts = len(exemplar.assembly), len(exemplar.assembly.edges)
     return Cell(picture, f"{exemplar.name}: {_count(parts, 'part')}, {_count(contacts, 'contact')}")
 
@@ -68,7 +68,7 @@ def _type_picture(kit: Kit, index: int) -> ByteArray:
     poses = [each.assembly.poses[each.assembly.types == index] for each in kit.exemplars]
     pose = np.concatenate([*poses, np.eye(4)[None]])[:1]
     alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
-    return portrait(scene_of(kit_shape(kit, alone)), PART, (CELL, CELL), backend="raycast")
+    return portrait(scene_of(kit_shape(kit, alone)), PART, (CELL, CELL))
 
 
 def _rows(cells: list[Cell], columns: int) -> list[list[Cell]]:

@@ -15,10 +15,9 @@ from stages.shape.collection.collection import Collection
 from stages.shape.collection.declared import members
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, part_count, upright
-from stages.shape.views.buffers import Backend
+from stages.shape.views.buffers import Backend, drawn_by
 from stages.shape.views.camera import Camera
 from stages.shape.views.portrait import portrait
-from stages.shape.views.probe import backend_for
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.sketches.settings import SketchesConfig
@@ -42,11 +41,12 @@ def draw_preview(task: Task) -> Outcome:
     """File of the shard: `.png`. Its params: `title`, all `samples`, the `shards` to choose from, and the stages that
     have `rows` to show.
 
-    The first row of shapes and the rows of the stages show the same shapes, one a column.
+    The first row of shapes and the rows of the stages show the same shapes, one a column. The backend that draws the
+    sketches draws this picture too.
     """
     params, config = task.shard.params, task.config.section(PackageConfig)
     sketches = task.config.section(SketchesConfig)
-    backend = backend_for(sketches.backend)
+    backend = sketches.backend
     camera = BELOW if sketches.views[0].elevation < 0 else ABOVE
     collection, shards = Collection(task), params["shards"]
     made = {stage: _members(task, stage, shards) for stage in params["rows"]}
@@ -66,7 +66,7 @@ def draw_preview(task: Task) -> Outcome:
             sections.append(Section(row.title, _rows(cells), row.caption(task.config)))
     with task.output(f"{task.shard.name}.png") as stream:
         stream.write(picture_png(contact_sheet(sections, params["title"], CELL)))
-    return Outcome(samples=0)
+    return Outcome(samples=0, summary={"backend": backend, "renderer": drawn_by(backend)})
 
 
 def varied(samples: Sequence[tuple[Sample, Shape]], count: int) -> list[tuple[Sample, Shape]]:

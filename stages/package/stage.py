@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.package.compose import compose_dataset
 from stages.package.described import described_members
@@ -27,6 +28,8 @@ from stages.shape.collection.shards import (
     planned_producer,
     sample_count,
 )
+from stages.shape.views.probe import check_backend
+from stages.sketches.settings import SketchesConfig
 
 __all__ = ["STAGE"]
 
@@ -128,12 +131,21 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 def report(plan: Plan) -> Sequence[str]:
     """What the finished dataset holds."""
-    if plan.summary("package", WHOLE) is None:
+    drawn = plan.summary("package", PICTURE)
+    if drawn is None or plan.summary("package", WHOLE) is None:
         return []
     summaries = [plan.summary("package", shard) or {} for shard in plan.shards("package")]
     shards = [summary for summary in summaries if summary.get("path")]
     samples, size = sum(shard["samples"] for shard in shards), sum(shard["bytes"] for shard in shards) / 1e6
-    return [f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB"]
+    return [
+        f"dataset {plan.config.name}: {samples:,} samples in {len(shards)} shards, {size:,.1f} MB",
+        f"preview drawn by {drawn['backend']}, {drawn['renderer']}",
+    ]
+
+
+def check_machine(config: Config) -> None:
+    """Raises ConfigError where the backend that draws sketches and preview cannot draw."""
+    check_backend(config.section(SketchesConfig).backend, f"{config.path}: sketches.backend")
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -176,4 +188,5 @@ STAGE = Stage(
     report=report,
     publish=publish,
     check=check_producers,
+    check_machine=check_machine,
 )

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
+from stages.shape.views.buffers import Backend
 
 __all__ = ["Augmentation", "SketchView", "SketchesConfig", "StrokeOptions"]
 
@@ -117,10 +118,11 @@ class SketchesConfig(StrictModel):
     )
     strokes: StrokeOptions = Field(StrokeOptions(), description="what is drawn, and how heavily")
     augment: Augmentation = Field(Augmentation(), description="chances of changes after drawing")
-    backend: Literal["auto", "egl", "osmesa", "raycast"] = Field(
-        "auto",
-        description="what finds the visible surfaces; auto: OpenGL on EGL where it works, else ray casting; each "
-        "shard's record says which it was. Fix it where bytes must be equal across machines",
+    backend: Backend = Field(
+        "raycast",
+        description="what finds the visible surfaces, in sketches and preview; raycast: Embree, at the version that "
+        "set-up installs on every machine; egl: OpenGL, in a third of the time, always by Mesa's llvmpipe, at the "
+        "system's version. Their pictures differ in a few pixels",
     )
 
     @model_validator(mode="after")

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
+from pipeline.config import Config
 from pipeline.errors import ShardFailed
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
-from stages.shape.views.buffers import Backend
-from stages.shape.views.probe import backend_for
+from stages.shape.views.buffers import drawn_by
+from stages.shape.views.probe import check_backend
 from stages.shape.views.scene import Scene, scene_of
 from stages.sketches.cameras import camera_fields
 from stages.sketches.draw import draw_sketch, jittered_camera
@@ -27,17 +29,21 @@ def run_shard(task: Task) -> Outcome:
     Raises ShardFailed, naming the sample, for a drawing without a line.
     """
     config = task.config.section(SketchesConfig)
-    backend = backend_for(config.backend)
 
     def made(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
-        return drawings(task, config, sample, scene_of(collection.shape(sample)), backend)
+        return drawings(task, config, sample, scene_of(collection.shape(sample)))
 
     samples = add_members(task, made)
-    views = [view.name for view in config.views]
-    return Outcome(samples, {"split": task.shard.params["split"], "views": views, "backend": backend})
+    summary = {
+        "split": task.shard.params["split"],
+        "views": [view.name for view in config.views],
+        "backend": config.backend,
+        "renderer": drawn_by(config.backend),
+    }
+    return Outcome(samples, summary)
 
 
-def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, backend: Backend) -> dict[str, bytes]:
+def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene) -> dict[str, bytes]:
     """The members of one sample. Raises ShardFailed for a drawing without a line."""
     strokes = config.strokes
     widest = max(strokes.outline, strokes.contour, strokes.boundary, strokes.crease, 1.0)
@@ -46,7 +52,7 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, b
     for index, view in enumerate(config.views):
         camera = jittered_camera(view, task.rng(sample.key, view.name, "camera"))
         try:
-            drawing, seen = draw_sketch(scene, camera, config.size, config.supersample, strokes, backend)
+            drawing, seen = draw_sketch(scene, camera, config.size, config.supersample, strokes, config.backend)
         except ShardFailed as error:
             raise ShardFailed(f"sample {sample.key}, view {view.name}: {error}") from error
         drawing, flipped, thicker = augment(drawing, config.augment, task.rng(sample.key, view.name, "augment"))
@@ -56,6 +62,18 @@ def drawings(task: Task, config: SketchesConfig, sample: Sample, scene: Scene, b
         said = camera_fields(seen, config.size, flipped)
         described.append({"view": view.name, **said, "line_width": float(widest + thicker)})
     return {"json": json_bytes({"sketches": described}), **members}
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """What drew the sketches: one line, or several where machines differ."""
+    summaries = (plan.summary("sketches", name) for name in plan.shards("sketches"))
+    drawn = Counter(f"{each['backend']}, {each['renderer']}" for each in summaries if each is not None)
+    return [f"{count} shards drawn by {what}" for what, count in sorted(drawn.items())]
+
+
+def check_machine(config: Config) -> None:
+    """Raises ConfigError where the config's backend cannot draw: no other draws in its place."""
+    check_backend(config.section(SketchesConfig).backend, f"{config.path}: sketches.backend")
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -72,4 +90,6 @@ STAGE = Stage(
     plan=collection_shards,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
+    report=report,
+    check_machine=check_machine,
 )

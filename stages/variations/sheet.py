@@ -24,7 +24,6 @@ from stages.shape.sample import Sample, read_samples
 from stages.shape.shape import kit_shape, upright
 from stages.shape.views.camera import Camera
 from stages.shape.views.portrait import portrait
-from stages.shape.views.probe import backend_for
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
@@ -50,10 +49,9 @@ def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], rng: np.random.Gener
             "of the rest",
         ),
     ]
-    backend = backend_for("auto")
 
     def cell(assembly: Assembly, name: str) -> Cell:
-        picture = portrait(scene_of(upright(kit_shape(kit, assembly))), CAMERA, (CELL, CELL), backend=backend)
+        picture = portrait(scene_of(upright(kit_shape(kit, assembly))), CAMERA, (CELL, CELL))
         return Cell(picture, f"{name}, {len(assembly)} parts")
 
     sections = []

@@ -59,7 +59,7 @@ def _pyrender_buffers(views: list[Camera]) -> float:
 
     Normals, which ours include, would take it a further pass with a shader of one's own.
     """
-    pyrender = load_pyrender("egl")
+    pyrender = load_pyrender()
     import trimesh
 
     scene = _colonnade()

@@ -89,8 +89,8 @@ def test_make_inspect_without_a_model_says_what_is_missing() -> None:
 
 @pytest.mark.slow
 def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_path: Path) -> None:
-    (tmp_path / "fpsample.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')\n")
-    (tmp_path / "pynauty.py").write_text("import os\nos.abort()\n")
+    (tmp_path / "fcl.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')\n")
+    (tmp_path / "igraph.py").write_text("import os\nos.abort()\n")
     done = subprocess.run(
         [sys.executable, "-m", "pipeline", "doctor", "--out", str(tmp_path / "out")],
         cwd=ROOT,
@@ -101,9 +101,9 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
     )
     lines = [" ".join(line.split()) for line in done.stdout.splitlines()]
     assert done.returncode == 1
-    at = next(index for index, line in enumerate(lines) if line.startswith("fpsample FAILED"))
+    at = next(index for index, line in enumerate(lines) if line.startswith("python-fcl FAILED"))
     assert lines[at + 1] == "mend: apt-get install libgl1"
-    assert "pynauty FAILED killed by signal 6" in lines
+    assert "igraph FAILED killed by signal 6" in lines
     assert any(line.startswith("numpy ok") for line in lines)
     assert any(line.startswith("draw: raycast ok") for line in lines)
     assert lines[-1] == "2 of these must be mended"

@@ -1,13 +1,12 @@
 """Canonical graphs: one order of the nodes, and one digest, for all drawings of the same coloured graph.
 
-Colour refinement tells most nodes of a shape graph apart. Nauty orders those that it leaves alike, on the subgraph
+Colour refinement tells most nodes of a shape graph apart. BLISS orders those that it leaves alike, on the subgraph
 where they differ by more than names; so both answers are exact, and nearly always the second step has little to do.
 """
 
 from __future__ import annotations
 
 import hashlib
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -105,7 +104,7 @@ def _settle(order: Indices, start: Indices, pairs: Indices, forward: Indices, ba
     """`order` with the nodes inside each cell in canonical order too.
 
     Where a cell touches all of another cell alike, or none of it, that relation says nothing about which node is
-    which; so nauty sees only the relations that are neither, and only the nodes in them.
+    which; so BLISS sees only the relations that are neither, and only the nodes in them.
     """
     n = len(order)
     cell = np.empty(n, dtype=np.int64)
@@ -132,17 +131,18 @@ def _settle(order: Indices, start: Indices, pairs: Indices, forward: Indices, ba
     if not telling.any():
         return order
     plain = same_kind[relation[telling]]
-    return _nauty(order, start, ends[telling], plain, low_to_high[telling], high_to_low[telling])
+    return _bliss(order, start, ends[telling], plain, low_to_high[telling], high_to_low[telling])
 
 
-def _nauty(
+def _bliss(
     order: Indices, start: Indices, edges: Indices, plain: npt.NDArray[np.bool_], along: Indices, against: Indices
 ) -> Indices:
-    """`order` with the nodes of `edges` in nauty's canonical order inside their cells.
+    """`order` with the nodes of `edges` in the canonical order of igraph's BLISS inside their cells.
 
-    Edges that are not `plain` carry classes, `along` and `against`: they get nodes of their own, coloured by them.
+    Edges that are not `plain` carry classes, `along` and `against`: they get nodes of their own, coloured by them, one
+    where both classes are equal and two in a row where they are not.
     """
-    import pynauty
+    import igraph
 
     active = np.zeros(len(order), dtype=np.bool_)
     active[edges] = True
@@ -150,28 +150,24 @@ def _nauty(
     nodes = order[positions]
     number = np.empty(len(order), dtype=np.int64)
     number[nodes] = np.arange(len(nodes))
-    cuts = np.flatnonzero(np.diff(start[positions])) + 1
-    coloring: list[set[int]] = [set(each.tolist()) for each in np.split(np.arange(len(nodes)), cuts)]
-    adjacency: dict[int, list[int]] = {}
-    total = len(nodes)
-    middles: dict[int, set[int]] = {}
-    rows = zip(number[edges].tolist(), plain.tolist(), along.tolist(), against.tolist(), strict=True)
-    for (i, j), is_plain, there, back in rows:
-        if is_plain:
-            adjacency.setdefault(i, []).append(j)
-        elif there == back:
-            adjacency[total] = [i, j]
-            middles.setdefault(there, set()).add(total)
-            total += 1
-        else:
-            adjacency[total] = [i, total + 1]
-            adjacency[total + 1] = [j]
-            middles.setdefault(there, set()).add(total)
-            middles.setdefault(back, set()).add(total + 1)
-            total += 2
-    coloring += [middles[each] for each in sorted(middles)]
-    graph: Any = pynauty.Graph(total, adjacency_dict=adjacency, vertex_coloring=coloring)
-    canonical = np.array(pynauty.canon_label(graph)[: len(nodes)], dtype=np.int64)
+    cells = start[positions]
+    ends = number[edges]
+    same, turning = ~plain & (along == against), ~plain & (along != against)
+    near = len(nodes) + np.cumsum(~plain) - 1
+    far = len(nodes) + np.count_nonzero(~plain) + np.cumsum(turning) - 1
+    arcs = np.concatenate(
+        [
+            ends[plain],
+            np.stack([ends[~plain, 0], near[~plain]], axis=1),
+            np.stack([near[same], ends[same, 1]], axis=1),
+            np.stack([near[turning], far[turning]], axis=1),
+            np.stack([far[turning], ends[turning, 1]], axis=1),
+        ]
+    )
+    colors = np.concatenate([cells, len(order) + along[~plain], len(order) + against[turning]])
+    graph = igraph.Graph(n=len(colors), edges=arcs)
+    # igraph 1.0 answers with the nodes in canonical order, whatever its documentation says of new numbers.
+    place = np.argsort(graph.canonical_permutation(color=colors.tolist()))[: len(nodes)]
     settled = order.copy()
-    settled[positions] = nodes[canonical]
+    settled[positions] = nodes[np.lexsort((place, cells))]
     return settled

@@ -1,4 +1,7 @@
-"""Buffers of a view: depth, normal, part and colour of every pixel, by either of two backends."""
+"""Buffers of a view: depth, normal, part and colour of every pixel, by either of two backends.
+
+Which of them draws is never found out by trying: their pictures differ in a few pixels, so it is a choice of who asks.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,19 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 
-__all__ = ["Backend", "Buffers", "Visible", "render_buffers", "visible_triangles"]
+__all__ = ["Backend", "Buffers", "Visible", "drawn_by", "render_buffers", "visible_triangles"]
 
-Backend = Literal["egl", "osmesa", "raycast"]
+Backend = Literal["raycast", "egl"]
+"""`raycast`: Embree, which comes with Open3D; `egl`: OpenGL on EGL, rasterised by Mesa's llvmpipe."""
 
 RENDERS_A_CONTEXT = 20_000
 """A context is given back and made anew after so many renders: drivers have been seen to go blank or to grow."""
 
 
 class _Renderer(Protocol):
+    @property
+    def name(self) -> str: ...
+
     def triangles(self, scene: Scene, view: View, width: int, height: int) -> IntArray: ...
 
     def close(self) -> None: ...
@@ -78,6 +85,11 @@ def render_buffers(scene: Scene, camera: Camera, size: tuple[int, int], supersam
     return Buffers(*surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals))
 
 
+def drawn_by(backend: Backend) -> str:
+    """What draws for `backend` on this machine, with its version. Raises ShardFailed where nothing does."""
+    return _renderer(backend).name
+
+
 _RENDERERS: dict[Backend, _Renderer] = {}
 _RENDERS: dict[Backend, int] = {}
 
@@ -113,6 +125,6 @@ def _new_renderer(backend: Backend) -> _Renderer:
     from stages.shape.views.opengl import OpenGLRenderer
 
     try:
-        return OpenGLRenderer(backend)
+        return OpenGLRenderer()
     except RuntimeError as error:
-        raise ShardFailed(f"{error}; set the backend to 'raycast' to draw without OpenGL") from error
+        raise ShardFailed(str(error)) from error

@@ -1,8 +1,10 @@
 """Which triangle each pixel shows, by OpenGL: pyrender's offscreen context, and one shader that writes numbers.
 
 pyrender draws colours, with anti-aliasing that mixes neighbouring ids and one upload of every mesh for each scene.
-Here its context (EGL or OSMesa) is kept, meshes are uploaded once for each mesh set, all instances of a mesh are one
-draw call, and the only thing drawn is the number of the triangle.
+Here its EGL context is kept, meshes are uploaded once for each mesh set, all instances of a mesh are one draw call, and
+the only thing drawn is the number of the triangle.
+
+Graphics cards round differently, so Mesa's software rasteriser draws, on machines with a card too.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ import os
 from collections import OrderedDict
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,17 +53,36 @@ void main() { triangle = base + gl_PrimitiveID; }
 INSTANCE = np.dtype([("rows", np.float32, (3, 4)), ("first", np.int32)])
 
 
-def load_pyrender(platform: Literal["egl", "osmesa"]) -> Any:
-    """The module `pyrender`, imported with the OpenGL platform `platform`.
+SOFTWARE = {
+    "PYOPENGL_PLATFORM": "egl",
+    "LIBGL_ALWAYS_SOFTWARE": "1",
+    "GALLIUM_DRIVER": "llvmpipe",
+    "LP_NUM_THREADS": "0",
+}
+"""Mesa draws in software, and in the calling thread: the mill runs one worker for each core."""
 
-    pyrender still uses a NumPy name that NumPy 2 dropped. Software rendering is told to stay in the calling thread:
-    the mill runs one worker for each core.
+RASTERISER = "llvmpipe"
+VENDORS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
+"""Folders in which each driver has a file for libEGL."""
+
+
+def load_pyrender() -> Any:
+    """The module `pyrender`, set to draw by Mesa's software rasteriser. Raises RuntimeError where there is none.
+
+    pyrender still uses a NumPy name that NumPy 2 dropped.
     """
-    os.environ.setdefault("PYOPENGL_PLATFORM", platform)
-    os.environ.setdefault("LP_NUM_THREADS", "0")
+    os.environ.update(SOFTWARE)
+    mesa = [str(path) for folder in VENDORS for path in sorted(Path(folder).glob("*mesa*.json"))]
+    if mesa:
+        os.environ["__EGL_VENDOR_LIBRARY_FILENAMES"] = ":".join(mesa)
     vars(np).setdefault("infty", np.inf)
     import pyrender
+    from pyrender.platforms import egl
 
+    files = [device.name for device in egl.query_devices()]
+    if None not in files:
+        raise RuntimeError(f"EGL knows no device without a card, only {files}")
+    os.environ["EGL_DEVICE_ID"] = str(files.index(None))
     return pyrender
 
 
@@ -74,14 +96,17 @@ class _Mesh:
 
 
 class OpenGLRenderer:
-    """One OpenGL context. Raises RuntimeError where none can be had."""
+    """One OpenGL context. Raises RuntimeError where none can be had, or where anything but llvmpipe would draw."""
 
-    def __init__(self, platform: Literal["egl", "osmesa"] = "egl") -> None:
+    def __init__(self) -> None:
         try:
-            self._context = load_pyrender(platform).OffscreenRenderer(16, 16)
+            self._context = load_pyrender().OffscreenRenderer(16, 16)
             self._build()
         except Exception as error:
-            raise RuntimeError(f"no OpenGL context on {platform}: {type(error).__name__}: {error}") from error
+            raise RuntimeError(f"no OpenGL context on EGL: {type(error).__name__}: {error}") from error
+        self.name = _renderer_name()
+        if RASTERISER not in self.name:
+            raise RuntimeError(f"{self.name} would draw, not Mesa's {RASTERISER}: other bytes than elsewhere")
         self._uploaded: OrderedDict[MeshSet, list[_Mesh]] = OrderedDict()
         self._size = (0, 0)
         self._targets: list[int] = []
@@ -189,6 +214,13 @@ class OpenGLRenderer:
         GL.glDrawElementsInstanced(
             GL.GL_TRIANGLES, mesh.indices, GL.GL_UNSIGNED_INT, ctypes.c_void_p(0), len(instances)
         )
+
+
+def _renderer_name() -> str:
+    """Renderer and version as OpenGL names them."""
+    from OpenGL import GL
+
+    return ", ".join(GL.glGetString(each).decode() for each in (GL.GL_RENDERER, GL.GL_VERSION))
 
 
 def _upload(vertices: np.ndarray, faces: IntArray) -> _Mesh:

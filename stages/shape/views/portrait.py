@@ -12,7 +12,6 @@ from stages.shape.views.buffers import Backend, Visible, visible_triangles
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.light import KeyLight, eye_positions, key_light, openness, to_world
 from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
-from stages.shape.views.probe import backend_for
 from stages.shape.views.scene import Scene
 
 __all__ = ["PAPER", "points_portrait", "portrait"]
@@ -34,17 +33,16 @@ def portrait(
     camera: Camera,
     size: tuple[int, int],
     part_colors: ByteArray | None = None,
-    backend: Backend | None = None,
+    backend: Backend = "raycast",
 ) -> ByteArray:
     """A shaded picture of a scene, uint8 (height, width, 3) for `size` (width, height).
 
     A soft key light from the upper left with its shadows, sky and ground light, darker corners, thin lines where
     parts meet, and a shadow on the ground. `part_colors` uint8 (n, 3) paints each part in one colour instead of its
-    faces' own. `backend` None is what `backend_for("auto")` says. Raises ShardFailed for a blank picture.
+    faces' own. Raises ShardFailed for a blank picture.
     """
     from stages.shape.views.screen import surface_buffers
 
-    backend = backend_for("auto") if backend is None else backend
     width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
     seen = visible_triangles(scene, camera, (width, height), backend)
     depth, normal, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)

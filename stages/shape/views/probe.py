@@ -1,4 +1,4 @@
-"""Does a backend draw here? `python -m stages.shape.views.probe egl|osmesa|raycast` renders and checks one triangle."""
+"""Does a backend draw here? `python -m stages.shape.views.probe raycast|egl` renders and checks one triangle."""
 
 from __future__ import annotations
 
@@ -6,31 +6,33 @@ import subprocess
 import sys
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import get_args
 
 import numpy as np
 
-from pipeline.errors import ShardFailed
-from stages.shape.views.buffers import Backend, render_buffers
+from pipeline.errors import ConfigError, ShardFailed
+from stages.shape.views.buffers import Backend, drawn_by, render_buffers
 from stages.shape.views.camera import Camera
 from stages.shape.views.scene import mesh_scene
 
-__all__ = ["BACKENDS", "backend_for", "probe", "probe_in_subprocess"]
+__all__ = ["BACKENDS", "check_backend", "probe", "probe_in_subprocess"]
 
-BACKENDS: tuple[Backend, ...] = ("egl", "osmesa", "raycast")
+BACKENDS: tuple[Backend, ...] = get_args(Backend)
 
 SECONDS = 120.0
 
 
-def backend_for(choice: Literal["auto", "egl", "osmesa", "raycast"]) -> Backend:
-    """The backend that `auto` stands for on this machine: OpenGL on EGL where a probe in a process of its own draws
-    its triangle, else ray casting. Any other choice is taken at its word."""
-    return _probed() if choice == "auto" else choice
+def check_backend(backend: Backend, asked: str) -> None:
+    """Raises ConfigError, with the mend, where `backend` cannot draw on this machine; `asked` names the config's key.
 
-
-@lru_cache(maxsize=1)
-def _probed() -> Backend:
-    return "egl" if probe_in_subprocess("egl") is None else "raycast"
+    Ray casting needs nothing but what is installed for every other use of Open3D, so it is not tried.
+    """
+    wrong = None if backend == "raycast" else probe_in_subprocess(backend)
+    if wrong is not None:
+        raise ConfigError(
+            f"{asked}: {backend} cannot draw on this machine: {wrong}; `make doctor` says what is missing, and "
+            "raycast draws everywhere, with a few other pixels"
+        )
 
 
 def probe(backend: Backend) -> str | None:
@@ -51,6 +53,7 @@ def probe(backend: Backend) -> str | None:
     return None
 
 
+@lru_cache(maxsize=len(BACKENDS))
 def probe_in_subprocess(backend: Backend) -> str | None:
     """`probe` in a process of its own, so that a driver that crashes or hangs takes nothing with it."""
     root = Path(__file__).resolve().parents[3]
@@ -66,13 +69,14 @@ def probe_in_subprocess(backend: Backend) -> str | None:
 
 
 def main() -> int:
-    """Entry point: prints one line; 0 if the backend draws, 1 if it does not, 2 for a wrong call."""
+    """Entry point: prints what draws, or what is wrong, in one line; 0 if the backend draws, 1 if it does not, 2 for a
+    wrong call."""
     if len(sys.argv) != 2 or sys.argv[1] not in BACKENDS:
         print(f"usage: python -m stages.shape.views.probe {'|'.join(BACKENDS)}", file=sys.stderr)
         return 2
     backend = BACKENDS[BACKENDS.index(sys.argv[1])]
     wrong = probe(backend)
-    print(f"{backend}: {'draws' if wrong is None else wrong}")
+    print(drawn_by(backend) if wrong is None else wrong)
     return 0 if wrong is None else 1
 
 

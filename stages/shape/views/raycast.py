@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib.metadata import version
 from typing import Any
 
 import numba
@@ -18,6 +19,11 @@ __all__ = ["RaycastRenderer"]
 
 class RaycastRenderer:
     """Casts one ray through each pixel centre, in eye space, on one thread."""
+
+    @property
+    def name(self) -> str:
+        """Who casts the rays."""
+        return f"Embree in Open3D {version('open3d')}"
 
     def triangles(self, scene: Scene, view: View, width: int, height: int) -> IntArray:
         """The triangle that each pixel shows, int32 (height, width), -1 for none."""

@@ -155,7 +155,7 @@ def _make_sketches(task: Task) -> Outcome:
     def made(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         if sample.key == REFUSED:
             raise Rejected("blank drawing")
-        return drawings(task, config, sample, scene_of(collection.shape(sample)), "raycast")
+        return drawings(task, config, sample, scene_of(collection.shape(sample)))
 
     return Outcome(add_members(task, made))
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.config import Config, StrictModel
+from pipeline.errors import ConfigError
 from pipeline.places import Places
 from pipeline.run import RunResult, run_stage
 from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from pipeline.status import status_lines
 from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, write_sample
+from stages.shape.views.probe import probe_in_subprocess
 from stages.sketches.image import png_array
 from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
 from stages.sketches.stage import STAGE
@@ -73,8 +78,8 @@ STAGES = named_inputs(
 )
 
 
-def turn(out: Path, flat: bool = False, **keys: object) -> dict[str, RunResult]:
-    """Run all stages in this process."""
+def toys(flat: bool = False, **keys: object) -> Config:
+    """The config of a small dataset; `keys` are of the section `sketches`."""
     sketches = SketchesConfig.model_validate({"size": 48, "backend": "raycast", **keys})
     sections = {
         **ABSENT_SECTIONS,
@@ -82,7 +87,12 @@ def turn(out: Path, flat: bool = False, **keys: object) -> dict[str, RunResult]:
         "variations": ShapesConfig(flat=flat),
         "sketches": sketches,
     }
-    config = Config(name="toys", version="1.0.0", seed=5, sections=sections, path=Path("toys.yaml"))
+    return Config(name="toys", version="1.0.0", seed=5, sections=sections, path=Path("toys.yaml"))
+
+
+def turn(out: Path, flat: bool = False, **keys: object) -> dict[str, RunResult]:
+    """Run all stages in this process."""
+    config = toys(flat, **keys)
     return {name: run_stage(name, STAGES, config, Places(out, "toys"), workers=1) for name in STAGES}
 
 
@@ -114,6 +124,28 @@ def test_the_same_config_gives_the_same_bytes(tmp_path):
     assert one == two
     first, second = (members["sketch0.png"] for _, members in one["toys-train-000000"][:2])
     assert first != second
+
+
+def test_where_the_backend_of_the_config_cannot_draw_nothing_starts(tmp_path, monkeypatch):
+    (tmp_path / "pyrender.py").write_text("raise ImportError('libXrender.so.1: cannot open shared object file')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    probe_in_subprocess.cache_clear()
+    try:
+        with pytest.raises(ConfigError, match=r"toys\.yaml: sketches\.backend: egl cannot draw .*libXrender.*doctor"):
+            turn(tmp_path / "out", backend="egl")
+    finally:
+        probe_in_subprocess.cache_clear()
+    assert not list((tmp_path / "out").rglob("*.tar")) + list((tmp_path / "out").rglob("*.npy"))
+
+
+def test_the_records_and_the_report_say_what_drew(tmp_path):
+    turn(tmp_path)
+    records = [json.loads(path.read_bytes()) for path in tmp_path.rglob("sketches/records/*.json")]
+    drawn = {(each["summary"]["backend"], each["summary"]["renderer"]) for each in records}
+    assert len(records) == 2
+    assert drawn == {("raycast", f"Embree in Open3D {version('open3d')}")}
+    status = list(status_lines(toys(), STAGES, Places(tmp_path, "toys"), workers=1))
+    assert f"sketches: 2 shards drawn by raycast, Embree in Open3D {version('open3d')}" in status
 
 
 def test_augmented_drawings_keep_their_members(tmp_path, plain):

@@ -5,10 +5,11 @@ import pytest
 
 from pipeline.errors import ShardFailed
 from stages.shape.views import buffers as module
-from stages.shape.views.buffers import render_buffers, visible_triangles
+from stages.shape.views import opengl
+from stages.shape.views.buffers import drawn_by, render_buffers, visible_triangles
 from stages.shape.views.camera import Camera
 from stages.shape.views.opengl import OpenGLRenderer
-from stages.shape.views.probe import backend_for, probe
+from stages.shape.views.probe import probe, probe_in_subprocess
 from stages.shape.views.scene import mesh_scene
 from tests.stages.shape.views.solids import box, boxes_scene, cylinder, exemplar_scene
 
@@ -119,7 +120,7 @@ def test_the_same_view_gives_the_same_pixels_again_and_with_a_new_context(backen
 def test_a_lost_context_is_made_anew():
     scene = boxes_scene([(0, 0, 0)])
     first = visible_triangles(scene, FRONT, (32, 32), "egl").triangles
-    other = OpenGLRenderer("egl")
+    other = OpenGLRenderer()
     # Both contexts share one display, and closing one of them ends it for both.
     other.close()
     assert (visible_triangles(scene, FRONT, (32, 32), "egl").triangles == first).all()
@@ -133,6 +134,17 @@ def test_a_blank_picture_is_an_error(backend):
         render_buffers(scene, Camera(0.0, 0.0), (32, 32), 1, backend)
 
 
-def test_auto_is_egl_exactly_where_the_probe_draws():
-    assert backend_for("auto") == ("egl" if probe("egl") is None else "raycast")
-    assert backend_for("raycast") == "raycast"
+@needs_egl
+def test_opengl_is_drawn_in_software_whatever_the_environment_says(monkeypatch):
+    for name, value in (("LIBGL_ALWAYS_SOFTWARE", "0"), ("GALLIUM_DRIVER", "softpipe"), ("EGL_DEVICE_ID", "7")):
+        monkeypatch.setenv(name, value)
+    probe_in_subprocess.cache_clear()
+    assert probe_in_subprocess("egl") is None
+    assert drawn_by("egl").startswith("llvmpipe")
+
+
+@needs_egl
+def test_another_rasteriser_than_the_one_promised_does_not_draw(monkeypatch):
+    monkeypatch.setattr(opengl, "RASTERISER", "some card")
+    with pytest.raises(RuntimeError, match=r"llvmpipe .* would draw"):
+        OpenGLRenderer()
