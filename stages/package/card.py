@@ -27,8 +27,9 @@ MADE = {
 SPLITS = {
     "variations": "Samples whose shape graphs are equal stand in one split.",
     "programs": "No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike "
-    "up to their continuous parameters stand in one split; where every value of every parameter is sampled, all splits "
-    "have all values, as published.",
+    "up to their continuous parameters stand in one split, if their `lineage` says `apart: structure`; where it says "
+    "`apart: values`, the program has fewer structures than there are splits, and shapes of one structure stand in all "
+    "of them. Where every value of every parameter is sampled, all splits have all values, as published.",
     "shapeassembly": "Samples of programs that are alike up to their numbers stand in one split.",
 }
 """What keeps the splits apart, for each producer."""
