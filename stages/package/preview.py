@@ -42,7 +42,7 @@ BELOW = replace(ABOVE, elevation=-ABOVE.elevation)
 
 
 def draw_preview(task: Task) -> Outcome:
-    """File of the shard: `.png`. Its params: `title`, all `samples`, and the `shards` to choose from.
+    """File of the shard: `.png`. Its params: `title`, `of` how many samples, and the `shards` to choose from.
 
     The first row of shapes, the points and the sketches show the same shapes, one a column.
     """
@@ -64,7 +64,7 @@ def draw_preview(task: Task) -> Outcome:
     exemplars = [Section("Exemplars", _rows(_exemplars(list(collection.kits.values()), backend)), "what goes in")]
     sections = [
         *(exemplars if collection.kits else []),
-        Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {task.shard.params['samples']:,}"),
+        Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {task.shard.params['of']:,}"),
         Section("Points", _rows(points), f"{count:,} a shape, coloured by part label"),
         Section("Sketches", _rows(drawings), f"{len(sketches.views)} a shape, {sketches.size} × {sketches.size}"),
     ]

@@ -42,7 +42,7 @@ def plan(plan: Plan) -> list[Shard]:
     stages = (producer, "points", "sketches")
     pictured = {
         "title": plan.config.title or plan.config.name,
-        "samples": sum(shard["samples"] for shard in filled),
+        "of": sum(shard["samples"] for shard in filled),
         "shards": shown,
     }
     picture = Shard(PICTURE, pictured, (*kits, *(f"{stage}/{name}" for name in shown for stage in stages)))
