@@ -2,6 +2,7 @@
 #
 #   make dataset        sets everything up, then makes the default dataset
 #   make test           sets everything up, then runs the tests
+#   make plan           shows what it will take, before it starts
 #   make help           shows every target and what the variables are set to
 #
 # Stages are never up to date for make: it always asks the mill, which compares fingerprints (of config, seed, code
@@ -74,7 +75,9 @@ package: validity strings points sketches  ## Put the dataset's folder together:
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 
-.PHONY: status verify inspect eval doctor
+.PHONY: plan status verify inspect eval doctor
+plan: setup  ## Show the shards, samples, disk and time that the whole dataset will take, before it starts
+	@$(PYTHON) -m pipeline plan $(HOW)
 status: setup  ## Show what is done, failed, rejected and left
 	@$(PYTHON) -m pipeline status $(HOW)
 verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes

@@ -110,6 +110,10 @@ def _no_report(_: Plan) -> Sequence[str]:
     return ()
 
 
+def _nothing_asked(_: Config) -> Sequence[int]:
+    return ()
+
+
 def _nothing_published(_: Plan) -> Mapping[str, str]:
     return {}
 
@@ -124,6 +128,9 @@ class Stage:
     them there (or copies, where the disk has no links) and takes away what it published before and no more.
     `check`: asked with the whole config before anything starts; raises ConfigError for sections that do not go
     together.
+
+    For `make plan`, a stage that makes samples says in `asked` how many the config wants, shard by shard of those that
+    later stages read, and in `trial` its section for a short run: some thirty samples in shards of at most ten.
     """
 
     name: str
@@ -136,3 +143,5 @@ class Stage:
     report: Callable[[Plan], Sequence[str]] = _no_report
     publish: Callable[[Plan], Mapping[str, str]] = _nothing_published
     check: Callable[[Config], None] = _nothing_wrong
+    asked: Callable[[Config], Sequence[int]] = _nothing_asked
+    trial: Callable[[Config], StrictModel] | None = None

@@ -13,6 +13,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from pipeline.config import Config
 from pipeline.errors import ConfigError, ShardFailed
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -35,7 +36,11 @@ Found = tuple[dict[str, Value], dict[str, Any]]
 
 def planned_shards(plan: Plan) -> list[Shard]:
     """The shards of every split. Each owns a share of all shapes that no other shard has a part in."""
-    config = plan.config.section(ProgramsConfig)
+    return _shards(plan.config)
+
+
+def _shards(dataset: Config) -> list[Shard]:
+    config = dataset.section(ProgramsConfig)
     if not config.program:
         return []
     source = _source_digest(config.program)
@@ -57,7 +62,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
                     sweep.owned(split, start, end) if sweep is not None else _each_value_share(sizes, first, start, end)
                 ),
             }
-            shards.append(Shard(f"{plan.config.name}-{split}-{number:06d}", params))
+            shards.append(Shard(f"{dataset.name}-{split}-{number:06d}", params))
         first += size
     return shards
 
@@ -179,6 +184,17 @@ def report(plan: Plan) -> Sequence[str]:
     return told
 
 
+def asked(config: Config) -> Sequence[int]:
+    """The shapes of each shard."""
+    return [int(shard.params["samples"]) for shard in _shards(config)]
+
+
+def trial(config: Config) -> ProgramsConfig:
+    """The same shapes in shards of few."""
+    section = config.section(ProgramsConfig)
+    return section.model_copy(update={"splits": section.splits.model_copy(update={"samples_per_shard": 8})})
+
+
 STAGE = Stage(
     name="programs",
     version=1,
@@ -188,4 +204,6 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=lambda plan: sum(BYTES_A_SAMPLE * int(each.params["samples"]) for each in planned_shards(plan)),
     report=report,
+    asked=asked,
+    trial=trial,
 )

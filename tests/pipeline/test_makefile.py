@@ -74,7 +74,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
 
 def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
     said = nasty(tmp_path)
-    targets = ("dataset", "status", "verify", "inspect", "eval", "doctor", "clean")
+    targets = ("dataset", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
     assert len(reached) == 9 + len(targets[1:]) + 1  # dataset is nine stages; inspect looks at a program and a model
