@@ -68,7 +68,10 @@ def plan_lines(config: Config, stages: Mapping[str, Stage], places: Places, work
     used = [each for each in forecasts if each.shards]
     yield from _table(used, workers)
     if tried:
-        yield f"about, after a trial of {span(time.monotonic() - start)} with one worker; small samples mislead"
+        yield (
+            f"about, by a trial of {span(time.monotonic() - start)}: a machine with other work takes longer, and few "
+            "samples may mislead"
+        )
     if any(each.grows for each in used):
         yield "+: and as many more as it takes; a search slows down as it goes on, and ends when it ends"
     size, free = sum(each.size for each in used), shutil.disk_usage(places.out).free
@@ -80,7 +83,7 @@ def _own_costs(survey: Survey, stages: Mapping[str, Stage], name: str) -> Costs 
     if not all(survey.complete(each) for each in stages[name].inputs):
         return None
     surveyed = survey.stage(name)
-    costs = costs_of(surveyed)
+    costs = costs_of(surveyed, {shard: record.seconds for shard, record in surveyed.records.items()})
     if not surveyed.missing:
         return costs
     return costs if costs.samples and not stages[name].asked(survey.config) else None

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.places import Places
-from pipeline.records import ShardRecord
 from pipeline.stage import Shard, Stage
 from pipeline.survey import StageSurvey, Survey
 from pipeline.task import Job
@@ -65,25 +64,26 @@ def run_trial(config: Config, stages: Mapping[str, Stage], places: Places) -> di
     return costs
 
 
-def costs_of(surveyed: StageSurvey, warm_up: float = 0.0) -> Costs:
-    """What the finished shards of a stage have cost."""
+def costs_of(surveyed: StageSurvey, seconds: Mapping[str, float], warm_up: float = 0.0) -> Costs:
+    """What the finished shards of a stage have cost, where each has taken so many `seconds`."""
     with_samples = {shard.name for shard in surveyed.shards if _holds_samples(shard)}
-    own = [record for name, record in surveyed.records.items() if name in with_samples]
-    once = [record for name, record in surveyed.records.items() if name not in with_samples]
-    samples = sum(record.samples for record in own)
+    own = {name: record for name, record in surveyed.records.items() if name in with_samples}
+    other = {name: record for name, record in surveyed.records.items() if name not in with_samples}
+    samples = sum(record.samples for record in own.values())
     return Costs(
         samples=samples,
-        seconds_each=_seconds(own) / max(samples, 1),
-        bytes_each=_bytes(own) / max(samples, 1),
+        seconds_each=sum(seconds[name] for name in own) / max(samples, 1),
+        bytes_each=sum(record.bytes_on_disk() for record in own.values()) / max(samples, 1),
         shards=len(own),
-        other_shards=len(once),
-        seconds_once=_seconds(once),
-        bytes_once=_bytes(once),
+        other_shards=len(other),
+        seconds_once=sum(seconds[name] for name in other),
+        bytes_once=sum(record.bytes_on_disk() for record in other.values()),
         warm_up=warm_up,
     )
 
 
 def _measured(survey: Survey, surveyed: StageSurvey, places: Places, workers: Workers) -> Costs:
+    seconds: dict[str, float] = {}
     warm_up = 0.0
     chosen: set[str] = set()
     while True:
@@ -95,35 +95,28 @@ def _measured(survey: Survey, surveyed: StageSurvey, places: Places, workers: Wo
             if surveyed.ready(shard) and (shard.name in chosen or not _holds_samples(shard))
         ]
         if not ready:
-            return costs_of(surveyed, warm_up)
+            return costs_of(surveyed, seconds, warm_up)
         for shard in ready:
-            first = not surveyed.records
-            seconds = _make(survey, surveyed, places, workers, shard)
+            first = not seconds
+            seconds[shard.name] = _make(surveyed, shard, places, workers)
             if first:
-                warm_up = max(seconds - _make(survey, surveyed, places, workers, shard), 0.0)
+                cold, seconds[shard.name] = seconds[shard.name], _make(surveyed, shard, places, workers)
+                warm_up = max(cold - seconds[shard.name], 0.0)
         survey.refresh(surveyed.stage.name)
 
 
-def _make(survey: Survey, surveyed: StageSurvey, places: Places, workers: Workers, shard: Shard) -> float:
-    """Make a shard; the seconds that it took."""
+def _make(surveyed: StageSurvey, shard: Shard, places: Places, workers: Workers) -> float:
+    """Make a shard; the seconds that processors were busy with it, whatever else they had to do."""
     stage = surveyed.stage
     mark = surveyed.fingerprints[shard.name]
     workers.submit(Job(stage.name, stage.run_shard, shard, surveyed.config, places, mark))
     for _, report in workers.finished(None):
-        if report is None or report.status != "done":
-            message = "its worker died" if report is None else report.message
-            raise ConfigError(f"the trial of {stage.name} failed, as the run would: {message}")
-    survey.accept(stage.name, shard.name)
-    return surveyed.records[shard.name].seconds
+        if report is not None and report.status == "done":
+            return report.cpu_seconds
+        message = "its worker died" if report is None else report.message
+        raise ConfigError(f"the trial of {stage.name} failed, as the run would: {message}")
+    raise AssertionError("a worker ends what it is given")
 
 
 def _holds_samples(shard: Shard) -> bool:
     return "samples" in shard.params or "split" in shard.params
-
-
-def _seconds(records: list[ShardRecord]) -> float:
-    return sum(record.seconds for record in records)
-
-
-def _bytes(records: list[ShardRecord]) -> int:
-    return sum(record.bytes_on_disk() for record in records)
