@@ -2,6 +2,7 @@
 #
 #   make dataset        sets everything up, then makes the default dataset
 #   make test           sets everything up, then runs the tests
+#   make plan           shows what it will take, before it starts
 #   make help           shows every target and what the variables are set to
 #
 # Stages are never up to date for make: it always asks the mill, which compares fingerprints (of config, seed, code
@@ -16,19 +17,37 @@ MAKEFLAGS   += --warn-undefined-variables --no-builtin-rules
 .SUFFIXES:
 .DEFAULT_GOAL := help
 
-# What a user may set, on the command line or in the environment.
+# What a user may set, on the command line or in the environment. `make help` shows these lines.
+## CONFIG   the dataset's config, a YAML file
 CONFIG  ?= configs/default.yaml
+## OUT      the folder that datasets are made in
 OUT     ?= datasets
-WORKERS ?= $(shell nproc 2>/dev/null || echo 1)
+## WORKERS  worker processes; unless you say, one for each core
+WORKERS ?=
+## SEED     a seed instead of the config's
 SEED    ?=
+## MESH     a model that `make inspect` looks at
 MESH    ?=
+## PROGRAM  a shape program that `make inspect` looks at: a name, such as chair, or a module
 PROGRAM ?=
+## TABLE    the table that `make eval` prints
 TABLE   ?= physical
+
+# Their values are text, whatever stands in it: make expands none of it, and recipes read it from the environment, as
+# "$$CONFIG", so that no shell does. A recipe never says $(CONFIG).
+VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM TABLE
+$(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
+ifeq ($(value WORKERS),)
+override WORKERS := $(shell nproc 2>/dev/null || echo 1)
+endif
+export $(VARIABLES)
 
 PYTHON  := .venv/bin/python
 READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))
-ASKED   := --config $(CONFIG) --out $(OUT) $(if $(SEED),--seed $(SEED))
-RUN      = $(PYTHON) -m pipeline run $@ $(ASKED) --workers $(WORKERS)
+ASKED   := --config "$$CONFIG" --out "$$OUT"
+SEEDED  := $${SEED:+--seed "$$SEED"}
+HOW     := $(ASKED) $(SEEDED) --workers "$$WORKERS"
+RUN      = @$(PYTHON) -m pipeline run $@ $(HOW)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
@@ -56,19 +75,22 @@ package: validity strings points sketches  ## Put the dataset's folder together:
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 
-.PHONY: status verify inspect eval doctor
+.PHONY: plan status verify inspect eval doctor
+plan: setup  ## Show the shards, samples, disk and time that the whole dataset will take, before it starts
+	@$(PYTHON) -m pipeline plan $(HOW)
 status: setup  ## Show what is done, failed, rejected and left
-	$(PYTHON) -m pipeline status $(ASKED) --workers $(WORKERS)
+	@$(PYTHON) -m pipeline status $(HOW)
 verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes
-	$(PYTHON) -m pipeline verify $(ASKED)
+	@$(PYTHON) -m pipeline verify $(ASKED) $(SEEDED)
 inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or what PROGRAM can make
-	@test -n '$(MESH)$(PROGRAM)' || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
-	$(if $(PROGRAM),$(PYTHON) -m stages.programs inspect '$(PROGRAM)' --out '$(OUT)/inspect')
-	$(if $(MESH),$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png')
+	@[ -n "$$MESH$$PROGRAM" ] || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
+	@[ -z "$$PROGRAM" ] || $(PYTHON) -m stages.programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
+	@file=$${MESH##*/}; [ -z "$$MESH" ] || \
+	    $(PYTHON) -m pipeline inspect --picture "$$OUT/inspect/$${file%.*}.png" -- "$$MESH"
 eval: setup  ## Print TABLE (physical: does it stand?) about the finished dataset; keep it as Markdown, CSV, LaTeX
-	$(PYTHON) -m eval '$(TABLE)' --config $(CONFIG) --out $(OUT)
+	@$(PYTHON) -m eval $(ASKED) -- "$$TABLE"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
-	$(PYTHON) -m pipeline doctor --out $(OUT)
+	@$(PYTHON) -m pipeline doctor --out "$$OUT"
 
 # Working on it ------------------------------------------------------------------------------------------------------
 
@@ -107,12 +129,13 @@ $(READY):
 	touch $@
 
 clean: setup  ## Remove the work folder of CONFIG (records, shards); the finished dataset stays
-	$(PYTHON) -m pipeline clean --config $(CONFIG) --out $(OUT)
+	@$(PYTHON) -m pipeline clean $(ASKED)
 
 help:  ## Show this
 	@echo 'make <target> [VARIABLE=value]'
 	@echo
-	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | while IFS='|' read -r target text; do \
-	    printf '  %-13s %s\n' $$target "$$text"; done
+	@sed -n 's/^\([a-z0-9_-]*\):[^#]*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r target text; do \
+	    printf '  %-13s %s\n' "$$target" "$$text"; done
 	@echo
-	@printf '  %-13s %s\n' CONFIG '$(CONFIG)' OUT '$(OUT)' WORKERS '$(WORKERS)' SEED '$(or $(SEED),as in CONFIG)'
+	@sed -n 's/^## \([A-Z]*\) *\(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name text; do \
+	    printf '  %-13s %-22s %s\n' "$$name" "$${!name:--}" "$$text"; done

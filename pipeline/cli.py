@@ -1,4 +1,4 @@
-"""The command line: `python -m pipeline run|status|verify|inspect|doctor|keys|clean`.
+"""The command line: `python -m pipeline run|plan|status|verify|inspect|doctor|keys|clean`.
 
 Exit codes: 0 all is well; 1 shards were set aside, or something that was checked is not as it should be; 2 nothing
 started, because of a mistake in the config or the command; 3 everything had to stop (disk full, no permission);
@@ -73,6 +73,23 @@ def run(
     if result.failed:
         print(f"{stage}: set aside: {', '.join(result.failed)}; run again to try them again", file=sys.stderr)
         raise typer.Exit(1)
+
+
+@app.command()
+def plan(
+    context: typer.Context,
+    config: ConfigOption = DEFAULT_CONFIG,
+    out: OutOption = DEFAULT_OUT,
+    workers: WorkersOption = DEFAULT_WORKERS,
+    seed: SeedOption = None,
+) -> None:
+    """Show what the whole dataset will take: shards, samples, disk and time, from a short trial where need be."""
+    from pipeline.estimate import plan_lines
+
+    stages = find_stages(context.obj)
+    loaded = _load(stages, config, seed)
+    for line in plan_lines(loaded, stages, Places(out, loaded.name), workers):
+        print(line, flush=True)
 
 
 @app.command()

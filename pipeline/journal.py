@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import NoReturn
 
 from tqdm import tqdm
 
-__all__ = ["Journal", "span"]
+from pipeline.time_left import TimeLeft
+
+__all__ = ["Journal", "Standing", "figures", "span"]
 
 _LINE_EVERY = 20.0
 """Seconds between two lines where there is no terminal."""
@@ -27,19 +30,34 @@ def span(seconds: float) -> str:
     return f"{whole // 3600}h{whole % 3600 // 60:02d}m"
 
 
+@dataclass(frozen=True)
+class Standing:
+    """How far a stage is.
+
+    planned: shards as far as they are known; done: those that are finished, running ones by how far they are; failed:
+    those set aside. work: samples that finished and planned shards hold, where the plan says so; worked: those that are
+    made, with those of running shards. samples: those of finished shards; rejects: items that these refused.
+    """
+
+    planned: int
+    done: float
+    failed: int
+    work: int
+    worked: float
+    samples: int
+    rejects: int
+
+
 class Journal:
-    """The bar, the lines and the log of one stage's run."""
+    """The bar, the lines and the log of one stage's run. Nothing is shown of a stage that has nothing to do."""
 
     def __init__(self, stage: str, log: Path) -> None:
         self._stage = stage
         self._log = log
         self._start = time.monotonic()
         self._said = self._start
-        self._first: float | None = None
+        self._left = TimeLeft()
         self._bar: tqdm[NoReturn] | None = None
-        if sys.stderr.isatty():
-            shape = "{desc} {percentage:3.0f}%|{bar}| {postfix}"
-            self._bar = tqdm(desc=f"{stage:<11}", total=1.0, bar_format=shape, dynamic_ncols=True, leave=True)
 
     def say(self, text: str) -> None:
         """A line for people and for the log."""
@@ -59,32 +77,44 @@ class Journal:
         except OSError:
             pass
 
-    def show(self, done: float, planned: int, samples: int, rejects: int, failed: int) -> None:
-        """Move the bar: `done` of `planned` shards, where a running shard counts by how far it is."""
+    def show(self, standing: Standing) -> None:
+        """Say how far the stage is: in the bar, or by a line now and then."""
         now = time.monotonic()
-        if self._first is None:
-            self._first = done
-        text = self._figures(done, planned, samples, rejects, failed, now - self._start)
-        if self._bar is not None:
-            self._bar.total, self._bar.n = max(planned, 1), done
-            self._bar.set_postfix_str(text, refresh=True)
+        left = self._left.after(standing.worked, standing.work, now)
+        text = figures(standing, now - self._start, left)
+        if sys.stderr.isatty():
+            if self._bar is None:
+                self._bar = tqdm(bar_format=self._stage, dynamic_ncols=True, leave=False)
+            # How many shards there will be is known where samples are: elsewhere a bar would run backwards.
+            bar = "{percentage:3.0f}% |{bar:20}| " if standing.work else ""
+            self._bar.bar_format = f"{self._stage:<14}{bar}{{desc}}"
+            self._bar.total, self._bar.n = standing.work, standing.worked
+            self._bar.set_description_str(text)
         elif now - self._said >= _LINE_EVERY:
             self._said = now
             self.say(text)
 
-    def _figures(self, done: float, planned: int, samples: int, rejects: int, failed: int, seconds: float) -> str:
-        figures = [f"{int(done)}/{planned} shards", f"{samples:,} samples", f"{span(seconds)} gone"]
-        fresh = done - (self._first or 0.0)
-        if fresh > 0 and seconds > 0:
-            figures.append(f"{60 * fresh / seconds:.1f} shards/min")
-            figures.append(f"{span((planned - done) * seconds / fresh)} left")
-        if rejects:
-            figures.append(f"{rejects:,} rejects")
-        if failed:
-            figures.append(f"{failed} set aside")
-        return ", ".join(figures)
-
     def close(self) -> None:
-        """Leave the bar as it stands."""
+        """Take the bar away: what there is to say of the finished stage is said in lines."""
         if self._bar is not None:
             self._bar.close()
+            self._bar = None
+
+
+def figures(standing: Standing, seconds: float, left: float | None) -> str:
+    """What is told of a stage that has run for `seconds` and needs about `left` more, if that can be told."""
+    if standing.work:
+        told = [f"{int(standing.worked):,} of {standing.work:,} samples, {int(standing.done):,}"]
+    else:
+        told = [f"{standing.done:,.1f}"]
+    told[0] += f" of {standing.planned:,} shards"
+    if standing.samples and not standing.work:
+        told.append(f"{standing.samples:,} samples")
+    if standing.rejects:
+        told.append(f"{standing.rejects:,} rejects")
+    if standing.failed:
+        told.append(f"{standing.failed} set aside")
+    told.append(f"{span(seconds)} gone")
+    if left is not None:
+        told.append(f"about {span(left)} left")
+    return ", ".join(told)

@@ -14,14 +14,14 @@ from pipeline.check import withdraw_damaged
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal
 from pipeline.finish import finish_stage
-from pipeline.journal import Journal, span
+from pipeline.journal import Journal, Standing, span
 from pipeline.places import Places, StagePlaces, stops_everything, write_whole
 from pipeline.reasons import reasons
 from pipeline.records import fingerprint
 from pipeline.registry import upstream
 from pipeline.shards import json_bytes
 from pipeline.slices import WHOLE, Slice, locked
-from pipeline.space import check_space
+from pipeline.space import byte_size, check_space
 from pipeline.stage import Shard, Stage
 from pipeline.survey import StageSurvey, Survey
 from pipeline.task import Job, Report
@@ -116,7 +116,7 @@ class _Run:
             for line in reasons(surveyed):
                 self._journal.say(line)
             surveyed.places.manifest.unlink(missing_ok=True)
-            self._journal.note(check_space(surveyed, self._places.out))
+            self._journal.say(f"{_shards(len(surveyed.missing))} to make, {check_space(surveyed, self._places.out)}")
             self._make_missing()
             surveyed = self._survey.stage(self._name)
         if not surveyed.missing:
@@ -277,31 +277,42 @@ class _Run:
         write_whole(self._places.stage(self._name).failed / f"{name}.json", json_bytes(described))
 
     def _show(self, surveyed: StageSurvey, workers: Workers) -> None:
-        records = surveyed.records.values()
-        underway = sum(_how_far(surveyed.places, job.shard.name) for job in workers.jobs)
+        records = surveyed.records
+        share = {job.shard.name: _how_far(surveyed.places, job.shard.name) for job in workers.jobs}
+        share |= dict.fromkeys(records, 1.0)
+        work = {shard.name: int(shard.params.get("samples", 0)) for shard in surveyed.shards}
         self._journal.show(
-            len(records) + underway,
-            len(surveyed.shards),
-            sum(record.samples for record in records),
-            sum(sum(record.rejects.values()) for record in records),
-            len(self._result.failed),
+            Standing(
+                planned=len(surveyed.shards),
+                done=sum(share.values()),
+                failed=len(self._result.failed),
+                work=sum(work.values()),
+                worked=sum(samples * share.get(name, 0.0) for name, samples in work.items()),
+                samples=sum(record.samples for record in records.values()),
+                rejects=sum(sum(record.rejects.values()) for record in records.values()),
+            )
         )
 
     def _close(self, surveyed: StageSurvey) -> None:
-        result, planned = self._result, len(surveyed.shards)
+        self._journal.close()
+        result, records = self._result, surveyed.records.values()
         result.left = len(surveyed.missing) - len(result.failed)
-        seconds = sum(record.seconds for record in surveyed.records.values())
-        samples = sum(record.samples for record in surveyed.records.values())
-        text = f"{len(surveyed.records)} of {planned} shards, {samples:,} samples"
-        text += f", {result.made} made now" if result.made else ", nothing to make"
-        text += f" ({span(seconds)} of worker time in all)"
+        text = f"{len(records):,} of {len(surveyed.shards):,} shards, {sum(each.samples for each in records):,} samples"
+        text += f", {byte_size(sum(each.bytes_on_disk() for each in records))}"
+        text += f", {_shards(result.made)} made now" if result.made else ", nothing to make"
+        text += f" ({span(sum(each.seconds for each in records))} of worker time in all)"
         if result.failed:
             text += f"; {len(result.failed)} set aside: {', '.join(result.failed)}"
         if result.left:
             text += f"; {result.left} not made"
-        self._journal.say(text)
+        # Of a stage that the config has no use for nobody wants to hear.
+        (self._journal.say if surveyed.shards else self._journal.note)(text)
         for line in surveyed.stage.report(surveyed.view):
             self._journal.say(line)
+
+
+def _shards(count: int) -> str:
+    return f"{count:,} shard{'' if count == 1 else 's'}"
 
 
 def _how_far(places: StagePlaces, shard: str) -> float:

@@ -21,16 +21,17 @@ def byte_size(count: float) -> str:
 
 
 def check_space(surveyed: StageSurvey, out: Path) -> str:
-    """What the stage still needs on disk, as a sentence. Raises ConfigError when `out` has less than that free."""
+    """What the stage still needs on disk, in words. Raises ConfigError when `out` has less than that free."""
     estimate = surveyed.stage.estimate_bytes(surveyed.view)
     needed = max(0, estimate - sum(record.bytes_on_disk() for record in surveyed.records.values()))
     samples = sum(int(shard.params.get("samples", 0)) for shard in surveyed.shards)
-    each = f", {byte_size(estimate / samples)} a sample" if samples else ""
+    notes = [f"{byte_size(estimate)} in all"] if needed < estimate else []
+    notes += [f"{byte_size(estimate / samples)} a sample"] if samples else []
     free = shutil.disk_usage(out).free
-    sentence = f"needs about {byte_size(needed)} more ({byte_size(estimate)} in all{each})"
+    words = f"about {byte_size(needed)} of disk" + (f" ({', '.join(notes)})" if notes else "")
     if needed > free:
         raise ConfigError(
-            f"{out}: stage {surveyed.stage.name} {sentence}, and {byte_size(free)} are free: "
+            f"{out}: stage {surveyed.stage.name} needs {words}, and {byte_size(free)} are free: "
             "free some space, choose another OUT, or ask for less in the config"
         )
-    return sentence
+    return words

@@ -113,6 +113,10 @@ def _no_report(_: Plan) -> Sequence[str]:
     return ()
 
 
+def _nothing_asked(_: Config) -> Sequence[int]:
+    return ()
+
+
 def _nothing_published(_: Plan) -> Mapping[str, str]:
     return {}
 
@@ -131,6 +135,9 @@ class Stage:
     `check`: asked with the whole config before anything starts; raises ConfigError for sections that do not go
     together. `check_machine`: asked before the stage makes its first shards, and before the stages that everything
     begins with do; raises ConfigError for what this machine cannot do and the config asks for. May take seconds.
+
+    For `make plan`, a stage that makes samples says in `asked` how many the config wants, shard by shard of those that
+    later stages read, and in `trial` its section for a short run: some thirty samples in shards of at most ten.
     """
 
     name: str
@@ -144,3 +151,5 @@ class Stage:
     publish: Callable[[Plan], Mapping[str, str]] = _nothing_published
     check: Callable[[Config], None] = _nothing_wrong
     check_machine: Callable[[Config], None] = _nothing_wrong
+    asked: Callable[[Config], Sequence[int]] = _nothing_asked
+    trial: Callable[[Config], StrictModel] | None = None

@@ -54,7 +54,8 @@ class Report:
     """How a shard ended.
 
     done: committed; failed: may be tried again; refused: would fail again; fatal: nothing else may start; damaged: a
-    file of the input `damaged`, `stage/shard`, is not what its record says.
+    file of the input `damaged`, `stage/shard`, is not what its record says. cpu_seconds: what a shard that is done has
+    kept processors busy for.
     """
 
     shard: str
@@ -62,16 +63,17 @@ class Report:
     message: str = ""
     trace: str = ""
     damaged: str = ""
+    cpu_seconds: float = 0.0
 
 
 def make_shard(job: Job) -> Report:
     """Make and commit one shard. Never raises: an exception becomes the status of the report."""
-    task = _ShardTask(job)
+    task, start = _ShardTask(job), time.process_time()
     try:
         outcome = job.run_shard(task)
         _check_code(job)
         task.commit(outcome)
-        return Report(job.shard.name, "done")
+        return Report(job.shard.name, "done", cpu_seconds=time.process_time() - start)
     except BaseException as error:
         task.withdraw()
         trace = traceback.format_exc()

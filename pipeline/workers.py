@@ -110,8 +110,8 @@ class Workers:
         worker = self._idle.pop()
         self._busy[worker.submit(job)] = (worker, job)
 
-    def finished(self, timeout: float) -> Iterator[tuple[Job, Report | None]]:
-        """Jobs that end within `timeout` seconds, with None for one that has killed its worker."""
+    def finished(self, timeout: float | None) -> Iterator[tuple[Job, Report | None]]:
+        """Jobs that end within `timeout` seconds (None: the next), with None for one that has killed its worker."""
         for future in wait(self._busy, timeout=timeout, return_when=FIRST_COMPLETED).done:
             worker, job = self._busy.pop(future)
             try:

@@ -14,13 +14,13 @@ from stages.exemplars.formats.scene import unique_name
 from stages.exemplars.grammar import observe_contacts, observe_grammar
 from stages.exemplars.hubs import chosen_hubs, set_hubs_aside, with_touching
 from stages.exemplars.identify import Identified, identify_parts
-from stages.exemplars.read import Model
+from stages.exemplars.read import Model, read_model
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import NOTHING, Assembly, ContactKind, Exemplar, Kit
 
-__all__ = ["KitReport", "Observation", "build_kit", "observe_models"]
+__all__ = ["KitReport", "Observation", "build_kit", "observe_models", "read_kit"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,12 @@ class Observation:
     aliases: Mapping[str, tuple[str, ...]]
     refusals: tuple[str, ...]
     warnings: tuple[str, ...]
+
+
+def read_kit(config: KitConfig) -> Kit:
+    """The kit of the model files of `config`. Raises ConfigError, as `build_kit` and `read_model` do."""
+    kit, _ = build_kit(config, [read_model(shape.path, config.parts) for shape in config.shapes])
+    return kit
 
 
 def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, KitReport]:

@@ -38,8 +38,8 @@ BELOW = replace(ABOVE, elevation=-ABOVE.elevation)
 
 
 def draw_preview(task: Task) -> Outcome:
-    """File of the shard: `.png`. Its params: `title`, all `samples`, the `shards` to choose from, and the stages that
-    have `rows` to show.
+    """File of the shard: `.png`. Its params: `title`, `of` how many samples, the `shards` to choose from, and the
+    stages that have `rows` to show.
 
     The first row of shapes and the rows of the stages show the same shapes, one a column. The backend that draws the
     sketches draws this picture too.
@@ -55,7 +55,7 @@ def draw_preview(task: Task) -> Outcome:
     whole = whole[:: -(-len(whole) // CHOSEN_FROM)]
     shown = varied([(each, collection.shape(each)) for each in whole], config.previewed)
     variants = [Cell(_picture(shape, camera, backend), part_count(shape)) for _, shape in shown]
-    sections = [Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {params['samples']:,}")]
+    sections = [Section("Shapes", _rows(variants), f"what comes out: {len(shown)} of {params['of']:,}")]
     going_in = [Cell(_picture(shape, ABOVE, backend), said) for said, shape in collection.speaker.shown(COLUMNS)]
     if going_in:
         sections.insert(0, Section("Exemplars", _rows(going_in), "what goes in"))

@@ -58,7 +58,7 @@ def plan(plan: Plan) -> list[Shard]:
     pictured = {
         "producer": producer,
         "title": plan.config.title or plan.config.name,
-        "samples": sum(shard["samples"] for shard in filled),
+        "of": sum(shard["samples"] for shard in filled),
         "shards": shown,
         "rows": rows,
     }

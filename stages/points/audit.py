@@ -26,6 +26,11 @@ def point_faults(sample: Packaged) -> Iterator[str]:
     instances = sample.arrays["instances.npy"].astype(np.int32)
     if not np.isfinite(points).all() or not np.isfinite(normals).all():
         return  # named already: arrays that hold what is no number
+    if len(points) != described["farthest"] + described["uniform"]:
+        yield "its point arrays have other lengths than its json counts"
+        return
+    if np.abs(np.linalg.norm(normals, axis=1) - 1.0).max() > NEAR:
+        yield "its normals are not of unit length"
     if instances.min() < 0 or instances.max() >= len(sample.shape):
         yield "its points name parts that are not there"
         return

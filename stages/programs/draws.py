@@ -26,15 +26,17 @@ DECIMALS = 4
 
 @dataclass(frozen=True)
 class Share:
-    """What one shard may make: shapes of these `structures` at these places."""
+    """What one shard may make: shapes of these `structures` at these places. weight: how large a share of all draws has
+    these structures, which the interval does not say where structures are few."""
 
     structures: Interval = (0.0, 1.0)
     shapes: Interval = (0.0, 1.0)
+    weight: float = 1.0
 
     @property
     def size(self) -> float:
-        """The share of all shapes."""
-        return (self.structures[1] - self.structures[0]) * (self.shapes[1] - self.shapes[0])
+        """The share of all draws."""
+        return self.weight * (self.shapes[1] - self.shapes[0])
 
 
 @dataclass(frozen=True)
@@ -47,17 +49,23 @@ class Draws:
 
     def owned(self, share: Share) -> npt.NDArray[np.int64]:
         """The indices of the draws that lie in `share`, ascending."""
-        discrete = np.array([each.kind != "continuous" for each in self.schema.parameters])
-        structures, shapes = self._places(discrete), self._places(np.ones_like(discrete))
+        structures, shapes = self.structure_places(), self._places(np.ones(len(self.columns), dtype=np.bool_), "")
         (low, high), (first, last) = share.structures, share.shapes
         return np.flatnonzero((structures >= low) & (structures < high) & (shapes >= first) & (shapes < last))
 
-    def _places(self, rows: BoolArray) -> FloatArray:
+    def structure_places(self) -> FloatArray:
+        """The place of each draw's structure in [0, 1), float64 (n,). It says nothing of the place of the shape, also
+        where the structure is all there is to a shape."""
+        return self._places(np.array([each.kind != "continuous" for each in self.schema.parameters]), "structure")
+
+    def _places(self, rows: BoolArray, salt: str) -> FloatArray:
         """The place of each draw in [0, 1) by the given parameters, float64 (n,)."""
         shown = np.where(self.visible, self.columns + 0.0, np.nan)[rows]
         names = [each.name for each, chosen in zip(self.schema.parameters, rows, strict=True) if chosen]
         salts = np.array([_salt(name) for name in names], dtype=np.uint64)[:, None]
         total = _mixed(shown.view(np.uint64) ^ salts).sum(axis=0, dtype=np.uint64)
+        if salt:
+            total ^= np.uint64(_salt(salt))
         place: FloatArray = (_mixed(total) >> np.uint64(11)).astype(np.float64) * 2.0**-53
         return place
 
@@ -70,8 +78,8 @@ def draw(
     Every value of a parameter is as likely as every other; `between` draws continuous parameters from their whole
     range instead.
     """
-    sizes = np.array([len(each.values) for each in schema.parameters])
-    table = np.zeros((len(sizes), sizes.max()))
+    sizes = np.array([len(each.values) for each in schema.parameters], dtype=np.int64)
+    table = np.zeros((len(sizes), sizes.max(initial=1)))
     for row, parameter in zip(table, schema.parameters, strict=True):
         row[: len(parameter.values)] = parameter.values
     columns = np.take_along_axis(table, rng.integers(0, sizes[:, None], (len(sizes), count)), axis=1)

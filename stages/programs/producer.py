@@ -21,7 +21,8 @@ def _recipe(plan: Plan) -> Sequence[str]:
 
 def _lineage(config: Config) -> Mapping[str, Field]:
     if config.section(ProgramsConfig).mode == "sweep":
-        return {}
+        kept = "what keeps the splits apart: `structure`, the discrete parameters, or `values`, all parameters together"
+        return {"apart": Field({"enum": ["structure", "values"], "description": kept})}
     return {
         "parameter": Field(
             {"type": "string", "minLength": 1, "description": "the parameter whose value was asked for"}
@@ -36,8 +37,9 @@ PRODUCER = Producer(
     asked=lambda config: bool(config.section(ProgramsConfig).program),
     sentence="curve programs are run on parameters drawn from their ranges; a shape's parameters are its `txt`.",
     splits="No two samples are alike, within a split or across splits. In a plain sweep, samples that are alike up to "
-    "their continuous parameters stand in one split; where every value of every parameter is sampled, all splits have "
-    "all values, as published.",
+    "their continuous parameters stand in one split, if their `lineage` says `apart: structure`; where it says "
+    "`apart: values`, the program has fewer structures than splits, and shapes of one structure stand in all of them. "
+    "Where every value of every parameter is sampled, all splits have all values, as published.",
     apart=False,
     lineage=_lineage,
     limits=("All shapes are values of the same parameters; what the program cannot say is not there.",),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,10 +15,11 @@ from stages.programs.effect import has_effect
 from stages.programs.intersection import intersecting
 from stages.programs.parameters import Value
 from stages.programs.program import Program, shape_of_parts
+from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 
-__all__ = ["Cell", "Sampler", "cells", "structure_digest"]
+__all__ = ["Cell", "NoMoreShapes", "Sampler", "cells", "structure_digest"]
 
 MOST_TRIES = 2000
 """So many draws of a shard's own are tried for one shape."""
@@ -45,6 +47,10 @@ def structure_digest(program: Program, values: dict[str, Value]) -> str:
     return hashlib.sha256("\n".join([program.name, *seen]).encode()).hexdigest()
 
 
+class NoMoreShapes(ShardFailed):
+    """There is no other shape in a share, or none that enough tries would find."""
+
+
 @dataclass
 class Sampler:
     """Finds shapes within one share, no two alike.
@@ -65,7 +71,7 @@ class Sampler:
         """Settled values of a new shape that keeps every constraint, whose parts stay apart where they should, and in
         which the parameter of `cell` has its value, is visible and takes effect.
 
-        Raises ShardFailed where none is found, with what the draws were refused for.
+        Raises NoMoreShapes where none is found, with what the draws were refused for.
         """
         schema = self.program.schema
         fixed = None if cell is None else (cell[0], float(schema.by_name[cell[0]].values[cell[1]]))
@@ -80,16 +86,32 @@ class Sampler:
                     self.refused[item, "hidden"] += 1
                     continue
                 values = schema.from_vector(draws.columns[:, column])
-                reason = self._refusal(values, cell)
-                if reason is None:
+                if self._accepts(values, cell):
                     return values
-                self.refused[item, reason] += 1
-        why = ", ".join(f"{count} {reason}" for (_, reason), count in sorted((self.refused - before).items()))
         value = "" if fixed is None else f" with {item} = {fixed[1]:g}"
-        raise ShardFailed(
-            f"{self.program.name}: no shape{value} in {self.tried - first} tries ({why or 'none of this shard'}); "
+        why = _reasons(self.refused - before) or "none of this shard"
+        raise NoMoreShapes(
+            f"{self.program.name}: no shape{value} in {self.tried - first} tries ({why}); "
             "ask for fewer shapes or shards, or look at the program's constraints"
         )
+
+    def listed(self, shapes: FloatArray) -> Iterator[dict[str, Value]]:
+        """The settled values of those of `shapes` (parameters, n) that `find` could find."""
+        for column in shapes.T:
+            self.tried += 1
+            values = self.program.schema.from_vector(column)
+            if self._accepts(values, None):
+                yield values
+
+    def reasons(self) -> str:
+        """What was refused and why, in words."""
+        return _reasons(self.refused)
+
+    def _accepts(self, values: dict[str, Value], cell: Cell | None) -> bool:
+        reason = self._refusal(values, cell)
+        if reason is not None:
+            self.refused["any" if cell is None else cell[0], reason] += 1
+        return reason is None
 
     def _refusal(self, values: dict[str, Value], cell: Cell | None) -> str | None:
         """Why `values` make no sample, or None; what is cheap to ask is asked first."""
@@ -110,3 +132,7 @@ class Sampler:
             return weak
         self._known.add(text)
         return None
+
+
+def _reasons(refused: Counter[tuple[str, str]]) -> str:
+    return ", ".join(f"{count} {reason}" for (_, reason), count in sorted(refused.items()))

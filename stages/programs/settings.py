@@ -55,7 +55,8 @@ class ProgramsConfig(StrictModel):
     sweep: SweepConfig = Field(
         default_factory=SweepConfig,
         description="Shapes of a sweep, for mode sweep. Shapes that are alike up to their continuous parameters stand "
-        "in one split.",
+        "in one split; a program with fewer structures than splits is split by values alone, and one with fewer shapes "
+        "than asked gives all it has.",
     )
     require: Requirements = Field(
         default_factory=Requirements, description="What every shape must be physically; others are refused and counted."

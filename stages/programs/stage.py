@@ -6,31 +6,44 @@ A sample carries no meshes: its text is its parameters, and `stages.programs.pro
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
 from typing import Any
 
+from pipeline.config import Config
+from pipeline.errors import ConfigError, ShardFailed
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.programs.draws import Interval, Share
 from stages.programs.parameters import Value
 from stages.programs.program import Program, find_program, program_module
-from stages.programs.sampling import Sampler, cells, structure_digest
+from stages.programs.sampling import NoMoreShapes, Sampler, cells, structure_digest
 from stages.programs.settings import ProgramsConfig
+from stages.programs.sweep import listed_shapes, plan_sweep
 from stages.shape.sample import Sample, write_sample
+from stages.shape.splits import SPLITS
 
 __all__ = ["STAGE"]
 
-SPLITS = ("train", "val", "test")
 BYTES_A_SAMPLE = 8192
+
+Found = tuple[dict[str, Value], dict[str, Any]]
+"""The values of a shape, and its lineage."""
 
 
 def planned_shards(plan: Plan) -> list[Shard]:
     """The shards of every split. Each owns a share of all shapes that no other shard has a part in."""
-    config = plan.config.section(ProgramsConfig)
+    return _shards(plan.config)
+
+
+def _shards(dataset: Config) -> list[Shard]:
+    config = dataset.section(ProgramsConfig)
     if not config.program:
         return []
-    program = find_program(config.program)
-    sizes, code = _split_sizes(program, config), (program_module(config.program),)
+    code = (program_module(config.program),)
+    sweep = plan_sweep(config.program, config.sweep) if config.mode == "sweep" else None
+    sizes = sweep.sizes if sweep else _each_value_sizes(config)
     shards: list[Shard] = []
     first = 0
     for split, size in sizes.items():
@@ -42,40 +55,72 @@ def planned_shards(plan: Plan) -> list[Shard]:
                 "start": start,
                 "samples": end - start,
                 "first_key": first + start,
-                "share": _share(config, sizes, split, start, end),
+                **(
+                    sweep.owned(split, start, end) if sweep is not None else _each_value_share(sizes, first, start, end)
+                ),
             }
-            shards.append(Shard(f"{plan.config.name}-{split}-{number:06d}", params, code=code))
+            shards.append(Shard(f"{dataset.name}-{split}-{number:06d}", params, code=code))
         first += size
     return shards
 
 
 def run_shard(task: Task) -> Outcome:
-    """The samples of one shard, in random order; its summary says how many draws it looked at for how many samples."""
-    config = task.config.section(ProgramsConfig)
+    """The samples of one shard, in random order; its summary says how many draws it looked at for how many samples.
+
+    A shard of a sweep has fewer samples than planned where its share holds no more. Raises ShardFailed where a value
+    has no shape, and where the whole program has none.
+    """
+    config, params = task.config.section(ProgramsConfig), task.shard.params
     program = find_program(config.program)
-    params = task.shard.params
-    structures, shapes = params["share"]
-    sampler = Sampler(
-        program,
-        Share((structures[0], structures[1]), (shapes[0], shapes[1])),
-        between=config.mode == "sweep",
-        require=config.require,
-    )
-    every = cells(program)
-    order = task.rng("order").permutation(params["samples"]).tolist()
+    structures, shapes = params.get("share", ((0.0, 1.0), (0.0, 1.0)))
+    share = Share((structures[0], structures[1]), (shapes[0], shapes[1]), params.get("weight", 1.0))
+    sampler = Sampler(program, share, between=config.mode == "sweep", require=config.require)
+    found = _swept(task, sampler) if config.mode == "sweep" else _each_value(task, sampler)
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for place, number in enumerate(order):
-            cell = None if config.mode == "sweep" else every[(params["start"] + number) % len(every)]
-            values = sampler.find(cell, task.rng("shape", number))
-            key = f"{program.name}-{params['first_key'] + place:06d}"
-            lineage: dict[str, Any] = {"method": config.mode}
-            if cell is not None:
-                lineage |= {"parameter": cell[0], "class": cell[1]}
+        for values, lineage in found:
+            key = f"{program.name}-{params['first_key'] + writer.samples:06d}"
             write_sample(writer, _sample(program, key, params["split"], config.program, values, lineage))
-            task.progress(writer.samples, len(order))
+            task.progress(writer.samples, params["samples"])
     for (parameter, reason), count in sorted(sampler.refused.items()):
         task.reject(parameter, reason, count=count)
-    return Outcome(len(order), {"split": params["split"], "samples": len(order), "tried": sampler.tried})
+    return Outcome(writer.samples, {"split": params["split"], "samples": writer.samples, "tried": sampler.tried})
+
+
+def _each_value(task: Task, sampler: Sampler) -> Iterator[Found]:
+    """Shapes with every value of every parameter in turn, in random order."""
+    params, every = task.shard.params, cells(sampler.program)
+    for number in task.rng("order").permutation(params["samples"]).tolist():
+        cell = every[(params["start"] + number) % len(every)]
+        values = sampler.find(cell, task.rng("shape", number))
+        yield values, {"method": "each_value", "parameter": cell[0], "class": cell[1]}
+
+
+def _swept(task: Task, sampler: Sampler) -> Iterator[Found]:
+    """Random shapes of the shard's share: as many as planned, or all that there are."""
+    params = task.shard.params
+    listed = (
+        listed_shapes(task.config.section(ProgramsConfig).program, task.config.seed) if "listed" in params else None
+    )
+    shapes = _drawn(task, sampler) if listed is None else sampler.listed(listed[:, slice(*params["listed"])])
+    found = 0
+    for values in islice(shapes, params["samples"]):
+        found += 1
+        yield values, {"method": "sweep", "apart": params["apart"]}
+    if not found:
+        # An empty share is no mistake. A program without any shape is one, and here it says why.
+        whole = replace(sampler, share=Share(), refused=Counter(), tried=0)
+        if listed is None:
+            whole.find(None, task.rng("any"))
+        elif next(whole.listed(listed), None) is None:
+            raise ShardFailed(f"{whole.program.name}: none of its {whole.tried} shapes is kept ({whole.reasons()})")
+
+
+def _drawn(task: Task, sampler: Sampler) -> Iterator[dict[str, Value]]:
+    for number in task.rng("order").permutation(task.shard.params["samples"]).tolist():
+        try:
+            yield sampler.find(None, task.rng("shape", number))
+        except NoMoreShapes:
+            return
 
 
 def _sample(
@@ -92,36 +137,51 @@ def _sample(
     )
 
 
-def _split_sizes(program: Program, config: ProgramsConfig) -> dict[str, int]:
-    if config.mode == "sweep":
-        sizes = {split: max(round(getattr(config.sweep, split) * config.sweep.samples), 1) for split in ("val", "test")}
-        return {"train": config.sweep.samples - sum(sizes.values()), **sizes}
-    return {split: getattr(config.each_value, split) * len(cells(program)) for split in SPLITS}
+def _each_value_sizes(config: ProgramsConfig) -> dict[str, int]:
+    """The samples of each split. Raises ConfigError for a program without parameters, which has no value to show."""
+    count = len(cells(find_program(config.program)))
+    if not count:
+        raise ConfigError(f"programs.mode: {config.program} has no parameters, and so no values; set it to sweep")
+    return {split: getattr(config.each_value, split) * count for split in SPLITS}
 
 
-def _share(config: ProgramsConfig, sizes: dict[str, int], split: str, start: int, end: int) -> list[Interval]:
-    """The structures and the shapes that belong to samples `start` to `end` of a split: shares as large as theirs of
-    the samples. In a sweep a split has its own structures."""
+def _each_value_share(sizes: dict[str, int], first: int, start: int, end: int) -> dict[str, list[Interval]]:
+    """A share of the shapes as large as samples `start` to `end` are of all samples; structures recur."""
     total = sum(sizes.values())
-    before = sum(sizes[each] for each in SPLITS[: SPLITS.index(split)])
-    if config.mode == "sweep":
-        return [(before / total, (before + sizes[split]) / total), (start / sizes[split], end / sizes[split])]
-    return [(0.0, 1.0), ((before + start) / total, (before + end) / total)]
+    return {"share": [(0.0, 1.0), ((first + start) / total, (first + end) / total)]}
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many draws there were for each sample, and why the others were refused."""
+    """How many draws there were for each sample, why the others were refused, and where a sweep ended early."""
     counts: Counter[str] = Counter()
-    tried = samples = 0
-    for shard in planned_shards(plan):
+    made: Counter[str] = Counter()
+    tried = 0
+    shards = planned_shards(plan)
+    for shard in shards:
         summary = plan.summary("programs", shard.name)
         if summary is not None:
-            tried, samples = tried + summary["tried"], samples + summary["samples"]
+            tried += summary["tried"]
+            made[summary["split"]] += summary["samples"]
             counts.update(plan.rejects("programs", shard.name))
-    if not samples:
+    if not made:
         return []
     why = ", ".join(f"{100 * count / tried:.1f} % {reason}" for reason, count in counts.most_common())
-    return [f"{samples:,} shapes of {tried:,} tries; refused: {why or 'none'}"]
+    told = [f"{sum(made.values()):,} shapes of {tried:,} tries; refused: {why or 'none'}"]
+    config = plan.config.section(ProgramsConfig)
+    if config.mode == "sweep" and all(plan.summary("programs", shard.name) for shard in shards):
+        told += plan_sweep(config.program, config.sweep).told(config.sweep, made)
+    return told
+
+
+def asked(config: Config) -> Sequence[int]:
+    """The shapes of each shard."""
+    return [int(shard.params["samples"]) for shard in _shards(config)]
+
+
+def trial(config: Config) -> ProgramsConfig:
+    """The same shapes in shards of few."""
+    section = config.section(ProgramsConfig)
+    return section.model_copy(update={"splits": section.splits.model_copy(update={"samples_per_shard": 8})})
 
 
 STAGE = Stage(
@@ -133,4 +193,6 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=lambda plan: sum(BYTES_A_SAMPLE * int(each.params["samples"]) for each in planned_shards(plan)),
     report=report,
+    asked=asked,
+    trial=trial,
 )

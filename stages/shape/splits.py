@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["SPLITS", "shards_of_split", "share_out"]
+__all__ = ["SPLITS", "shard_sizes", "shards_of_split", "share_out"]
 
 SPLITS = ("train", "val", "test")
 
@@ -34,3 +34,9 @@ def shards_of_split(samples: int, fewest: int, most_samples: int) -> npt.NDArray
     many samples, of at most `most_samples` each."""
     shards = min(max(fewest, -(-samples // most_samples)), samples)
     return np.arange(samples) * shards // max(samples, 1)
+
+
+def shard_sizes(splits: Iterable[int], fewest: int, most_samples: int) -> list[int]:
+    """The samples of each shard of `shards_of_split`, for splits of so many samples each."""
+    counts = [np.bincount(shards_of_split(samples, fewest, most_samples)) for samples in splits]
+    return [int(count) for each in counts for count in each]

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.config import Config
 from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -21,7 +22,7 @@ from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import unstated
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS, shards_of_split, share_out
+from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
 from stages.shapeassembly.checks import overflow, violations
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
@@ -212,6 +213,21 @@ def estimate_bytes(plan: Plan) -> int:
     return BYTES_A_PROGRAM * sum(summary["programs"].values()) if summary else 0
 
 
+def asked(config: Config) -> Sequence[int]:
+    """The programs of each shard of the collection, if all are accepted."""
+    section = config.section(ShapeAssemblyConfig)
+    total = sum(sum(1 for _ in program_texts(each.path, each.folder)) for each in section.programs)
+    total += sum(len(each.source) for each in section.hierarchies)
+    val, test = round(section.splits.val * total), round(section.splits.test * total)
+    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+
+
+def trial(config: Config) -> ShapeAssemblyConfig:
+    """The same programs in shards of few."""
+    section = config.section(ShapeAssemblyConfig)
+    return section.model_copy(update={"splits": section.splits.model_copy(update={"samples_per_shard": 8})})
+
+
 STAGE = Stage(
     name="shapeassembly",
     module=__name__,
@@ -221,4 +237,6 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
     report=report,
+    asked=asked,
+    trial=trial,
 )

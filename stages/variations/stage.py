@@ -12,6 +12,7 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.splits import shard_sizes
 from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
 from stages.variations.measures import described, growth
 from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
@@ -73,6 +74,21 @@ def check(config: Config) -> None:
             )
 
 
+def asked(config: Config) -> Sequence[int]:
+    """The variants of each shard of the collection, if the search finds as many as it is asked for."""
+    section = config.section(VariationsConfig)
+    total = section.per_kit * len(config.section(ExemplarsConfig).kits)
+    val, test = round(section.splits.val * total), round(section.splits.test * total)
+    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+
+
+def trial(config: Config) -> VariationsConfig:
+    """A search for few variants of each kit."""
+    section, kits = config.section(VariationsConfig), len(config.section(ExemplarsConfig).kits)
+    few = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
+    return section.model_copy(update={"per_kit": max(32 // max(kits, 1), 4), "splits": few})
+
+
 STAGE = Stage(
     name="variations",
     module=__name__,
@@ -88,4 +104,6 @@ STAGE = Stage(
     ),
     report=report,
     check=check,
+    asked=asked,
+    trial=trial,
 )

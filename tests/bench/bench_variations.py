@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
-from stages.exemplars.settings import ContactConfig, KitConfig
+from stages.exemplars.settings import ContactConfig, KitConfig, ShapeFile
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
 from stages.shape.kit import Assembly, Kit
 from stages.variations.exchange.checks import validate
@@ -62,7 +62,9 @@ def _some(line: Search, rng: np.random.Generator, found: list[Assembly]) -> int:
 
 
 def _kit(paths: tuple[Path, ...], kinds: tuple[Any, ...]) -> Kit:
-    config = KitConfig(name="bench", shapes=paths, contact=ContactConfig(kinds=kinds))
+    config = KitConfig(
+        name="bench", shapes=tuple(ShapeFile(path=path) for path in paths), contact=ContactConfig(kinds=kinds)
+    )
     kit, _ = build_kit(config, [read_model(path) for path in paths])
     return kit
 

@@ -61,7 +61,7 @@ def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig
     kit_config = config.section(ExemplarsConfig).kits[0]
     if grammar is not None:
         kit_config = kit_config.model_copy(update={"grammar": grammar})
-    kit, _ = build_kit(kit_config, [read_model(shape, kit_config.parts) for shape in kit_config.shapes])
+    kit, _ = build_kit(kit_config, [read_model(shape.path, kit_config.parts) for shape in kit_config.shapes])
     return kit, config.section(VariationsConfig).search
 
 

@@ -1,4 +1,4 @@
-"""Set-up, the Makefile and the doctor, on machines where something is missing."""
+"""Set-up and the doctor, on machines where something is missing."""
 
 from __future__ import annotations
 
@@ -56,35 +56,6 @@ def test_set_up_prints_the_exact_command_where_apt_may_not_or_cannot(tmp_path: P
     assert done.returncode == 1
     assert "apt-get install -y --no-install-recommends libnowhere9" in done.stderr
     assert not (tmp_path / "project/.venv").exists()
-
-
-def make(*arguments: str) -> str:
-    # The stamp is given, so that nothing is set up by asking what would be done.
-    command = ["make", "--no-print-directory", "READY=Makefile", *arguments]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-
-
-def test_make_dataset_runs_each_stage_once_after_what_it_reads() -> None:
-    lines = make("-n", "dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7").splitlines()
-    assert [line.split(" run ")[1].split()[0] for line in lines] == [
-        "exemplars", "variations", "programs", "shapeassembly", "validity", "strings", "points", "sketches", "package",
-    ]  # fmt: skip
-    assert all(line.endswith("--config c.yaml --out /data --seed 7 --workers 3") for line in lines)
-
-
-def test_make_help_lists_every_target_and_the_live_variables() -> None:
-    text = make("help", "OUT=/data", "WORKERS=3")
-    rows = {line.split()[0]: line.split() for line in text.splitlines() if line.startswith("  ")}
-    phony = [line for line in (ROOT / "Makefile").read_text().splitlines() if line.startswith(".PHONY:")]
-    assert {target for line in phony for target in line.split()[1:]} <= set(rows)
-    assert (rows["OUT"][1], rows["WORKERS"][1]) == ("/data", "3")
-
-
-def test_make_inspect_without_a_model_says_what_is_missing() -> None:
-    command = ["make", "READY=Makefile", "inspect"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "make inspect needs MESH=my.glb or PROGRAM=chair" in done.stderr
 
 
 @pytest.mark.slow

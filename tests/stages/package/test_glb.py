@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from stages.package.glb import glb_bytes, linear_colors
+from stages.package.glb_shape import glb_shape
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, PartType
 from stages.shape.shape import Shape, kit_shape
@@ -110,3 +111,18 @@ def test_a_type_of_more_than_65535_vertices_has_wide_indices() -> None:
 def test_the_same_assembly_gives_the_same_bytes() -> None:
     kit = toy_kit("planks")
     assert glb_bytes(kit_shape(kit, turned_chain())) == glb_bytes(kit_shape(kit, turned_chain()))
+
+
+def test_the_shape_in_a_glb_is_the_one_that_was_written() -> None:
+    shape = kit_shape(toy_kit("blocks"), turned_chain())
+    read = glb_shape(glb_bytes(shape))
+    assert sorted(read.part_names) == sorted(shape.part_names)
+    assert set(read.labels) == {"tower", "long.wall"}
+    for part, name in enumerate(shape.part_names):
+        found = read.part_names.index(name)
+        mesh, written = (each.meshes[each.assembly.types[at]] for each, at in ((read, found), (shape, part)))
+        assert mesh.name == written.name
+        np.testing.assert_allclose(mesh.face_colors.astype(int), written.face_colors, atol=2)
+        triangles = transform_points(read.assembly.poses[found], mesh.vertices)[mesh.faces]
+        expected = transform_points(shape.assembly.poses[part], written.vertices)[written.faces]
+        np.testing.assert_allclose(triangles, expected, atol=1e-6)

@@ -1,0 +1,41 @@
+"""The shape in a sample's GLB: `glb_bytes` backwards."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.shape import Shape
+from stages.shape.views.palette import linear_to_srgb
+
+__all__ = ["glb_shape"]
+
+
+def glb_shape(content: bytes) -> Shape:
+    """The parts of a sample by the bytes of its member `glb`: their names, meshes, poses, and colours within 2 of 255;
+    y up. What touches what stands in the sample's `json`: the shape has no contacts."""
+    import trimesh
+
+    scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
+    names = sorted(scene.graph.nodes_geometry)
+    placed = [scene.graph.get(name) for name in names]
+    label_of = {geometry: name.rpartition(".")[0] or name for name, (_, geometry) in zip(names, placed, strict=True)}
+    geometries = list(label_of)
+    assembly = Assembly(
+        types=np.array([geometries.index(geometry) for _, geometry in placed], dtype=np.int16),
+        poses=np.array([pose for pose, _ in placed], dtype=np.float64),
+        edges=np.empty((0, 2), dtype=np.int32),
+    )
+    meshes = tuple(_part_mesh(label_of[geometry], scene.geometry[geometry]) for geometry in geometries)
+    return Shape(meshes, assembly, "y", tuple(dict.fromkeys(label_of.values())), tuple(names))
+
+
+def _part_mesh(label: str, mesh: Any) -> PartMesh:
+    # In the file a vertex stands once for each of its colours, so the first corner of a face has the face's.
+    vertices, place = np.unique(np.asarray(mesh.vertices, dtype=np.float64), axis=0, return_inverse=True)
+    faces = np.asarray(mesh.faces)
+    linear = np.asarray(mesh.visual.vertex_colors, dtype=np.float64)[faces[:, 0], :3] / 255.0
+    return PartMesh(label, vertices, place.reshape(-1)[faces].astype(np.int32), linear_to_srgb(linear))

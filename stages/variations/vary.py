@@ -1,0 +1,23 @@
+"""Variants of a kit in memory, without a dataset: one search, from the exemplars on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.shape.kit import Assembly, Kit
+from stages.variations.exchange.search import Search
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import SearchConfig
+
+__all__ = ["vary"]
+
+
+def vary(kit: Kit, count: int, rng: np.random.Generator, config: SearchConfig | None = None) -> list[Assembly]:
+    """`count` new assemblies of the kit's parts, or fewer where `config.tries` tries find no more.
+
+    Every neighbourhood and every contact of theirs was seen in the exemplars, by the kit's grammar; no two are the
+    same by `config.duplicates`, and none is a piece of an exemplar. Backdrops are not put back.
+    """
+    search = Search(ContactAnswers(kit), config or SearchConfig())
+    variants, _ = search.run(rng, search.config.tries, count, kit.name, lambda _: None)
+    return [variant.assembly for variant in variants[:count]]

@@ -1,0 +1,111 @@
+"""What people see of a run: no bar that stays, nothing of stages without work, and no guess at the time left."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import pty
+import subprocess
+import sys
+import termios
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.config import Config, StrictModel
+from pipeline.journal import Standing, figures
+from pipeline.places import Places
+from pipeline.run import run_stage
+from pipeline.stage import Outcome, Stage
+from pipeline.time_left import TimeLeft
+from tests.pipeline.conftest import WriteConfig
+from tests.pipeline.turn import turn
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def told(worked: Callable[[float], float], work: float, seconds: int) -> Iterator[tuple[float, float | None]]:
+    """What is said of the time left, twice a second, of work that goes on like `worked`."""
+    watch = TimeLeft()
+    for now in np.arange(0.0, seconds, 0.5):
+        yield float(now), watch.after(worked(float(now)), work, float(now))
+
+
+def test_nothing_is_told_while_workers_start_and_then_what_is_true() -> None:
+    # Thirty seconds of imports, then ten samples a second: 1,000 samples are there after 130 seconds.
+    for now, left in told(lambda now: max(now - 30, 0) * 10, 1000, 130):
+        if now < 35:
+            assert left is None
+        elif now > 40:
+            assert left == pytest.approx(130 - now, abs=1.0)
+
+
+def test_time_left_does_not_jump_when_shards_end_together() -> None:
+    # Fifty samples at a time, one time in three at half the pace, as shards of few and of many parts are.
+    def worked(now: float) -> float:
+        return 50.0 * int(now / 15 if int(now / 45) % 2 else now / 7.5)
+
+    answers = [left for _, left in told(worked, 2000, 240) if left is not None]
+    assert len(answers) > 300
+    steps = [after - before for before, after in itertools.pairwise(answers)]
+    assert max(map(abs, steps)) < 0.1 * max(answers)
+
+
+def test_what_was_done_before_the_start_says_nothing_of_the_pace() -> None:
+    answers = dict(told(lambda now: 900 + now, 1000, 60))
+    assert answers[50.0] == pytest.approx(50, abs=1)
+
+
+def test_nothing_is_told_of_work_that_is_not_counted_or_is_over() -> None:
+    assert all(left is None for _, left in told(lambda _: 0.0, 0.0, 100))
+    assert TimeLeft().after(5.0, 5.0, 10.0) is None
+
+
+def test_figures_count_samples_where_the_plan_says_how_many_there_will_be() -> None:
+    known = Standing(planned=24, done=12, failed=1, work=1200, worked=512.6, samples=500, rejects=7)
+    assert figures(known, 41.0, 58.2) == (
+        "512 of 1,200 samples, 12 of 24 shards, 7 rejects, 1 set aside, 41s gone, about 58s left"
+    )
+    grows = Standing(planned=8, done=6.4, failed=0, work=0, worked=0.0, samples=0, rejects=0)
+    assert figures(grows, 41.0, None) == "6.4 of 8 shards, 41s gone"
+
+
+def seen_on_a_terminal(*arguments: object) -> str:
+    """All that the mill of the tests writes to a terminal."""
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (40, 120))
+    command = [sys.executable, "-m", "tests.pipeline.turn", *(str(each) for each in arguments)]
+    running = subprocess.Popen(command, cwd=ROOT, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    written = bytearray()
+    while True:
+        try:
+            written += os.read(ours, 4096)
+        except OSError:  # how a terminal says that nobody has it open any more
+            break
+    assert running.wait() == 0
+    os.close(ours)
+    return written.decode()
+
+
+def test_a_terminal_shows_a_bar_with_samples_while_it_works_and_none_afterwards(
+    tmp_path: Path, write_config: WriteConfig
+) -> None:
+    config = write_config(flour={"seconds": 0.3})
+    turn(config, tmp_path / "out", "grain")
+    shown = seen_on_a_terminal("run", "flour", "--config", config, "--out", tmp_path / "out", "--workers", 2)
+    assert "of 24 samples" in shown
+    assert "% |" in shown
+    left = [line.rpartition("\r")[2] for line in shown.replace("\r\n", "\n").split("\n")]
+    assert left[0] == "flour: 6 shards to make, about 100.0 kB of disk (4.2 kB a sample)"
+    assert left[1].startswith("flour: 6 of 6 shards, 24 samples, 61.4 kB, 6 shards made now")
+    assert left[2:] == [""]
+
+
+def test_a_stage_without_a_plan_says_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    idle = Stage("idle", 1, StrictModel, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
+    config = Config("mill", "1.0.0", 0, {"idle": StrictModel()}, tmp_path / "mill.yaml")
+    assert run_stage("idle", {"idle": idle}, config, Places(tmp_path, "mill"), workers=1).left == 0
+    assert capfd.readouterr() == ("", "")

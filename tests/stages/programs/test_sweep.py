@@ -1,0 +1,183 @@
+"""A sweep finishes, however small its program is, and says what it could not give."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.config import load_config
+from pipeline.errors import ConfigError
+from pipeline.places import Places
+from pipeline.registry import find_stages
+from pipeline.survey import Survey
+from pipeline.task import Job, Report, make_shard
+from stages.programs.curves import Part, box
+from stages.programs.parameters import discrete
+from stages.programs.program import Constraint, Program
+from stages.programs.rules import Rule
+from stages.programs.schema import Values
+from stages.programs.settings import SweepConfig
+from stages.programs.sweep import listed_shapes, plan_sweep
+from stages.shape.sample import Sample, read_samples
+from tests.stages.programs.lid import LID, PROGRAM, WIDTH, build
+from tests.stages.programs.rack import PROGRAM as RACK
+
+FIXED = replace(PROGRAM, parameters=())
+WIDE = replace(PROGRAM, parameters=(LID, WIDTH))
+HEAP = replace(PROGRAM, parameters=(LID, discrete("boxes", 1, 4, 1, "boxes", "Number of boxes.")))
+"""Eight combinations of parameters, each a shape and a structure of its own."""
+THREE = replace(WIDE, parameters=(*WIDE.parameters, discrete("boxes", 1, 3, 1, "boxes", "Number of boxes.")))
+
+RACK_OF_ONE_WIDTH = replace(RACK, parameters=(RACK.parameters[0], RACK.parameters[2]))
+
+
+def sunk(values: Values) -> Sequence[Part]:
+    """As `build`, but the lid stands in the box."""
+    return [*build({**values, "has_lid": False}), *([SUNK_PART] if values["has_lid"] else [])]
+
+
+SUNK_PART = Part("lid", box((0.5, 0.3, 0.5), (0, 1, 0)), (180, 180, 180))
+SUNK = replace(HEAP, build=sunk, apart=(("case", "lid"),))
+"""All shapes with a lid are refused, which is known only when they are built."""
+
+Name = Callable[[Program], str]
+
+
+@pytest.fixture
+def name_of(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Name:
+    """Gives a program a module of its own, as a user's has, and answers its name."""
+
+    def name(program: Program) -> str:
+        module = ModuleType(f"mine.{request.node.name}")
+        vars(module).update(__file__=__file__, PROGRAM=program)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        return module.__name__
+
+    return name
+
+
+def make(folder: Path, program: str, samples: int, *stages: str) -> tuple[list[Report], list[Sample], list[str]]:
+    """Run `stages` on a sweep, here and now: how each shard ended, all samples, and the report of the first stage."""
+    section = {"program": program, "mode": "sweep", "sweep": {"samples": samples}, "splits": {"shards": 2}}
+    small = {"points": {"uniform": 64}, "package": {"previewed": 2}}
+    small["sketches"] = {"size": 48, "backend": "raycast", "views": [{"name": "front"}]}
+    path = folder / "toy.yaml"
+    path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section, **small}))
+    found = find_stages()
+    config = load_config(path, {name: stage.config for name, stage in found.items()})
+    places, reports = Places(folder / "out", "toy"), []
+    survey = Survey(config, found, places)
+    for stage in stages or ("programs",):
+        places.stage(stage).make()
+        surveyed = survey.stage(stage)
+        asked: set[str] = set()
+        while ready := [each for each in surveyed.missing if each.name not in asked and surveyed.ready(each)]:
+            asked |= {each.name for each in ready}
+            for shard in ready:
+                mark = surveyed.fingerprints[shard.name]
+                reports.append(make_shard(Job(stage, found[stage].run_shard, shard, surveyed.config, places, mark)))
+            survey.refresh(stage)
+    folder = places.stage("programs").root
+    samples_made = [sample for tar in sorted(folder.glob("*.tar")) for sample in read_samples(tar)]
+    return reports, samples_made, list(found["programs"].report(survey.stage("programs").view))
+
+
+def splits_of(samples: Sequence[Sample]) -> dict[str, int]:
+    return dict(Counter(sample.split for sample in samples))
+
+
+def test_one_binary_parameter_gives_both_shapes_and_a_split_stays_empty(tmp_path: Path, name_of: Name) -> None:
+    reports, samples, told = make(tmp_path, name_of(PROGRAM), 100)
+    assert {each.status for each in reports} == {"done"}
+    assert {sample.text for sample in samples} == {'{"has_lid":false}', '{"has_lid":true}'}
+    assert splits_of(samples) == {"train": 1, "test": 1}
+    assert told[1:] == [
+        "100 shapes were asked for, and the program has 2 in all", "split val is empty: no shape is left for it"
+    ]  # fmt: skip
+
+
+def test_a_program_of_one_shape_gives_it(tmp_path: Path, name_of: Name) -> None:
+    reports, samples, told = make(tmp_path, name_of(FIXED), 10)
+    assert [each.status for each in reports] == ["done"]
+    assert [(sample.text, sample.split) for sample in samples] == [("{}", "train")]
+    assert "split test is empty: no shape is left for it" in told
+
+
+def test_with_two_structures_continuous_values_keep_the_splits_apart(tmp_path: Path, name_of: Name) -> None:
+    _, samples, told = make(tmp_path, name_of(WIDE), 40)
+    assert splits_of(samples) == {"train": 32, "val": 4, "test": 4}
+    assert len({sample.text for sample in samples}) == 40
+    assert {sample.lineage["apart"] for sample in samples} == {"values"}
+    assert any("fewer structures than splits" in line for line in told)
+
+
+def test_without_a_choice_of_structure_continuous_values_keep_the_splits_apart(tmp_path: Path, name_of: Name) -> None:
+    _, samples, _ = make(tmp_path, name_of(replace(PROGRAM, parameters=(WIDTH,))), 20)
+    assert splits_of(samples) == {"train": 16, "val": 2, "test": 2}
+    assert len({sample.graph for sample in samples}) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_few_structures_are_shared_out_so_that_every_split_has_some(tmp_path: Path, name_of: Name, seed: int) -> None:
+    # Structures fall in one split or another by the hash of their values: other names are other hashes.
+    boxes = discrete(f"boxes{seed}", 1, 3, 1, "boxes", "Number of boxes.")
+    _, samples, told = make(tmp_path, name_of(replace(PROGRAM, parameters=(boxes, WIDTH))), 40)
+    assert splits_of(samples) == {"train": 32, "val": 4, "test": 4}
+    kept = {split: {each.graph for each in samples if each.split == split} for split in ("train", "val", "test")}
+    assert [len(graphs) for graphs in kept.values()] == [1, 1, 1]
+    assert len(set().union(*kept.values())) == 3
+    assert len(told) == 1
+
+
+def test_a_program_of_few_shapes_gives_as_many_as_asked_and_others_with_another_seed(name_of: Name) -> None:
+    name = name_of(RACK_OF_ONE_WIDTH)
+    sweep = plan_sweep(name, SweepConfig(samples=10))
+    assert (sweep.sizes, sweep.existing) == ({"train": 8, "val": 1, "test": 1}, 24)
+    owned = [sweep.owned(split, 0, size)["listed"] for split, size in sweep.sizes.items()]
+    assert owned == [[0, 19], [19, 21], [21, 24]]
+    first, second = listed_shapes(name, 1), listed_shapes(name, 2)
+    assert first.shape == (2, 24)
+    assert not np.array_equal(first, second)
+    assert sorted(first.T.tolist()) == sorted(second.T.tolist())
+
+
+def test_shapes_that_are_refused_leave_shards_empty_and_the_dataset_is_finished(tmp_path: Path, name_of: Name) -> None:
+    stages = ("exemplars", "variations", "programs", "shapeassembly", "validity", "strings", "points", "sketches")
+    reports, samples, told = make(tmp_path, name_of(SUNK), 100, *stages, "package")
+    assert {each.status for each in reports} == {"done"}, [each.message for each in reports]
+    assert sorted(json.loads(sample.text)["boxes"] for sample in samples) == [1, 2, 3, 4]
+    assert not any(json.loads(sample.text)["has_lid"] for sample in samples)
+    assert "100 shapes were asked for, and the program has 8 in all" in told
+    assert any(line.startswith("split train has ") for line in told)
+    card = (tmp_path / "out/.work/toy/package/dataset.README.md").read_text()
+    assert "| all | 4 |" in card
+
+
+def test_a_program_whose_shapes_are_all_refused_fails_and_says_why(tmp_path: Path, name_of: Name) -> None:
+    never = replace(SUNK, build=lambda values: sunk({**values, "has_lid": True}))
+    reports, _, _ = make(tmp_path, name_of(never), 100)
+    assert {each.status for each in reports} == {"failed"}
+    assert reports[0].message == "lid: none of its 8 shapes is kept (8 case meets lid)"
+
+
+def test_constraints_that_leave_no_shape_are_told_before_anything_starts(tmp_path: Path, name_of: Name) -> None:
+    never = replace(HEAP, constraints=(Constraint("never", Rule("boxes > 9"), "."),))
+    with pytest.raises(ConfigError, match="no combination of its parameters keeps all its constraints"):
+        make(tmp_path, name_of(never), 100)
+
+
+def test_structures_that_no_valid_shape_has_get_no_split(tmp_path: Path, name_of: Name) -> None:
+    # Of three numbers of boxes one is left: a split that owned the others would wait for ever.
+    only = replace(THREE, constraints=(Constraint("one", Rule("boxes < 2"), "."),))
+    _, samples, _ = make(tmp_path, name_of(only), 30)
+    assert splits_of(samples) == {"train": 24, "val": 3, "test": 3}
+    assert {sample.lineage["apart"] for sample in samples} == {"values"}
