@@ -73,8 +73,8 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 # Working on it ------------------------------------------------------------------------------------------------------
 
 .PHONY: test lint bench kits keys lock
-test: setup  ## Run the tests
-	$(PYTHON) -m pytest
+test: setup  ## Run the tests on WORKERS cores
+	$(PYTHON) -m pytest --numprocesses $(WORKERS) --dist worksteal
 lint: setup  ## Check style and types
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .

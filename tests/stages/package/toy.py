@@ -184,7 +184,7 @@ def toy_config(shards: int = 8) -> Config:
         "strings": OtherNoConfig(),
         "validity": PhysicsConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
-        "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right"))),
+        "sketches": SketchesConfig(views=(SketchView(name="left"), SketchView(name="right")), backend="raycast"),
         "package": PackageConfig(previewed=2),
     }
     return Config(

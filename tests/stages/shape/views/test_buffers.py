@@ -14,8 +14,7 @@ from tests.stages.shape.views.solids import box, boxes_scene, cylinder, exemplar
 
 FRONT = Camera(0.0, 0.0, "orthographic", margin=0.25)
 
-needs_egl = pytest.mark.skipif(probe("egl") is not None, reason="no OpenGL context on EGL here")
-EACH = [pytest.param("egl", marks=needs_egl), "raycast"]
+EACH = [pytest.param("egl", marks=pytest.mark.egl), "raycast"]
 
 
 @pytest.mark.parametrize("backend", EACH)
@@ -60,7 +59,7 @@ def test_where_faces_of_two_parts_coincide_the_lower_layer_is_seen(backend, came
     assert set(np.unique(buffers.part)) == {-1, 0}
 
 
-@needs_egl
+@pytest.mark.egl
 @pytest.mark.parametrize(
     "camera", [Camera(-40.0, 25.0), Camera(35.0, 15.0, fov=60.0), Camera(10.0, 60.0, "orthographic")]
 )
@@ -115,7 +114,7 @@ def test_the_same_view_gives_the_same_pixels_again_and_with_a_new_context(backen
     assert (first == again).all()
 
 
-@needs_egl
+@pytest.mark.egl
 def test_a_lost_context_is_made_anew():
     scene = boxes_scene([(0, 0, 0)])
     first = visible_triangles(scene, FRONT, (32, 32), "egl").triangles
