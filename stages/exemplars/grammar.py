@@ -81,12 +81,10 @@ def observe(
         counted = np.array([kind in kinds for kind in found[-1]], dtype=bool)
         kept.append(replace(assembly, edges=assembly.edges[counted]))
     usable = tuple(each for each in dockings if each.kind in kinds)
-    return kept, Grammar(observe_neighbourhoods(kept), usable, _observe_nested(types, assemblies, contact)), found
+    return kept, Grammar(observe_neighbourhoods(kept), usable, _observe_nested(types, assemblies)), found
 
 
-def _observe_nested(
-    types: Sequence[PartType], assemblies: Sequence[Assembly], contact: ContactTest
-) -> dict[tuple[int, int], float]:
+def _observe_nested(types: Sequence[PartType], assemblies: Sequence[Assembly]) -> dict[tuple[int, int], float]:
     """For pairs of types the greatest depth of parts that reach into each other without any contact of surfaces."""
     penetration = PenetrationTest(types)
     nested: dict[tuple[int, int], float] = {}

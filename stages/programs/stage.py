@@ -19,10 +19,10 @@ from stages.programs.program import Program, find_program, program_source
 from stages.programs.sampling import Sampler, cells, structure_digest
 from stages.programs.settings import ProgramsConfig
 from stages.shape.sample import Sample, write_sample
+from stages.shape.splits import SPLITS
 
 __all__ = ["STAGE"]
 
-SPLITS = ("train", "val", "test")
 BYTES_A_SAMPLE = 8192
 
 

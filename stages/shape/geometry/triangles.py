@@ -365,8 +365,8 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
 
 
 @numba.njit(cache=True)
-def _point_triangle_distance2(p, tri, n, sides):
-    """Squared distance of a point and a triangle; n, sides are scratch (3,)."""
+def _point_triangle_distance2(p, tri, n):
+    """Squared distance of a point and a triangle; n is scratch (3,)."""
     length = _normal(tri, n)
     if length > 0.0 and _inside_prism(p, tri, n):
         h = (n[0] * (p[0] - tri[0, 0]) + n[1] * (p[1] - tri[0, 1]) + n[2] * (p[2] - tri[0, 2])) / length
@@ -381,7 +381,7 @@ def _point_triangle_distance2(p, tri, n, sides):
 def points_on_surface(corners, boxes, links, points, tolerance):
     """Whether every one of `points` (q, 3) lies within `tolerance` of the mesh."""
     stack = np.empty(512, dtype=np.int64)
-    n, sides = np.empty(3), np.empty(3)
+    n = np.empty(3)
     for index in range(len(points)):
         p = points[index]
         stack[0] = 0
@@ -399,7 +399,7 @@ def points_on_surface(corners, boxes, links, points, tolerance):
             if links[node, 0] < 0:
                 first = -links[node, 0] - 1
                 for u in range(first, first + links[node, 1]):
-                    if _point_triangle_distance2(p, corners[u], n, sides) <= tolerance * tolerance:
+                    if _point_triangle_distance2(p, corners[u], n) <= tolerance * tolerance:
                         near = True
                         break
             else:
