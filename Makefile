@@ -1,7 +1,7 @@
 # Shapemill: exemplar meshes in, verified shape datasets out.
 #
 #   make dataset        sets everything up, then makes the default dataset
-#   make test           sets everything up, then runs the tests
+#   make test           sets everything up, then checks style, types and tests
 #   make help           shows every target and what the variables are set to
 #
 # Stages are never up to date for make: it always asks the mill, which compares fingerprints (of config, seed, code
@@ -73,7 +73,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 # Working on it ------------------------------------------------------------------------------------------------------
 
 .PHONY: test lint bench kits keys lock
-test: setup  ## Run the tests on WORKERS cores
+test: lint  ## Check style and types, then run the tests on WORKERS cores
 	$(PYTHON) -m pytest --numprocesses $(WORKERS) --dist worksteal
 lint: setup  ## Check style and types
 	$(PYTHON) -m ruff check .

@@ -12,7 +12,7 @@ __all__ = ["depth_first_tree", "first_edges_tree", "walk"]
 
 
 @numba.njit(cache=True)
-def _arcs(n, edges, turn):  # type: ignore[no-untyped-def]
+def _arcs(n, edges, turn):
     """The arcs out of each node, those of edges that come first in `turn` first: `(first, target, edge)`."""
     first = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(edges)):
@@ -32,7 +32,7 @@ def _arcs(n, edges, turn):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def first_edges_tree(n, edges, turn):  # type: ignore[no-untyped-def]
+def first_edges_tree(n, edges, turn):
     """The spanning forest of the edges that close no cycle when taken in the order `turn`, bool (m,)."""
     leader = np.arange(n)
     tree = np.zeros(len(edges), dtype=np.bool_)
@@ -51,7 +51,7 @@ def first_edges_tree(n, edges, turn):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def depth_first_tree(n, edges, turn, root):  # type: ignore[no-untyped-def]
+def depth_first_tree(n, edges, turn, root):
     """The spanning tree of a depth-first search from `root` that tries edges in the order `turn`, bool (m,)."""
     first, target, edge = _arcs(n, edges, turn)
     following = first[:n].copy()
@@ -76,7 +76,7 @@ def depth_first_tree(n, edges, turn, root):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def walk(types, edges, tree, turn, root, letters):  # type: ignore[no-untyped-def]
+def walk(types, edges, tree, turn, root, letters):
     """The tokens of a graph, walked along `tree` from `root`: `(codes, nodes)`, both int64.
 
     codes: a type below `letters`, `letters` for `(`, `letters` + 1 for `)`, `letters` + 2 + k for cycle number k.

@@ -16,8 +16,10 @@ __all__ = ["build_tree", "contact_patches", "first_contact", "near_pairs", "poin
 
 LEAF = 4
 
+Tree = tuple[FloatArray, FloatArray, np.ndarray]
 
-def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
+
+def build_tree(vertices: FloatArray, faces: IntArray) -> Tree:
     """The box tree of a mesh: median split along the longest axis of the triangle centres."""
     corners = np.ascontiguousarray(vertices[faces])
     order, boxes, links = _split(corners.min(axis=1), corners.max(axis=1))
@@ -256,12 +258,12 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
 _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 
-def first_contact(a, b, pose: FloatArray, tolerance: float) -> bool:
+def first_contact(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> bool:
     """Whether mesh `b`, moved by `pose` (4, 4) into the coordinates of mesh `a`, comes within `tolerance` of it."""
     return bool(_walk(*a, *b, pose, tolerance, True, _NO_PAIRS))
 
 
-def near_pairs(a, b, pose: FloatArray, tolerance: float) -> np.ndarray:
+def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarray:
     """All pairs of triangles within `tolerance`, int64 (p, 2) in tree order of `a` and `b`."""
     pairs = np.empty((4096, 2), dtype=np.int64)
     found = _walk(*a, *b, pose, tolerance, False, pairs)

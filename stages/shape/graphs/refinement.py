@@ -12,7 +12,7 @@ __all__ = ["refine"]
 
 
 @numba.njit(cache=True)
-def refine(colors, edges, forward, backward, classes):  # type: ignore[no-untyped-def]
+def refine(colors, edges, forward, backward, classes):
     """The equitable refinement of a colouring: `(order, start)`, both int64 (n,).
 
     Nodes of one cell have, for each cell and each class of arc, equally many neighbours in that cell over arcs of
@@ -140,7 +140,7 @@ def refine(colors, edges, forward, backward, classes):  # type: ignore[no-untype
 
 
 @numba.njit(cache=True)
-def _sort_by_count(order, position, count, low, end):  # type: ignore[no-untyped-def]
+def _sort_by_count(order, position, count, low, end):
     """Sort `order[low:end]` by the counts of its nodes."""
     top = 0
     for k in range(low, end):
