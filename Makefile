@@ -1,7 +1,7 @@
 # Shapemill: exemplar meshes in, verified shape datasets out.
 #
 #   make dataset        sets everything up, then makes the default dataset
-#   make test           sets everything up, then runs the tests
+#   make test           sets everything up, then checks style, types and tests
 #   make plan           shows what it will take, before it starts
 #   make help           shows every target and what the variables are set to
 #
@@ -95,8 +95,8 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 # Working on it ------------------------------------------------------------------------------------------------------
 
 .PHONY: test lint bench kits keys lock
-test: setup  ## Run the tests
-	$(PYTHON) -m pytest
+test: lint  ## Check style and types, then run the tests on WORKERS cores
+	$(PYTHON) -m pytest --numprocesses $(WORKERS) --dist worksteal
 lint: setup  ## Check style and types
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .

@@ -4,11 +4,28 @@ from __future__ import annotations
 
 import os
 
-# As in workers: with several threads on a busy machine LAPACK is a hundred times slower. Before numpy is imported.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# As in workers of the mill: with several threads on a busy machine LAPACK is a hundred times slower. Before numpy is
+# imported; torch heeds OMP.
+os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"))
 
+from functools import cache
+
+import pytest
 from hypothesis import HealthCheck, settings
 
 # A busy machine must not fail a test, and a failure must come back when the tests are run again.
 settings.register_profile("shapemill", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("shapemill")
+
+
+@cache
+def no_egl() -> str | None:
+    from stages.shape.views.probe import probe
+
+    return probe("egl")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    # Not while tests are collected, which every worker does: a first drawing takes seconds.
+    if item.get_closest_marker("egl") and no_egl():
+        pytest.skip(f"no OpenGL context on EGL here: {no_egl()}")

@@ -19,6 +19,7 @@ from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
 from stages.strings.alphabet import make_alphabet
 from stages.strings.grammar import check
+from tests.mill import mill
 
 STAGES = ("exemplars", "variations", "validity", "strings", "points", "sketches", "package")
 
@@ -57,7 +58,8 @@ def start(stage: str, config: Path, out: Path, workers: int) -> subprocess.Popen
 
 def make(config: Path, out: Path, workers: int) -> None:
     for stage in STAGES:
-        assert start(stage, config, out, workers).wait() == 0, f"{stage} failed; see {out}/.work/small/log.txt"
+        code, printed = mill("run", stage, "--config", config, "--out", out, "--workers", workers)
+        assert code == 0, printed
 
 
 def kill_while_it_works(stage: str, config: Path, out: Path) -> bool:
@@ -103,25 +105,26 @@ def test_a_kill_in_each_stage_and_another_go_make_the_same_folder(made: tuple[Pa
     alive = []
     for stage in STAGES:
         alive.append(kill_while_it_works(stage, config, killed))
-        assert start(stage, config, killed, 2).wait() == 0
+        code, printed = mill("run", stage, "--config", config, "--out", killed, "--workers", 2)
+        assert code == 0, printed
     assert sum(alive) >= 4, "too many stages were over before the kill"
     assert digests(killed) == digests(one)
 
 
 def test_verify_finds_nothing_wrong_and_then_a_flipped_byte(made: tuple[Path, Path]) -> None:
     config, one = made
-    command = [sys.executable, "-m", "pipeline", "verify", "--config", str(config), "--out", str(one)]
-    sound = subprocess.run([*command, "--samples", "10"], capture_output=True, text=True)
-    assert sound.returncode == 0, sound.stdout + sound.stderr
+    asked = ("verify", "--config", config, "--out", one)
+    code, printed = mill(*asked, "--samples", 10)
+    assert code == 0, printed
     shard = next((one / "small" / "data" / "val").glob("*.tar"))
     content = bytearray(shard.read_bytes())
     content[len(content) // 2] ^= 1
     shard.write_bytes(bytes(content))
-    broken = subprocess.run(command, capture_output=True, text=True)
+    code, printed = mill(*asked)
     content[len(content) // 2] ^= 1
     shard.write_bytes(bytes(content))
-    assert broken.returncode == 1
-    assert shard.name in broken.stdout
+    assert code == 1
+    assert shard.name in printed
 
 
 def test_every_string_of_the_corpus_decodes_to_its_graph_and_obeys_the_grammar(made: tuple[Path, Path]) -> None:

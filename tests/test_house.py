@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import tomllib
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -126,6 +127,36 @@ def test_random_streams_are_handed_in_and_never_a_default(path: Path) -> None:
                 if default is not None
             ]
             assert "rng" not in {argument.arg for argument in defaulted}, f"line {node.lineno}"
+
+
+def kernels(tree: ast.Module) -> list[ast.FunctionDef]:
+    """The functions that numba compiles."""
+    return [
+        node
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef)
+        and any(ast.unparse(each).startswith("numba.njit") for each in node.decorator_list)
+    ]
+
+
+def test_types_are_asked_for_everywhere_but_in_files_with_kernels() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
+    assert settings["strict"]
+    spared = [each["module"] for each in settings["overrides"] if each.get("disallow_untyped_defs") is False]
+    files = [path for path in CODE if kernels(ast.parse(path.read_text()))]
+    assert spared == [[relative(path).removesuffix(".py").replace("/", ".") for path in files]]
+
+
+@pytest.mark.parametrize("path", CODE, ids=relative)
+def test_every_function_but_kernels_says_its_types(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    compiled = kernels(tree)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node not in compiled:
+            named = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            untyped = [each.arg for each in named if each.annotation is None and each.arg not in {"self", "cls"}]
+            assert node.returns is not None, f"line {node.lineno}: what does {node.name} return?"
+            assert not untyped, f"line {node.lineno}: {node.name} has {', '.join(untyped)} without a type"
 
 
 @pytest.mark.parametrize("path", ALL, ids=relative)

@@ -121,7 +121,7 @@ def _points_of_meshes(
 
 
 @numba.njit(cache=True, inline="always")
-def _edges(vertices, face):  # type: ignore[no-untyped-def]
+def _edges(vertices, face):
     """First and second edge of a triangle, and their cross product."""
     o, p, q = face[0], face[1], face[2]
     ax, ay, az = vertices[p, 0] - vertices[o, 0], vertices[p, 1] - vertices[o, 1], vertices[p, 2] - vertices[o, 2]
@@ -130,7 +130,7 @@ def _edges(vertices, face):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _reach(vertices, faces, first):  # type: ignore[no-untyped-def]
+def _reach(vertices, faces, first):
     """Running sums of the triangles' areas, each mesh from zero."""
     reach = np.empty(len(faces))
     for mesh in range(len(first) - 1):
@@ -143,7 +143,7 @@ def _reach(vertices, faces, first):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _draw(vertices, faces, reach, first, meshes, draws, points, normals, hit):  # type: ignore[no-untyped-def]
+def _draw(vertices, faces, reach, first, meshes, draws, points, normals, hit):
     """Fill `points`, `normals`, `hit`: the first triangle whose running sum exceeds the draw, so none of zero area."""
     for i in range(len(meshes)):
         low, high = first[meshes[i]], first[meshes[i] + 1] - 1

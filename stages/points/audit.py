@@ -73,7 +73,8 @@ def _unit_normals(corners: FloatArray) -> FloatArray:
     """Normals of triangles float64 (t, 3, 3) by their winding; zero where a triangle has no area."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+    unit: FloatArray = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+    return unit
 
 
 def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
@@ -101,7 +102,8 @@ def _segment_distances(points: FloatArray, start: FloatArray, end: FloatArray) -
     length = np.einsum("ij,ij->i", along, along)
     away = points[:, None] - start[None]
     share = np.einsum("ntj,tj->nt", away, along) / np.where(length > 0, length, 1.0)
-    return np.linalg.norm(away - np.clip(share, 0, 1)[:, :, None] * along[None], axis=2)
+    distances: FloatArray = np.linalg.norm(away - np.clip(share, 0, 1)[:, :, None] * along[None], axis=2)
+    return distances
 
 
 AUDIT = Audit(faults=point_faults)

@@ -52,7 +52,7 @@ def _boxes(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], npt.
 
 
 @numba.njit(cache=True)
-def _pick(points, order, first, n, start):  # type: ignore[no-untyped-def]
+def _pick(points, order, first, n, start):
     """The picks, in the points' original indices. `points` (m, 3) and `order` (m,) are in box order."""
     boxes = len(first) - 1
     low = np.empty((boxes, 3))

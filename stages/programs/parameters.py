@@ -51,11 +51,6 @@ class Parameter:
         return len(self.values) + (self.visible_if is not None)
 
     @property
-    def hidden_class(self) -> int | None:
-        """The class of a hidden parameter, the last one; None for a parameter that is always visible."""
-        return None if self.visible_if is None else len(self.values)
-
-    @property
     def range(self) -> str:
         """Its range, for people: `0.2 to 1.0`, `3, 4, 5`, `false or true`."""
         if self.kind == "continuous":

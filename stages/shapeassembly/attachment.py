@@ -20,7 +20,6 @@ _GRID = 10
 _NEAR = 0.05  # a gap below this share of the largest size of both cuboids is none
 _FACING = 0.9  # cosine between a face's normal and the way to the goal, above which the face is moved
 _AGREE = 0.01  # by how much prior attachments may be moved apart
-_COLINEAR = 0.01  # norm of the cross product of the ways from the first prior attachment to the others
 _TINY = 1e-9
 
 

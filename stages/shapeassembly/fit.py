@@ -25,12 +25,11 @@ RESAMPLED = 20
 @dataclass(frozen=True)
 class FitResult:
     """A fitted program. before, after: Chamfer distance to the points, in their unit, on other points of the surface
-    than the fit has seen; history: of each step, on those it has seen, float64 (steps,)."""
+    than the fit has seen."""
 
     program: Program
     before: float
     after: float
-    history: FloatArray
 
 
 def fit(
@@ -56,7 +55,6 @@ def fit(
     optimiser = torch.optim.Adam([values], lr=rate)
     falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps, eta_min=rate / 10)
     seen = torch.from_numpy(np.asarray(points, dtype=np.float64))
-    history: list[float] = []
     best, best_values = np.inf, values.detach().clone()
     which, weights = np.empty(0, np.int64), torch.empty(0, 8)
     for step in range(steps):
@@ -70,7 +68,6 @@ def fit(
             which, weights = _chosen_points(corners.detach().numpy(), samples, rng)
         surface = (corners[which] * weights[:, :, None]).sum(dim=1)
         loss, distance = _squared_chamfer(surface, seen, target)
-        history.append(distance)
         if distance < best:
             best, best_values = distance, values.detach().clone()
         optimiser.zero_grad()
@@ -87,7 +84,7 @@ def fit(
         chamfer_distance(surface_points(execute(each), samples, state), points)
         for each, state in zip((program, fitted), states, strict=True)
     )
-    return FitResult(fitted, before, after, np.array(history))
+    return FitResult(fitted, before, after)
 
 
 def chamfer_distance(a: FloatArray, b: FloatArray) -> float:

@@ -271,7 +271,7 @@ def run(rows, block_rows, block_parts, program_blocks):
     decisions = np.zeros((block_events[-1], 8))
     for program in range(programs):
         low, high = program_blocks[program], program_blocks[program + 1]
-        nodes, leaves = 0, 0
+        nodes, cuboids = 0, 0
         if status[program] == OK:
             for block in range(low, high):
                 own = slice(block_parts[block], block_parts[block + 1])
@@ -279,9 +279,9 @@ def run(rows, block_rows, block_parts, program_blocks):
                 events = decisions[block_events[block] : block_events[block + 1]]
                 _execute(lines, boxes[own], child[own], mirrored[own], events)
             own = slice(block_parts[low], block_parts[high])
-            status[program], nodes, leaves = _count_nodes(child[own], block_parts[low : high + 1])
+            status[program], nodes, cuboids = _count_nodes(child[own], block_parts[low : high + 1])
         program_nodes[program + 1] = program_nodes[program] + nodes
-        program_leaves[program + 1] = program_leaves[program] + leaves
+        program_leaves[program + 1] = program_leaves[program] + cuboids
     node = np.empty((program_nodes[-1], 3), np.int64)
     leaves, corners = np.empty((program_leaves[-1], 15)), np.empty((program_leaves[-1], 8, 3))
     leaf_node, leaf_part = np.empty(program_leaves[-1], np.int64), np.empty(program_leaves[-1], np.int64)

@@ -12,7 +12,7 @@ __all__ = ["depth_first_tree", "first_edges_tree", "walk"]
 
 
 @numba.njit(cache=True)
-def _arcs(n, edges, edge_order):  # type: ignore[no-untyped-def]
+def _arcs(n, edges, edge_order):
     """The arcs out of each node, those of edges that come first in `edge_order` first: `(first, target, edge)`."""
     first = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(edges)):
@@ -32,7 +32,7 @@ def _arcs(n, edges, edge_order):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def first_edges_tree(n, edges, edge_order):  # type: ignore[no-untyped-def]
+def first_edges_tree(n, edges, edge_order):
     """The spanning forest of the edges that close no cycle when taken in the order `edge_order`, bool (m,)."""
     leader = np.arange(n)
     tree = np.zeros(len(edges), dtype=np.bool_)
@@ -51,7 +51,7 @@ def first_edges_tree(n, edges, edge_order):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def depth_first_tree(n, edges, edge_order, root):  # type: ignore[no-untyped-def]
+def depth_first_tree(n, edges, edge_order, root):
     """The spanning tree of a depth-first search from `root` that tries edges in the order `edge_order`, bool (m,)."""
     first, target, edge = _arcs(n, edges, edge_order)
     following = first[:n].copy()
@@ -76,7 +76,7 @@ def depth_first_tree(n, edges, edge_order, root):  # type: ignore[no-untyped-def
 
 
 @numba.njit(cache=True)
-def walk(types, edges, tree, edge_order, root, letters):  # type: ignore[no-untyped-def]
+def walk(types, edges, tree, edge_order, root, letters):
     """The tokens of a graph, walked along `tree` from `root`: `(codes, nodes)`, both int64.
 
     codes: a type below `letters`, `letters` for `(`, `letters` + 1 for `)`, `letters` + 2 + k for cycle number k.
@@ -92,7 +92,7 @@ def walk(types, edges, tree, edge_order, root, letters):  # type: ignore[no-unty
 
 
 @numba.njit(cache=True)
-def _tree_walk(first, target, edge, tree, root):  # type: ignore[no-untyped-def]
+def _tree_walk(first, target, edge, tree, root):
     """The nodes in the order of a walk along `tree`; and the same with -1 and -2 for the parentheses around every
     subtree but a node's last."""
     n = len(first) - 1
@@ -125,7 +125,7 @@ def _tree_walk(first, target, edge, tree, root):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _written(types, events, nodes, first, target, edge, tree, letters):  # type: ignore[no-untyped-def]
+def _written(types, events, nodes, first, target, edge, tree, letters):
     """The codes of a walk: types, parentheses, and the numbers of the edges that are not in `tree`."""
     m = len(tree)
     rank = np.full(len(types), -1, dtype=np.int64)

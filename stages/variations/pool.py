@@ -193,4 +193,5 @@ def write_kept(
 def _mapped(path: Path) -> np.ndarray:
     """An array on disk, mapped; an empty one, which cannot be mapped, is loaded."""
     empty = len(np.load(path, mmap_mode=None, allow_pickle=False)) == 0 if path.stat().st_size < 4096 else False
-    return np.load(path, mmap_mode=None if empty else "r", allow_pickle=False)
+    array: np.ndarray = np.load(path, mmap_mode=None if empty else "r", allow_pickle=False)
+    return array

@@ -59,7 +59,7 @@ def selection_space(counts: np.ndarray, features: np.ndarray) -> FloatArray:
 
 
 @numba.njit(cache=True)
-def farthest_first(points, starts, wanted):  # type: ignore[no-untyped-def]
+def farthest_first(points, starts, wanted):
     """Greedy k-centre: `wanted` of the points, int64, each the farthest from the starts and all taken before; the
     first of equals. points: float64 (n, d); starts: float64 (s, d)."""
     n, d = points.shape

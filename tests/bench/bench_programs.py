@@ -8,8 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from stages.programs.draws import Share
-from stages.programs.program import find_program, program_names, shape_of
-from stages.programs.sampling import Sampler, cells
+from stages.programs.parameters import Value
+from stages.programs.program import Program, find_program, program_names, shape_of
+from stages.programs.sampling import Cell, Sampler, cells
 from tests.bench.measure import Measure, rate
 
 __all__ = ["bench"]
@@ -26,14 +27,14 @@ def bench() -> Iterator[Measure]:
         sampler, rng = Sampler(program, Share(), between=False), np.random.default_rng(1)
         shapes = [sampler.find(None, rng) for _ in range(SHAPES)]
 
-        def build(program=program, shapes=shapes) -> int:
+        def build(program: Program = program, shapes: list[dict[str, Value]] = shapes) -> int:
             return sum(1 for values in shapes if len(shape_of(program, values)))
 
         peer, theirs = ("Infinigen chair factory", INFINIGEN) if name == "chair" else ("", None)
         yield Measure(f"programs, {name}", "shapes", rate(build), peer, theirs, f"{SHAPES} random shapes, triangulated")
         every = itertools.cycle(cells(program))
 
-        def sample(sampler=sampler, every=every, rng=rng) -> int:
+        def sample(sampler: Sampler = sampler, every: Iterator[Cell] = every, rng: np.random.Generator = rng) -> int:
             sampler.find(next(every), rng)
             return 1
 

@@ -50,9 +50,9 @@ def glb_bytes(layout: Layout) -> bytes:
         if name not in counts:
             scene.add_geometry(_mesh(layout.types[name]), node_name=node, geom_name=name, transform=pose)
         else:
-            scene.graph.update(node, matrix=pose, geometry=name)  # type: ignore[no-untyped-call]
+            scene.graph.update(node, matrix=pose, geometry=name)
         counts[name] = counts.get(name, 0) + 1
-    exported = scene.export(file_type="glb")  # type: ignore[no-untyped-call]
+    exported = scene.export(file_type="glb")
     assert isinstance(exported, bytes)
     return exported
 

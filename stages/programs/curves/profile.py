@@ -139,7 +139,7 @@ def _unit_superellipse(exponent: float, count: int) -> FloatArray:
     longest = across.max(axis=1)
     if np.isinf(exponent):
         # The cosine of 45 degrees is not quite its sine: what lies on a side lies there exactly.
-        points = np.where(across >= (1.0 - 1e-12) * longest[:, None], np.sign(ray), ray / longest[:, None])
+        points: FloatArray = np.where(across >= (1.0 - 1e-12) * longest[:, None], np.sign(ray), ray / longest[:, None])
     else:
         reach = longest * (((across / longest[:, None]) ** exponent).sum(axis=1)) ** (1.0 / exponent)
         points = ray / reach[:, None]

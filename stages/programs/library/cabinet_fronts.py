@@ -169,7 +169,7 @@ def _bars(inner: Opening, back: float, face: float) -> list[QuadMesh]:
 
 def _length(cabinet: CabinetDimensions, room: float) -> float:
     """How long a handle is where it has `room`."""
-    return (0.25 + 0.4 * cabinet.values["handle_size"]) * room
+    return float((0.25 + 0.4 * cabinet.values["handle_size"]) * room)
 
 
 def _handle(cabinet: CabinetDimensions, room: float) -> QuadMesh:

@@ -35,7 +35,8 @@ class ChairDimensions:
     @cached_property
     def unit(self) -> float:
         """Thicknesses grow with the chair, but much less."""
-        return 0.036 * float(self.values["scale x"] * self.values["scale y"] * self.values["scale z"]) ** (1.0 / 6.0)
+        size = float(self.values["scale x"] * self.values["scale y"] * self.values["scale z"])
+        return float(0.036 * size ** (1.0 / 6.0))
 
     @cached_property
     def width(self) -> float:
@@ -97,7 +98,8 @@ class ChairDimensions:
         """The direction in which the back rises at a relative height, of length 1, float64 (3,)."""
         bend, recline = self._leaning
         slope = bend * (1.0 - 2.0 * u) + recline * 2.0 * u
-        return np.array([0.0, 1.0, -slope]) / np.hypot(1.0, slope)
+        along: FloatArray = np.array([0.0, 1.0, -slope]) / np.hypot(1.0, slope)
+        return along
 
     def back(self, x: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
         """Points of the surface in which all of the back lies, float64 (..., 3), at distances x from the middle and

@@ -63,7 +63,8 @@ class TableDimensions:
             swing = [(0.5 + 0.5 * np.cos(np.pi * t), 0.12 + 0.6 * t) for t in np.linspace(0.0, 1.0, 7).tolist()]
             shares, most = [(1.0, 0.0), *swing, (0.0, 1.0)], 1.3
         reach = amount * min(most * (self.thickness + 0.01), 0.22 * float(self.half.min()))
-        return np.array(shares) * [reach, self.thickness]
+        edge: FloatArray = np.array(shares) * [reach, self.thickness]
+        return edge
 
     @cached_property
     def bearing(self) -> FloatArray:

@@ -16,8 +16,10 @@ __all__ = ["build_tree", "contact_patches", "first_contact", "near_pairs", "poin
 
 LEAF = 4
 
+Tree = tuple[FloatArray, FloatArray, np.ndarray]
 
-def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
+
+def build_tree(vertices: FloatArray, faces: IntArray) -> Tree:
     """The box tree of a mesh: median split along the longest axis of the triangle centres."""
     corners = np.ascontiguousarray(vertices[faces])
     order, boxes, links = _split(corners.min(axis=1), corners.max(axis=1))
@@ -256,12 +258,12 @@ def _walk(ca, ba, la, cb, bb, lb, pose, tolerance, stop_at_first, pairs):
 _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 
-def first_contact(a, b, pose: FloatArray, tolerance: float) -> bool:
+def first_contact(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> bool:
     """Whether mesh `b`, moved by `pose` (4, 4) into the coordinates of mesh `a`, comes within `tolerance` of it."""
     return bool(_walk(*a, *b, pose, tolerance, True, _NO_PAIRS))
 
 
-def near_pairs(a, b, pose: FloatArray, tolerance: float) -> np.ndarray:
+def near_pairs(a: Tree, b: Tree, pose: FloatArray, tolerance: float) -> np.ndarray:
     """All pairs of triangles within `tolerance`, int64 (p, 2) in tree order of `a` and `b`."""
     pairs = np.empty((4096, 2), dtype=np.int64)
     found = _walk(*a, *b, pose, tolerance, False, pairs)
@@ -365,8 +367,8 @@ def contact_patches(ca, cb, pairs, pose, tolerance):
 
 
 @numba.njit(cache=True)
-def _point_triangle_distance2(p, tri, n, sides):
-    """Squared distance of a point and a triangle; n, sides are scratch (3,)."""
+def _point_triangle_distance2(p, tri, n):
+    """Squared distance of a point and a triangle; n is scratch (3,)."""
     length = _normal(tri, n)
     if length > 0.0 and _inside_prism(p, tri, n):
         h = (n[0] * (p[0] - tri[0, 0]) + n[1] * (p[1] - tri[0, 1]) + n[2] * (p[2] - tri[0, 2])) / length
@@ -381,7 +383,7 @@ def _point_triangle_distance2(p, tri, n, sides):
 def points_on_surface(corners, boxes, links, points, tolerance):
     """Whether every one of `points` (q, 3) lies within `tolerance` of the mesh."""
     stack = np.empty(512, dtype=np.int64)
-    n, sides = np.empty(3), np.empty(3)
+    n = np.empty(3)
     for index in range(len(points)):
         p = points[index]
         stack[0] = 0
@@ -399,7 +401,7 @@ def points_on_surface(corners, boxes, links, points, tolerance):
             if links[node, 0] < 0:
                 first = -links[node, 0] - 1
                 for u in range(first, first + links[node, 1]):
-                    if _point_triangle_distance2(p, corners[u], n, sides) <= tolerance * tolerance:
+                    if _point_triangle_distance2(p, corners[u], n) <= tolerance * tolerance:
                         near = True
                         break
             else:

@@ -24,7 +24,7 @@ class _Partition(NamedTuple):
 
 
 @numba.njit(cache=True)
-def refine(colors, edges, forward, backward, classes):  # type: ignore[no-untyped-def]
+def refine(colors, edges, forward, backward, classes):
     """The equitable refinement of a colouring: `(order, start)`, both int64 (n,).
 
     Nodes of one cell have, for each cell and each class of arc, equally many neighbours in that cell over arcs of
@@ -83,7 +83,7 @@ def refine(colors, edges, forward, backward, classes):  # type: ignore[no-untype
 
 
 @numba.njit(cache=True)
-def _arcs(n, edges, forward, backward):  # type: ignore[no-untyped-def]
+def _arcs(n, edges, forward, backward):
     """The arcs into each node: those into `v` come from `source[first[v]:first[v + 1]]` and are of the classes `kind`
     there."""
     m = len(edges)
@@ -106,7 +106,7 @@ def _arcs(n, edges, forward, backward):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _partition(colors):  # type: ignore[no-untyped-def]
+def _partition(colors):
     """The cells of a colouring, by colour."""
     n = len(colors)
     order = np.argsort(colors, kind="mergesort")
@@ -121,7 +121,7 @@ def _partition(colors):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _wait(queue, waiting, head, queued, cell):  # type: ignore[no-untyped-def]
+def _wait(queue, waiting, head, queued, cell):
     """Put a cell at the end of the ring `queue`; returns how many wait."""
     waiting[cell] = True
     queue[(head + queued) % len(queue)] = cell
@@ -129,7 +129,7 @@ def _wait(queue, waiting, head, queued, cell):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _arcs_by_class(nodes, first, source, kind, members, newest, used):  # type: ignore[no-untyped-def]
+def _arcs_by_class(nodes, first, source, kind, members, newest, used):
     """List the arcs into `nodes` by their classes: their sources go to `members[0]`, the last one of a class at
     `newest` and the one before each at `members[1]`, or -1. Returns how many classes there are; they are `used`,
     ascending."""
@@ -150,7 +150,7 @@ def _arcs_by_class(nodes, first, source, kind, members, newest, used):  # type: 
 
 
 @numba.njit(cache=True)
-def _touch(partition, members, arc, count, touched, moved, parted):  # type: ignore[no-untyped-def]
+def _touch(partition, members, arc, count, touched, moved, parted):
     """Count, in `count`, the arcs of the list that begins at `arc` by the nodes they come from, and bring these to the
     end of their cells, `moved` of each. Returns how many nodes are `touched` and how many cells `parted`, ascending."""
     order, position, start, size = partition
@@ -178,7 +178,7 @@ def _touch(partition, members, arc, count, touched, moved, parted):  # type: ign
 
 
 @numba.njit(cache=True)
-def _split(partition, count, cell, low):  # type: ignore[no-untyped-def]
+def _split(partition, count, cell, low):
     """Cut a cell wherever the count of its nodes changes, the first of which is counted at `low`. Returns the number
     of pieces and where the largest starts, the first of those alike."""
     order, _, start, size = partition
@@ -199,7 +199,7 @@ def _split(partition, count, cell, low):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _sort_by_count(partition, count, low, end):  # type: ignore[no-untyped-def]
+def _sort_by_count(partition, count, low, end):
     """Sort the nodes at the positions from `low` to `end` by their counts."""
     order, position, _, _ = partition
     top = 0

@@ -47,13 +47,13 @@ def mirror_score(placed: Placed) -> float:
     ways = ways[alike & (np.linalg.norm(ways, axis=1) > 1e-9 * placed.diagonal)]
     own = places[outmost, :2]
     if np.linalg.norm(own) <= ALIKE * placed.diagonal:
-        own = _long_axis(placed, places)
+        own = _long_axis(placed)
     normals = np.concatenate([ways, [[-own[1], own[0]]], [own]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return max(_matched(placed, places, spreads, normal) for normal in normals)
 
 
-def _long_axis(placed: Placed, places: FloatArray) -> FloatArray:
+def _long_axis(placed: Placed) -> FloatArray:
     """The level axis along which the points of the shape spread most."""
     flat = np.concatenate(placed.points)[:, :2] - (placed.weights @ placed.centroids)[:2]
     axis: FloatArray = np.linalg.eigh(flat.T @ flat)[1][:, 1]

@@ -85,7 +85,8 @@ def _shared(first: Box, second: Box, tolerance: float) -> FloatArray:
         high = np.clip(corners.max(axis=0) + tolerance, -half, half)
         points = own.center + (low + _GRID * (high - low)) @ own.axes
         found.append(points[inside(other, points, tolerance)])
-    return found[0] if len(found[0]) >= len(found[1]) else found[1]
+    more: FloatArray = found[0] if len(found[0]) >= len(found[1]) else found[1]
+    return more
 
 
 def _face_center(first: Box, second: Box, tolerance: float) -> FloatArray | None:

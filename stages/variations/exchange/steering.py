@@ -83,7 +83,8 @@ class Steering:
         possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, _ in CHOICES])
         rates = np.where(possible, (self._gains + 1.0) / (self._work + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.explore * possible / possible.sum()
-        return explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()
+        chances: FloatArray = explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()
+        return chances
 
     def _draw(self, rng: np.random.Generator, parents: Parents, archive: Archive, draws: np.ndarray) -> list[Parent]:
         """A parent for each of `draws`: an exemplar, or an earlier variant in the way that it says."""

@@ -31,8 +31,7 @@ def test_the_lamp_of_the_guide_keeps_what_programs_promise() -> None:
     lamp = space["PROGRAM"]
     assert isinstance(lamp, Program)
     sampler, rng = Sampler(lamp, Share(), between=False), np.random.default_rng(3)
-    for cell in cells(lamp):
-        check(lamp, sampler.find(cell, rng))
+    check(lamp, [sampler.find(cell, rng) for cell in cells(lamp)])
 
 
 def test_the_config_of_the_guide_is_one(tmp_path: Path) -> None:

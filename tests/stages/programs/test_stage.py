@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from stages.programs.effect import has_effect
 from stages.programs.program import find_program, shape_of_text
 from stages.programs.sampling import structure_digest
 from stages.shape.sample import Sample, read_samples
+from tests.mill import mill
 from tests.stages.programs.stool import PROGRAM as STOOL_PROGRAM
 
 STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
@@ -33,9 +32,8 @@ def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[in
     path = folder / "toy.yaml"
     path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section}))
     out = folder / f"out-{workers}"
-    command = [sys.executable, "-m", "pipeline", "run", "programs", "--config", str(path), "--out", str(out)]
-    done = subprocess.run([*command, "--workers", str(workers)], capture_output=True, text=True)
-    return done.returncode, done.stdout + done.stderr, out / ".work" / "toy" / "programs"
+    code, printed = mill("run", "programs", "--config", path, "--out", out, "--workers", workers)
+    return code, printed, out / ".work" / "toy" / "programs"
 
 
 def shards_of(folder: Path) -> dict[str, list[Sample]]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import subprocess
-import sys
 import tarfile
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from stages.shape.sample import Sample, read_samples
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.shape import shape_of_text
 from stages.shapeassembly.structure import signature
+from tests.mill import mill
 
 EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 CHAIR = next(path.read_text() for path in EXAMPLES if path.stem == "chair-slats")
@@ -41,9 +40,8 @@ def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[in
     path = folder / "toy.yaml"
     path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "shapeassembly": section}))
     out = folder / f"out-{workers}"
-    command = [sys.executable, "-m", "pipeline", "run", "shapeassembly", "--config", str(path), "--out", str(out)]
-    done = subprocess.run([*command, "--workers", str(workers)], capture_output=True, text=True)
-    return done.returncode, done.stdout + done.stderr, out / ".work" / "toy" / "shapeassembly"
+    code, printed = mill("run", "shapeassembly", "--config", path, "--out", out, "--workers", workers)
+    return code, printed, out / ".work" / "toy" / "shapeassembly"
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ import pytest
 
 from pipeline.errors import ShardFailed
 from stages.shape.views.camera import Camera
-from stages.shape.views.probe import probe
 from stages.shape.views.scene import mesh_scene
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.settings import SketchesConfig, SketchView, StrokeOptions
@@ -45,7 +44,7 @@ def test_another_process_draws_the_same_bytes():
     assert done.stdout.strip() == hashlib.sha256(drawing("raycast").tobytes()).hexdigest()
 
 
-@pytest.mark.skipif(probe("egl") is not None, reason="no OpenGL context on EGL here")
+@pytest.mark.egl
 @pytest.mark.parametrize("shape", ["blocks", "a05_manor_house"])
 def test_both_backends_draw_the_same_picture(shape):
     if shape == "blocks":

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +12,7 @@ import yaml
 
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.sample import read_samples
+from tests.mill import mill
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
 
 
@@ -35,12 +34,9 @@ def make(folder: Path, out: str, workers: int, **variations: object) -> str:
     (folder / "toy.yaml").write_text(yaml.safe_dump(config))
     printed = ""
     for stage in ("exemplars", "variations"):
-        command = [sys.executable, "-m", "pipeline", "run", stage, "--config", str(folder / "toy.yaml")]
-        done = subprocess.run(
-            [*command, "--out", str(folder / out), "--workers", str(workers)], capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
-        printed += done.stdout + done.stderr
+        code, said = mill("run", stage, "--config", folder / "toy.yaml", "--out", folder / out, "--workers", workers)
+        assert code == 0, said
+        printed += said
     return printed
 
 
@@ -105,14 +101,9 @@ def test_only_towers_that_bear_the_required_push_are_kept(tmp_path: Path) -> Non
         "variations": {"per_kit": 50, "search": search, "require": {"stable": True, "physics": {"push": 0.135}}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
-    printed = ""
     for stage in ("exemplars", "variations"):
-        command = [sys.executable, "-m", "pipeline", "run", stage, "--config", str(tmp_path / "toy.yaml")]
-        done = subprocess.run(
-            [*command, "--out", str(tmp_path / "out"), "--workers", "1"], capture_output=True, text=True
-        )
-        printed += done.stdout + done.stderr
-        assert done.returncode == 0, printed
+        code, printed = mill("run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1)
+        assert code == 0, printed
     links = {
         len(sample) - 2 for shard in collection(tmp_path, "out") for sample in (s.assembly for s in read_samples(shard))
     }
@@ -138,9 +129,8 @@ def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: P
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     for stage in ("exemplars", "variations"):
-        command = [sys.executable, "-m", "pipeline", "run", stage, "--config", str(tmp_path / "toy.yaml")]
-        done = subprocess.run([*command, "--out", str(tmp_path / "out")], capture_output=True, text=True)
-    assert "the search found no variant of any kit" in done.stdout + done.stderr
+        _, printed = mill("run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1)
+    assert "the search found no variant of any kit" in printed
     records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
     assert "no backdrop" in records
 
@@ -153,8 +143,7 @@ def test_hubs_that_no_kit_puts_back_cannot_be_required(tmp_path: Path) -> None:
         "variations": {"require": {"hubs": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
-    command = [sys.executable, "-m", "pipeline", "run", "exemplars", "--config", str(tmp_path / "toy.yaml")]
-    done = subprocess.run([*command, "--out", str(tmp_path / "out")], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert "kit chain puts none back" in done.stdout + done.stderr
+    code, printed = mill("run", "exemplars", "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out")
+    assert code == 2
+    assert "kit chain puts none back" in printed
     assert not (tmp_path / "out").exists()

@@ -18,6 +18,7 @@ from pipeline.shards import bytes_array
 from stages.package.verify_samples import read_packaged, read_record, sample_faults
 from stages.package.verify_shard import shard_samples
 from stages.programs.language import LANGUAGE
+from tests.mill import mill
 
 STAGES = (
     "exemplars",
@@ -43,11 +44,6 @@ STOOLS = {
 KITS = {"exemplars": {"kits": [{"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]}]}}
 
 
-def run(command: str, *arguments: str) -> tuple[int, str]:
-    done = subprocess.run([sys.executable, "-m", "pipeline", command, *arguments], capture_output=True, text=True)
-    return done.returncode, done.stdout + done.stderr
-
-
 def config_of(folder: Path, sections: dict[str, object]) -> tuple[str, ...]:
     path = folder / "toy.yaml"
     path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "license": "MIT", **sections}))
@@ -59,7 +55,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[str, ...
     folder = tmp_path_factory.mktemp("stools")
     arguments = config_of(folder, STOOLS)
     for stage in STAGES:
-        code, printed = run("run", stage, *arguments)
+        code, printed = mill("run", stage, *arguments)
         assert code == 0, printed
     return folder / "out", arguments
 
@@ -85,7 +81,7 @@ def test_samples_of_a_program_have_the_members_and_fields_of_all_samples(made: t
 
 
 def test_a_dataset_of_a_program_is_verified_and_has_no_corpus(made: tuple[Path, tuple[str, ...]]) -> None:
-    code, printed = run("verify", *made[1])
+    code, printed = mill("verify", *made[1])
     assert code == 0, printed
     assert "geometry" in printed
     assert not (made[0] / "toy-corpus").exists()
@@ -141,13 +137,13 @@ def test_a_row_of_the_index_finds_its_sample(made: tuple[Path, tuple[str, ...]])
 
 
 def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
-    code, printed = run("run", "exemplars", *config_of(tmp_path, {}))
+    code, printed = mill("run", "exemplars", *config_of(tmp_path, {}))
     assert code == 2
     assert "a dataset needs one of programs.program, shapeassembly.programs or hierarchies, exemplars.kits" in printed
     assert "this has none" in printed
 
 
 def test_a_config_that_makes_shapes_in_two_ways_is_refused(tmp_path: Path) -> None:
-    code, printed = run("run", "exemplars", *config_of(tmp_path, {**STOOLS, **KITS}))
+    code, printed = mill("run", "exemplars", *config_of(tmp_path, {**STOOLS, **KITS}))
     assert code == 2
     assert "this has programs.program and exemplars.kits" in printed

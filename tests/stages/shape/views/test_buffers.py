@@ -9,14 +9,13 @@ from stages.shape.views import opengl
 from stages.shape.views.buffers import drawn_by, render_buffers, visible_triangles
 from stages.shape.views.camera import Camera
 from stages.shape.views.opengl import OpenGLRenderer
-from stages.shape.views.probe import probe, probe_in_subprocess
+from stages.shape.views.probe import probe_in_subprocess
 from stages.shape.views.scene import mesh_scene
 from tests.stages.shape.views.solids import box, boxes_scene, cylinder, exemplar_scene
 
 FRONT = Camera(0.0, 0.0, "orthographic", margin=0.25)
 
-needs_egl = pytest.mark.skipif(probe("egl") is not None, reason="no OpenGL context on EGL here")
-EACH = [pytest.param("egl", marks=needs_egl), "raycast"]
+EACH = [pytest.param("egl", marks=pytest.mark.egl), "raycast"]
 
 
 @pytest.mark.parametrize("backend", EACH)
@@ -61,7 +60,7 @@ def test_where_faces_of_two_parts_coincide_the_lower_layer_is_seen(backend, came
     assert set(np.unique(buffers.part)) == {-1, 0}
 
 
-@needs_egl
+@pytest.mark.egl
 @pytest.mark.parametrize(
     "camera", [Camera(-40.0, 25.0), Camera(35.0, 15.0, fov=60.0), Camera(10.0, 60.0, "orthographic")]
 )
@@ -116,7 +115,7 @@ def test_the_same_view_gives_the_same_pixels_again_and_with_a_new_context(backen
     assert (first == again).all()
 
 
-@needs_egl
+@pytest.mark.egl
 def test_a_lost_context_is_made_anew():
     scene = boxes_scene([(0, 0, 0)])
     first = visible_triangles(scene, FRONT, (32, 32), "egl").triangles
@@ -134,7 +133,7 @@ def test_a_blank_picture_is_an_error(backend):
         render_buffers(scene, Camera(0.0, 0.0), (32, 32), 1, backend)
 
 
-@needs_egl
+@pytest.mark.egl
 def test_opengl_is_drawn_in_software_whatever_the_environment_says(monkeypatch):
     for name, value in (("LIBGL_ALWAYS_SOFTWARE", "0"), ("GALLIUM_DRIVER", "softpipe"), ("EGL_DEVICE_ID", "7")):
         monkeypatch.setenv(name, value)
@@ -143,7 +142,7 @@ def test_opengl_is_drawn_in_software_whatever_the_environment_says(monkeypatch):
     assert drawn_by("egl").startswith("llvmpipe")
 
 
-@needs_egl
+@pytest.mark.egl
 def test_another_rasteriser_than_the_one_promised_does_not_draw(monkeypatch):
     monkeypatch.setattr(opengl, "RASTERISER", "some card")
     with pytest.raises(RuntimeError, match=r"llvmpipe .* would draw"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,7 @@ def histogram(kit: Kit, variant: Variant) -> tuple[int, ...]:
     return tuple(counts[name] for name in sorted(each.name for each in kit.types))
 
 
+@cache
 def shipped_kit(folder: Path) -> Kit:
     shapes = tuple(sorted(folder.glob("*.glb")))
     kit, _ = build_kit(KitConfig(name=folder.name, shapes=shapes), [read_model(shape) for shape in shapes])

@@ -1,0 +1,25 @@
+"""`python -m pipeline` in this process: its workers are real, and Python starts once, not once for each stage."""
+
+from __future__ import annotations
+
+import io
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+
+from pipeline.cli import main
+
+__all__ = ["mill"]
+
+
+def mill(*arguments: object) -> tuple[int, str]:
+    """The exit code of `python -m pipeline` with these arguments, and all that it printed."""
+    printed, before, code = io.StringIO(), sys.argv, 0
+    sys.argv = ["pipeline", *map(str, arguments)]
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed):
+            main()
+    except SystemExit as end:
+        code = int(str(end.code or 0))
+    finally:
+        sys.argv = before
+    return code, printed.getvalue()
