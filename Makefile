@@ -65,7 +65,7 @@ inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or 
 	@test -n '$(MESH)$(PROGRAM)' || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
 	$(if $(PROGRAM),$(PYTHON) -m stages.programs inspect '$(PROGRAM)' --out '$(OUT)/inspect')
 	$(if $(MESH),$(PYTHON) -m pipeline inspect '$(MESH)' --picture '$(OUT)/inspect/$(basename $(notdir $(MESH))).png')
-eval: setup  ## Print TABLE (physical: does it stand?) about the finished dataset; keep it as Markdown, CSV, LaTeX
+eval: setup  ## Print TABLE (physical: does it stand? near_twins: are splits apart?) about the finished dataset, and keep it
 	$(PYTHON) -m eval '$(TABLE)' --config $(CONFIG) --out $(OUT)
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	$(PYTHON) -m pipeline doctor --out $(OUT)

@@ -7,37 +7,54 @@ nearest points. It is told in units of the shape's own resampling distance: that
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 
 import numba
 import numpy as np
 
+from eval.shapes import split_shapes
 from eval.table import Table
+from pipeline.randomness import decision_rng
+from stages.points.surface import sample_shape
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["TWIN", "Nearest", "cloud_distance", "near_twins", "near_twins_table", "nearest_in_train"]
+__all__ = [
+    "TWIN",
+    "Clouds",
+    "Nearest",
+    "cloud_distance",
+    "dataset_clouds",
+    "near_twins",
+    "near_twins_table",
+    "nearest_in_train",
+]
+
+Clouds = Mapping[tuple[str, str], Sequence[tuple[FloatArray, FloatArray]]]
+"""By kit and split two independent clouds, float (n, 3), y up, of each shape."""
 
 TWIN = 1.25
 """A near-twin is at most so many resampling distances from a shape of train."""
+POINTS = 2048
+"""Points of a cloud."""
 COARSE = 256
 """Points of the clouds by which those shapes of train are chosen that are looked at closely."""
-LOOKED_AT = 12
+LOOKED_AT = 8
 """So many shapes of train, each in one turn, are looked at closely for each shape."""
-STEPS = 4
+STEPS = 3
 """So many times two clouds are moved upon each other."""
 
 _TURNS = [np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
 
-COLUMNS = ("shapes of", "split", "shapes", "near-twins", "near-twins %", "least", "median", "train median")
+COLUMNS = ("shapes of", "split", "shapes", "near-twins", "near-twins %", "least", "median")
 
 NOTES = (
     "Distances to the nearest shape of train, in resampling distances of the shape: symmetric mean chamfer distance of "
     "clouds of equally many points, uniform by area, laid upon each other by their centroids, in the best of four "
     f"quarter turns about the vertical, and moved {STEPS} times by the median step to the nearest points; 1 is the "
-    f"distance of two independent clouds of one shape. Near-twins: at most {TWIN:g}. Train median: the same from "
-    "shapes of train, as many, to others of train.",
+    f"distance of two independent clouds of one shape. Near-twins: at most {TWIN:g}.",
 )
 
 
@@ -54,19 +71,27 @@ def near_twins(nearest: Sequence[Nearest]) -> BoolArray:
     return np.array([each.distance <= TWIN for each in nearest], dtype=np.bool_)
 
 
-def near_twins_table(clouds: Mapping[tuple[str, str], Sequence[tuple[FloatArray, FloatArray]]]) -> Table:
-    """One row for each kit and each of its splits but train.
+def dataset_clouds(folder: Path, seed: int) -> Clouds:
+    """The clouds of a finished dataset, of POINTS points, in its coordinates; 0.1 MB a shape.
 
-    clouds: by kit and split two independent clouds float (n, 3) of each shape, y up.
+    Raises ConfigError where no dataset stands in `folder`.
     """
+    clouds: dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]] = {}
+    for kit, split, key, shape in split_shapes(folder):
+        first, second = decision_rng(seed, "near_twins", key).spawn(2)
+        both = sample_shape(shape, POINTS, first).points, sample_shape(shape, POINTS, second).points
+        clouds.setdefault((kit, split), []).append(both)
+    return clouds
+
+
+def near_twins_table(clouds: Clouds) -> Table:
+    """One row for each kit and each of its splits but train."""
     rows = []
     for (kit, split), asked in clouds.items():
         train = [first for first, _ in clouds.get((kit, "train"), ())]
         if split == "train" or not train or not asked:
             continue
         found = nearest_in_train(asked, train)
-        step = max(1, len(train) // len(asked))
-        within = nearest_in_train(clouds[kit, "train"][::step], train, own=range(0, len(train), step))
         distances = [each.distance for each in found]
         twins = int(near_twins(found).sum())
         rows.append(
@@ -78,33 +103,28 @@ def near_twins_table(clouds: Mapping[tuple[str, str], Sequence[tuple[FloatArray,
                 100 * twins / len(asked),
                 min(distances),
                 median(distances),
-                median(each.distance for each in within),
             )
         )
     return Table("Near-twins of train", COLUMNS, tuple(rows), NOTES)
 
 
-def nearest_in_train(
-    asked: Sequence[tuple[FloatArray, FloatArray]], train: Sequence[FloatArray], own: Iterable[int] = ()
-) -> list[Nearest]:
-    """The nearest of `train`, clouds float (n, 3), for each shape of `asked`, two independent clouds of it. Where `own`
-    says for each its own place in train, it is not its own nearest."""
+def nearest_in_train(asked: Sequence[tuple[FloatArray, FloatArray]], train: Sequence[FloatArray]) -> list[Nearest]:
+    """The nearest of `train`, clouds float (n, 3), for each shape of `asked`, two independent clouds of it.
+
+    The LOOKED_AT that are nearest by the first COARSE points of each cloud are looked at closely.
+    """
     centred = [_centred(cloud) for cloud in train]
     coarse = np.array([cloud[:COARSE] for cloud in centred])
-    places = list(own) or [-1] * len(asked)
     found = []
-    for (first, second), place in zip(asked, places, strict=True):
-        unit = _chamfer(np.asarray(first, np.float64), np.asarray(second, np.float64))
+    for first, second in asked:
+        unit = _mean_gap(_centred(first), np.asarray(second, np.float64) - np.mean(first, axis=0), steps=0)
         cloud = _centred(first)
         gaps = np.array([_coarse_distances(cloud[:COARSE] @ turn.T, coarse) for turn in _TURNS])
-        if place >= 0:
-            gaps[:, place] = np.inf
         turn_of, gap_of = gaps.argmin(axis=0), gaps.min(axis=0)
         best = Nearest(-1, np.inf)
         for other in np.argsort(gap_of, kind="stable")[:LOOKED_AT].tolist():
-            if np.isfinite(gap_of[other]):
-                distance = _settled_distance(cloud @ _TURNS[turn_of[other]].T, centred[other]) / unit
-                best = min(best, Nearest(other, distance), key=lambda each: each.distance)
+            distance = _mean_gap(cloud @ _TURNS[turn_of[other]].T, centred[other], STEPS) / unit
+            best = min(best, Nearest(other, distance), key=lambda each: each.distance)
         found.append(best)
     return found
 
@@ -112,7 +132,7 @@ def nearest_in_train(
 def cloud_distance(first: FloatArray, second: FloatArray) -> float:
     """The symmetric mean chamfer distance of two clouds float (n, 3), laid upon each other in the best quarter turn."""
     a, b = _centred(first), _centred(second)
-    return min(_settled_distance(a @ turn.T, b) for turn in _TURNS)
+    return min(_mean_gap(a @ turn.T, b, STEPS) for turn in _TURNS)
 
 
 def _centred(cloud: FloatArray) -> FloatArray:
@@ -121,25 +141,20 @@ def _centred(cloud: FloatArray) -> FloatArray:
     return centred
 
 
-def _chamfer(first: FloatArray, second: FloatArray) -> float:
+def _mean_gap(first: FloatArray, second: FloatArray, steps: int) -> float:
+    """The least symmetric mean chamfer distance while `first` is moved so many times by the median of the steps between
+    nearest points: a median, so that where most of two shapes is the same, the rest does not push them apart."""
     from scipy.spatial import cKDTree
 
-    there, back = cKDTree(second).query(first)[0], cKDTree(first).query(second)[0]
-    return float(there.mean() + back.mean()) / 2
-
-
-def _settled_distance(first: FloatArray, second: FloatArray) -> float:
-    """The least distance while `first` is moved by the median of the steps between nearest points: a median, so that
-    where most of two shapes is the same, the rest does not push them apart."""
-    from scipy.spatial import cKDTree
-
-    tree, least, moved = cKDTree(second), np.inf, first
-    for step in range(STEPS + 1):
-        there, to = tree.query(moved)
-        back, of = cKDTree(moved).query(second)
+    of_first, of_second = cKDTree(first), cKDTree(second)
+    least, shift = np.inf, np.zeros(3)
+    for step in range(steps + 1):
+        there, to = of_second.query(first + shift)
+        back, of = of_first.query(second - shift)
         least = min(least, float(there.mean() + back.mean()) / 2)
-        if step < STEPS:
-            moved = moved + np.median(np.concatenate([second[to] - moved, second - moved[of]]), axis=0)
+        if step < steps:
+            gaps = np.concatenate([second[to] - first, second - first[of]])
+            shift = np.median(gaps, axis=0)
     return least
 
 

@@ -21,6 +21,8 @@ LET_GO = -1
 REGIONS = (16, 8, 4, 2, 1)
 """Regions of a split, tried in turn until enough is left for train: many small regions show more of the pool, few large
 ones have less around them."""
+TRIES = 3
+"""So many cuts are tried for each number of regions."""
 RIVALS = 4
 """Variants drawn at random for each place; the one with least around it, or with little enough, is taken."""
 SOUNDED = 512
@@ -90,7 +92,7 @@ class _Ground:
 def _attempts(wanted: Mapping[str, int]) -> list[tuple[dict[str, int], int]]:
     """Sizes of val and test with numbers of regions, what is asked for first, nothing at all last."""
     sizes = {split: wanted[split] for split in ("test", "val")}
-    attempts = [(dict(sizes), regions) for regions in REGIONS]
+    attempts = [(dict(sizes), regions) for regions in REGIONS for _ in range(TRIES)]
     while any(sizes.values()):
         sizes = {split: size // 2 for split, size in sizes.items()}
         attempts.append((dict(sizes), 1))

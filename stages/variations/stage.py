@@ -75,7 +75,7 @@ def check(config: Config) -> None:
 
 STAGE = Stage(
     name="variations",
-    version=3,
+    version=4,
     config=VariationsConfig,
     inputs=("exemplars",),
     plan=plan,
