@@ -87,7 +87,7 @@ inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or 
 	@[ -z "$$PROGRAM" ] || $(PYTHON) -m stages.programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
 	@file=$${MESH##*/}; [ -z "$$MESH" ] || \
 	    $(PYTHON) -m pipeline inspect --picture "$$OUT/inspect/$${file%.*}.png" -- "$$MESH"
-eval: setup  ## Print TABLE (physical: does it stand?) about the finished dataset; keep it as Markdown, CSV, LaTeX
+eval: setup  ## Print TABLE (physical: does it stand? near_twins: are splits apart?) about the finished dataset, and keep it
 	@$(PYTHON) -m eval $(ASKED) -- "$$TABLE"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	@$(PYTHON) -m pipeline doctor --out "$$OUT"

@@ -1,9 +1,10 @@
 """`make eval`: prints a table about a dataset or about files, and keeps it as Markdown, CSV and LaTeX.
 
 python -m eval physical [--config YAML] [--out FOLDER] [--most N] [--dry N] [--up y|z] [FILE...]
+python -m eval near_twins [--config YAML] [--out FOLDER]
 
 FILE is a model (GLB, OBJ, ...) or an `.npz` of boxes; without any, the finished dataset of the config is measured. The
-table is written to `OUT/<dataset>-eval/physical.md`, `.csv` and `.tex`; of files it is only printed.
+table is written to `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`; of files it is only printed.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from eval.table import Table
+
 __all__ = ["main"]
 
-TABLES = ("physical",)
+TABLES = ("physical", "near_twins")
 
 
 def main(arguments: list[str]) -> int:
@@ -39,7 +42,7 @@ def main(arguments: list[str]) -> int:
     from pipeline.errors import ConfigError
 
     try:
-        return _physical(asked)
+        return _physical(asked) if asked.table == "physical" else _near_twins(asked)
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
@@ -50,7 +53,6 @@ def _physical(asked: argparse.Namespace) -> int:
     from eval.shapes import box_shapes, dataset_shapes, model_shapes
     from pipeline.config import load_config
     from pipeline.errors import ConfigError
-    from pipeline.places import write_whole
     from pipeline.registry import find_stages
     from stages.shape.physics.settings import PhysicsConfig
     from stages.shape.shape import Shape
@@ -69,14 +71,32 @@ def _physical(asked: argparse.Namespace) -> int:
         return 0
     config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
     shapes = dataset_shapes(asked.out / config.name, asked.most)
-    table = physical_table(shapes, config.section(PhysicsConfig), asked.dry)
-    folder = asked.out / f"{config.name}-eval"
+    _keep(
+        physical_table(shapes, config.section(PhysicsConfig), asked.dry), asked.out / f"{config.name}-eval", "physical"
+    )
+    return 0
+
+
+def _near_twins(asked: argparse.Namespace) -> int:
+    from eval.near_twins import dataset_clouds, near_twins_table
+    from pipeline.config import load_config
+    from pipeline.registry import find_stages
+
+    config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
+    clouds = dataset_clouds(asked.out / config.name, config.seed)
+    _keep(near_twins_table(clouds), asked.out / f"{config.name}-eval", "near_twins")
+    return 0
+
+
+def _keep(table: Table, folder: Path, name: str) -> None:
+    """Print a table and write it to a folder."""
+    from pipeline.places import write_whole
+
     folder.mkdir(parents=True, exist_ok=True)
     for suffix, text in (("md", table.markdown()), ("csv", table.csv()), ("tex", table.latex())):
-        write_whole(folder / f"physical.{suffix}", text.encode())
+        write_whole(folder / f"{name}.{suffix}", text.encode())
     print(table.markdown(), end="")
-    print(f"\nAlso in {folder}: physical.md, physical.csv, physical.tex")
-    return 0
+    print(f"\nAlso in {folder}: {name}.md, {name}.csv, {name}.tex")
 
 
 if __name__ == "__main__":

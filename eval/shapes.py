@@ -20,7 +20,7 @@ from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 
-__all__ = ["NO_CONTACTS", "box_shape", "box_shapes", "dataset_shapes", "model_shapes", "shared_meshes"]
+__all__ = ["NO_CONTACTS", "box_shape", "box_shapes", "dataset_shapes", "model_shapes", "shared_meshes", "split_shapes"]
 
 NO_CONTACTS = np.empty((0, 2), dtype=np.int32)
 QUADS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -45,6 +45,20 @@ def dataset_shapes(folder: Path, most: int) -> Iterator[tuple[str, Shape]]:
                 record = json.loads(members["json"])
                 yield str(record["kit"]), _sample_shape(record, members)
             number += 1
+
+
+def split_shapes(folder: Path) -> Iterator[tuple[str, str, str, Shape]]:
+    """Every shape of a finished dataset with its kit, its split and its key.
+
+    Raises ConfigError where no dataset stands in `folder`.
+    """
+    shards = sorted((folder / "data").glob("*/*.tar"))
+    if not shards:
+        raise ConfigError(f"no dataset stands in {folder}; make it first: make dataset CONFIG=...")
+    for shard in shards:
+        for key, members in read_shard(shard):
+            record = json.loads(members["json"])
+            yield str(record["kit"]), str(record["split"]), key, _sample_shape(record, members)
 
 
 def model_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:

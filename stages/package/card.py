@@ -33,13 +33,13 @@ LIMITS = (
 class Story:
     """How a dataset was made, in the words of its producer and its language.
 
-    made: how its samples come about; splits: what keeps the splits apart; coordinates: their units and their origin;
+    made: how its samples come about; splits: paragraphs on what keeps the splits apart; coordinates: their units and their origin;
     limits: what not to expect; paragraphs, variety: Markdown; rejects: refused items by reason; origins: what it was
     made from, and whose that is; unstated: a sentence for each of these without a licence.
     """
 
     made: str
-    splits: str
+    splits: Sequence[str]
     coordinates: str
     limits: Sequence[str]
     paragraphs: Sequence[str]
@@ -100,7 +100,7 @@ def card(
         split_table(splits, shards),
         source_table(sources, rows),
         "## How the splits are kept apart",
-        story.splits,
+        *story.splits,
         "## Part labels",
         class_table(classes, splits),
         *(["## How different they are", *story.variety] if story.variety else []),

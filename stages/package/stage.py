@@ -76,7 +76,7 @@ def plan(plan: Plan) -> list[Shard]:
         "apart": declared.apart,
         "story": {
             "made": declared.sentence,
-            "splits": declared.splits,
+            "splits": [declared.splits, *declared.nearness(plan)],
             "coordinates": language.coordinates,
             "limits": list(declared.limits),
             "paragraphs": list(declared.card(plan)),

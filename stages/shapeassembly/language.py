@@ -49,8 +49,13 @@ def _speaker(task: Task) -> Programs:
     return Programs(json.loads(listed.read_bytes()))
 
 
-def _anew(_: Places) -> Anew:
-    return lambda record, _: upright(shape_of_text(record["text"]))
+def _anew(places: Places) -> Anew:
+    """The executed program, its labels those of its category as the dataset lists them."""
+    labels: dict[str, list[str]] = {}
+    path = places.out / places.dataset / "classes.json"
+    for each in json.loads(path.read_bytes()) if path.is_file() else ():
+        labels.setdefault(each["kit"], []).append(each["name"])
+    return lambda record, _: upright(shape_of_text(record["text"], labels.get(record["kit"], ())))
 
 
 LANGUAGE = Language(

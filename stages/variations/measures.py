@@ -13,6 +13,7 @@ from stages.variations.edit_distance import edit_bounds
 from stages.variations.features import AXES, MIXED
 from stages.variations.meeting import meeting_words
 from stages.variations.settings import NoveltyConfig
+from stages.variations.split_report import shortage
 
 __all__ = ["SAMPLE", "described", "edit_measures", "growth", "measure_table", "pool_measures"]
 
@@ -65,14 +66,16 @@ def _share(holds: np.ndarray) -> float:
 def described(measures: Mapping[str, Any]) -> str:
     """The measures of the variants chosen from a pool, in words."""
     low, _, median, _, high = measures["parts"] or [0] * 5
-    edits, met = measures["edits"], _met(measures)
+    edits, met, short = measures["edits"], _met(measures), shortage(measures)
     return (
         f"chosen {measures['variants']:,} of {measures['pool']:,}: {measures['graphs']:,} distinct graphs, "
         f"{measures['histograms']:,} distinct histograms in {measures['cells']:,} cells; "
         f"{measures['mixed']:.0%} mix material of the exemplars, {measures['blended']:.0%} "
         f"their neighbourhoods; mean distance E to the nearest {measures['distance']:.2f}; "
         f"{edits['low']:.0f} to {edits['high']:.0f} edits from the nearest on a sample; "
-        f"{low:.0f} to {high:.0f} parts, median {median:.0f}" + (f"; {met}" if met else "")
+        f"{low:.0f} to {high:.0f} parts, median {median:.0f}"
+        + (f"; {met}" if met else "")
+        + (f"; fewer than asked for: {short}" if short else "")
     )
 
 

@@ -12,6 +12,7 @@ from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
 from stages.variations.measures import measure_table
+from stages.variations.split_report import splits_table
 
 __all__ = ["PRODUCER"]
 
@@ -20,6 +21,11 @@ def _measures(plan: Plan) -> Mapping[str, Any]:
     """What the variants of each kit are worth."""
     summary = plan.summary("variations", f"{plan.config.name}-assignment")
     return dict(summary["kits"]) if summary is not None else {}
+
+
+def _splits(plan: Plan) -> Sequence[str]:
+    measures = _measures(plan)
+    return [splits_table(measures)] if measures else []
 
 
 def _variety(plan: Plan) -> Sequence[str]:
@@ -86,8 +92,9 @@ PRODUCER = Producer(
     asked=lambda config: bool(config.section(ExemplarsConfig).kits),
     sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
     "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's "
-    "`lineage.parents` are exemplars, or variants by the `name` in their own `lineage`.",
+    "`lineage.parents` are samples of its own split, by their keys, and exemplars.",
     splits="Samples whose shape graphs are equal stand in one split.",
+    nearness=_splits,
     apart=True,
     lineage=_lineage,
     origins=exemplar_origins,

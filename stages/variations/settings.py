@@ -106,8 +106,22 @@ class SelectionConfig(StrictModel):
 class SplitConfig(StrictModel):
     """How the samples are shared out."""
 
-    val: float = Field(0.1, gt=0, lt=0.5, description="Share of distinct graphs in the validation split.")
-    test: float = Field(0.1, gt=0, lt=0.5, description="Share of distinct graphs in the test split.")
+    by: Literal["family", "graph"] = Field(
+        "family",
+        description="What stands whole in one split: near relatives, with a gap between splits (variants that share "
+        "much of their surface, parents and children, siblings of one cut, and equal graphs; what stands between two "
+        "splits is let go of, so ask for a larger pool, selection.oversample, where a split comes out short), or "
+        "equal graphs and no more.",
+    )
+    near: float = Field(
+        0.8,
+        ge=0.3,
+        le=1,
+        description="Share of the larger surface that two variants have in common, laid upon each other as well as "
+        "may be, from which on they are relatives; at 0.8 the point clouds of two splits are told apart.",
+    )
+    val: float = Field(0.1, gt=0, lt=0.5, description="Share of samples (by graph: of distinct ones) in validation.")
+    test: float = Field(0.1, gt=0, lt=0.5, description="Share of samples (by graph: of distinct ones) in test.")
     shards: int = Field(8, ge=1, description="Fewest shards of a split.")
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 

@@ -44,6 +44,7 @@ class Producer:
     lineage: what `Sample.lineage` of its samples holds beside `method` and `parents`, by name; the same fields of the
     same types in all samples of a dataset, and no value empty.
     origins: the files that its samples are made from, and whose they are.
+    nearness: Markdown for the card on how near the samples of each split are to train.
     card: paragraphs and tables for the card's section on how the dataset was made, from finished records.
     variety: Markdown for the card's section on how different the samples are.
     measures: figures for the manifest.
@@ -58,6 +59,7 @@ class Producer:
     limits: tuple[str, ...] = ()
     lineage: Callable[[Config], Mapping[str, Field]] = _no_lineage
     origins: Callable[[Config], Sequence[Origin]] = _no_origins
+    nearness: Callable[[Plan], Sequence[str]] = _nothing_to_add
     card: Callable[[Plan], Sequence[str]] = _nothing_to_add
     variety: Callable[[Plan], Sequence[str]] = _nothing_to_add
     measures: Callable[[Plan], Mapping[str, Any]] = _no_measures

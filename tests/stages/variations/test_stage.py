@@ -1,8 +1,9 @@
-"""The stage in the real mill: rounds, splits by structure, and an end where there is nothing more to find."""
+"""The stage in the real mill: rounds, splits by family or graph, and an end where there is nothing more to find."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,12 @@ import pytest
 import trimesh
 import yaml
 
+from pipeline.randomness import decision_rng
 from stages.shape.graphs.canonical import graph_digest
+from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
+from stages.shape.splits import SPLITS, share_out
+from stages.variations.shared_surface import PackedShapes
 from tests.mill import mill
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
 
@@ -74,6 +79,50 @@ def test_every_sample_is_whole_and_equal_graphs_stand_in_one_split(made: tuple[P
             assert {"parents", "boundary", "motion", "name"} <= set(sample.lineage)
     assert len(keys) >= 20
     assert set(split_of.values()) == {"train", "val", "test"}
+
+
+def test_parents_are_samples_of_the_same_split_or_exemplars_and_no_two_splits_share_much(
+    made: tuple[Path, str],
+) -> None:
+    folder, _ = made
+    samples = [sample for shard in collection(folder, "one") for sample in read_samples(shard)]
+    split_of = {sample.key: sample.split for sample in samples}
+    key_of = {sample.lineage["name"]: sample.key for sample in samples}
+    exemplars = {f"{kit}{number}" for kit in ("chain", "road") for number in (0, 1)}
+    resolved = 0
+    for sample in samples:
+        assert sample.lineage["parents"]
+        for parent in sample.lineage["parents"]:
+            assert parent in exemplars or split_of[parent] == sample.split
+        for made_of in sample.lineage["made_of"]:
+            resolved += made_of not in exemplars and made_of not in key_of
+            if made_of in key_of:
+                assert key_of[made_of] in sample.lineage["parents"]
+    assert resolved, "no parent was let go of, so nothing was tried here"
+    work = folder / "one" / ".work" / "toy"
+    for name in ("chain", "road"):
+        kit = load_kit(work / "exemplars" / f"{name}.json", work / "exemplars" / f"{name}.tar")
+        own = [sample for sample in samples if sample.kit == name]
+        shapes = PackedShapes(kit, [sample.assembly for sample in own], upright=True)
+        for place, sample in enumerate(own):
+            others = np.array([k for k, other in enumerate(own) if other.split != sample.split], dtype=np.int64)
+            assert not shapes.shares(place, others, 0.8).any()
+
+
+def test_by_graph_everything_found_is_shared_out_by_equal_graphs_alone(tmp_path: Path) -> None:
+    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}
+    make(tmp_path, "one", 1, per_kit=2000, search=search, splits={"by": "graph", "val": 0.2, "test": 0.3})
+    root = tmp_path / "one" / ".work" / "toy" / "variations"
+    kits = json.loads((root / "records" / "toy-assignment.json").read_text())["summary"]["kits"]
+    by_key = {sample.key: sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
+    groups: dict[tuple[str, str], list[int]] = {}
+    keys = [f"{kit}-{place:06d}" for kit in ("chain", "road") for place in range(kits[kit]["pool"])]
+    for row, key in enumerate(keys):
+        groups.setdefault((by_key[key].kit, by_key[key].graph), []).append(row)
+    expected = share_out(list(groups.values()), 0.2, 0.3, decision_rng(5, "variations", "toy-assignment", "splits"))
+    assert sorted(by_key) == sorted(keys)
+    assert [by_key[key].split for key in keys] == [SPLITS[split] for split in expected]
+    assert {kit: found["let_go"] for kit, found in kits.items()} == {"chain": 0, "road": 0}
 
 
 def test_two_workers_make_the_same_bytes(made: tuple[Path, str]) -> None:

@@ -1,0 +1,142 @@
+"""Families: val and test as regions of the pool, with a gap around each that is let go of.
+
+In a pool of variants everything is somebody's cousin: chains of near relatives join nearly all, so families cannot be
+found, they must be cut. A region is a variant drawn at random and others of those near it; whatever is near a member of
+a region may stand in no other split. What is near nothing in val or test is left for train.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.shape.splits import SPLITS
+
+__all__ = ["LET_GO", "Cut", "Near", "cut_families"]
+
+LET_GO = -1
+REGIONS = (16, 8, 4, 2, 1)
+"""Regions of a split, tried in turn until enough is left for train: many small regions show more of the pool, few large
+ones have less around them."""
+TRIES = 3
+"""So many cuts are tried for each number of regions."""
+RIVALS = 4
+"""Variants drawn at random for each place; the one with least around it, or with little enough, is taken."""
+SOUNDED = 512
+"""Variants of the pool on which is estimated how much is around a rival."""
+
+Indices = npt.NDArray[np.int64]
+Near = Callable[[int, Indices], Indices]
+"""Which of some others are so near to a variant that they may stand in no other split; symmetric."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """split_of: int8 (n,), for each variant of the pool where it may stand, counted as in SPLITS, or LET_GO; in train
+    there may be more than asked for. regions: how many val and test are made of."""
+
+    split_of: npt.NDArray[np.int8]
+    regions: int
+
+    def sizes(self, wanted: Mapping[str, int]) -> dict[str, int]:
+        """How many of those wanted of each split there are."""
+        return {split: min(wanted[split], int((self.split_of == SPLITS.index(split)).sum())) for split in SPLITS}
+
+
+def cut_families(near: Near, count: int, wanted: Mapping[str, int], rng: np.random.Generator) -> Cut:
+    """The splits of a pool of `count` variants, no two of different splits near each other.
+
+    Val and test have as many as wanted and train at least as many, if any number of regions leaves so many; else val
+    and test are halved until train has its share; and where the pool does not allow that either, the cut that gives
+    most of its share to the split that gets least.
+    """
+    ground = _Ground(near, count, np.sort(rng.permutation(count)[:SOUNDED]))
+    best, best_worth = Cut(np.zeros(count, dtype=np.int8), 0), (-1.0, -1)
+    for sizes, regions in _attempts(wanted):
+        cut = _grow(ground, sizes, max(count - sum(wanted.values()), 0), regions, rng)
+        got = cut.sizes(wanted)
+        worth = min((got[split] / wanted[split] for split in SPLITS if wanted[split]), default=1.0), sum(got.values())
+        if worth > best_worth:
+            best, best_worth = cut, worth
+        if got["train"] == wanted["train"]:
+            break
+    return best
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What is near what, remembered, in a pool of `count` variants, of which those `sounded` stand for all."""
+
+    near: Near
+    count: int
+    sounded: Indices
+    _around: dict[int, Indices] = field(default_factory=dict)
+    _heard: dict[int, Indices] = field(default_factory=dict)
+
+    def around(self, variant: int) -> Indices:
+        """All that is near a variant."""
+        if variant not in self._around:
+            self._around[variant] = self.near(variant, np.arange(self.count))
+        return self._around[variant]
+
+    def cost(self, variant: int, spent: npt.NDArray[np.bool_]) -> float:
+        """About how many that are not `spent` yet are near a variant."""
+        if variant not in self._heard:
+            self._heard[variant] = self.near(variant, self.sounded)
+        return float((~spent[self._heard[variant]]).sum() * self.count / len(self.sounded))
+
+
+def _attempts(wanted: Mapping[str, int]) -> list[tuple[dict[str, int], int]]:
+    """Sizes of val and test with numbers of regions, what is asked for first, nothing at all last."""
+    sizes = {split: wanted[split] for split in ("test", "val")}
+    attempts = [(dict(sizes), regions) for regions in REGIONS for _ in range(TRIES)]
+    while any(sizes.values()):
+        sizes = {split: size // 2 for split, size in sizes.items()}
+        attempts.append((dict(sizes), 1))
+    return attempts
+
+
+def _grow(ground: _Ground, sizes: Mapping[str, int], spare: int, regions: int, rng: np.random.Generator) -> Cut:
+    """Val and test grown to `sizes` at most, each of about so many regions; `spare` variants may be let go of."""
+    split_of = np.zeros(ground.count, dtype=np.int8)
+    touched = {split: np.zeros(ground.count, dtype=np.bool_) for split in sizes}
+    left, grown = dict(sizes), 0
+    while any(left.values()):
+        split = max(left, key=lambda each: left[each])
+        barred = (split_of > 0) | np.any([touched[each] for each in sizes if each != split], axis=0)
+        free = np.flatnonzero(~barred & ~touched[split])
+        if not len(free):
+            left[split] = 0
+            continue
+        size = min(left[split], -(-sizes[split] // regions))
+        gone = sum(int(each.sum()) for each in touched.values())
+        affordable = max(spare - gone, 0) * size / sum(left.values())
+        member = _cheapest(ground, free, touched[split], affordable, rng)
+        family = ground.around(member)
+        for _ in range(size):
+            split_of[member] = SPLITS.index(split)
+            touched[split][ground.around(member)] = True
+            left[split] -= 1
+            family = family[~barred[family] & (split_of[family] == 0)]
+            if not len(family):
+                break
+            member = _cheapest(ground, family, touched[split], 0.0, rng)
+        grown += 1
+    split_of[(split_of == 0) & np.any(list(touched.values()), axis=0)] = LET_GO
+    return Cut(split_of, grown)
+
+
+def _cheapest(
+    ground: _Ground, among: Indices, spent: npt.NDArray[np.bool_], affordable: float, rng: np.random.Generator
+) -> int:
+    """Of some variants drawn at random the first with no more around it than is affordable, or that with least."""
+    rivals: list[int] = rng.permutation(among)[:RIVALS].tolist()
+    costs = []
+    for rival in rivals:
+        costs.append(ground.cost(rival, spent))
+        if costs[-1] <= affordable:
+            return rival
+    return rivals[int(np.argmin(costs))]

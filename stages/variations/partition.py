@@ -1,0 +1,98 @@
+"""Which variants of a pool become samples, and in which split: by families with gaps between, or by equal graphs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.stage import Task
+from stages.shape.kit import Kit
+from stages.shape.splits import SPLITS
+from stages.variations.ancestry import Ancestry
+from stages.variations.backdrop import backdrop_of
+from stages.variations.families import LET_GO, Near, cut_families
+from stages.variations.pool import PoolIndex
+from stages.variations.selection import select
+from stages.variations.settings import SplitConfig, VariationsConfig
+from stages.variations.shared_surface import PackedShapes
+
+__all__ = ["Chosen", "choose_by_family", "nearness_of", "packed_shapes", "wanted_sizes"]
+
+COMPARED = 64
+"""So many shapes of val and of test at most are compared with train."""
+
+Indices = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The samples of a kit: variants int64 (k,), places in the pool, the most telling first; split_of int64 (k,),
+    counted as in SPLITS; let_go: variants of the pool that stand too near to others for any split."""
+
+    variants: Indices
+    split_of: Indices
+    let_go: int
+
+
+def wanted_sizes(count: int, splits: SplitConfig) -> dict[str, int]:
+    """How many of `count` samples each split is to get."""
+    val, test = round(splits.val * count), round(splits.test * count)
+    return {"train": count - val - test, "val": val, "test": test}
+
+
+def packed_shapes(task: Task, kit: Kit, pool: PoolIndex, variants: Indices) -> PackedShapes:
+    """Some variants of a pool with their backdrops, ready to be laid upon each other."""
+    backdrop = backdrop_of(task, kit.name)
+    assemblies = (backdrop.fit(found.assembly(at)[0]) for found, at in pool.variants(task, variants.tolist()))
+    return PackedShapes(kit, assemblies, task.config.section(VariationsConfig).search.upright)
+
+
+def choose_by_family(
+    kit: Kit, pool: PoolIndex, ancestry: Ancestry, shapes: PackedShapes, config: VariationsConfig,
+    rng: np.random.Generator,
+) -> Chosen:  # fmt: skip
+    """The samples of a kit, no two of different splits near: alike in graph, parent and child, siblings of one cut, or
+    sharing `config.splits.near` of their surface or more. Train is what differs most among what may stand there."""
+    wanted = wanted_sizes(min(config.per_kit, len(pool)), config.splits)
+    cut = cut_families(_near(pool, ancestry, shapes, config.splits.near), len(pool), wanted, rng)
+    taken = [np.flatnonzero(cut.split_of == SPLITS.index(split)) for split in SPLITS]
+    able = taken[0]
+    taken[0] = able[select(kit, pool.counts[able], pool.features[able], wanted["train"], config.selection, rng)]
+    variants = np.concatenate(taken)
+    split_of = np.repeat(np.arange(len(SPLITS)), [len(each) for each in taken])
+    order = select(kit, pool.counts[variants], pool.features[variants], len(variants), config.selection, rng)
+    return Chosen(variants[order], split_of[order], int((cut.split_of == LET_GO).sum()))
+
+
+def _near(pool: PoolIndex, ancestry: Ancestry, shapes: PackedShapes, least: float) -> Near:
+    kin = ancestry.kin()
+    _, graph_of = np.unique(pool.digests[:, 0], axis=0, return_inverse=True)
+    graph_of = graph_of.reshape(-1)
+
+    def near(variant: int, among: Indices) -> Indices:
+        close = np.isin(among, kin[variant]) | (graph_of[among] == graph_of[variant])
+        rest = np.flatnonzero(~close)
+        close[rest[shapes.shares(variant, among[rest], least, least) > 0.0]] = True
+        found: Indices = among[close & (among != variant)]
+        return found
+
+    return near
+
+
+def nearness_of(shapes: PackedShapes, split_of: Indices) -> dict[str, dict[str, float]]:
+    """How much of their surface the shapes of val and of test share with the nearest of train: median and most, to
+    three digits, over at most COMPARED of each, evenly spread; for splits that have any.
+
+    shapes: the samples of a kit; split_of: int64 (k,), theirs.
+    """
+    train, nearness = np.flatnonzero(split_of == 0), {}
+    for split in SPLITS[1:]:
+        own = np.flatnonzero(split_of == SPLITS.index(split))
+        compared = own[:: max(1, -(-len(own) // COMPARED))]
+        if len(train) and len(own):
+            most = [shapes.most_shared(each, train) for each in compared.tolist()]
+            median, greatest = round(float(np.median(most)), 3), round(max(most), 3)
+            nearness[split] = {"compared": len(compared), "median": median, "most": greatest}
+    return nearness

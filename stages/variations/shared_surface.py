@@ -1,0 +1,243 @@
+"""Shared surface: how much of two shapes is the same when they are laid upon each other as well as may be.
+
+That is what point clouds see. Parts coincide where parts of one type have one centroid; their area, as a share of the
+larger surface, is the measure: 1 for copies, and above about 0.8 two clouds are hardly farther apart than two samplings
+of one shape. Motions are those that lay a part upon a part of its type, so a shared piece is found wherever it stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from stages.shape.arrays import Float32Array, FloatArray, IntArray
+from stages.shape.kit import Assembly, Kit
+
+__all__ = ["PackedShapes"]
+
+SEEDS = 24
+"""Parts of each shape, drawn by area, by which motions are found and first judged."""
+SPARE_MISSES = 3
+"""So many seeds more may miss than a share lets expect."""
+TOLERANCE = 4.0
+"""Largest gap of centroids that coincide, in the kit's pose tolerance: poses drift from docking to docking."""
+BATCH = 16
+"""Shapes that are asked at once for the largest share."""
+UPRIGHT = 1.0 - 1e-3
+"""Cosine from which on a motion leaves up where it is."""
+
+Indices = npt.NDArray[np.int64]
+
+
+class _Tables(NamedTuple):
+    """Shapes as kernels see them.
+
+    area: float64 (types,); symmetries: float64 (s, 3, 3) of all types, those of type t from `symmetries_from[t]`;
+    centres: float32 (n, 3), and turns: int32 (n,) rows of rotations, float64 (r, 3, 3), of the parts of all shapes, by
+    shape and type, then by x; firsts: int64 (shapes, types + 1), where the parts of a shape and type begin; seeds:
+    int64 (shapes, SEEDS) parts, and kinds: int64, their types; areas: float64 (shapes,); up: the axis that motions
+    leave where it is, or -1; tolerance: the largest gap of centroids that coincide.
+    """
+
+    area: FloatArray
+    symmetries: FloatArray
+    symmetries_from: Indices
+    centres: Float32Array
+    turns: IntArray
+    rotations: FloatArray
+    firsts: Indices
+    seeds: Indices
+    kinds: Indices
+    areas: FloatArray
+    up: int
+    tolerance: float
+
+
+class PackedShapes:
+    """The parts of many assemblies of one kit in a few flat arrays, about 20 bytes a part.
+
+    upright: whether shapes are laid upon each other by turns about the vertical only.
+    """
+
+    def __init__(self, kit: Kit, assemblies: Iterable[Assembly], upright: bool) -> None:
+        area = np.array([_surface_area(each.vertices, each.faces) for each in kit.types])
+        centroids = np.stack([each.centroid for each in kit.types])
+        rotations: dict[bytes, int] = {}
+        kept: list[FloatArray] = []
+        firsts, seeds, kinds, centres, turns = [], [], [], [], []
+        begin = 0
+        for assembly in assemblies:
+            turn_of, place = assembly.poses[:, :3, :3], assembly.poses[:, :3, 3]
+            centre = np.einsum("nij,nj->ni", turn_of, centroids[assembly.types]) + place
+            order = np.lexsort((centre[:, 0], assembly.types))
+            own, numbers = assembly.types[order], []
+            for turn in turn_of[order]:
+                key = np.round(turn * 1e4).astype(np.int16).tobytes()
+                if key not in rotations:
+                    rotations[key] = len(kept)
+                    kept.append(turn)
+                numbers.append(rotations[key])
+            drawn = _seeds(area[own])
+            centres.append(centre[order].astype(np.float32))
+            turns.append(np.array(numbers, dtype=np.int32))
+            firsts.append(begin + np.searchsorted(own, np.arange(len(area) + 1)))
+            seeds.append(begin + drawn)
+            kinds.append(own[drawn])
+            begin += len(own)
+        first = np.array(firsts, dtype=np.int64).reshape(-1, len(area) + 1)
+        self._counts = np.diff(first, axis=1)
+        self._tables = _Tables(
+            area=area,
+            symmetries=np.concatenate([each.symmetries[:, :3, :3] for each in kit.types]),
+            symmetries_from=np.cumsum([0, *(len(each.symmetries) for each in kit.types)]),
+            centres=np.concatenate([np.empty((0, 3), np.float32), *centres]),
+            turns=np.concatenate([np.empty(0, np.int32), *turns]),
+            rotations=np.array(kept).reshape(-1, 3, 3),
+            firsts=first,
+            seeds=np.array(seeds, dtype=np.int64).reshape(-1, SEEDS),
+            kinds=np.array(kinds, dtype=np.int64).reshape(-1, SEEDS),
+            areas=self._counts @ area,
+            up={"y": 1, "z": 2}[kit.up] if upright else -1,
+            tolerance=TOLERANCE * kit.pose_tolerance,
+        )
+
+    def __len__(self) -> int:
+        return len(self._counts)
+
+    def shares(self, shape: int, others: Indices, least: float, enough: float = 1.0) -> FloatArray:
+        """The surface that a shape shares with each of `others`, float64 (k,), as a share of the larger of the two;
+        0 where it is less than `least`, and perhaps too little where it is more than `enough`."""
+        found: FloatArray = np.zeros(len(others))
+        able = np.flatnonzero(self._bounds(shape, others) >= least)
+        found[able] = _shares(self._tables, shape, others[able], least, enough)
+        return found
+
+    def most_shared(self, shape: int, others: Indices) -> float:
+        """The largest share that a shape has with one of `others`; those that may share most are asked first."""
+        bounds = self._bounds(shape, others)
+        order, most = np.argsort(-bounds, kind="stable"), 0.0
+        for start in range(0, len(order), BATCH):
+            batch = order[start : start + BATCH]
+            if bounds[batch[0]] <= most:
+                break
+            most = max(most, float(self.shares(shape, others[batch], most).max()))
+        return most
+
+    def _bounds(self, shape: int, others: Indices) -> FloatArray:
+        """What a shape can share with others at most, by the types of their parts, float64 (k,)."""
+        common = np.minimum(self._counts[shape], self._counts[others]) @ self._tables.area
+        bounds: FloatArray = common / np.maximum(self._tables.areas[shape], self._tables.areas[others])
+        return bounds
+
+
+def _surface_area(vertices: FloatArray, faces: np.ndarray) -> float:
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def _seeds(areas: FloatArray) -> Indices:
+    """SEEDS parts, evenly spread over the surface of a shape, int64, in a scattered order."""
+    reach = areas.cumsum()
+    at = (np.arange(SEEDS) * 7 % SEEDS + 0.5) / SEEDS * reach[-1]
+    seeds: Indices = np.searchsorted(reach, at).clip(0, len(areas) - 1)
+    return seeds
+
+
+@numba.njit(cache=True)
+def _shares(tables, shape, others, least, enough):  # type: ignore[no-untyped-def]
+    found = np.zeros(len(others))
+    motion = np.empty((3, 4))
+    work = np.empty(SEEDS, dtype=np.int64)
+    own, area = tables.seeds[shape], tables.areas[shape]
+    for place in range(len(others)):
+        other = others[place]
+        larger = max(area, tables.areas[other])
+        # So many of the seeds may miss; of one more than that, however chosen, one must hit: the cheapest are tried.
+        misses = min(int(SEEDS * (1.0 - least * larger / area) + 1e-9) + SPARE_MISSES, SEEDS - 1)
+        for seed in range(SEEDS):
+            kind = tables.kinds[shape, seed]
+            targets = tables.firsts[other, kind + 1] - tables.firsts[other, kind]
+            work[seed] = targets * (tables.symmetries_from[kind + 1] - tables.symmetries_from[kind])
+        best = 0.0
+        for seed in np.argsort(work, kind="mergesort")[: misses + 1]:
+            met = _most_of_seed(tables, shape, other, own[seed], misses, min(enough * larger, 0.999 * area), motion)
+            best = max(best, met)
+            if best >= min(enough * larger, 0.999 * area):
+                break
+        if best >= least * larger:
+            found[place] = best / larger
+    return found
+
+
+@numba.njit(cache=True)
+def _most_of_seed(tables, shape, other, part, misses, enough, motion):  # type: ignore[no-untyped-def]
+    """The largest area that coincides, or the first that is `enough`, under a motion that lays a part of a shape upon
+    one of the other's."""
+    best = 0.0
+    kind = np.searchsorted(tables.firsts[shape], part, side="right") - 1
+    for target in range(tables.firsts[other, kind], tables.firsts[other, kind + 1]):
+        for symmetry in range(tables.symmetries_from[kind], tables.symmetries_from[kind + 1]):
+            _lay_upon(tables, part, target, tables.symmetries[symmetry], motion)
+            if tables.up >= 0 and motion[tables.up, tables.up] < UPRIGHT:
+                continue
+            missed = 0
+            for seed in range(SEEDS):
+                if not _meets(tables, motion, tables.seeds[shape, seed], other, tables.kinds[shape, seed]):
+                    missed += 1
+                    if missed > misses:
+                        break
+            if missed > misses:
+                continue
+            met = 0.0
+            for each_kind in range(len(tables.area)):
+                for each in range(tables.firsts[shape, each_kind], tables.firsts[shape, each_kind + 1]):
+                    if _meets(tables, motion, each, other, each_kind):
+                        met += tables.area[each_kind]
+            best = max(best, met)
+            if best >= enough:
+                return best
+    return best
+
+
+@numba.njit(cache=True)
+def _lay_upon(tables, part, target, symmetry, motion):  # type: ignore[no-untyped-def]
+    """The motion (3, 4) that takes a part to another of its type, turned by a symmetry."""
+    rotation, onto = tables.rotations[tables.turns[part]], tables.rotations[tables.turns[target]]
+    centre, there = tables.centres[part], tables.centres[target]
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                for m in range(3):
+                    total += onto[i, k] * symmetry[k, m] * rotation[j, m]
+            motion[i, j] = total
+    for i in range(3):
+        moved = motion[i, 0] * centre[0] + motion[i, 1] * centre[1] + motion[i, 2] * centre[2]
+        motion[i, 3] = there[i] - moved
+
+
+@numba.njit(cache=True)
+def _meets(tables, motion, part, other, kind):  # type: ignore[no-untyped-def]
+    """Whether a part, moved, has the centroid of a part of its type in the other shape."""
+    a, b, c = tables.centres[part, 0], tables.centres[part, 1], tables.centres[part, 2]
+    x = motion[0, 0] * a + motion[0, 1] * b + motion[0, 2] * c + motion[0, 3]
+    y = motion[1, 0] * a + motion[1, 1] * b + motion[1, 2] * c + motion[1, 3]
+    z = motion[2, 0] * a + motion[2, 1] * b + motion[2, 2] * c + motion[2, 3]
+    low, end = tables.firsts[other, kind], tables.firsts[other, kind + 1]
+    high = end
+    while low < high:
+        middle = (low + high) // 2
+        if tables.centres[middle, 0] < x - tables.tolerance:
+            low = middle + 1
+        else:
+            high = middle
+    while low < end and tables.centres[low, 0] <= x + tables.tolerance:
+        centre = tables.centres[low]
+        if abs(centre[1] - y) <= tables.tolerance and abs(centre[2] - z) <= tables.tolerance:
+            return True
+        low += 1
+    return False
