@@ -33,7 +33,8 @@ LIMITS = (
 class Story:
     """How a dataset was made, in the words of its producer and its language.
 
-    made: how its samples come about; splits: paragraphs on what keeps the splits apart; coordinates: their units and their origin;
+    made: how its samples come about; splits: paragraphs on what keeps the splits apart; coordinates: their units and
+    their origin;
     limits: what not to expect; paragraphs, variety: Markdown; rejects: refused items by reason; origins: what it was
     made from, and whose that is; unstated: a sentence for each of these without a licence.
     """
