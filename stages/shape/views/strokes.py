@@ -52,28 +52,31 @@ def find_strokes(seen: Visible, crease_angle: float, step: float, shortest: floa
     crease_angle: degrees between the normals of two faces above which their edge is drawn. step: smallest jump in
     depth that is a contour; shortest: connected lines shorter in all than this are left out; both in pixels.
     """
-    across, across_kind, down, down_kind = _crossings(_drawn(seen), _thresholds(seen, crease_angle, step))
+    across, across_kind, down, down_kind = _crossings(
+        seen.triangles, _triangles(seen), _parts(seen), _thresholds(seen, crease_angle, step), seen.view.projection
+    )
     ends, kinds, nodes = _join(across, across_kind, down, down_kind)
     kept = _long_enough(ends, nodes, shortest)
     return Strokes(ends[kept], kinds[kept])
 
 
-class _Drawn(NamedTuple):
-    """What the kernels walk on. Of the view: triangles int32 (h, w), the triangle that each pixel shows or -1, screen
-    float64 (t, 3, 3), normals float64 (t, 3) of all triangles, projection float64 (4, 4). Of each triangle: parts
-    (t,), its part, and faces (t,), its face in its mesh. Of each part: triangle_first, face_first, where those of its
-    begin, and layers. neighbours (f, 3): the faces beside each face of the meshes, or -1."""
+class _Triangles(NamedTuple):
+    """All triangles of a view: where they stand on the screen, float64 (t, 3, 3), their normals, float64 (t, 3), the
+    face of each in its mesh, (t,), and the neighbours of each face of the meshes, or -1, (f, 3)."""
 
-    triangles: np.ndarray
     screen: np.ndarray
     normals: np.ndarray
-    projection: np.ndarray
-    parts: np.ndarray
     faces: np.ndarray
-    triangle_first: np.ndarray
-    face_first: np.ndarray
-    layers: np.ndarray
     neighbours: np.ndarray
+
+
+class _Parts(NamedTuple):
+    """Whose the triangles are: the part of each, (t,), and by part what is to be added to a face for its triangle, and
+    the layer, both (n,)."""
+
+    of: np.ndarray
+    shifts: np.ndarray
+    layers: np.ndarray
 
 
 class _Thresholds(NamedTuple):
@@ -90,20 +93,14 @@ class _Thresholds(NamedTuple):
     perspective: bool
 
 
-def _drawn(seen: Visible) -> _Drawn:
+def _triangles(seen: Visible) -> _Triangles:
+    return _Triangles(seen.screen, seen.normals, seen.scene.triangle_face, seen.scene.meshes.neighbours)
+
+
+def _parts(seen: Visible) -> _Parts:
     scene = seen.scene
-    return _Drawn(
-        triangles=seen.triangles,
-        screen=seen.screen,
-        normals=seen.normals,
-        projection=seen.view.projection,
-        parts=scene.triangle_part,
-        faces=scene.triangle_face,
-        triangle_first=scene.triangle_first,
-        face_first=scene.meshes.face_first[scene.mesh_of],
-        layers=scene.layers,
-        neighbours=scene.meshes.neighbours,
-    )
+    shifts = scene.triangle_first[:-1] - scene.meshes.face_first[scene.mesh_of]
+    return _Parts(scene.triangle_part, shifts, scene.layers)
 
 
 def _thresholds(seen: Visible, crease_angle: float, step: float) -> _Thresholds:
@@ -131,15 +128,14 @@ def _cosine(normals, a, b):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _walk(drawn, crease, start, goal, p, q):
-    """Walk on the surface from triangle `start` at the point `p` of the screen straight to the point `q`.
+def _walk(triangles, shift, crease, start, goal, p, q):
+    """Walk on the surface from triangle `start` at the point `p` of the screen straight to the point `q`;
+    `shift` is that of its part.
 
     Returns (arrived, s, last, sharp): whether the walk ended on `goal`; the share of the way where the surface ends
     (1 if it reaches q); the last triangle; the share of the way at the sharpest edge above the crease angle, or -1.
     """
-    screen, neighbours, faces = drawn.screen, drawn.neighbours, drawn.faces
-    part = drawn.parts[start]
-    shift = drawn.triangle_first[part] - drawn.face_first[part]
+    screen, normals, faces, neighbours = triangles
     triangle, entry = start, -1
     s, sharp, sharpest = 0.0, -1.0, crease
     for _ in range(MOST_STEPS):
@@ -173,7 +169,7 @@ def _walk(drawn, crease, start, goal, p, q):
         corner = (back + 2) % 3
         if _side(screen, triangle, exit_edge, screen[following, corner, 0], screen[following, corner, 1]) / area >= 0.0:
             return False, s, triangle, sharp
-        cosine = _cosine(drawn.normals, triangle, following)
+        cosine = _cosine(normals, triangle, following)
         if cosine < sharpest:
             sharp, sharpest = s, cosine
         triangle, entry = following, back
@@ -181,33 +177,34 @@ def _walk(drawn, crease, start, goal, p, q):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _between(drawn, thresholds, a, b, p, q):
+def _between(triangles, parts, thresholds, projection, a, b, p, q):
     """Kind and place (share of the way from p to q) of the line between the pixels at `p` and `q` of the screen, which
     show the triangles `a` and `b`, one of them perhaps none."""
-    crease, parts, layers = thresholds.crease, drawn.parts, drawn.layers
+    screen, normals, crease = triangles.screen, triangles.normals, thresholds.crease
     if b < 0:
-        return OUTLINE, _walk(drawn, crease, a, -1, p, q)[1]
+        return OUTLINE, _walk(triangles, parts.shifts[parts.of[a]], crease, a, -1, p, q)[1]
     if a < 0:
-        return OUTLINE, 1.0 - _walk(drawn, crease, b, -1, q, p)[1]
-    one_part = parts[a] == parts[b]
-    arrived, end_a, last_a, sharp = _walk(drawn, crease, a, b if one_part else -1, p, q)
+        return OUTLINE, 1.0 - _walk(triangles, parts.shifts[parts.of[b]], crease, b, -1, q, p)[1]
+    part_a, part_b = parts.of[a], parts.of[b]
+    goal_a, goal_b = (b, a) if part_a == part_b else (-1, -1)
+    arrived, end_a, last_a, sharp = _walk(triangles, parts.shifts[part_a], crease, a, goal_a, p, q)
     if arrived:
-        return _on_one_surface(drawn.normals, thresholds.rounded, a, b, sharp)
-    arrived, end_b, last_b, sharp = _walk(drawn, crease, b, a if one_part else -1, q, p)
+        return _on_one_surface(normals, thresholds.rounded, a, b, sharp)
+    arrived, end_b, last_b, sharp = _walk(triangles, parts.shifts[part_b], crease, b, goal_b, q, p)
     if arrived:
-        kind, s = _on_one_surface(drawn.normals, thresholds.rounded, b, a, sharp)
+        kind, s = _on_one_surface(normals, thresholds.rounded, b, a, sharp)
         return kind, 1.0 - s
     start_b = 1.0 - end_b
     # How much farther the surface of a is than that of b, where that of b begins and where that of a ends.
-    at_start = _gap(drawn.screen, drawn.projection, last_a, last_b, p, q, start_b)
-    at_end = _gap(drawn.screen, drawn.projection, last_a, last_b, p, q, end_a)
-    depth = eye_depth(clip_at(drawn.screen, a, p[0], p[1]), drawn.projection)
+    at_start = _gap(screen, projection, last_a, last_b, p, q, start_b)
+    at_end = _gap(screen, projection, last_a, last_b, p, q, end_a)
+    depth = eye_depth(clip_at(screen, a, p[0], p[1]), projection)
     tolerance = thresholds.jump * (depth if thresholds.perspective else 1.0)
     if start_b >= end_a:
         s, gap = (start_b + end_a) / 2, min(abs(at_start), abs(at_end))
     elif max(abs(at_start), abs(at_end)) < 0.01 * tolerance:
         # Two faces in one plane: the part of the lower layer is seen up to its end.
-        s, gap = end_a if layers[parts[a]] <= layers[parts[b]] else start_b, 0.0
+        s, gap = end_a if parts.layers[part_a] <= parts.layers[part_b] else start_b, 0.0
     elif at_start < 0.0 < at_end:
         s, gap = start_b + (end_a - start_b) * at_start / (at_start - at_end), 0.0
     elif at_start + at_end < 0.0:
@@ -216,9 +213,9 @@ def _between(drawn, thresholds, a, b, p, q):
         s, gap = start_b, at_start
     if abs(gap) > tolerance:
         return CONTOUR, s
-    if not one_part:
+    if part_a != part_b:
         return BOUNDARY, s
-    if _cosine(drawn.normals, last_a, last_b) < crease:
+    if _cosine(normals, last_a, last_b) < crease:
         return CREASE, s
     return 0, 0.0
 
@@ -241,13 +238,13 @@ def _on_one_surface(normals, rounded, a, b, sharp):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _runs_on(drawn, crease, a, b):
+def _runs_on(triangles, crease, a, b):
     """Whether two triangles of one part share an edge that is neither sharp nor one where the surface turns away.
 
     Most pairs are like that, and need no walk.
     """
-    screen, neighbours, faces = drawn.screen, drawn.neighbours, drawn.faces
-    if _cosine(drawn.normals, a, b) < crease:
+    screen, normals, faces, neighbours = triangles
+    if _cosine(normals, a, b) < crease:
         return False
     for edge in range(3):
         if neighbours[faces[a], edge] == faces[b]:
@@ -260,27 +257,30 @@ def _runs_on(drawn, crease, a, b):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _crossings(drawn, thresholds):
-    """Lines between horizontal neighbours: share (h, w) of the way from pixel (r, c) to (r, c + 1) and kind (h, w);
+def _crossings(shown, triangles, parts, thresholds, projection):
+    """The lines between the pixels, of which each shows the triangle `shown` or none (-1).
+
+    Between horizontal neighbours: share (h, w) of the way from pixel (r, c) to (r, c + 1) and kind (h, w);
     and between vertical neighbours."""
-    triangles, parts = drawn.triangles, drawn.parts
-    height, width = triangles.shape
+    height, width = shown.shape
     across, down = np.zeros((height, width)), np.zeros((height, width))
     across_kind = np.zeros((height, width), dtype=np.uint8)
     down_kind = np.zeros((height, width), dtype=np.uint8)
     for r in range(height):
         for c in range(width):
-            a = triangles[r, c]
+            a = shown[r, c]
             for way in range(2):
                 r2, c2 = r + way, c + 1 - way
                 if r2 == height or c2 == width:
                     continue
-                b = triangles[r2, c2]
+                b = shown[r2, c2]
                 if a == b:
                     continue
-                if a >= 0 and b >= 0 and parts[a] == parts[b] and _runs_on(drawn, thresholds.crease, a, b):
+                one_part = a >= 0 and b >= 0 and parts.of[a] == parts.of[b]
+                if one_part and _runs_on(triangles, thresholds.crease, a, b):
                     continue
-                kind, s = _between(drawn, thresholds, a, b, (c + 0.5, r + 0.5), (c2 + 0.5, r2 + 0.5))
+                p, q = (c + 0.5, r + 0.5), (c2 + 0.5, r2 + 0.5)
+                kind, s = _between(triangles, parts, thresholds, projection, a, b, p, q)
                 if kind:
                     if way == 0:
                         across[r, c], across_kind[r, c] = s, kind
