@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["croissant"]
+__all__ = ["INDEX", "croissant"]
 
 VOCABULARY = {
     "@language": "en",

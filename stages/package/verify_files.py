@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.places import file_digest
 from pipeline.shards import bytes_array
+from stages.package.croissant import INDEX
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 
@@ -120,11 +121,16 @@ def _check_bytes(folder: Path, listed: Mapping[str, str], findings: FileFindings
 def _check_listing(
     listed: Mapping[str, str], manifest: Mapping[str, Any], croissant: Mapping[str, Any] | None, findings: FileFindings
 ) -> None:
-    """Manifest, checksums and Croissant name the same shards with the same digests."""
+    """Manifest, checksums and Croissant name the same shards with the same digests, Croissant also the index."""
     digests = {shard["path"]: shard["sha256"] for shard in manifest["shards"]}
     others = {CHECKSUMS: {file: digest for file, digest in listed.items() if file.startswith("data/")}}
     if croissant is not None:
-        others[CROISSANT] = {each["@id"]: each["sha256"] for each in croissant["distribution"] if "sha256" in each}
+        stated = {each["@id"]: each["sha256"] for each in croissant["distribution"] if "sha256" in each}
+        if stated.pop(INDEX, None) != manifest["index"]["sha256"]:
+            findings.fault(
+                "manifest", manifest["index"]["path"], f"{MANIFEST} and {CROISSANT} do not say the same of it"
+            )
+        others[CROISSANT] = stated
     findings.look("manifest", len(digests))
     for name, other in others.items():
         for file in sorted({*digests, *other}):
