@@ -15,7 +15,7 @@ from typing import Any
 
 from stages.package.layout import CLASSES
 
-__all__ = ["croissant"]
+__all__ = ["INDEX", "croissant"]
 
 VOCABULARY = {
     "@language": "en",

@@ -11,6 +11,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 from pipeline.places import file_digest
+from stages.package.croissant import INDEX
 from stages.package.findings import Findings
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, SCHEMA
 
@@ -162,7 +163,8 @@ def _check_listing(folder: Path, listed: Mapping[str, str], manifest: Mapping[st
         given = described.get("distribution")
         files = [each for each in given if isinstance(each, dict)] if isinstance(given, list) else []
         named = {str(each.get("@id")): each["sha256"] for each in files if "sha256" in each}
-        others[CROISSANT] = (named, {file: digests.get(file) for file in named} | shards)
+        own = digests | {INDEX: manifest["index"]["sha256"]}
+        others[CROISSANT] = (named, {file: own.get(file) for file in named} | shards)
     findings.look("manifest", len(digests))
     for name, (other, own) in others.items():
         for file in sorted({*own, *other}):

@@ -71,7 +71,7 @@ def test_a_torch_loader_of_four_workers_yields_each_sample_once(toy_folder: Path
 
 HUGGING_FACE = """
 import json, sys
-import datasets
+import datasets, numpy
 loaded = datasets.load_dataset(sys.argv[1], cache_dir=sys.argv[2])
 streamed = datasets.load_dataset(sys.argv[1], streaming=True, cache_dir=sys.argv[2])
 features = {name: str(kind) for name, kind in loaded["train"].features.items()}
@@ -85,7 +85,10 @@ print(json.dumps({
     "size": first["sketch0.png"].size,
     "points": [len(each["points.npy"]) for each in loaded["val"]],
     "contacts": {
-        each["__key__"]: each["contacts.npy"] for kind in (loaded, streamed) for split in kind for each in kind[split]
+        each["__key__"]: numpy.asarray(each["contacts.npy"]).tolist()
+        for kind in (loaded, streamed)
+        for split in kind
+        for each in kind[split]
     },
     "types": str(streamed["train"].features["contacts.npy"]),
 }))
