@@ -32,10 +32,12 @@ MESH    ?=
 PROGRAM ?=
 ## TABLE    the table that `make eval` prints
 TABLE   ?= physical
+## SAMPLES  how many samples `make verify` looks at by all means: a number, or all
+SAMPLES ?= 100
 
 # Their values are text, whatever stands in it: make expands none of it, and recipes read it from the environment, as
 # "$$CONFIG", so that no shell does. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM TABLE
+VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM TABLE SAMPLES
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -80,8 +82,8 @@ plan: setup  ## Show the shards, samples, disk and time that the whole dataset w
 	@$(PYTHON) -m pipeline plan $(HOW)
 status: setup  ## Show what is done, failed, rejected and left
 	@$(PYTHON) -m pipeline status $(HOW)
-verify: setup  ## Check the finished dataset: checksums, members, and shapes computed anew from their meshes
-	@$(PYTHON) -m pipeline verify $(ASKED) $(SEEDED)
+verify: setup  ## Look at the finished dataset: every file, every sample, and SAMPLES of them by all means
+	@$(PYTHON) -m pipeline verify $(HOW) --samples "$$SAMPLES"
 inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or what PROGRAM can make
 	@[ -n "$$MESH$$PROGRAM" ] || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
 	@[ -z "$$PROGRAM" ] || $(PYTHON) -m stages.programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
@@ -96,7 +98,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 .PHONY: test lint bench kits keys lock
 test: lint  ## Check style and types, then run the tests on WORKERS cores
-	$(PYTHON) -m pytest --numprocesses $(WORKERS) --dist worksteal
+	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist worksteal
 lint: setup  ## Check style and types
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .

@@ -9,15 +9,17 @@ from pipeline.config import Config
 from pipeline.places import Places, StagePlaces, file_digest
 from pipeline.records import ShardRecord, read_record
 from pipeline.stage import Stage
-from pipeline.survey import Survey
+from pipeline.survey import StageSurvey, Survey
 
 __all__ = ["damaged_files", "damaged_shards", "withdraw_damaged"]
 
 
 def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) -> Iterator[str]:
-    """A line for each stage that is unfinished and for each file whose bytes differ from its record.
+    """A line for each stage that is unfinished, for each file whose bytes differ from its record, and for each file in
+    the output folder that is not the one that a stage put there.
 
-    The record of a damaged shard is withdrawn, so that the next run makes that shard again and nothing else.
+    The record of a damaged shard is withdrawn, so that the next run makes that shard again and nothing else; it puts
+    published files back, too.
     """
     survey = Survey(config, stages, places)
     for name in stages:
@@ -29,6 +31,18 @@ def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) 
             for file in damaged_files(record, surveyed.places):
                 (surveyed.places.records / f"{shard}.json").unlink(missing_ok=True)
                 yield f"{name}: {file} is damaged; the next run makes {shard} again"
+        if not surveyed.missing:
+            yield from (f"{name}: {path} is not what the stage made" for path in _altered(surveyed, places))
+
+
+def _altered(surveyed: StageSurvey, places: Places) -> Iterator[Path]:
+    """The published files that are gone, or have other bytes than the stage gave them."""
+    for target, file in surveyed.stage.publish(surveyed.view).items():
+        path, made = places.out / target, surveyed.places.root / file
+        noted = surveyed.records[file.partition(".")[0]].files[file]["sha256"]
+        # what is linked has been looked at as a file of the shard
+        if not path.is_file() or not ((made.is_file() and path.samefile(made)) or file_digest(path) == noted):
+            yield path
 
 
 def damaged_files(record: ShardRecord, places: StagePlaces) -> list[Path]:

@@ -111,7 +111,11 @@ def status(
 
 @app.command(context_settings=_PASS_ON)
 def verify(
-    context: typer.Context, config: ConfigOption = DEFAULT_CONFIG, out: OutOption = DEFAULT_OUT, seed: SeedOption = None
+    context: typer.Context,
+    config: ConfigOption = DEFAULT_CONFIG,
+    out: OutOption = DEFAULT_OUT,
+    seed: SeedOption = None,
+    workers: WorkersOption = 1,
 ) -> None:
     """Check every byte against the records, then the finished dataset from its meshes."""
     from pipeline.check import damaged_shards
@@ -121,7 +125,7 @@ def verify(
     damages = list(damaged_shards(loaded, stages, Places(out, loaded.name)))
     for line in damages:
         print(line)
-    arguments = ["--config", str(config), "--out", str(out), *context.args]
+    arguments = ["--config", str(config), "--out", str(out), "--workers", str(workers), *context.args]
     if seed is not None:
         arguments += ["--seed", str(seed)]
     code = _entry(context, "package.verify")(arguments)

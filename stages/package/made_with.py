@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import tomllib
+from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pipeline
 import stages
+from pipeline.code import code_digest, reached
 
 __all__ = ["code_version", "library_versions"]
 
@@ -22,15 +24,19 @@ PROJECT = Path(pipeline.__file__).parent.parent / "pyproject.toml"
 def code_version() -> str:
     """The project's version and a digest of its code, `0.1.0+3f2a9c01d4e7`.
 
-    It is a function of the code alone, so that the same code says the same in a checkout, in a fresh clone and in a
-    copy without history, and an edited file says so by itself.
+    It is a function of what the code says alone, comments and docstrings aside, so that the same code says the same in
+    a checkout, in a fresh clone and in a copy without history, and an edited file says so by itself.
     """
-    digest = hashlib.sha256()
-    for package in (pipeline, stages):
-        for root in sorted(package.__path__):
-            for path in sorted(Path(root).rglob("*.py")):
-                digest.update(f"{package.__name__}/{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes())
-    return f"{_project()['version']}+{digest.hexdigest()[:12]}"
+    digest = code_digest(reached(name for package in (pipeline, stages) for name in _modules(package)))
+    return f"{_project()['version']}+{digest[:12]}"
+
+
+def _modules(package: ModuleType) -> Iterator[str]:
+    """The names of all modules of a package, wherever its folders lie."""
+    for root in map(Path, package.__path__):
+        for path in root.rglob("*.py"):
+            steps = path.relative_to(root).with_suffix("").parts
+            yield ".".join([package.__name__, *(steps[:-1] if steps[-1] == "__init__" else steps)])
 
 
 @cache

@@ -23,6 +23,7 @@ import numpy as np
 
 from pipeline.places import file_digest
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
+from stages.package.croissant import INDEX
 from stages.package.index import index_row, tar_bytes, write_index
 from stages.package.manifest import checksums
 from stages.package.verify import verify_dataset
@@ -382,6 +383,7 @@ def reseal(folder: Path) -> None:
         manifest["index"] |= {"sha256": file_digest(index), "bytes": index.stat().st_size}
         croissant = json.loads((folder / "croissant.json").read_text())
         digests = {shard["path"]: shard["sha256"] for shard in manifest["shards"]}
+        digests[INDEX] = manifest["index"]["sha256"]
         for each in croissant["distribution"]:
             if each["@id"] in digests:
                 each["sha256"] = digests[each["@id"]]
