@@ -22,7 +22,7 @@ REGIONS = (16, 8, 4, 2, 1)
 """Regions of a split, tried in turn until enough is left for train: many small regions show more of the pool, few large
 ones have less around them."""
 TRIES, NEARLY = 6, 0.9
-"""So many cuts are tried for each number of regions, as long as train gets nearly its share."""
+"""So many cuts are tried for each number of regions, of several only as long as train gets nearly its share."""
 RIVALS, MIDDLES = 4, 16
 """Variants drawn at random for each place, and for the middle of a region, that with least around it is taken; a middle
 with little enough at once."""
@@ -66,7 +66,7 @@ def cut_families(near: Near, count: int, wanted: Mapping[str, int], rng: np.rand
                 best, best_worth = cut, worth
             if got["train"] == wanted["train"]:
                 return best
-            if got["train"] < NEARLY * wanted["train"]:
+            if regions > 1 and got["train"] < NEARLY * wanted["train"]:
                 break
     return best
 
