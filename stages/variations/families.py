@@ -21,10 +21,11 @@ LET_GO = -1
 REGIONS = (16, 8, 4, 2, 1)
 """Regions of a split, tried in turn until enough is left for train: many small regions show more of the pool, few large
 ones have less around them."""
-TRIES = 3
-"""So many cuts are tried for each number of regions."""
-RIVALS = 4
-"""Variants drawn at random for each place; the one with least around it, or with little enough, is taken."""
+TRIES, NEARLY = 6, 0.9
+"""So many cuts are tried for each number of regions, of several only as long as train gets nearly its share."""
+RIVALS, MIDDLES = 4, 16
+"""Variants drawn at random for each place, and for the middle of a region, that with least around it is taken; a middle
+with little enough at once."""
 SOUNDED = 512
 """Variants of the pool on which is estimated how much is around a rival."""
 
@@ -56,13 +57,17 @@ def cut_families(near: Near, count: int, wanted: Mapping[str, int], rng: np.rand
     ground = _Ground(near, count, np.sort(rng.permutation(count)[:SOUNDED]))
     best, best_worth = Cut(np.zeros(count, dtype=np.int8), 0), (-1.0, -1)
     for sizes, regions in _attempts(wanted):
-        cut = _grow(ground, sizes, max(count - sum(wanted.values()), 0), regions, rng)
-        got = cut.sizes(wanted)
-        worth = min((got[split] / wanted[split] for split in SPLITS if wanted[split]), default=1.0), sum(got.values())
-        if worth > best_worth:
-            best, best_worth = cut, worth
-        if got["train"] == wanted["train"]:
-            break
+        for _ in range(TRIES):
+            cut = _grow(ground, sizes, wanted, regions, rng)
+            got = cut.sizes(wanted)
+            shares = [got[split] / wanted[split] for split in SPLITS if wanted[split]]
+            worth = min(shares, default=1.0), sum(got.values())
+            if worth > best_worth:
+                best, best_worth = cut, worth
+            if got["train"] == wanted["train"]:
+                return best
+            if regions > 1 and got["train"] < NEARLY * wanted["train"]:
+                break
     return best
 
 
@@ -92,19 +97,22 @@ class _Ground:
 def _attempts(wanted: Mapping[str, int]) -> list[tuple[dict[str, int], int]]:
     """Sizes of val and test with numbers of regions, what is asked for first, nothing at all last."""
     sizes = {split: wanted[split] for split in ("test", "val")}
-    attempts = [(dict(sizes), regions) for regions in REGIONS for _ in range(TRIES)]
+    attempts = [(dict(sizes), regions) for regions in REGIONS]
     while any(sizes.values()):
         sizes = {split: size // 2 for split, size in sizes.items()}
         attempts.append((dict(sizes), 1))
     return attempts
 
 
-def _grow(ground: _Ground, sizes: Mapping[str, int], spare: int, regions: int, rng: np.random.Generator) -> Cut:
-    """Val and test grown to `sizes` at most, each of about so many regions; `spare` variants may be let go of."""
+def _grow(
+    ground: _Ground, sizes: Mapping[str, int], wanted: Mapping[str, int], regions: int, rng: np.random.Generator
+) -> Cut:
+    """Val and test grown to `sizes` at most, each of about so many regions; given up where several regions leave far
+    less for train than is wanted."""
     split_of = np.zeros(ground.count, dtype=np.int8)
     touched = {split: np.zeros(ground.count, dtype=np.bool_) for split in sizes}
-    left, grown = dict(sizes), 0
-    while any(left.values()):
+    left, grown, rest = dict(sizes), 0, ground.count
+    while any(left.values()) and (regions == 1 or rest >= NEARLY * wanted["train"]):
         split = max(left, key=lambda each: left[each])
         barred = (split_of > 0) | np.any([touched[each] for each in sizes if each != split], axis=0)
         free = np.flatnonzero(~barred & ~touched[split])
@@ -112,9 +120,8 @@ def _grow(ground: _Ground, sizes: Mapping[str, int], spare: int, regions: int, r
             left[split] = 0
             continue
         size = min(left[split], -(-sizes[split] // regions))
-        gone = sum(int(each.sum()) for each in touched.values())
-        affordable = max(spare - gone, 0) * size / sum(left.values())
-        member = _cheapest(ground, free, touched[split], affordable, rng)
+        affordable = max(rest - wanted["train"], 0) * size / sum(left.values())
+        member = _cheapest(ground, rng.permutation(free)[:MIDDLES], touched[split], affordable)
         family = ground.around(member)
         for _ in range(size):
             split_of[member] = SPLITS.index(split)
@@ -123,20 +130,18 @@ def _grow(ground: _Ground, sizes: Mapping[str, int], spare: int, regions: int, r
             family = family[~barred[family] & (split_of[family] == 0)]
             if not len(family):
                 break
-            member = _cheapest(ground, family, touched[split], 0.0, rng)
+            member = _cheapest(ground, rng.permutation(family)[:RIVALS], touched[split], 0.0)
         grown += 1
+        rest = int((~np.any([split_of > 0, *touched.values()], axis=0)).sum())
     split_of[(split_of == 0) & np.any(list(touched.values()), axis=0)] = LET_GO
     return Cut(split_of, grown)
 
 
-def _cheapest(
-    ground: _Ground, among: Indices, spent: npt.NDArray[np.bool_], affordable: float, rng: np.random.Generator
-) -> int:
-    """Of some variants drawn at random the first with no more around it than is affordable, or that with least."""
-    rivals: list[int] = rng.permutation(among)[:RIVALS].tolist()
-    costs = []
-    for rival in rivals:
+def _cheapest(ground: _Ground, rivals: Indices, spent: npt.NDArray[np.bool_], affordable: float) -> int:
+    """Of some variants the first with no more around it than is affordable, or that with least."""
+    costs: list[float] = []
+    for rival in rivals.tolist():
         costs.append(ground.cost(rival, spent))
         if costs[-1] <= affordable:
-            return rival
-    return rivals[int(np.argmin(costs))]
+            return int(rival)
+    return int(rivals[int(np.argmin(costs))])

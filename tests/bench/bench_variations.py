@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from stages.variations.exchange.search import Search
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import TRY, Outcome
 from stages.variations.settings import NoveltyConfig, SearchConfig
+from stages.variations.shared_surface import PackedShapes
 from tests.bench.measure import Measure, rate
 
 SHIPPED = Path("datasets/exemplars")
@@ -53,6 +55,7 @@ def bench() -> Iterator[Measure]:
             yield Measure(f"new variants, {name}, {led}", "variants", ours, note=f"{len(found) / tries:.0%} of tries")
         if "castle" in name or "dungeon" in name:
             yield _validation(name, kit, line, found[-20:])
+            yield _relatives(name, kit, found[-200:])
 
 
 def _some(line: Search, rng: np.random.Generator, found: list[Assembly]) -> int:
@@ -67,6 +70,19 @@ def _kit(paths: tuple[Path, ...], kinds: tuple[Any, ...]) -> Kit:
     )
     kit, _ = build_kit(config, [read_model(path) for path in paths])
     return kit
+
+
+def _relatives(name: str, kit: Kit, assemblies: list[Assembly]) -> Measure:
+    """Pairs of variants of which is told whether they share four fifths of their surface."""
+    shapes, everything = PackedShapes(kit, assemblies, upright=True), np.arange(len(assemblies))
+    asked = cycle(everything.tolist())
+
+    def pairs() -> int:
+        shapes.shares(next(asked), everything, 0.8, 0.8)
+        return len(everything)
+
+    parts = int(np.mean([len(each) for each in assemblies]))
+    return Measure(f"near relatives, {name}", "pairs", rate(pairs, 1.5, 2), note=f"{parts} parts")
 
 
 def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -> Measure:
