@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from stages.programs.program import find_program, program_names
-from tests.stages.programs.truth import FOLDER, SEEDS, measured, swept
+from tests.stages.programs.truth import FOLDER, SEEDS, declared, measured, swept
 
 TOLERANCE = 1e-6
 
@@ -28,12 +28,14 @@ def test_there_is_a_file_for_each_program_and_no_other() -> None:
 
 
 @pytest.mark.parametrize("name", program_names())
-def test_the_parameters_have_their_bases_and_values(name: str) -> None:
-    schema, expected = find_program(name).schema, truth(name)
-    found = {name: [each.base, *each.values] for name, each in schema.by_name.items()}
-    assert list(found) == list(expected["parameters"])
-    assert found == {name: near(each) for name, each in expected["parameters"].items()}
-    assert schema.text(schema.base) == expected["shapes"][0]["values"]
+def test_labels_rules_and_parameters_are_declared_as_they_were(name: str) -> None:
+    program, expected = find_program(name), truth(name)
+    found = declared(program)
+    parameters = expected["declared"].pop("parameters")
+    assert list(found["parameters"]) == list(parameters)
+    assert found.pop("parameters") == {each: near(row) for each, row in parameters.items()}
+    assert found == expected["declared"]
+    assert program.schema.text(program.schema.base) == expected["shapes"][0]["values"]
 
 
 @pytest.mark.parametrize("place", range(1 + len(SEEDS)))
@@ -56,6 +58,6 @@ def test_every_value_of_every_parameter_does_what_it_did(name: str, place: int) 
 @pytest.mark.parametrize("name", program_names())
 def test_every_parameter_takes_effect_in_one_of_the_shapes(name: str) -> None:
     described = truth(name)
-    for parameter in described["parameters"]:
+    for parameter in described["declared"]["parameters"]:
         seen = [{tuple(each) for each in shape["swept"][parameter] if each} for shape in described["shapes"]]
         assert any(len(each) > 1 for each in seen), parameter

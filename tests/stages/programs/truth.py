@@ -1,5 +1,5 @@
-"""What the programs of the library make, written down in `tests/data/programs`: the parameters, each part at the base
-and at three random shapes, and the whole at every value of every parameter.
+"""What the programs of the library make, written down in `tests/data/programs`: what they declare, each part at the
+base and at three random shapes, and the whole at every value of every parameter.
 
 `python -m tests.stages.programs.truth` writes it anew, where a change of shapes is meant.
 """
@@ -16,6 +16,7 @@ import numpy as np
 from stages.programs.curves import Part
 from stages.programs.draws import Share
 from stages.programs.program import Program, find_program, program_names
+from stages.programs.repair import repaired
 from stages.programs.sampling import Sampler
 from stages.programs.schema import Values
 
@@ -28,20 +29,34 @@ ASIDE = (0.1, 0.2, 0.3)
 """A point that no symmetry of a shape leaves where it is, near enough to feel small changes."""
 
 
+def declared(program: Program) -> dict[str, Any]:
+    """What a program says of itself: of each parameter its group, when it is visible, its base and its values."""
+    return {
+        "labels": list(program.labels),
+        "constraints": {each.name: each.rule.text for each in program.constraints},
+        "apart": [list(pair) for pair in program.apart],
+        "elevation": program.elevation,
+        "parameters": {
+            each.name: [each.group, each.visible_if.text if each.visible_if else "", each.base, *each.values]
+            for each in program.parameters
+        },
+    }
+
+
 def measured(parts: Sequence[Part]) -> list[list[Any]]:
     """Of each part its label, colour, volume, lowest and highest corner."""
     return [[part.label, *part.color, part.mesh.volume, *part.mesh.bounds.ravel().tolist()] for part in parts]
 
 
 def swept(program: Program, values: Values, name: str) -> list[list[float]]:
-    """At each value of the parameter `name`, the others as in `values`: the volume of the whole and the mean distance
-    of its vertices from a point aside; nothing where that breaks a constraint."""
+    """At each value of the parameter `name`, the others as near to `values` as constraints let them: the volume of the
+    whole and the mean distance of its vertices from a point aside; nothing where no others would do."""
     found = []
     for value in program.schema.by_name[name].values:
-        changed = {**values, name: value}
-        parts = [] if program.broken(changed) else [part.mesh for part in program.parts(changed)]
-        away = [np.linalg.norm(mesh.vertices - ASIDE, axis=1) for mesh in parts]
-        found.append([sum(mesh.volume for mesh in parts), float(np.concatenate(away).mean())] if parts else [])
+        changed = repaired(program, {**values, name: value}, {name})
+        meshes = [part.mesh for part in program.parts(changed)] if changed is not None else []
+        away = [np.linalg.norm(mesh.vertices - ASIDE, axis=1) for mesh in meshes]
+        found.append([sum(mesh.volume for mesh in meshes), float(np.concatenate(away).mean())] if meshes else [])
     return found
 
 
@@ -50,7 +65,7 @@ def described(program: Program) -> dict[str, Any]:
     schema = program.schema
     drawn = [Sampler(program, Share(), between=True).find(None, np.random.default_rng(seed)) for seed in SEEDS]
     return {
-        "parameters": {name: [each.base, *each.values] for name, each in schema.by_name.items()},
+        "declared": declared(program),
         "shapes": [
             {
                 "values": schema.text(values),
