@@ -159,7 +159,7 @@ def _mean_gap(first: FloatArray, second: FloatArray, steps: int) -> float:
 
 
 @numba.njit(cache=True)
-def _coarse_distances(cloud, others):  # type: ignore[no-untyped-def]
+def _coarse_distances(cloud, others):
     """Symmetric mean chamfer distances of a cloud (n, 3) to each of `others` (k, n, 3), float64 (k,)."""
     k, n = others.shape[:2]
     distances = np.empty(k)

@@ -63,7 +63,7 @@ class Report:
     message: str = ""
     trace: str = ""
     damaged: str = ""
-    cpu_seconds: float = 0.0
+    cpu_seconds: float = field(default=0.0, compare=False)
 
 
 def make_shard(job: Job) -> Report:

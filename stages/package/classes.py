@@ -12,7 +12,7 @@ import numpy as np
 from stages.shape.collection.classes import Classes
 from stages.shape.shape import Shape
 
-__all__ = ["ClassTally", "class_table", "table_bytes"]
+__all__ = ["ClassTally", "counted_classes", "table_bytes"]
 
 UNSEEN = (160, 160, 160)
 """The colour of a class that has none of its own and of which there is no part."""
@@ -44,7 +44,7 @@ class ClassTally:
         }
 
 
-def class_table(
+def counted_classes(
     classes: Classes, tallies: Iterable[tuple[str, Mapping[str, Mapping[str, Any]]]]
 ) -> list[dict[str, Any]]:
     """What `classes.json` says: the classes in the order of their ids, also those of which there is no part.

@@ -11,7 +11,7 @@ from typing import Any
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
-from stages.package.classes import class_table, table_bytes
+from stages.package.classes import counted_classes, table_bytes
 from stages.package.croissant import croissant
 from stages.package.index import column_kinds, read_rows, write_index
 from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
@@ -43,7 +43,7 @@ def compose_dataset(task: Task) -> Outcome:
     }
     known = language_of(params["producer"]).speaker(task).sources
     tallies = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
-    classes = class_table(Classes.of(known), tallies)
+    classes = counted_classes(Classes.of(known), tallies)
     listed = table_bytes(classes)
     counted = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(listed).hexdigest()}
     used = {row["kit"] for row in rows}

@@ -148,7 +148,7 @@ def _seeds(areas: FloatArray) -> Indices:
 
 
 @numba.njit(cache=True)
-def _shares(tables, shape, others, least, enough):  # type: ignore[no-untyped-def]
+def _shares(tables, shape, others, least, enough):
     found = np.zeros(len(others))
     motion = np.empty((3, 4))
     work = np.empty(SEEDS, dtype=np.int64)
@@ -174,7 +174,7 @@ def _shares(tables, shape, others, least, enough):  # type: ignore[no-untyped-de
 
 
 @numba.njit(cache=True)
-def _most_of_seed(tables, shape, other, part, misses, enough, motion):  # type: ignore[no-untyped-def]
+def _most_of_seed(tables, shape, other, part, misses, enough, motion):
     """The largest area that coincides, or the first that is `enough`, under a motion that lays a part of a shape upon
     one of the other's."""
     best = 0.0
@@ -204,7 +204,7 @@ def _most_of_seed(tables, shape, other, part, misses, enough, motion):  # type: 
 
 
 @numba.njit(cache=True)
-def _lay_upon(tables, part, target, symmetry, motion):  # type: ignore[no-untyped-def]
+def _lay_upon(tables, part, target, symmetry, motion):
     """The motion (3, 4) that takes a part to another of its type, turned by a symmetry."""
     rotation, onto = tables.rotations[tables.turns[part]], tables.rotations[tables.turns[target]]
     centre, there = tables.centres[part], tables.centres[target]
@@ -221,7 +221,7 @@ def _lay_upon(tables, part, target, symmetry, motion):  # type: ignore[no-untype
 
 
 @numba.njit(cache=True)
-def _meets(tables, motion, part, other, kind):  # type: ignore[no-untyped-def]
+def _meets(tables, motion, part, other, kind):
     """Whether a part, moved, has the centroid of a part of its type in the other shape."""
     a, b, c = tables.centres[part, 0], tables.centres[part, 1], tables.centres[part, 2]
     x = motion[0, 0] * a + motion[0, 1] * b + motion[0, 2] * c + motion[0, 3]

@@ -51,11 +51,11 @@ def write_nothing(task: Task) -> Outcome:
 
 
 CORN = Stage(
-    "corn", 1, CornConfig, (), corn_plan, write_samples, lambda _: 0,
+    "corn", __name__, CornConfig, (), corn_plan, write_samples, lambda _: 0,
     asked=corn_asked, trial=lambda config: CornConfig(wanted=20),
 )  # fmt: skip
-FLOUR = Stage("flour", 1, StrictModel, ("corn",), flour_plan, write_samples, lambda _: 0)
-IDLE = Stage("idle", 1, StrictModel, (), lambda _: [], write_nothing, lambda _: 0)
+FLOUR = Stage("flour", __name__, StrictModel, ("corn",), flour_plan, write_samples, lambda _: 0)
+IDLE = Stage("idle", __name__, StrictModel, (), lambda _: [], write_nothing, lambda _: 0)
 STAGES = {"idle": IDLE, "corn": CORN, "flour": FLOUR}
 
 
@@ -109,7 +109,7 @@ def test_a_trial_that_fails_is_told_as_what_the_run_would_meet(tmp_path: Path) -
     def fail(task: Task) -> Outcome:
         raise ValueError("the stones are blunt")
 
-    stages = {**STAGES, "flour": Stage("flour", 1, StrictModel, ("corn",), flour_plan, fail, lambda _: 0)}
+    stages = {**STAGES, "flour": Stage("flour", __name__, StrictModel, ("corn",), flour_plan, fail, lambda _: 0)}
     with pytest.raises(ConfigError, match="the trial of flour failed, as the run would: ValueError: the stones are"):
         list(plan_lines(config(), stages, Places(tmp_path, "mill"), workers=2))
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]

@@ -19,6 +19,7 @@ FACTS = {
     "tags": [],
 }
 INDEX = {"path": "../toy-index/toy.parquet", "bytes": 1, "sha256": "00" * 32, "columns": {"key": "string"}}
+CLASSES = {"sha256": "12" * 32}
 
 
 def test_the_table_gives_credit_and_says_what_is_not_stated() -> None:
@@ -30,7 +31,9 @@ def test_the_table_gives_credit_and_says_what_is_not_stated() -> None:
 
 
 def test_croissant_says_what_the_dataset_is_based_on() -> None:
-    said, unsaid = croissant(FACTS, [], [], INDEX, [{**ORIGIN, **SAID}, {**ORIGIN, **UNSAID}], "cited")["isBasedOn"]
+    said, unsaid = croissant(FACTS, [], [], INDEX, CLASSES, [{**ORIGIN, **SAID}, {**ORIGIN, **UNSAID}], "cited")[
+        "isBasedOn"
+    ]
     assert said == {
         "@type": "sc:CreativeWork",
         "name": "tower/model.glb",
@@ -41,4 +44,4 @@ def test_croissant_says_what_the_dataset_is_based_on() -> None:
         "creditText": "Copyright\n(c) Jane",
     }
     assert unsaid == {key: said[key] for key in ("@type", "name", "identifier")}
-    assert "isBasedOn" not in croissant(FACTS, [], [], INDEX, [], "cited")
+    assert "isBasedOn" not in croissant(FACTS, [], [], INDEX, CLASSES, [], "cited")

@@ -176,8 +176,9 @@ def test_what_the_stages_made_gives_away_what_no_look_at_the_sample_could(toy_fo
     assert not verify_dataset(folder, 0, 0).faults
     key = forge(folder, "the sketch of another sample", np.random.default_rng(1))
     faults = verify_dataset(folder, 0, 0).faults["samples"]
-    assert len(faults) == 1
-    assert faults[0].endswith(f"{key}: sketch0.png is not the one that stage sketches has made for it")
+    assert any(
+        each.endswith(f"{key}: sketch0.png is not the one that stage sketches has made for it") for each in faults
+    )
 
 
 def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(

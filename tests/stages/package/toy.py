@@ -83,7 +83,8 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
         kit = list(KITS)[number % 2]
         # loaders take types from what they see first: shapes of one part, in which nothing touches
         length = {"train": 2, "val": 4, "test": 5}[split] + number % 2 * (split != "val")
-        assembly = chain(length if index else 1, number % 2)
+        first = {"train": 0, "val": 1}.get(split, 0)
+        assembly = chain(1, first) if index == 0 and split != "test" else chain(length, number % 2)
         lineage: dict[str, Any] = {
             "method": "toy",
             "parents": ["row"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 from collections import Counter
@@ -19,7 +20,7 @@ from pipeline.errors import ConfigError
 from pipeline.places import Places
 from pipeline.registry import find_stages
 from pipeline.survey import Survey
-from pipeline.task import Job, Report, make_shard
+from pipeline.task import Report, make_shard
 from stages.programs.curves import Part, box
 from stages.programs.parameters import discrete
 from stages.programs.program import Constraint, Program
@@ -50,15 +51,21 @@ SUNK = replace(HEAP, build=sunk, apart=(("case", "lid"),))
 """All shapes with a lid are refused, which is known only when they are built."""
 
 Name = Callable[[Program], str]
+NUMBERS = itertools.count()
 
 
 @pytest.fixture
-def name_of(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Name:
-    """Gives a program a module of its own, as a user's has, and answers its name."""
+def name_of(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Name:
+    """Gives a program a module of its own, as a user's has, and answers its name, which no other test has."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "__init__.py").write_text("")
 
     def name(program: Program) -> str:
-        module = ModuleType(f"mine.{request.node.name}")
-        vars(module).update(__file__=__file__, PROGRAM=program)
+        number = next(NUMBERS)
+        (tmp_path / "mine" / f"program{number}.py").write_text(f"NUMBER = {number}\n")
+        module = ModuleType(f"mine.program{number}")
+        vars(module).update(PROGRAM=program)
         monkeypatch.setitem(sys.modules, module.__name__, module)
         return module.__name__
 
@@ -82,9 +89,7 @@ def make(folder: Path, program: str, samples: int, *stages: str) -> tuple[list[R
         asked: set[str] = set()
         while ready := [each for each in surveyed.missing if each.name not in asked and surveyed.ready(each)]:
             asked |= {each.name for each in ready}
-            for shard in ready:
-                mark = surveyed.fingerprints[shard.name]
-                reports.append(make_shard(Job(stage, found[stage].run_shard, shard, surveyed.config, places, mark)))
+            reports += [make_shard(survey.job(stage, shard)) for shard in ready]
             survey.refresh(stage)
     folder = places.stage("programs").root
     samples_made = [sample for tar in sorted(folder.glob("*.tar")) for sample in read_samples(tar)]

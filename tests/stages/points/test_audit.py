@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
 import pytest
 
+from stages.points.audit import AUDIT
 from stages.points.cloud import sample_cloud
 from stages.points.frame import NormalizeMode, normalization
-from stages.points.members import MEMBERS
-from stages.shape.collection.members import Packaged
+from stages.shape.collection.packaged import Packaged
 from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.kit import Assembly
 from stages.shape.shape import kit_shape
@@ -32,12 +33,13 @@ def sample(mode: NormalizeMode = "none") -> Packaged:
         "labels.npy": cloud.labels + np.int16(5),
         "instances.npy": cloud.instances,
     }
-    return Packaged("a", {"points": made, "parts": parts, "bounds": shape_bounds(shape).tolist()}, {}, arrays)
+    record = {"points": made, "parts": parts, "bounds": shape_bounds(shape).tolist()}
+    return Packaged("a", record, {}, arrays, replace(shape, first_class=5), {})
 
 
 @pytest.mark.parametrize("mode", get_args(NormalizeMode))
 def test_good_points_have_no_faults(mode: NormalizeMode) -> None:
-    assert list(MEMBERS.faults(sample(mode))) == []
+    assert list(AUDIT.faults(sample(mode))) == []
 
 
 def at_first(value: Any) -> Callable[[np.ndarray], np.ndarray]:
@@ -52,10 +54,11 @@ def at_first(value: Any) -> Callable[[np.ndarray], np.ndarray]:
 @pytest.mark.parametrize(
     ("member", "change", "found"),
     [
-        ("points.npy", at_first(np.nan), "not finite"),
-        ("points.npy", lambda points: points + np.float32(0.1), "out of its bounds"),
+        ("points.npy", lambda points: points + np.float32(5), "80 of its 80 points are not on the surface"),
+        ("points.npy", at_first(50.0), "1 of its 80 points are not on the surface"),
         ("points.npy", lambda points: points[1:], "other lengths"),
-        ("normals.npy", at_first(np.inf), "not finite"),
+        ("normals.npy", lambda normals: -normals, "80 of its 80 normals are not those of their part"),
+        ("normals.npy", lambda normals: np.concatenate([-normals[:1], normals[1:]]), "1 of its 80 normals"),
         ("normals.npy", lambda normals: normals * np.float32(1.01), "unit length"),
         ("labels.npy", lambda labels: labels - np.int16(1), "not the classes of their parts"),
         ("instances.npy", at_first(3), "not there"),
@@ -65,5 +68,5 @@ def at_first(value: Any) -> Callable[[np.ndarray], np.ndarray]:
 def test_damaged_points_are_found(member: str, change: Callable[[np.ndarray], np.ndarray], found: str) -> None:
     good = sample()
     arrays = {**good.arrays, member: change(good.arrays[member])}
-    faults = list(MEMBERS.faults(Packaged("a", good.record, {}, arrays)))
+    faults = list(AUDIT.faults(replace(good, arrays=arrays)))
     assert [found in fault for fault in faults] == [True]
