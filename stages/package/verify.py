@@ -23,7 +23,7 @@ from pipeline.randomness import decision_rng
 from pipeline.yaml_text import read_yaml
 from stages.package.findings import Findings
 from stages.package.layout import MANIFEST
-from stages.package.verify_files import Row, check_files, check_index, check_splits, read_schema
+from stages.package.verify_files import Row, Tally, check_classes, check_files, check_index, check_splits, read_schema
 from stages.package.verify_shard import check_shard
 
 __all__ = ["main", "verify_dataset"]
@@ -63,14 +63,18 @@ def verify_dataset(folder: Path, samples: int | None, seed: int, workers: int = 
             work.append((folder, shard, manifest, schema, index, anew))
         first += shard["samples"]
     rows: list[Row] = []
-    for found, of_shard in _side_by_side(work, workers):
+    tally: Tally = Tally()
+    for found, of_shard, of_classes in _side_by_side(work, workers):
         findings.add(found)
         rows += of_shard
+        tally.update(of_classes)
     check_splits(manifest, rows, findings)
+    if len(work) == len(manifest["shards"]):
+        check_classes(folder, tally, findings)
     return findings
 
 
-def _side_by_side(work: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[Findings, list[Row]]]:
+def _side_by_side(work: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[Findings, list[Row], Tally]]:
     if workers <= 1:
         yield from (check_shard(*each) for each in work)
         return

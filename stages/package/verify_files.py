@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,24 @@ from jsonschema.exceptions import best_match
 from pipeline.places import file_digest
 from stages.package.croissant import INDEX
 from stages.package.findings import Findings
-from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, SCHEMA
+from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, MANIFEST, SCHEMA
 
-__all__ = ["Row", "check_files", "check_index", "check_splits", "read_document", "read_schema"]
+__all__ = [
+    "Row",
+    "Tally",
+    "check_classes",
+    "check_files",
+    "check_index",
+    "check_splits",
+    "read_document",
+    "read_schema",
+]
 
 Row = tuple[str, str, str, str, str]
 """Key, shard, split, kit and graph of a sample."""
+
+Tally = Counter[tuple[str, str, str]]
+"""How many `shapes` and `parts` of a split have a class, by these three."""
 
 _COUNTS = {"type": "object", "additionalProperties": {"type": "integer", "minimum": 0}}
 _MEMBER = {"name": {"type": "string"}, "dtype": {"type": "string"}, "shape": {"type": "array"}}
@@ -107,6 +120,29 @@ def check_splits(manifest: Mapping[str, Any], rows: Sequence[Row], findings: Fin
         found = sum(each[2] == split for each in rows)
         if found != samples and len(rows) == manifest["samples"]:
             findings.fault("splits", MANIFEST, f"counts {samples} samples of {split}, the shards have {found}")
+
+
+def check_classes(folder: Path, tally: Tally, findings: Findings) -> None:
+    """`classes.json` counts as many shapes and parts of each class in each split as the samples have."""
+    try:
+        listed = json.loads((folder / CLASSES).read_bytes())
+        said = {
+            (what, split, str(each["id"])): count
+            for each in listed
+            for what in ("shapes", "parts")
+            for split, count in each[what].items()
+            if count
+        }
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        findings.fault("classes", CLASSES, f"cannot be read: {type(error).__name__}: {error}")
+        return
+    findings.look("classes", len(listed))
+    for what, split, number in sorted(said.keys() | tally.keys()):
+        counted, found = said.get((what, split, number), 0), tally[what, split, number]
+        if counted != found:
+            findings.fault(
+                "classes", CLASSES, f"counts {counted} {what} of class {number} in {split}; there are {found}"
+            )
 
 
 def _listed(folder: Path, findings: Findings) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tarfile
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from pipeline.shards import read_shard
 from stages.package.findings import Findings
 from stages.package.index import index_row, tar_bytes
 from stages.package.schema import schema_faults, validator_of
-from stages.package.verify_files import Row
+from stages.package.verify_files import Row, Tally
 from stages.package.verify_samples import (
     SampleError,
     array_faults,
@@ -39,13 +40,13 @@ def check_shard(
     schema: str,
     index: Path | None,
     anew: Collection[int],
-) -> tuple[Findings, list[Row]]:
+) -> tuple[Findings, list[Row], Tally]:
     """What is found in one whole shard of the dataset in `folder`, and what all its samples together are held against.
 
     shard: its entry in the manifest; schema: of the records, as JSON; index: the index, if it can be read; anew: the
     places of the samples that are held against what they were made from by other means, which takes long.
     """
-    findings, rows, path = Findings(), list[Row](), str(shard["path"])
+    findings, rows, tally, path = Findings(), list[Row](), Tally(), str(shard["path"])
     places = Places(folder.resolve().parent, folder.resolve().name)
     spoken = {name: each.anew(places) for name, each in languages().items()}
     validator = validator_of(schema)
@@ -74,6 +75,7 @@ def check_shard(
                     for what in _misplaced(row, record, path, offset, tar_bytes(members)):
                         findings.fault("index", where, what)
                 rows.append((key, path, str(record.get("split")), str(record.get("kit")), str(record.get("graph"))))
+                tally.update(_classes_of(record, str(shard["split"])))
                 sample = read_packaged(key, record, members, spoken, manifest["config"])
                 if place in anew:
                     findings.look("geometry")
@@ -90,7 +92,7 @@ def check_shard(
     count = findings.checked.get("samples", 0)
     if count != shard["samples"]:
         findings.fault("samples", path, f"has {count} samples, the manifest counts {shard['samples']}")
-    return findings, rows
+    return findings, rows, tally
 
 
 def shard_samples(path: Path) -> Iterator[tuple[str, int, dict[str, bytes]]]:
@@ -120,6 +122,15 @@ def _faults(sample: Packaged, manifest: Mapping[str, Any], places: Places | None
                 yield from (("geometry", what) for what in each.anew(sample, places))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         yield "samples", f"its json cannot be meant: {type(error).__name__}: {error}"
+
+
+def _classes_of(record: Mapping[str, Any], split: str) -> Tally:
+    """How many parts of each class a record lists, and that it is one shape with them."""
+    parts = record.get("parts")
+    listed = [each["class"] for each in parts if isinstance(each, dict) and "class" in each] if parts else []
+    counted = Counter({("parts", split, str(number)): count for number, count in Counter(map(str, listed)).items()})
+    counted.update({("shapes", split, number): 1 for number in set(map(str, listed))})
+    return counted
 
 
 def _indexed(index: Path | None, path: str) -> dict[str, dict[str, Any]] | None:

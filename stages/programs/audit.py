@@ -1,0 +1,24 @@
+"""How `make verify` looks at samples that are a program's parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from stages.programs.language import LANGUAGE
+from stages.programs.program import find_program
+from stages.programs.sampling import structure_digest
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.packaged import Packaged
+
+__all__ = ["AUDIT"]
+
+
+def _faults(sample: Packaged) -> Iterator[str]:
+    record = sample.record
+    if record["language"] == LANGUAGE.name:
+        program = find_program(record["kit"])
+        if structure_digest(program, program.schema.values(record["text"])) != record["graph"]:
+            yield "its parameters have another structure than its json names"
+
+
+AUDIT = Audit(faults=_faults)

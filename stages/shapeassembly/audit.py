@@ -1,0 +1,22 @@
+"""How `make verify` looks at samples that are ShapeAssembly programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.packaged import Packaged
+from stages.shapeassembly.language import LANGUAGE
+from stages.shapeassembly.parser import parse
+from stages.shapeassembly.structure import signature
+
+__all__ = ["AUDIT"]
+
+
+def _faults(sample: Packaged) -> Iterator[str]:
+    record = sample.record
+    if record["language"] == LANGUAGE.name and signature(parse(record["text"])) != record["graph"]:
+        yield "its program has another signature than its json names"
+
+
+AUDIT = Audit(faults=_faults)
