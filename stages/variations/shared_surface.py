@@ -27,6 +27,8 @@ TOLERANCE = 4.0
 """Largest gap of centroids that coincide, in the kit's pose tolerance: poses drift from docking to docking."""
 BATCH = 16
 """Shapes that are asked at once for the largest share."""
+FLOORS = (0.7, 0.4, 0.0)
+"""The largest share is looked for above each of these in turn: high ones are told soonest."""
 UPRIGHT = 1.0 - 1e-3
 """Cosine from which on a motion leaves up where it is."""
 
@@ -119,12 +121,16 @@ class PackedShapes:
     def most_shared(self, shape: int, others: Indices) -> float:
         """The largest share that a shape has with one of `others`; those that may share most are asked first."""
         bounds = self._bounds(shape, others)
-        order, most = np.argsort(-bounds, kind="stable"), 0.0
-        for start in range(0, len(order), BATCH):
-            batch = order[start : start + BATCH]
-            if bounds[batch[0]] <= most:
+        order = np.argsort(-bounds, kind="stable")
+        most = 0.0
+        for least in FLOORS:
+            for start in range(0, len(order), BATCH):
+                batch = order[start : start + BATCH]
+                if bounds[batch[0]] <= max(most, least):
+                    break
+                most = max(most, float(self.shares(shape, others[batch], max(most, least)).max()))
+            if most > 0.0:
                 break
-            most = max(most, float(self.shares(shape, others[batch], most).max()))
         return most
 
     def _bounds(self, shape: int, others: Indices) -> FloatArray:
