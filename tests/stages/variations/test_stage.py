@@ -15,6 +15,8 @@ from stages.shape.sample import read_samples
 from tests.mill import mill
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
 
+pytestmark = pytest.mark.slow
+
 
 def write_model(path: Path, meshes: dict[str, trimesh.Trimesh], shape: list[Placed]) -> str:
     scene = trimesh.Scene()
