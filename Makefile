@@ -98,7 +98,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 .PHONY: test lint bench kits keys lock
 test: lint  ## Check style and types, then run the tests on WORKERS cores
-	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist worksteal
+	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder
 lint: setup  ## Check style and types
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .

@@ -25,6 +25,12 @@ def no_egl() -> str | None:
     return probe("egl")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    # Files with slow tests first, so that no worker is left alone with one of them at the end.
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     # Not while tests are collected, which every worker does: a first drawing takes seconds.
     if item.get_closest_marker("egl") and no_egl():

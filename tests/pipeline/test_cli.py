@@ -88,7 +88,7 @@ def test_verify_finds_a_flipped_byte_and_the_next_run_mends_it(tmp_path: Path, w
     whole = made(out)
     asked = ("verify", "--config", config, "--out", out)
     good = mill(*asked, "--samples", 3)
-    assert (good.returncode, good.stdout) == (0, f"verify --config {config} --out {out} --samples 3\n")
+    assert (good.returncode, good.stdout) == (0, f"verify --config {config} --out {out} --workers 1 --samples 3\n")
     assert mill(*asked, "--spoiled").returncode == 1
     loaf = out / "mill/loaves/1.bin"
     content = bytearray(loaf.read_bytes())

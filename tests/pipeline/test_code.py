@@ -177,7 +177,9 @@ def test_edit_while_a_stage_runs_stops_it_before_a_shard_is_committed(mill: Writ
 def test_of_the_mill_only_what_makes_bytes_counts() -> None:
     for name, stage in find_stages().items():
         mill = {each for each in reached(starts_of(stage.module)) if each.partition(".")[0] == "pipeline"}
-        assert mill == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"}, name
+        # package writes a digest of all code into the manifest
+        own = {"pipeline.code"} if name == "package" else set()
+        assert mill == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"} | own, name
 
 
 def test_chair_does_not_know_the_vase() -> None:

@@ -78,3 +78,16 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
     assert any(line.startswith("numpy ok") for line in lines)
     assert any(line.startswith("draw: raycast ok") for line in lines)
     assert lines[-1] == "2 of these must be mended"
+
+
+def test_workers_count_alike_whatever_the_shell_says(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Kernels of OpenBLAS for other processors give other last digits; a worker has the same ones everywhere."""
+    from pipeline.workers import _ENVIRONMENT
+
+    products = set()
+    for said in ("Haswell", "Nehalem", "Zen"):
+        environment = {**os.environ, "OPENBLAS_CORETYPE": said, **_ENVIRONMENT}
+        command = "import numpy as np; a, b = np.random.default_rng(1).random((2, 99, 99)); print((a @ b).tobytes())"
+        done = subprocess.run([sys.executable, "-c", command], env=environment, capture_output=True, text=True)
+        products.add(done.stdout)
+    assert len(products) == 1

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-VARIABLES = ("CONFIG", "OUT", "WORKERS", "SEED", "MESH", "PROGRAM", "TABLE")
+VARIABLES = ("CONFIG", "OUT", "WORKERS", "SEED", "MESH", "PROGRAM", "TABLE", "SAMPLES")
 SAY_ARGUMENTS = "import json, sys; print(json.dumps(sys.argv[1:]))"
 
 
@@ -67,7 +67,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert all(len(row) > 2 for row in rows.values()), "each is explained"
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
-        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-",
+        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-", "SAMPLES": "100",
         "TABLE": "physical",
     }  # fmt: skip
 

@@ -24,6 +24,8 @@ from tests.stages.exemplars.model_files import box, write_obj
 
 STAGES = {"exemplars": STAGE}
 
+pytestmark = pytest.mark.slow
+
 
 def blocks(count: int, gap: float = 0.0) -> dict[str, np.ndarray]:
     return {f"block.{k:03d}": box(at=(k * (1 + gap), 0, 0)) for k in range(count)}

@@ -20,6 +20,8 @@ from stages.variations.shared_surface import PackedShapes
 from tests.mill import mill
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
 
+pytestmark = pytest.mark.slow
+
 
 def write_model(path: Path, meshes: dict[str, trimesh.Trimesh], shape: list[Placed]) -> str:
     scene = trimesh.Scene()

@@ -43,6 +43,8 @@ STOOLS = {
 }
 KITS = {"exemplars": {"kits": [{"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]}]}}
 
+pytestmark = pytest.mark.slow
+
 
 def config_of(folder: Path, sections: dict[str, object]) -> tuple[str, ...]:
     path = folder / "toy.yaml"
