@@ -67,8 +67,8 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert all(len(row) > 2 for row in rows.values()), "each is explained"
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
-        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-", "SAMPLES": "100",
-        "TABLE": "physical",
+        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-",
+        "TABLE": "physical", "SAMPLES": "100",
     }  # fmt: skip
 
 
