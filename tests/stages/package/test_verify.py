@@ -188,3 +188,18 @@ def test_a_dataset_without_its_kits_says_what_it_could_not_look_at(
         shutil.copytree(toy_folder.parent / name, tmp_path / name)
     assert main([str(tmp_path / "toy")]) == 0
     assert "not looked at: 24 samples: kit blocks is not beside the dataset" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("moved", "same"), [(1e-7, True), (1e-4, False)])
+def test_last_digits_of_a_mesh_are_no_fault_and_more_is(toy_folder: Path, moved: float, same: bool) -> None:
+    from pipeline.shards import read_shard
+    from stages.package.verify_samples import _same_mesh
+    from tests.stages.package.forge import glb_of, glb_parts
+
+    made = next(read_shard(toy_folder / SHARD))[1]["glb"]
+    header, binary = glb_parts(made)
+    positions = np.frombuffer(bytes(binary[:96]), "<f4") + np.float32(moved)
+    binary[:96] = positions.tobytes()
+    assert _same_mesh(glb_of(header, bytes(binary)), glb_of(*glb_parts(made)), 5.0) == same
+    header["nodes"][0]["extras"]["class"] += 1
+    assert not _same_mesh(glb_of(header, bytes(binary)), glb_of(*glb_parts(made)), 5.0)
