@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -10,7 +10,7 @@ from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 from stages.variations.features import Axis
 
-__all__ = ["NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]
+__all__ = ["GrownConfig", "NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]
 
 
 class NoveltyConfig(StrictModel):
@@ -45,6 +45,17 @@ class NoveltyConfig(StrictModel):
     )
 
 
+class GrownConfig(StrictModel):
+    """The size of shapes that are grown; without it they are as large as `smallest` and `largest` say."""
+
+    parts: tuple[Annotated[int, Field(ge=2)], Annotated[int, Field(ge=2)]] | None = Field(
+        None, description="Fewest and most parts, met within a quarter."
+    )
+    footprint: tuple[Annotated[float, Field(gt=0)], Annotated[float, Field(gt=0)]] | None = Field(
+        None, description="Sides of the area seen from above, in units of the models, met within a quarter."
+    )
+
+
 class SearchConfig(StrictModel):
     """How variants are searched for."""
 
@@ -68,6 +79,12 @@ class SearchConfig(StrictModel):
     largest: float = Field(
         2.0, ge=1, le=20, description="Most parts of a variant, as a share of the largest exemplar's."
     )
+    method: Literal["both", "exchange", "growth"] = Field(
+        "both",
+        description="How variants are made: pieces of two shapes are exchanged, shapes are grown part by part from "
+        "what was seen around parts, or both, each given its share by what it finds.",
+    )
+    grown: GrownConfig = Field(default_factory=GrownConfig, description="What grown shapes are to be like.")
     growth_share: float = Field(
         0.3, ge=0, le=1, description="Share of pieces grown part by part; the rest are cut by half-space, slab or box."
     )

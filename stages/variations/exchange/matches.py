@@ -8,11 +8,11 @@ import numpy as np
 from stages.variations.kernels.layout import BOUNDARY, PARTS, UPRIGHT, Outcome
 from stages.variations.kernels.lookup import random_below
 
-__all__ = ["lies_in", "looks_same", "match_poses", "rotate", "squared_distance", "transform"]
+__all__ = ["lies_in", "looks_same", "match_poses", "rotate", "same_rotation", "squared_distance", "transform"]
 
 
 @numba.njit(cache=True)
-def _same_rotation(symmetries, first, last, rotation, other, slack):
+def same_rotation(symmetries, first, last, rotation, other, slack):
     """Whether two rotations of a part look the same, entries within `slack` together; the symmetry or -1."""
     limit = slack * slack
     between = np.empty((3, 3))
@@ -37,7 +37,7 @@ def _same_rotation(symmetries, first, last, rotation, other, slack):
 def looks_same(kit, part_type, rotation, other):
     """Whether two rotations of a part of a type look the same within the pose tolerance; the symmetry or -1."""
     first, last = kit.symmetry_starts[part_type], kit.symmetry_starts[part_type + 1]
-    return _same_rotation(kit.symmetries, first, last, rotation, other, kit.limits[0] / kit.reach[part_type])
+    return same_rotation(kit.symmetries, first, last, rotation, other, kit.limits[0] / kit.reach[part_type])
 
 
 @numba.njit(cache=True)

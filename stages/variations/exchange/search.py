@@ -19,8 +19,9 @@ from stages.variations.exchange.correction import correct_orientations
 from stages.variations.exchange.joins import join
 from stages.variations.exchange.matches import lies_in
 from stages.variations.exchange.parents import Parent, Parents
-from stages.variations.exchange.steering import BATCH, Choice, Steering
+from stages.variations.exchange.steering import BATCH, GROW, TRY_WORK, Choice, Steering
 from stages.variations.features import FeatureTest, material_shares
+from stages.variations.growth.grower import Grower
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, UNKNOWNS, Outcome
@@ -42,7 +43,10 @@ REASONS = {
     Outcome.CLASH: "parts clash",
     Outcome.GRAMMAR: "neighbourhood not in the grammar",
 }
-
+GROWN_REASONS = {
+    Outcome.NO_MATCH: "growth given up",
+    **{each: f"grown: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
+}
 
 DUPLICATE = "duplicate"
 SUBASSEMBLY = "nothing but a piece of an exemplar"
@@ -86,6 +90,7 @@ class Search:
         self.largest = max(3, round(config.largest * max(sizes)))
         self.tables = kit_tables(kit, config.upright)
         self._ws = workspace(max(self.largest, *sizes))
+        self._grower = self._made_grower() if config.method != "exchange" else None
         self.archive = Archive(config.novelty.quota)
         self.steering = Steering(config)
         self._features = FeatureTest(kit)
@@ -132,28 +137,33 @@ class Search:
         while number < tries and telling < wanted and len(found) < SPARE * wanted:
             batch = self.steering.plan(rng, self.parents, self.archive, min(BATCH, tries - number))
             for choice in batch:
-                number += 1
-                variant = self._attempt(rng, choice)
-                if not (choice.a.shares * choice.b.shares).any():
-                    self.crossings[variant if isinstance(variant, str) else NEW] += 1
+                if choice.number == GROW:
+                    variant, work = self._grow(rng)
+                    number += max(round(work / TRY_WORK), 1)
+                else:
+                    number += 1
+                    variant = self._attempt(rng, choice)
+                    work = 1.0 if isinstance(variant, str) and variant in EARLY else LATE_WORK
+                    if not (choice.a.shares * choice.b.shares).any():
+                        self.crossings[variant if isinstance(variant, str) else NEW] += 1
                 if isinstance(variant, str):
                     self.rejects[variant] += 1
-                    self.steering.learn(choice, 0.0, 1.0 if variant in EARLY else LATE_WORK)
+                    self.steering.learn(choice, 0.0, work)
                     continue
                 found.append(variant)
-                if self._keep(rng, variant, choice, f"{name}-{len(found) - 1}"):
+                if self._keep(rng, variant, choice, work, f"{name}-{len(found) - 1}"):
                     telling += 1
                     progress(telling)
                 if telling >= wanted or len(found) >= SPARE * wanted:
                     break
         return found, number
 
-    def _keep(self, rng: np.random.Generator, variant: Variant, choice: Choice, name: str) -> bool:
+    def _keep(self, rng: np.random.Generator, variant: Variant, choice: Choice, work: float, name: str) -> bool:
         """Count a find, and make it a parent where it adds to the archive; whether it does."""
         self.seen.add(self.key(variant.assembly.types, variant.graph, variant.docked))
         spare = self.archive.is_full(variant.cell, variant.histogram)
         gain = KNOWN_GAIN if self.archive.has_histogram(variant.histogram) else 1.0
-        self.steering.learn(choice, 0.0 if spare else gain, LATE_WORK)
+        self.steering.learn(choice, 0.0 if spare else gain, work)
         place = self.archive.add(variant.cell, variant.histogram)
         if spare and self.config.novelty.guided:
             self.spares += 1
@@ -192,6 +202,54 @@ class Search:
                 outcome, key = complete(kit, self.answers.table, ws, with_labels)
         if outcome != Outcome.OK:
             return REASONS[outcome]
+        lineage = {
+            "parents": [a.name, b.name],
+            "parts_from": [
+                int((ws.origin[: ws.counts[PARTS]] != 1).sum()),
+                int((ws.origin[: ws.counts[PARTS]] == 1).sum()),
+            ],
+            "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
+            "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
+            "motion": np.round(ws.motion, 9).tolist(),
+        }
+        origins = np.empty(int(ws.counts[PARTS]), dtype=np.int8)
+        for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
+            at = placed[: len(parent.assembly)]
+            origins[at[at >= 0]] = parent.origins[at >= 0]
+        return self._finished(int(key), origins, lineage)
+
+    def _made_grower(self) -> Grower:
+        grown, limits = self.config.grown, (self.smallest, self.largest)
+        return Grower(self.answers, self.tables, *limits, grown.parts, grown.footprint)
+
+    def _grow(self, rng: np.random.Generator) -> tuple[Variant | str, float]:
+        """One shape grown from nothing: a new variant, or the reason why there is none; and what it cost."""
+        assert self._grower is not None, "no choice is to grow where the method forbids it"
+        ws = self._ws
+        outcome, work = self._grower.grow(rng, ws)
+        if outcome != Outcome.OK:
+            return GROWN_REASONS.get(outcome, REASONS[outcome]), work
+        origins = ws.origin[: ws.counts[PARTS]].astype(np.int8)
+        ws.origin[: ws.counts[PARTS]] = 2  # no contact is left to be found between two shapes
+        outcome, key = complete(self.tables, self.answers.table, ws, self.config.duplicates == "docking")
+        if outcome != Outcome.OK:
+            return REASONS[outcome], work
+        exemplar, part = self._grower.seed
+        counts = np.bincount(origins, minlength=len(self.kit.exemplars))
+        used = [exemplar, *(number for number in np.flatnonzero(counts).tolist() if number != exemplar)]
+        lineage = {
+            "method": "growth",
+            "parents": [self.kit.exemplars[number].name for number in used],
+            "parts_from": counts[used].tolist(),
+            "boundary": [part],
+            "images": [0],
+            "motion": [*np.eye(3).tolist(), [0.0, 0.0, 0.0]],
+        }
+        return self._finished(int(key), origins, lineage), work
+
+    def _finished(self, key: int, origins: np.ndarray, lineage: dict[str, Any]) -> Variant | str:
+        """What the workspace holds, of parts from the exemplars `origins`, as a new variant, or why it is none."""
+        ws, kit = self._ws, self.tables
         types = ws.types[: ws.counts[PARTS]]
         if (self.histogram(types) if self.config.duplicates == "histogram" else int(key)) in self.seen:
             return DUPLICATE
@@ -200,7 +258,7 @@ class Search:
         outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
-        return self._variant(a, b, int(graph_key(ws, False)), int(graph_key(ws, True)))
+        return self._variant(origins, lineage, int(graph_key(ws, False)), int(graph_key(ws, True)))
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""
@@ -224,7 +282,7 @@ class Search:
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
                 return Outcome.CLASH
 
-    def _variant(self, a: Parent, b: Parent, graph: int, docked: int) -> Variant:
+    def _variant(self, origins: np.ndarray, lineage: dict[str, Any], graph: int, docked: int) -> Variant:
         ws = self._ws
         parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
         poses = np.tile(np.eye(4), (parts, 1, 1))
@@ -233,19 +291,7 @@ class Search:
         edges = np.sort(ws.edges[:count], axis=1)
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
         labels = np.stack([ws.label[edges[:, 0], edges[:, 1]], ws.label[edges[:, 1], edges[:, 0]]], axis=1)
-        origin = ws.origin[:parts]
-        lineage = {
-            "parents": [a.name, b.name],
-            "parts_from": [int((origin != 1).sum()), int((origin == 1).sum())],
-            "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
-            "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
-            "motion": np.round(ws.motion, 9).tolist(),
-        }
         assembly = Assembly(ws.types[:parts].astype(np.int16), poses, edges)
-        origins = np.empty(parts, dtype=np.int8)
-        for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
-            at = placed[: len(parent.assembly)]
-            origins[at[at >= 0]] = parent.origins[at >= 0]
         # A part whose neighbourhood tells its exemplar is of that one, whichever copy of it a piece brought along.
         marks = self._features.marks(assembly)
         origins = np.where(marks >= 0, marks, origins)

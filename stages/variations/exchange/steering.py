@@ -18,7 +18,7 @@ from stages.variations.exchange.parents import Parent, Parents
 from stages.variations.kernels.layout import GROWN, JOINTS, PLANES
 from stages.variations.settings import SearchConfig
 
-__all__ = ["BATCH", "CHOICES", "CUTS", "PLAIN", "RARE", "Choice", "Steering"]
+__all__ = ["BATCH", "CHOICES", "CUTS", "GROW", "PLAIN", "RARE", "Choice", "Steering"]
 
 CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
 """Ways of cutting, and whether the piece must be large."""
@@ -26,10 +26,18 @@ PLAIN, RARE, FAMILY, CROSSED = range(4)
 """Ways of drawing parents: at random; rare ones likelier; rare ones of a random family; a rare one and, of some, that
 of most other ancestry."""
 CHOICES = tuple(product(range(4), range(len(CUTS))))
+GROW = len(CHOICES)
+"""The number of one more choice: to grow a shape from nothing."""
 BATCH = 64
 """Tries that are planned at once."""
 MEMORY = 4000.0
 """Tries after which what was learnt counts for a third."""
+TRY_WORK = 1.5
+"""What a try of the exchange costs on average."""
+LEAST = 0.2
+"""Least share of the work for either method."""
+FIRST_GUESS = 100.0
+"""What growing a shape costs, before any is grown."""
 PARTNERS = 4
 """Variants of which the one of most other ancestry is taken."""
 
@@ -50,17 +58,19 @@ class Steering:
 
     def __init__(self, config: SearchConfig) -> None:
         self.config = config
-        self._gains = np.zeros(len(CHOICES))
-        self._work = np.zeros(len(CHOICES))
+        self._gains = np.zeros(len(CHOICES) + 1)
+        self._work = np.zeros(len(CHOICES) + 1)
+        self._grown_work, self._grown = FIRST_GUESS, 1
 
     def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[Choice]:
         """The next `count` tries."""
         if self.config.novelty.guided:
             odds = self._odds(len(parents.exemplars)).cumsum()
-            numbers = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, len(CHOICES) - 1)
+            last = int(np.flatnonzero(np.diff(odds, prepend=0.0))[-1])
+            numbers = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, last)
         else:
-            numbers = np.where(rng.random(count) < self.config.growth_share, 0, 1)
-        draws = np.array([CHOICES[number][0] for number in numbers.tolist()])
+            numbers = self._plain(rng, count)
+        draws = np.array([CHOICES[number][0] if number < GROW else PLAIN for number in numbers.tolist()])
         first = self._draw(rng, parents, archive, draws)
         second = self._draw(rng, parents, archive, np.where(draws == CROSSED, RARE, draws))
         crossed = np.flatnonzero(draws == CROSSED).tolist()
@@ -69,7 +79,7 @@ class Steering:
         self._gains *= np.exp(-count / MEMORY)
         self._work *= np.exp(-count / MEMORY)
         return [
-            Choice(number, a, b, *CUTS[CHOICES[number][1]])
+            Choice(number, a, b, *CUTS[CHOICES[number][1] if number < GROW else 0])
             for number, a, b in zip(numbers.tolist(), first, second, strict=True)
         ]
 
@@ -77,14 +87,39 @@ class Steering:
         """What a try has brought, and what it cost."""
         self._gains[choice.number] += gain
         self._work[choice.number] += work
+        if choice.number == GROW:
+            self._grown_work += work
+            self._grown += 1
 
     def _odds(self, exemplars: int) -> FloatArray:
-        """How likely each choice is: a share for all alike, the rest by the square of what it gains for its work."""
+        """How likely each choice is: of the exchange a share for all alike, the rest by the square of what it gains."""
+        if self.config.method == "growth":
+            return np.eye(GROW + 1)[GROW]
         possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, _ in CHOICES])
-        rates = np.where(possible, (self._gains + 1.0) / (self._work + 50.0), 0.0) ** 2
+        rates = np.where(possible, (self._gains[:GROW] + 1.0) / (self._work[:GROW] + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.explore * possible / possible.sum()
         chances: FloatArray = explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()
-        return chances
+        grown = self._grown_share() / self._cost() if self.config.method == "both" else 0.0
+        return np.append(chances * (1.0 - self._grown_share()) if grown else chances, grown)
+
+    def _grown_share(self) -> float:
+        """The share of the work that is given to growth: that of what it gains for its work, within limits."""
+        exchanged = (self._gains[:GROW].sum() + 1.0) / (self._work[:GROW].sum() + 50.0)
+        grown = (self._gains[GROW] + 1.0) / (self._work[GROW] + 50.0)
+        return float(np.clip(grown / (grown + exchanged), LEAST, 1.0 - LEAST))
+
+    def _cost(self) -> float:
+        """What growing a shape costs beside a try of the exchange."""
+        return max(self._grown_work / self._grown / TRY_WORK, 1.0)
+
+    def _plain(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Choices by no experience: both methods get half of the work where both may be used."""
+        if self.config.method == "growth":
+            return np.full(count, GROW)
+        numbers = np.where(rng.random(count) < self.config.growth_share, 0, 1)
+        if self.config.method == "both":
+            numbers[rng.random(count) < 1.0 / (1.0 + self._cost())] = GROW
+        return numbers
 
     def _draw(self, rng: np.random.Generator, parents: Parents, archive: Archive, draws: np.ndarray) -> list[Parent]:
         """A parent for each of `draws`: an exemplar, or an earlier variant in the way that it says."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+from typing import Any
+
 import numpy as np
 
 from stages.shape.arrays import FloatArray
@@ -34,6 +37,7 @@ class ContactAnswers:
         self.dockings = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
         self.table = Answers(np.zeros(1 << 16, dtype=np.uint64), np.zeros(1 << 16, dtype=np.int64))
         self.asked = 0
+        self._broken: BaseException | None = None
         self._size = 0
         self._penetration = PenetrationTest(kit.types)
         self._of_geometry: dict[bytes, int] = {}
@@ -51,6 +55,32 @@ class ContactAnswers:
             if value == FORBIDDEN:
                 return False
         return True
+
+    def asker(self, types: np.ndarray, rotations: np.ndarray, translations: np.ndarray) -> Any:
+        """A C function that answers, and remembers, how the parts at two places of these arrays (n,), (n, 3, 3),
+        (n, 3) stand to each other, for kernels that call it by its address. What goes wrong in it is raised by
+        `complain`."""
+
+        def answer(i: int, j: int) -> int:
+            try:
+                quanta = np.empty(12, dtype=np.int64)
+                a, b = int(types[i]), int(types[j])
+                reach, quantum = self.kit.types[b].diagonal / 2, self._quantum
+                quantise(rotations[i], translations[i], rotations[j], translations[j], reach, quantum, quanta)
+                value = self._answer(a, b, quanta)
+                self._insert(int(hash_key(a, b, quanta)), value)
+                return value
+            except BaseException as error:
+                self._broken = error
+                return FORBIDDEN
+
+        return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(answer)
+
+    def complain(self) -> None:
+        """Raise what went wrong in an `asker`, where no exception can pass."""
+        if self._broken is not None:
+            error, self._broken = self._broken, None
+            raise error
 
     def answer(self, a: int, b: int, pose: FloatArray) -> int:
         """The answer for a part of type `b` at `pose` (4, 4) in coordinates of a part of type `a`."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
 
 from stages.variations.kernels.layout import MISSING
 
-__all__ = ["ask", "hash_key", "mix", "quantise", "random_below"]
+__all__ = ["ask", "ask_python", "hash_key", "mix", "quantise", "random_below"]
 
 
 @numba.njit(cache=True)
@@ -50,6 +53,19 @@ def ask(keys, values, key):
             return values[slot]
         slot = (slot + np.uint64(1)) & mask
     return MISSING
+
+
+@intrinsic
+def ask_python(typing_context, address, a, b):
+    """Call the C function of two int64 that returns one and lies at an address: an answer that only Python has, in the
+    middle of a kernel."""
+
+    def code(context, builder, signature, arguments):
+        word = ir.IntType(64)
+        function = builder.inttoptr(arguments[0], ir.FunctionType(word, [word, word]).as_pointer())
+        return builder.call(function, arguments[1:])
+
+    return types.int64(types.int64, types.int64, types.int64), code
 
 
 @numba.njit(cache=True)
