@@ -1,107 +1,25 @@
-"""The local patterns of a kit: what was seen around its parts, pose by pose, modulo their symmetries (strings §3)."""
+"""The patterns that growth may use, as tables for its kernels."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray
-from stages.shape.geometry.docking import DockingTable
-from stages.shape.geometry.pose import invert
-from stages.shape.kit import Kit, PartType
+from stages.shape.graphs.patterns import Pattern, observed_patterns
+from stages.shape.graphs.slots import SLOT_LEVELS, SlotGrammar
+from stages.shape.kit import Kit
 from stages.variations.growth.layout import PatternTables
 
-__all__ = ["Pattern", "observed_patterns", "pattern_tables", "patterns_of", "seen_once"]
-
-SAME_UP = 0.02
-"""Ways up that differ by less, as unit vectors, are one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Pattern:
-    """What stands around a part of type `part_type`: parts of `types` int64 (n,) at `poses` float64 (n, 4, 4) in its
-    coordinates, ordered by type and docking; `up` float64 (3,) is what was up there; `seen` says how often, `owner` in
-    which exemplar first."""
-
-    part_type: int
-    types: np.ndarray
-    poses: FloatArray
-    up: FloatArray
-    seen: int
-    owner: int
-
-
-def observed_patterns(kit: Kit, upright: bool) -> list[Pattern]:
-    """The patterns of all parts of the exemplars, each once, in the order of their types.
-
-    With `upright` patterns that differ only in which way is up are two.
-    """
-    table = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
-    axis = {"y": 1, "z": 2}[kit.up]
-    found: dict[tuple[int, ...], list[Pattern]] = {}
-    for number, exemplar in enumerate(kit.exemplars):
-        assembly = exemplar.assembly
-        labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)
-        tails = np.concatenate([assembly.edges[:, 0], assembly.edges[:, 1]])
-        heads = np.concatenate([assembly.edges[:, 1], assembly.edges[:, 0]])
-        seen_from = np.concatenate([labels[:, 0], labels[:, 1]])
-        order = np.lexsort((heads, seen_from, assembly.types[heads], tails))
-        starts = np.searchsorted(tails[order], np.arange(len(assembly) + 1))
-        inverses = invert(assembly.poses)
-        for part in range(len(assembly)):
-            rows = order[starts[part] : starts[part + 1]]
-            around = heads[rows]
-            types = assembly.types[around].astype(np.int64)
-            signature = (int(assembly.types[part]), *types.tolist(), *seen_from[rows].tolist())
-            pattern = Pattern(
-                int(assembly.types[part]),
-                types,
-                inverses[part] @ assembly.poses[around],
-                np.ascontiguousarray(assembly.poses[part][axis, :3]),
-                1,
-                number,
-            )
-            alike = found.setdefault(signature, [])
-            for place, known in enumerate(alike):
-                if _same(kit, known, pattern, upright):
-                    alike[place] = replace(known, seen=known.seen + 1)
-                    break
-            else:
-                alike.append(pattern)
-    return sorted((each for alike in found.values() for each in alike), key=lambda each: each.part_type)
+__all__ = ["pattern_tables", "patterns_of"]
 
 
 def patterns_of(kit: Kit, upright: bool) -> list[Pattern]:
-    """The patterns that growth may use, as the kit's grammar admits them."""
+    """The patterns that growth may use: those observed, and where the kit's grammar is one of slots others that it
+    admits too."""
+    if kit.grammar.strictness in SLOT_LEVELS:
+        return SlotGrammar(kit, upright).patterns()
     return observed_patterns(kit, upright)
-
-
-def _same(kit: Kit, first: Pattern, second: Pattern, upright: bool) -> bool:
-    """Whether one pattern is the other, turned by a symmetry of the part in the middle."""
-    turns = kit.types[first.part_type].symmetries[:, :3, :3]
-    if upright:
-        turns = turns[np.linalg.norm(turns @ first.up - second.up, axis=1) < SAME_UP]
-    limit = 2.0 * kit.pose_tolerance
-    for turn in turns:
-        places = first.poses[:, :3, 3] @ turn.T
-        gaps = np.linalg.norm(places[:, None] - second.poses[None, :, :3, 3], axis=2)
-        gaps[first.types[:, None] != second.types[None]] = np.inf
-        nearest = gaps.argmin(axis=1) if len(gaps) else np.empty(0, dtype=np.int64)
-        if len(set(nearest.tolist())) < len(nearest) or (gaps[np.arange(len(gaps)), nearest] > limit).any():
-            continue
-        if all(
-            _looks_same(kit.types[kind], turn @ pose[:3, :3], second.poses[at][:3, :3], limit)
-            for kind, pose, at in zip(first.types.tolist(), first.poses, nearest.tolist(), strict=True)
-        ):
-            return True
-    return False
-
-
-def _looks_same(part_type: PartType, rotation: FloatArray, other: FloatArray, limit: float) -> bool:
-    gaps = part_type.symmetries[:, :3, :3] - other.T @ rotation
-    return bool(np.linalg.norm(gaps.reshape(-1, 9), axis=1).min() * part_type.diagonal / 2 <= limit)
 
 
 def pattern_tables(kit: Kit, patterns: Sequence[Pattern]) -> PatternTables:
@@ -119,9 +37,3 @@ def pattern_tables(kit: Kit, patterns: Sequence[Pattern]) -> PatternTables:
         translations=np.ascontiguousarray(poses[:, :3, 3]),
         shares=parts / parts.sum(),
     )
-
-
-def seen_once(patterns: Sequence[Pattern]) -> float:
-    """The share of the exemplars' parts whose pattern no other part shows: it foretells how much growth copies."""
-    total = sum(each.seen for each in patterns)
-    return sum(each.seen == 1 for each in patterns) / total

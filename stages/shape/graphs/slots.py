@@ -1,0 +1,320 @@
+"""Slots as seen: a grammar that asks of each place around a part what was seen there, whatever stands elsewhere.
+
+A *place* is a relative pose in which a part of some type was seen beside a part. Places whose boxes overlap by more
+than OVERLAP of the smaller are one *slot*: where one part stands no other can. A slot's *state* is the places in it
+that are taken, often one or none. A part is valid if
+
+- `slots`: the state of each slot was seen in it;
+- `slot_fillings`: and of each two slots it was seen together which are filled and which empty;
+- `slot_pairs`: and of each two slots their very states were seen together.
+
+All is modulo the symmetries of the part, and, where shapes are upright, apart for each way up that a part was seen in.
+Each level admits what the next of this list admits, all admit what was observed, and none asks for the numbers or pairs
+of neighbour types that the other levels of strictness ask for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.geometry.pose import invert
+from stages.shape.graphs.patterns import SAME_UP, Pattern, observed_patterns
+from stages.shape.kit import Assembly, Kit, Strictness
+
+__all__ = ["SLOT_LEVELS", "SlotGrammar"]
+
+SLOT_LEVELS: tuple[Strictness, ...] = ("slot_pairs", "slot_fillings", "slots")
+"""The levels of slots, the strictest first."""
+OVERLAP = 0.3
+"""Share of the smaller box from which on two places are one slot."""
+IMAGES = 512
+"""A way to stand with more symmetric images than this is taken as observed: round parts have hundreds, all alike."""
+PATTERNS = 256
+"""Most patterns of a way to stand that are offered to growth."""
+DRAWS = 2048
+"""Random neighbourhoods that are drawn where there are too many to list."""
+STEPS = 4096
+"""Most steps of one listing of neighbourhoods."""
+UNSEEN = 0.5
+"""Weight of a neighbourhood that no part shows, beside one that is shown once."""
+
+State = tuple[int, ...]
+
+
+@dataclass
+class _Stance:
+    """One way of standing of a part type: the places around it, and what was seen of them.
+
+    up: float64 (3,), what is up in part coordinates; turns: float64 (k, 3, 3), symmetries that keep it; types int64
+    (p,), poses float64 (p, 4, 4) of the places; slot_of: int64 (p,); images: (k, p), where each turn takes each place;
+    seen: observed neighbourhoods as sorted places, in all images, with how often, and the exemplar that showed it first.
+    """
+
+    part_type: int
+    up: FloatArray
+    turns: FloatArray
+    types: list[int] = field(default_factory=list)
+    poses: list[FloatArray] = field(default_factory=list)
+    slot_of: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    slots: int = 0
+    images: np.ndarray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
+    seen: dict[State, tuple[float, int]] = field(default_factory=dict)
+    states: list[dict[State, float]] = field(default_factory=list)
+    fillings: set[tuple[int, int, bool, bool]] = field(default_factory=set)
+    pairs: set[tuple[int, int, State, State]] = field(default_factory=set)
+    vectors: set[tuple[bool, ...]] = field(default_factory=set)
+    patterns: list[Pattern] = field(default_factory=list)
+
+    def split(self, places: State) -> list[State]:
+        """The state of each slot where these places are taken."""
+        states: list[list[int]] = [[] for _ in range(self.slots)]
+        for place in places:
+            states[self.slot_of[place]].append(place)
+        return [tuple(each) for each in states]
+
+
+class SlotGrammar:
+    """What a kit's exemplars show of the slots around its types; the kit's grammar says how strict it is."""
+
+    def __init__(self, kit: Kit, upright: bool, level: Strictness | None = None) -> None:
+        self.kit = kit
+        self.level = level or kit.grammar.strictness
+        self.upright = upright
+        self._axis = {"y": 1, "z": 2}[kit.up]
+        self._limit = 2.0 * kit.pose_tolerance
+        self._stances: dict[int, list[_Stance]] = {}
+        for pattern in observed_patterns(kit, upright):
+            self._stance(pattern).patterns.append(pattern)
+        for stances in self._stances.values():
+            for stance in stances:
+                self._observe(stance)
+
+    def _stance(self, pattern: Pattern) -> _Stance:
+        known = self._stances.setdefault(pattern.part_type, [])
+        turns = self.kit.types[pattern.part_type].symmetries[:, :3, :3]
+        for stance in known:
+            if not self.upright or np.linalg.norm(turns @ pattern.up - stance.up, axis=1).min() < SAME_UP:
+                return stance
+        kept = turns
+        if self.upright:
+            kept = turns[np.linalg.norm(turns @ pattern.up - pattern.up, axis=1) < SAME_UP]
+        known.append(_Stance(pattern.part_type, pattern.up, kept))
+        return known[-1]
+
+    def _turn_to(self, stance: _Stance, up: FloatArray) -> FloatArray | None:
+        """A symmetry that brings a part's way up to that of the stance."""
+        turns = self.kit.types[stance.part_type].symmetries[:, :3, :3]
+        gaps = np.linalg.norm(turns @ up - stance.up, axis=1)
+        best = int(gaps.argmin())
+        return turns[best] if gaps[best] < SAME_UP or not self.upright else None
+
+    def _observe(self, stance: _Stance) -> None:
+        """Read the places, slots and states of a stance off its patterns."""
+        if len(stance.turns) * len(stance.patterns) > IMAGES:
+            stance.turns = stance.turns[:1]
+        for pattern in stance.patterns:
+            first = self._turn_to(stance, pattern.up) if self.upright else np.eye(3)
+            for turn in stance.turns:
+                places = tuple(
+                    sorted(
+                        self._place(stance, kind, _turned(turn @ first, pose), add=True)
+                        for kind, pose in zip(pattern.types.tolist(), pattern.poses, strict=True)
+                    )
+                )
+                seen, owner = stance.seen.get(places, (0.0, pattern.owner))
+                stance.seen[places] = seen + pattern.seen / len(stance.turns), owner
+        stance.slot_of, stance.slots = self._slots(stance)
+        stance.images = np.array(
+            [
+                [
+                    self._place(stance, kind, _turned(turn, pose))
+                    for kind, pose in zip(stance.types, stance.poses, strict=True)
+                ]
+                for turn in stance.turns
+            ],
+            dtype=np.int64,
+        ).reshape(len(stance.turns), -1)
+        stance.states = [{} for _ in range(stance.slots)]
+        for places, (seen, _) in stance.seen.items():
+            split = stance.split(places)
+            stance.vectors.add(tuple(bool(each) for each in split))
+            for slot, state in enumerate(split):
+                stance.states[slot][state] = stance.states[slot].get(state, 0.0) + seen
+            for i, j in combinations(range(stance.slots), 2):
+                stance.fillings.add((i, j, bool(split[i]), bool(split[j])))
+                stance.pairs.add((i, j, split[i], split[j]))
+
+    def _place(self, stance: _Stance, kind: int, pose: FloatArray, add: bool = False) -> int:
+        """The number of a place, new if it may be added, else -1."""
+        part_type = self.kit.types[kind]
+        for number, (other, known) in enumerate(zip(stance.types, stance.poses, strict=True)):
+            if other == kind and np.linalg.norm(known[:3, 3] - pose[:3, 3]) <= self._limit:
+                gaps = part_type.symmetries[:, :3, :3] - known[:3, :3].T @ pose[:3, :3]
+                if np.linalg.norm(gaps.reshape(-1, 9), axis=1).min() * part_type.diagonal / 2 <= self._limit:
+                    return number
+        if not add:
+            return -1
+        stance.types.append(kind)
+        stance.poses.append(pose)
+        return len(stance.types) - 1
+
+    def _slots(self, stance: _Stance) -> tuple[np.ndarray, int]:
+        """The slot of each place, int64 (p,), and how many there are: overlapping places are one."""
+        count = len(stance.types)
+        boxes = np.empty((count, 2, 3))
+        for number, (kind, pose) in enumerate(zip(stance.types, stance.poses, strict=True)):
+            low, high = self.kit.types[kind].bounds
+            middle = pose[:3, :3] @ (low + high) / 2 + pose[:3, 3]
+            half = np.abs(pose[:3, :3]) @ (high - low) / 2 + self.kit.contact_tolerance
+            boxes[number] = middle - half, middle + half
+        owner = np.arange(count)
+        volumes = np.prod(boxes[:, 1] - boxes[:, 0], axis=1)
+        for i, j in combinations(range(count), 2):
+            shared = np.minimum(boxes[i, 1], boxes[j, 1]) - np.maximum(boxes[i, 0], boxes[j, 0])
+            if (shared > 0).all() and np.prod(shared) > OVERLAP * min(volumes[i], volumes[j]):
+                owner[owner == owner[j]] = owner[i]
+        _, slot_of = np.unique(owner, return_inverse=True)
+        return slot_of.astype(np.int64), int(slot_of.max()) + 1 if count else 0
+
+    def around(self, assembly: Assembly, part: int, neighbours: list[int]) -> tuple[_Stance, State] | None:
+        """How a part of an assembly stands and the places around it that are taken; None where one was never seen."""
+        pose = assembly.poses[part]
+        up = pose[self._axis, :3]
+        inverse = invert(pose)
+        for stance in self._stances.get(int(assembly.types[part]), []):
+            turn = self._turn_to(stance, up) if self.upright else np.eye(3)
+            if turn is None:
+                continue
+            places = [
+                self._place(stance, int(assembly.types[other]), _turned(turn, inverse @ assembly.poses[other]))
+                for other in neighbours
+            ]
+            return (stance, tuple(sorted(places))) if min(places, default=0) >= 0 else None
+        return None
+
+    def admits(self, assembly: Assembly, part: int, neighbours: list[int]) -> bool:
+        """Whether a part of an assembly may have these neighbours, by their places."""
+        found = self.around(assembly, part, neighbours)
+        if found is None:
+            return False
+        stance, places = found
+        split = stance.split(places)
+        known = all(state in states for state, states in zip(split, stance.states, strict=True))
+        pairs = combinations(range(stance.slots), 2)
+        return known and all(self._together(stance, split, i, j) for i, j in pairs)
+
+    def misfits(self, assembly: Assembly) -> list[int]:
+        """The parts of an assembly whose neighbours the grammar does not admit, ascending."""
+        return [part for part, near in enumerate(assembly.neighbours()) if not self.admits(assembly, part, near)]
+
+    def familiar(self, assembly: Assembly) -> float:
+        """The share of parts of which it was seen just so which slots are filled and which are empty: it tells whether
+        a level is too loose for a kit."""
+        good = 0
+        for part, near in enumerate(assembly.neighbours()):
+            found = self.around(assembly, part, near)
+            if found is not None:
+                stance, places = found
+                good += tuple(bool(each) for each in stance.split(places)) in stance.vectors
+        return good / max(len(assembly), 1)
+
+    def patterns(self) -> list[Pattern]:
+        """Neighbourhoods that the grammar admits, as patterns, ordered by type: all that were observed, and others, at
+        most PATTERNS a way of standing, modulo symmetry."""
+        found: list[Pattern] = []
+        for part_type, stances in sorted(self._stances.items()):
+            for stance in stances:
+                chosen: dict[State, tuple[float, int]] = {}
+                for places, (seen, owner) in stance.seen.items():
+                    key = _canonical(stance, places)
+                    before, first = chosen.get(key, (0.0, owner))
+                    chosen[key] = before + seen, first
+                owner = stance.patterns[0].owner
+                for places in self._others(stance):
+                    if len(chosen) >= PATTERNS:
+                        break
+                    chosen.setdefault(_canonical(stance, places), (UNSEEN, owner))
+                for places, (weight, owner) in chosen.items():
+                    poses = np.array([stance.poses[place] for place in places]).reshape(-1, 4, 4)
+                    types = np.array([stance.types[place] for place in places], dtype=np.int64)
+                    found.append(Pattern(part_type, types, poses, stance.up, weight, owner))
+        return found
+
+    def _others(self, stance: _Stance) -> Iterator[State]:
+        """Neighbourhoods that the grammar admits: all in order where they are few, else drawn at random."""
+        if not stance.slots:
+            return
+        listed = list(self._list(stance))
+        if len(listed) < PATTERNS * len(stance.turns):
+            yield from listed
+            return
+        rng = np.random.Generator(np.random.PCG64([stance.part_type, stance.slots]))
+        for _ in range(DRAWS):
+            drawn = self._draw(stance, rng)
+            if drawn is not None:
+                yield drawn
+
+    def _list(self, stance: _Stance) -> Iterator[State]:
+        split: list[State] = [()] * stance.slots
+        steps = 0
+
+        def fill(slot: int) -> Iterator[State]:
+            nonlocal steps
+            if slot == stance.slots:
+                yield tuple(sorted(place for state in split for place in state))
+                return
+            for state in sorted(stance.states[slot]):
+                steps += 1
+                if steps > STEPS:
+                    return
+                split[slot] = state
+                if all(self._together(stance, split, other, slot) for other in range(slot)):
+                    yield from fill(slot + 1)
+
+        yield from fill(0)
+
+    def _draw(self, stance: _Stance, rng: np.random.Generator) -> State | None:
+        """One neighbourhood: slot after slot in random order, states by how often they were seen; None at a dead end."""
+        split: list[State] = [()] * stance.slots
+        done: list[int] = []
+        for slot in rng.permutation(stance.slots).tolist():
+            states = sorted(stance.states[slot])
+            fitting = []
+            for state in states:
+                split[slot] = state
+                if all(self._together(stance, split, *sorted((other, slot))) for other in done):
+                    fitting.append(state)
+            if not fitting:
+                return None
+            odds = np.array([stance.states[slot][state] for state in fitting])
+            split[slot] = fitting[int(np.searchsorted(odds.cumsum(), rng.random() * odds.sum()).clip(0, len(odds) - 1))]
+            done.append(slot)
+        return tuple(sorted(place for state in split for place in state))
+
+    def _together(self, stance: _Stance, split: list[State], i: int, j: int) -> bool:
+        if self.level == "slots":
+            return True
+        if self.level == "slot_fillings":
+            return (i, j, bool(split[i]), bool(split[j])) in stance.fillings
+        return (i, j, split[i], split[j]) in stance.pairs
+
+
+def _canonical(stance: _Stance, places: State) -> State:
+    """The first of the symmetric images of some places."""
+    if not places:
+        return places
+    images = np.sort(stance.images[:, list(places)], axis=1)
+    first: State = min(map(tuple, images[(images >= 0).all(axis=1)].tolist()), default=places)
+    return first
+
+
+def _turned(turn: FloatArray, pose: FloatArray) -> FloatArray:
+    """A pose turned about the origin by a rotation (3, 3)."""
+    turned = pose.copy()
+    turned[:3] = turn @ pose[:3]
+    return turned
