@@ -27,7 +27,7 @@ __all__ = [
 
 ContactKind = Literal["point", "line", "face"]
 
-Strictness = Literal["multiset", "count_and_set", "count_and_pairs"]
+Strictness = Literal["multiset", "count_and_set", "count_and_pairs", "count_and_types"]
 """How near to what was observed a neighbourhood must be; `stages.shape.graphs.neighbourhoods` says what each admits."""
 
 Multiset = tuple[tuple[int, int], ...]

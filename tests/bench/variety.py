@@ -24,6 +24,7 @@ from pipeline.registry import find_stages
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit import Kit
 from stages.variations.exchange.search import Search
 from stages.variations.features import AXES, MIXED
@@ -104,7 +105,7 @@ def main() -> None:
     parser.add_argument("configs", nargs="*", help=f"names in configs/; all of {', '.join(CONFIGS)} if none is named")
     parser.add_argument("--seconds", type=float, default=120.0, help="CPU seconds of each worker")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--grammar", choices=("multiset", "count_and_set", "count_and_pairs"))
+    parser.add_argument("--grammar", choices=STRICTNESS)
     asked = parser.parse_args()
     print(HEADER, flush=True)
     notes: list[str] = []

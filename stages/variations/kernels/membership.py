@@ -64,7 +64,7 @@ def _rule(rules, part_type, near, count):
         row = rules.local[part_type, near[n]]
         if row < 0:
             return 0
-        for m in range(n):
+        for m in range(n if rules.level == 2 else 0):
             column = rules.local[part_type, near[m]]
             if row != column and not rules.pairs[rules.pair_starts[part_type] + row * around + column]:
                 return 0
