@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,15 @@ class Copied:
     pieces: int
     exemplar: float
     of: str
+
+    def described(self) -> dict[str, Any]:
+        """The same as JSON, as it stands in a lineage."""
+        return {
+            "largest": round(self.largest, 6),
+            "pieces": self.pieces,
+            "exemplar": round(self.exemplar, 6),
+            "of": self.of,
+        }
 
 
 class CopyTest:

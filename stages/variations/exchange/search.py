@@ -12,6 +12,7 @@ import numpy as np
 from stages.shape.arrays import Float32Array, IntArray
 from stages.shape.kit import Assembly
 from stages.variations.archive import Archive, Cell, Place, cell_of
+from stages.variations.copied import CopyTest
 from stages.variations.exchange.attempt import attempt, complete, cut_piece
 from stages.variations.exchange.centroids import match_centroids
 from stages.variations.exchange.checks import validate
@@ -58,9 +59,9 @@ LATE_WORK = 3.0
 @dataclass(frozen=True)
 class Variant:
     """A valid new shape. labels: int32 (m, 2), directed docking labels of its edges; graph and docked: its two keys
-    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (9,);
-    histogram: a hash of its type histogram; lineage: parents, number of parts from each, boundary and docking
-    motion, as JSON."""
+    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (10,);
+    histogram: a hash of its type histogram; lineage: parents, number of parts from each, boundary, docking motion and
+    what is copied whole, as JSON."""
 
     assembly: Assembly
     labels: IntArray
@@ -89,6 +90,7 @@ class Search:
         self.archive = Archive(config.novelty.quota)
         self.steering = Steering(config)
         self._features = FeatureTest(kit)
+        self._copies = CopyTest(kit, answers.dockings)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
         self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.parents.exemplars}
         self.spares = 0
@@ -99,7 +101,7 @@ class Search:
         exemplar = self.kit.exemplars[number]
         assembly, origins = exemplar.assembly, np.full(len(exemplar.assembly), number, dtype=np.int8)
         shares = material_shares(origins, len(self.kit.exemplars))
-        features = self._features.features(assembly, shares, self._features.marks(assembly))
+        features = self._features.features(assembly, shares, self._features.marks(assembly), 1.0)
         place = self.archive.add(self._cell(features), self.histogram(assembly.types))
         return self.parent(exemplar.name, assembly, origins, place)
 
@@ -195,7 +197,8 @@ class Search:
         types = ws.types[: ws.counts[PARTS]]
         if (self.histogram(types) if self.config.duplicates == "histogram" else int(key)) in self.seen:
             return DUPLICATE
-        if any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
+        pieces_count = self.config.sub_assemblies
+        if not pieces_count and any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
         outcome = self._validate()
         if outcome != Outcome.OK:
@@ -233,6 +236,8 @@ class Search:
         edges = np.sort(ws.edges[:count], axis=1)
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
         labels = np.stack([ws.label[edges[:, 0], edges[:, 1]], ws.label[edges[:, 1], edges[:, 0]]], axis=1)
+        assembly = Assembly(ws.types[:parts].astype(np.int16), poses, edges)
+        copied = self._copies.copied(assembly, labels)
         origin = ws.origin[:parts]
         lineage = {
             "parents": [a.name, b.name],
@@ -240,8 +245,8 @@ class Search:
             "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
             "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
             "motion": np.round(ws.motion, 9).tolist(),
+            "copied": copied.described(),
         }
-        assembly = Assembly(ws.types[:parts].astype(np.int16), poses, edges)
         origins = np.empty(parts, dtype=np.int8)
         for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
             at = placed[: len(parent.assembly)]
@@ -249,7 +254,8 @@ class Search:
         # A part whose neighbourhood tells its exemplar is of that one, whichever copy of it a piece brought along.
         marks = self._features.marks(assembly)
         origins = np.where(marks >= 0, marks, origins)
-        features = self._features.features(assembly, material_shares(origins, len(self.kit.exemplars)), marks)
+        shares = material_shares(origins, len(self.kit.exemplars))
+        features = self._features.features(assembly, shares, marks, copied.largest)
         return Variant(
             assembly,
             labels.astype(np.int32),

@@ -49,7 +49,7 @@ def test_what_is_wanted_beyond_the_spread_is_drawn_without_doubles() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     test = FeatureTest(kit)
     shape = kit.exemplars[0].assembly
-    pure = test.features(shape, material_shares(np.zeros(len(shape), int), 2), test.marks(shape))
+    pure = test.features(shape, material_shares(np.zeros(len(shape), int), 2), test.marks(shape), 1.0)
     features = np.tile(pure, (20, 1))
     features[:, AXES.index("parts")] += np.arange(20)
     counts = np.tile(np.bincount(shape.types, minlength=2), (20, 1))
