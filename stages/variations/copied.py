@@ -101,9 +101,12 @@ class CopyTest:
         type_sizes = np.diff(shape.type_starts)
         rank = np.empty(len(whole), dtype=np.int64)
         rank[shape.by_type] = np.arange(len(whole)) - np.repeat(shape.type_starts[:-1], type_sizes)
-        by_label = np.argsort(shape.labels, kind="stable")
         joints, tails = self._joints(shape), _tails(shape)
-        groups = self._groups
+        groups, dockings = self._groups, self._dockings
+        by_label = np.argsort(shape.labels, kind="stable")
+        rooms = dockings.spot_counts[shape.types]
+        at_starts, at = np.cumsum(rooms) - rooms, np.full(rooms.sum(), -1, dtype=np.int32)
+        at[at_starts[tails] + dockings.spots[dockings.rows[joints.labels] + joints.near]] = np.arange(len(tails))
         directed = np.arange(2 * len(kit.grammar.dockings) + 1)
         return Target(
             rank=rank,
@@ -114,6 +117,8 @@ class CopyTest:
             joints=joints,
             undo_near=groups.inverses[groups.starts[shape.types[tails]] + joints.near],
             undo_far=groups.inverses[groups.starts[shape.types[shape.ends]] + joints.far],
+            at=at,
+            at_starts=at_starts,
             tails=tails,
             by_label=by_label,
             label_starts=np.searchsorted(shape.labels[by_label], directed),
@@ -166,7 +171,8 @@ def _dockings(kit: Kit, groups: Groups) -> Dockings:
     for each in kit.grammar.dockings:
         ends = np.concatenate([ends, [(each.a, each.b), (each.b, each.a)]])
         poses = np.concatenate([poses, [each.pose, invert(each.pose)]])
-    passed, kept = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    passed, kept, spots = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    spot_counts = np.zeros(len(kit.types), dtype=np.int64)
     # Two images of a docking are the same where one pose is within tolerance of both.
     within = 2 * kit.pose_tolerance
     for (a, b), pose in zip(ends.tolist(), poses, strict=True):
@@ -177,7 +183,16 @@ def _dockings(kit: Kit, groups: Groups) -> Dockings:
         same = np.hypot(moved, gaps.min(axis=1)) <= within
         passed.append(np.append(np.where(same, gaps.argmin(axis=1), len(other)), len(other)))
         kept.append(np.flatnonzero(same))
+        side = len(first) + 1
+        table = groups.products[groups.rows[a] :][: side**2].reshape(side, side)
+        # Symmetries that differ by one that is kept put the other part into one place.
+        _, places = np.unique(table[:-1, kept[-1]].min(axis=1), return_inverse=True)
+        spots.append(np.append(spot_counts[a] + places, -1))
+        spot_counts[a] += places.max() + 1
     lengths = groups.orders[ends[:, 0]] + 1
+    joined_spots = np.concatenate(spots)
+    # The last place around a type is that of what stands nowhere.
+    joined_spots = np.where(joined_spots < 0, spot_counts[np.repeat(ends[:, 0], lengths)], joined_spots)
     return Dockings(
         ends=ends,
         rotations=np.ascontiguousarray(poses[:, :3, :3]),
@@ -186,5 +201,7 @@ def _dockings(kit: Kit, groups: Groups) -> Dockings:
         rows=np.cumsum(lengths) - lengths,
         kept=np.concatenate(kept),
         kept_starts=np.cumsum([len(each) for each in kept]),
+        spots=joined_spots,
+        spot_counts=spot_counts + 1,
         tolerance=kit.pose_tolerance,
     )

@@ -37,14 +37,15 @@ CONFIGS = ("castle", "dungeon", "spacebase-hall", "ring-segments", "ball-track",
 SLICE = 2000
 WARM_UP = 300
 HEADER = (
-    "| kit | search | tries | variants | a CPU s | graphs | histograms | at quarters | mixed | blended | E | MB |\n"
-    "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|"
+    "| kit | search | tries | variants | a CPU s | graphs | histograms | at quarters | mixed | blended | E | copied "
+    "| MB |\n"
+    "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|---:|"
 )
 
 
 @dataclass
 class Finds:
-    """What searches have found. keys: graph and histogram of each variant; features: float32 (9,) of each; curve:
+    """What searches have found. keys: graph and histogram of each variant; features: float32 (10,) of each; curve:
     numbers of variants after each quarter of the time; megabytes: the most memory that a process held."""
 
     tries: int = 0
@@ -91,10 +92,12 @@ def _row(name: str, guided: bool, workers: Sequence[Finds], seconds: float) -> s
     mixed = np.mean(features[:, AXES.index("mixture")] >= MIXED) if keys else 0.0
     blended = np.mean(features[:, AXES.index("blend")] > 0) if keys else 0.0
     distance = features[:, AXES.index("distance")].mean() if keys else 0.0
+    copied = np.median(features[:, AXES.index("copied")]) if keys else 0.0
     return (
         f"| {name} | {'novelty' if guided else 'random'} | {sum(each.tries for each in workers):,} | {len(keys):,} | "
         f"{len(keys) / seconds / len(workers):,.0f} | {graphs:,} | {histograms:,} | "
         f"{' '.join(f'{each:,}' for each in quarters)} | {mixed:.0%} | {blended:.0%} | {distance:.2f} | "
+        f"{copied:.0%} | "
         f"{max(each.megabytes for each in workers):,.0f} |"
     )
 

@@ -42,8 +42,9 @@ class Dockings(NamedTuple):
     ends int64 (labels, 2): types of the part that it is seen from and of the other; rotations float64 (labels, 3, 3),
     translations float64 (labels, 3): one pose of the other; passed int64 (t,): from rows int64 (labels,) on, for each
     symmetry of the first part the one of the other that does the same to the two, or none; kept int64 (c,): from
-    kept_starts int64 (labels + 1,) on the symmetries of the first part that have one; tolerance: of poses, in kit
-    units.
+    kept_starts int64 (labels + 1,) on the symmetries of the first part that have one; spots int64 (t,), as passed: the
+    number of the place where the other then stands, among all those around the first part's type, of which there are
+    spot_counts int64 (types,); tolerance: of poses, in kit units.
     """
 
     ends: np.ndarray
@@ -53,6 +54,8 @@ class Dockings(NamedTuple):
     rows: np.ndarray
     kept: np.ndarray
     kept_starts: np.ndarray
+    spots: np.ndarray
+    spot_counts: np.ndarray
     tolerance: float
 
 
@@ -70,7 +73,8 @@ class Joints(NamedTuple):
 class Target(NamedTuple):
     """All exemplars as one: rank int64 (n,): number of a part among those of its type; type_sizes int64 (types,);
     handed int64 (n,), -1 for parts that are placed as mirror images; owner int64 (n,): the exemplar of each part; sizes
-    int64 (exemplars,); joints, and undo_near, undo_far int64 (2 m,): the inverses of their near and far; tails int64
+    int64 (exemplars,); joints, and undo_near, undo_far int64 (2 m,): the inverses of their near and far; at int32
+    (c,): from at_starts int64 (n,) on, for each spot around a part the joint to what stands there, or -1; tails int64
     (2 m,): the part that each joint is seen from; by_label int64 (2 m,): joints in order of their labels, from
     label_starts int64 (labels + 1,) on."""
 
@@ -82,21 +86,11 @@ class Target(NamedTuple):
     joints: Joints
     undo_near: np.ndarray
     undo_far: np.ndarray
+    at: np.ndarray
+    at_starts: np.ndarray
     tails: np.ndarray
     by_label: np.ndarray
     label_starts: np.ndarray
-
-
-class Trail(NamedTuple):
-    """Where a look for pieces has been: visited uint64 (w,), a bit for each triple (p, q, s), those of p from bit
-    offsets int64 (n,) on; of the piece in hand on, by int64 (n,): q and s of each of its parts; piece_of int64 (n,):
-    the last piece that each part was in, or -1."""
-
-    offsets: np.ndarray
-    visited: np.ndarray
-    on: np.ndarray
-    by: np.ndarray
-    piece_of: np.ndarray
 
 
 @numba.njit(cache=True)
@@ -176,48 +170,6 @@ def _enter(visited, bit):
 
 
 @numba.njit(cache=True)
-def _grow(groups, dockings, types, joints, target, trail, piece, room):
-    """The piece that starts with part `room[0]`, breadth first: its parts in `room`; how many, and how many contacts
-    were looked at."""
-    # To take an array out of a tuple counts a reference, which in the loop would cost more than what is done there.
-    orders, products, rows = groups.orders, groups.products, groups.rows
-    passed, turns = dockings.passed, dockings.rows
-    starts, ends, labels, near, far = joints
-    their_starts, their_ends, their_labels = target.joints.starts, target.joints.ends, target.joints.labels
-    undo_near, undo_far = target.undo_near, target.undo_far
-    offsets, visited, on, by, piece_of = trail
-    rank = target.rank
-    size, done, looked = 1, 0, 0
-    piece_of[room[0]] = piece
-    while done < size:
-        p, q, s = room[done], on[done], by[done]
-        done += 1
-        a = types[p]
-        for k in range(starts[p], starts[p + 1]):
-            other, label = ends[k], labels[k]
-            if piece_of[other] == piece or label < 0:
-                continue
-            b = types[other]
-            turned = _product(products, rows[a], orders[a], s, near[k])
-            looked += their_starts[q + 1] - their_starts[q]
-            for t in range(their_starts[q], their_starts[q + 1]):
-                if their_labels[t] != label:
-                    continue
-                over = passed[turns[label] + _product(products, rows[a], orders[a], undo_near[t], turned)]
-                over = _product(products, rows[b], orders[b], over, far[k])
-                over = _product(products, rows[b], orders[b], undo_far[t], over)
-                if over == orders[b]:
-                    continue
-                image = their_ends[t]
-                if _enter(visited, offsets[other] + rank[image] * orders[b] + over):
-                    piece_of[other] = piece
-                    room[size], on[size], by[size] = other, image, over
-                    size += 1
-                    break
-    return size, looked
-
-
-@numba.njit(cache=True)
 def _rarest_first(joints, target):
     """The contacts of a shape, each once, int64 (k,), those first whose docking the exemplars have least of."""
     chosen, times = np.empty(len(joints.ends), dtype=np.int64), np.empty(len(joints.ends), dtype=np.int64)
@@ -233,54 +185,97 @@ def _rarest_first(joints, target):
 
 
 @numba.njit(cache=True)
+def _seeds(groups, dockings, types, handed, tails, joints, target, budget):
+    """The ways to lay a contact of a shape on one of an exemplar, rarest dockings first, at most `budget`: int64 (k, 3)
+    triples (p, q, s) of a part, the part that it lies on and by which symmetry."""
+    orders, products, rows, signs, firsts = groups.orders, groups.products, groups.rows, groups.signs, groups.starts
+    inverses, kept, kept_starts = groups.inverses, dockings.kept, dockings.kept_starts
+    labels, near, their_near = joints.labels, joints.near, target.joints.near
+    chosen, total = _rarest_first(joints, target), 0
+    for k in chosen:
+        label = labels[k]
+        times = target.label_starts[label + 1] - target.label_starts[label]
+        total += times * (kept_starts[label + 1] - kept_starts[label])
+    seeds, count = np.empty((min(total, budget), 3), dtype=np.int64), 0
+    for k in chosen:
+        p, label = tails[k], labels[k]
+        a = types[p]
+        for at in range(target.label_starts[label], target.label_starts[label + 1]):
+            t = target.by_label[at]
+            q = target.tails[t]
+            for c in range(kept_starts[label], kept_starts[label + 1]):
+                s = _product(products, rows[a], orders[a], kept[c], inverses[firsts[a] + near[k]])
+                s = _product(products, rows[a], orders[a], their_near[t], s)
+                if s == orders[a] or handed[p] * target.handed[q] * signs[firsts[a] + s] < 0:
+                    continue
+                if count == len(seeds):
+                    return seeds
+                seeds[count, 0], seeds[count, 1], seeds[count, 2] = p, q, s
+                count += 1
+    return seeds[:count]
+
+
+@numba.njit(cache=True)
 def rigid_pieces(groups, dockings, types, handed, tails, joints, target, budget):
     """The largest connected pieces, of two parts and more, of a shape that stand so in an exemplar by one rigid motion:
     parts int64 (p,), starts int64 (k + 1,) of each piece in them, and the exemplar of each, int64 (k,).
 
-    They are looked for from the rarest dockings on, until `budget` contacts have been looked at; no clock decides what
-    is found. types, handed, tails and joints: of the shape, as those of `target`.
+    They are grown breadth first from the rarest dockings on, until `budget` contacts have been looked at; no clock
+    decides what is found. types, handed, tails and joints: of the shape, as those of `target`.
     """
+    # To take an array out of a tuple counts a reference, which in the loop would cost more than what is done there.
+    orders, products, rows = groups.orders, groups.products, groups.rows
+    passed, spots, turns = dockings.passed, dockings.spots, dockings.rows
+    joint_starts, ends, labels, near, far = joints
+    their_ends, standing, standing_starts = target.joints.ends, target.at, target.at_starts
+    undo_near, undo_far, rank, owner = target.undo_near, target.undo_far, target.rank, target.owner
     n = len(types)
-    orders, products, rows, signs, sign_rows = groups.orders, groups.products, groups.rows, groups.signs, groups.starts
-    inverses, kept, kept_starts = groups.inverses, dockings.kept, dockings.kept_starts
-    labels, near, their_near = joints.labels, joints.near, target.joints.near
-    their_tails, their_handed, owner, rank = target.tails, target.handed, target.owner, target.rank
-    by_label, label_starts = target.by_label, target.label_starts
     spans = orders[types] * target.type_sizes[types]
-    offsets = spans.cumsum() - spans
-    visited = np.zeros(spans.sum() // 64 + 1, dtype=np.uint64)
-    on, by = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    trail = Trail(offsets, visited, on, by, np.full(n, -1, dtype=np.int64))
+    # A bit for each triple (p, q, s); q and s of the parts of the piece in hand; the last piece that a part was in.
+    offsets, visited = spans.cumsum() - spans, np.zeros(spans.sum() // 64 + 1, dtype=np.uint64)
+    on, by, piece_of = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.full(n, -1, dtype=np.int64)
     parts, filled = np.empty(4 * n, dtype=np.int64), 0
     starts, owners, pieces = np.zeros(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0
-    for k in _rarest_first(joints, target):
-        p, label = tails[k], labels[k]
-        a = types[p]
-        for at in range(label_starts[label], label_starts[label + 1]):
-            t = by_label[at]
-            q = their_tails[t]
-            for c in range(kept_starts[label], kept_starts[label + 1]):
+    seeds = _seeds(groups, dockings, types, handed, tails, joints, target, budget)
+    for seed in range(len(seeds)):
+        p, q, s = seeds[seed, 0], seeds[seed, 1], seeds[seed, 2]
+        if not _enter(visited, offsets[p] + rank[q] * orders[types[p]] + s):
+            continue
+        if budget < 0:
+            break
+        if filled + n > len(parts):
+            parts = np.concatenate((parts, np.empty_like(parts)))
+        if pieces == len(owners):
+            starts = np.concatenate((starts, np.empty_like(owners)))
+            owners = np.concatenate((owners, np.empty_like(owners)))
+        parts[filled], on[0], by[0], piece_of[p] = p, q, s, pieces
+        size, done = 1, 0
+        while done < size:
+            p, q, s = parts[filled + done], on[done], by[done]
+            done += 1
+            a = types[p]
+            for k in range(joint_starts[p], joint_starts[p + 1]):
+                other, label = ends[k], labels[k]
+                if piece_of[other] == pieces or label < 0:
+                    continue
                 budget -= 1
-                s = _product(products, rows[a], orders[a], kept[c], inverses[sign_rows[a] + near[k]])
-                s = _product(products, rows[a], orders[a], their_near[t], s)
-                if s == orders[a] or handed[p] * their_handed[q] * signs[sign_rows[a] + s] < 0:
+                b = types[other]
+                turned = _product(products, rows[a], orders[a], s, near[k])
+                t = standing[standing_starts[q] + spots[turns[label] + turned]]
+                if t < 0:
                     continue
-                if not _enter(visited, offsets[p] + rank[q] * orders[a] + s):
-                    continue
-                if budget < 0:
-                    return parts[:filled], starts[: pieces + 1], owners[:pieces]
-                if filled + n > len(parts):
-                    parts = np.concatenate((parts, np.empty_like(parts)))
-                if pieces == len(owners):
-                    starts = np.concatenate((starts, np.empty_like(owners)))
-                    owners = np.concatenate((owners, np.empty_like(owners)))
-                parts[filled], on[0], by[0] = p, q, s
-                size, looked = _grow(groups, dockings, types, joints, target, trail, pieces, parts[filled:])
-                budget -= looked
-                filled += size
-                owners[pieces] = owner[q]
-                pieces += 1
-                starts[pieces] = filled
+                over = passed[turns[label] + _product(products, rows[a], orders[a], undo_near[t], turned)]
+                over = _product(products, rows[b], orders[b], over, far[k])
+                over = _product(products, rows[b], orders[b], undo_far[t], over)
+                image = their_ends[t]
+                if over < orders[b] and _enter(visited, offsets[other] + rank[image] * orders[b] + over):
+                    piece_of[other] = pieces
+                    parts[filled + size], on[size], by[size] = other, image, over
+                    size += 1
+        filled += size
+        owners[pieces] = owner[on[0]]
+        pieces += 1
+        starts[pieces] = filled
     return parts[:filled], starts[: pieces + 1], owners[:pieces]
 
 
