@@ -17,7 +17,7 @@ from stages.variations.kernels.tables import shape_tables
 
 __all__ = ["Copied", "CopyTest"]
 
-BUDGET = 10_000_000
+BUDGET = 2_000_000
 """Contacts that are looked at for one shape at most. Rare dockings are looked at first, so that what is left unseen
 beyond it are repetitions of common ones: `largest` may then be too small, and `pieces` too many."""
 
@@ -88,7 +88,7 @@ class CopyTest:
     def _joints(self, shape: ShapeTables) -> Joints:
         return Joints(shape.starts, shape.ends, shape.labels, *locate(self._groups, self._dockings, shape))
 
-    def _exemplars(self, kit: Kit, dockings: DockingTable) -> Target:
+    def _exemplars(self, kit: Kit, table: DockingTable) -> Target:
         assemblies = [each.assembly for each in kit.exemplars]
         sizes = np.array([len(each) for each in assemblies])
         shifts = np.cumsum(sizes) - sizes
@@ -97,7 +97,7 @@ class CopyTest:
             np.concatenate([each.poses for each in assemblies]),
             np.concatenate([each.edges + shift for each, shift in zip(assemblies, shifts, strict=True)]),
         )
-        shape = shape_tables(whole, dockings.label_edges(whole.types, whole.poses, whole.edges), self._types)
+        shape = shape_tables(whole, table.label_edges(whole.types, whole.poses, whole.edges), self._types)
         type_sizes = np.diff(shape.type_starts)
         rank = np.empty(len(whole), dtype=np.int64)
         rank[shape.by_type] = np.arange(len(whole)) - np.repeat(shape.type_starts[:-1], type_sizes)
