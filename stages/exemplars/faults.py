@@ -18,7 +18,8 @@ from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.contact import ContactTest, overlapping_boxes
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.geometry.pose import invert
-from stages.shape.graphs.neighbourhoods import admits
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
+from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 
 __all__ = ["geometry_faults"]
@@ -105,9 +106,10 @@ def _contacts(
 def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[str]:
     known = kit.type_names()
     faults = []
+    misfits = SlotGrammar(kit, upright=True).misfits(assembly) if kit.grammar.strictness in SLOT_LEVELS else ()
     for part, neighbours in enumerate(assembly.neighbours()):
         around = assembly.multiset(neighbours)
-        if not admits(kit.grammar, int(assembly.types[part]), around):
+        if part in misfits or not admits(kit.grammar, int(assembly.types[part]), around):
             listed = ", ".join(f"{count} {known[other]}" for other, count in around) or "nothing"
             faults.append(f"{names[part]} has a neighbourhood that the grammar does not admit: {listed}")
     return faults

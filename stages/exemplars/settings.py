@@ -92,8 +92,9 @@ class KitConfig(StrictModel):
     grammar: Strictness = Field(
         "multiset",
         description="Which neighbours a part may have: the very numbers of neighbours of each type that were observed "
-        "around its type; as many neighbours, of the same set of types, as observed once; or as many neighbours as "
-        "observed, each two of their types observed together around its type. Each admits all that the former admits.",
+        "around its type; as many neighbours, of the same set of types, as observed once; as many neighbours as "
+        "observed, each two of their types observed together around its type; or as many neighbours as observed, each "
+        "of their types observed around its type (the published rule). Each admits all that the former admits.",
     )
     hubs: HubConfig = Field(
         default_factory=HubConfig,

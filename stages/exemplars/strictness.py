@@ -28,8 +28,7 @@ SEEN: tuple[Multiset, ...] = (((WALL, 2), (FLOOR, 1)), ((FLOOR, 1), (DOOR, 1)))
 MOST = 4
 """Neighbourhoods of at most so many parts are looked at."""
 REFUSED: tuple[tuple[Multiset, str], ...] = (
-    (((WALL, 1), (DOOR, 1)), "never\ntogether"),
-    (((WALL, 1), (FLOOR, 1), (DOOR, 1)), "two never\ntogether"),
+    (((DOOR, 1),), "never\nso few"),
     (((WALL, 2), (FLOOR, 2)), "never\nso many"),
     (((CENTRE, 1), (FLOOR, 1)), "never\naround it"),
 )
@@ -37,6 +36,7 @@ WORDS: dict[Strictness, str] = {
     "multiset": "only what was seen",
     "count_and_set": "also as many, of the same set of types",
     "count_and_pairs": "also as many as seen once, each two types seen together",
+    "count_and_types": "also as many as seen once, each type seen beside it: the published rule",
 }
 PAPER = "#fbf9f5"
 

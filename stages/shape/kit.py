@@ -27,8 +27,11 @@ __all__ = [
 
 ContactKind = Literal["point", "line", "face"]
 
-Strictness = Literal["multiset", "count_and_set", "count_and_pairs", "slot_pairs", "slot_fillings", "slots"]
-"""How near to what was observed a neighbourhood must be; `stages.shape.graphs.neighbourhoods` says what each admits."""
+Strictness = Literal[
+    "multiset", "count_and_set", "count_and_pairs", "count_and_types", "slot_pairs", "slot_fillings", "slots"
+]
+"""How near to what was observed a neighbourhood must be; `stages.shape.graphs.neighbourhoods`, and of the last three
+`stages.shape.graphs.slots`, say what each admits."""
 
 Multiset = tuple[tuple[int, int], ...]
 """Neighbour counts of a part: `(type index, count)` pairs in ascending order of type index."""

@@ -19,11 +19,11 @@ Cell = tuple[int, ...]
 Place = tuple[int, int]
 """Where a variant stands: the numbers of its cell and of its histogram, in the order in which they were first seen."""
 
-_SHARES = ("mixture", "blend", "distance")
+_SHARES = ("mixture", "blend", "distance", "copied")
 
 
 def cell_of(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Cell:
-    """The cell of features float32 (9,): sizes by octaves, shares in equal steps with 0 apart, the dominant type."""
+    """The cell of features float32 (10,): sizes by octaves, shares in equal steps with 0 apart, the dominant type."""
     cell = []
     for axis in axes:
         value = float(features[AXES.index(axis)])

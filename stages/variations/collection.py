@@ -18,6 +18,7 @@ from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.variations.ancestry import Ancestry, read_ancestry
 from stages.variations.backdrop import Backdrop, backdrop_of
+from stages.variations.dullness import dullness
 from stages.variations.measures import SAMPLE, edit_measures, pool_measures
 from stages.variations.meeting import meeting
 from stages.variations.partition import Chosen, choose_by_family, nearness_of, packed_shapes, wanted_sizes
@@ -144,10 +145,13 @@ def _measures(task: Task, name: str, pool: PoolIndex, chosen: Chosen) -> dict[st
         split: {"wanted": wanted[split], "samples": int((chosen.split_of == number).sum()), **nearness.get(split, {})}
         for number, split in enumerate(SPLITS)
     }
+    pieces = [found.described(at)["copied"]["pieces"] for found, at in pool.variants(task, variants.tolist())]
+    worth = {"variants": len(variants), **pool_measures(*taken, config.search.novelty)}
     return {
         "pool": len(pool),
-        "variants": len(variants),
-        **pool_measures(*taken, config.search.novelty),
+        **worth,
+        "pieces": float(np.median(pieces)) if pieces else 0.0,
+        "dull": dullness(kit, worth),
         "edits": edit_measures(kit, [found.assembly(at)[0] for found, at in pool.variants(task, sample)]),
         **task.shard.params["searched"][name],
         "strictness": kit.grammar.strictness,

@@ -1,4 +1,4 @@
-"""What a variant is like, in nine numbers: the axes along which the search and the selection want variety."""
+"""What a variant is like, in ten numbers: the axes along which the search and the selection want variety."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from stages.shape.kit import Assembly, Kit
 
 __all__ = ["AXES", "MIXED", "Axis", "FeatureTest", "material_shares"]
 
-Axis = Literal["parts", "footprint", "height", "aspect", "cycle_rank", "mixture", "blend", "distance", "dominant"]
+Axis = Literal[
+    "parts", "footprint", "height", "aspect", "cycle_rank", "mixture", "blend", "distance", "copied", "dominant"
+]
 AXES: tuple[Axis, ...] = get_args(Axis)
 MIXED = 0.1
 """Mixture from which on a shape counts as mixed: a tenth of its parts from other exemplars than its main one."""
@@ -35,15 +37,16 @@ class FeatureTest:
         self._rules, self._owners = rules, np.where(times == 1, owners[first], -1).astype(np.int8)
         self._exemplars = [np.bincount(each.assembly.types, minlength=self._types) for each in kit.exemplars]
 
-    def features(self, assembly: Assembly, shares: FloatArray, marks: np.ndarray) -> Float32Array:
-        """The nine features of an assembly, float32 (9,), in the order of AXES.
+    def features(self, assembly: Assembly, shares: FloatArray, marks: np.ndarray, copied: float) -> Float32Array:
+        """The ten features of an assembly, float32 (10,), in the order of AXES.
 
         parts: how many; footprint: area of the box around it seen from above, in squared kit units; height: of that
         box, in kit units; aspect: longer by shorter side of the footprint; cycle_rank: edges beyond a spanning tree;
         mixture: share of parts that are not of the exemplar that gave most; blend: among parts with a neighbourhood
         that only one exemplar shows, the share that is not of the exemplar shown most; distance: the histogram metric E
-        to the nearest exemplar (strings §5.3), 0 to 1; dominant: the type that most parts have.
-        shares: `material_shares` of the assembly; marks: int8 (n,) of `marks`.
+        to the nearest exemplar (strings §5.3), 0 to 1; copied: share of parts in the largest piece that stands rigidly
+        so in one exemplar; dominant: the type that most parts have.
+        shares: `material_shares` of the assembly; marks: int8 (n,) of `marks`; copied: `Copied.largest`.
         """
         centres = self._centres[assembly.types]
         turns, places = assembly.poses[:, :3, :3], assembly.poses[:, :3, 3]
@@ -63,6 +66,7 @@ class FeatureTest:
                 1.0 - shares.max(),
                 1.0 - material_shares(marks[marks >= 0], len(self._exemplars)).max() if (marks >= 0).any() else 0.0,
                 distance,
+                copied,
                 counts.argmax(),
             ],
             dtype=np.float32,

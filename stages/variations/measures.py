@@ -9,6 +9,7 @@ import numpy as np
 
 from stages.shape.kit import Assembly, Kit
 from stages.variations.archive import cell_of
+from stages.variations.dullness import mutual_distance
 from stages.variations.edit_distance import edit_bounds
 from stages.variations.features import AXES, MIXED
 from stages.variations.meeting import meeting_words
@@ -27,11 +28,12 @@ def pool_measures(
 ) -> dict[str, Any]:
     """What a set of k variants is worth, as JSON.
 
-    counts: int32 (k, types) parts by type; features: float32 (k, 9); digests: uint8 (k, 2, 32).
+    counts: int32 (k, types) parts by type; features: float32 (k, 10); digests: uint8 (k, 2, 32).
     graphs, histograms: distinct ones; mixed: share of variants with at least a tenth of their parts from other
     exemplars than the main one; blended: share with neighbourhoods of several exemplars that only one each shows;
     distance: mean, and distances: quantiles 0, 0.1, 0.5, 0.9 and 1, of the histogram metric E to the nearest exemplar
-    (strings §5.3); parts: the same quantiles of the number of parts; cells: filled cells of the archive; bins: for
+    (strings §5.3); apart: mean E of two of a sample; copied: median share of parts in the largest piece copied whole;
+    parts: the same quantiles of the number of parts; cells: filled cells of the archive; bins: for
     each of its axes the filled steps.
     """
     cells = [cell_of(each, novelty.axes, novelty.resolution) for each in features]
@@ -43,6 +45,8 @@ def pool_measures(
         "blended": _share(features[:, AXES.index("blend")] > 0),
         "distance": round(float(distances.mean()), 4) if len(features) else 0.0,
         "distances": _quantiles(distances, 4),
+        "apart": round(mutual_distance(counts), 4),
+        "copied": round(float(np.median(features[:, AXES.index("copied")])), 4) if len(features) else 0.0,
         "parts": _quantiles(parts, 0),
         "cells": len(set(cells)),
         "bins": {axis: len(set(steps)) for axis, steps in zip(novelty.axes, zip(*cells, strict=True), strict=False)},
@@ -73,6 +77,7 @@ def described(measures: Mapping[str, Any]) -> str:
         f"{measures['mixed']:.0%} mix material of the exemplars, {measures['blended']:.0%} "
         f"their neighbourhoods; mean distance E to the nearest {measures['distance']:.2f}; "
         f"{edits['low']:.0f} to {edits['high']:.0f} edits from the nearest on a sample; "
+        f"largest copied piece {measures['copied']:.0%} of the parts, {measures['pieces']:.0f} pieces, in the median; "
         f"{low:.0f} to {high:.0f} parts, median {median:.0f}"
         + (f"; {met}" if met else "")
         + (f"; fewer than asked for: {short}" if short else "")
@@ -82,15 +87,16 @@ def described(measures: Mapping[str, Any]) -> str:
 def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
     """The measures of the variants chosen of each kit as Markdown: a table, and how each search went."""
     lines = [
-        "| kit | found | chosen | graphs | histograms | cells | mixed | blended | E | edits | parts |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- | --- |",
+        "| kit | found | chosen | graphs | histograms | cells | mixed | blended | E | edits | copied | pieces "
+        "| parts |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- | ---: | ---: | --- |",
     ]
     for kit, each in measures.items():
         edits, sizes = each["edits"], " / ".join(f"{size:.0f}" for size in each["parts"][1:4])
         lines.append(
             f"| {kit} | {each['pool']:,} | {each['variants']:,} | {each['graphs']:,} | {each['histograms']:,} | "
             f"{each['cells']:,} | {each['mixed']:.0%} | {each['blended']:.0%} | {each['distance']:.2f} | "
-            f"{edits['low']:.0f} to {edits['high']:.0f} | {sizes} |"
+            f"{edits['low']:.0f} to {edits['high']:.0f} | {each['copied']:.0%} | {each['pieces']:.0f} | {sizes} |"
         )
     lines += [
         "",
@@ -106,6 +112,10 @@ def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
         "in common.",
         "- Edits: how many parts and contacts must be added or taken away to come to the nearest exemplar, on average; "
         "from at least to at most, on a few shapes.",
+        "- Copied: half of the shapes have at least so great a share of their parts in one piece that stands just so, "
+        "moved as a whole, in an exemplar. Two exemplars glued together: 50 %.",
+        "- Pieces: of so many such pieces, or fewer, half of the shapes can be put together. A sample's "
+        "`lineage.copied` has both numbers of its own.",
         "- Parts: a tenth, half and nine tenths of the shapes have at most so many parts.",
         "",
         "How the search went:",
@@ -113,6 +123,7 @@ def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
     ]
     lines += [f"- {kit}: histograms found: {growth(each['curve'])}" for kit, each in measures.items()]
     lines += [f"- {kit}: {words}" for kit, each in measures.items() if (words := _met(each))]
+    lines += [f"- {kit}: {each['dull']}" for kit, each in measures.items() if each["dull"]]
     return "\n".join(lines)
 
 

@@ -3,7 +3,7 @@ the index of what the pool shards kept of it, which is small and held in memory.
 
 Files of a lane: `types.npy` int16 (N,), `origins.npy` int8 (N,) the exemplar of each part, `poses.npy` float64
 (N, 4, 4), `edges.npy` int32 (M, 2), `labels.npy` int32 (M, 2), `offsets.npy` int64 (k + 1, 2) into the former for k
-variants, `features.npy` float32 (k, 9), `keys.npy` uint64 (k, 2) of refinement, `digests.npy` uint8 (k, 2, 32) of the
+variants, `features.npy` float32 (k, 10), `keys.npy` uint64 (k, 2) of refinement, `digests.npy` uint8 (k, 2, 32) of the
 canonical graph without and with docking labels, `lineage.jsonl`.
 
 Files of a pool: `kept.npy` int64 (k, 2), lane and index there of each variant that it kept, and for these `counts.npy`

@@ -46,6 +46,7 @@ def _endings(plan: Plan) -> Sequence[str]:
 
 def _lineage(_: Config) -> Mapping[str, Field]:
     whole = {"type": "integer", "minimum": 0}
+    share = {"type": "number", "exclusiveMinimum": 0, "maximum": 1}
     places = {"type": "array", "items": whole, "minItems": 1}
     row = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
     return {
@@ -80,6 +81,20 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "maxItems": 4,
                 "description": "moved the piece of the first of made_of to the second: the rows of a rotation, then a "
                 "translation, in the coordinates of the model files",
+            }
+        ),
+        "copied": Field(
+            {
+                "type": "object",
+                "properties": {
+                    "largest": {**share, "description": "share of the parts, but for the backdrop, in that piece"},
+                    "pieces": {**whole, "minimum": 1, "description": "such pieces that together have all parts"},
+                    "exemplar": {**share, "description": "share of the parts of that exemplar"},
+                    "of": {"type": "string", "minLength": 1, "description": "the name of that exemplar"},
+                },
+                "required": ["largest", "pieces", "exemplar", "of"],
+                "additionalProperties": False,
+                "description": "the largest connected piece that stands just so, moved as a whole, in one exemplar",
             }
         ),
         "backdrop": Field({**whole, "description": "parts at the end of the list that were put back behind it"}),

@@ -116,10 +116,13 @@ def run_lane(task: Task) -> Outcome:
 
 def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequence[Variant]) -> Sequence[Variant]:
     """The variants that are, with their backdrop, what the config requires; the others are refused."""
+    telling = [each for each in variants if each.lineage["copied"]["largest"] <= require.copied]
+    if len(telling) < len(variants):
+        task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
     if not (require.rooted or require.stable or require.hubs):
-        return variants
+        return telling
     backdrop, kept = backdrop_of(task, kit.name), []
-    for variant in variants:
+    for variant in telling:
         whole = backdrop.fit(variant.assembly)
         fitted = len(whole) - len(variant.assembly)
         weak = unmet(require, kit_shape(kit, whole)) if fitted >= require.hubs else "no backdrop"

@@ -22,12 +22,12 @@ def select(
     """Which of k variants are taken, int64 (min(wanted, k),), the most telling first.
 
     Each is the one farthest from the kit's exemplars and from all taken before (greedy k-centre). When more than
-    `config.spread` are wanted the rest are drawn at random. counts: int32 (k, types); features: float32 (k, 9).
+    `config.spread` are wanted the rest are drawn at random. counts: int32 (k, types); features: float32 (k, 10).
     """
     exemplars = [each.assembly for each in kit.exemplars]
     test = FeatureTest(kit)
     pure = np.ones(1)
-    known = [test.features(each, pure, test.marks(each)) for each in exemplars]
+    known = [test.features(each, pure, test.marks(each), 1.0) for each in exemplars]
     all_features = np.concatenate([features, known])
     all_counts = np.concatenate([counts, [np.bincount(each.types, minlength=len(kit.types)) for each in exemplars]])
     space = selection_space(all_counts, all_features)

@@ -25,7 +25,7 @@ class NoveltyConfig(StrictModel):
         description="Axes of the archive's grid: number of parts, area seen from above, height, longer by shorter "
         "side, edges beyond a tree, share of parts from other exemplars than the main one, share of "
         "telling neighbourhoods from other exemplars than the main one, histogram distance to the "
-        "nearest exemplar, commonest part type.",
+        "nearest exemplar, share of parts in the largest piece copied whole from an exemplar, commonest part type.",
     )
     resolution: int = Field(
         4, ge=1, le=64, description="Cells along a doubling of a size; a share has four times as many from 0 to 1."
@@ -68,6 +68,9 @@ class SearchConfig(StrictModel):
         "docking",
         description="When two shapes are the same: same graph and docking configurations, same graph, or (the paper's "
         "rule) same numbers of parts of each type.",
+    )
+    sub_assemblies: bool = Field(
+        False, description="Whether a shape that is nothing but a piece of an exemplar counts as a variant."
     )
     upright: bool = Field(
         True,
@@ -151,6 +154,13 @@ class VariantRequirements(Requirements):
         ge=0,
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
         "no bridge.",
+    )
+    copied: float = Field(
+        1.0,
+        gt=0,
+        le=1,
+        description="Greatest share of its parts, without its backdrop, that may stand in one piece just so in an "
+        "exemplar; 1 refuses none.",
     )
 
 

@@ -8,14 +8,16 @@ Reads the finished variations from the work folder and writes `OUT/sheets/<datas
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pipeline.config import load_config
 from pipeline.places import Places, write_whole
 from pipeline.randomness import decision_rng
+from pipeline.records import read_record
 from pipeline.registry import find_stages
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.kit import Assembly, Exemplar, Kit
@@ -35,14 +37,20 @@ CELL = 232
 CAMERA = Camera(azimuth=-40.0, elevation=25.0)
 
 
-def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], rng: np.random.Generator) -> bytes:
+def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], dull: str, rng: np.random.Generator) -> bytes:
     """The sheet of one kit as PNG. `samples` are its variants in the order in which they were chosen, which is that
-    of how much each differs from the exemplars and from those before it."""
+    of how much each differs from the exemplars and from those before it. Where they are `dull`, which it then says,
+    each of the first stands beside the exemplar of which it has copied most."""
     rest = rng.permutation(np.arange(min(SHOWN, len(samples)), len(samples)))[:SHOWN]
     drawn = [samples[place] for place in sorted(rest.tolist())]
+    exemplars = {each.name: (_whole(each), each.name) for each in kit.exemplars}
+    first = [(each.assembly, each.key) for each in samples[:SHOWN]]
+    if dull:
+        pairs = zip(first[: SHOWN // 2], samples, strict=False)
+        first = [shown for one, each in pairs for shown in (one, exemplars[each.lineage["copied"]["of"]])]
     parts = [
-        ("Exemplars", [(_whole(each), each.name) for each in kit.exemplars], "what goes in"),
-        ("Most different", [(each.assembly, each.key) for each in samples[:SHOWN]], "chosen first"),
+        ("Exemplars", list(exemplars.values()), "what goes in"),
+        ("Most different", first, f"each beside its exemplar; {dull}" if dull else "chosen first"),
         (
             "At random",
             [(each.assembly, each.key) for each in drawn],
@@ -70,6 +78,15 @@ def _whole(exemplar: Exemplar) -> Assembly:
     return Assembly(types, poses, front.edges)
 
 
+def _measures(path: Path) -> Mapping[str, Any]:
+    """The measures of each kit from the record of the assignment. Raises FileNotFoundError where there is none."""
+    record = read_record(path)
+    if record is None:
+        raise FileNotFoundError(f"{path} is no record; make the variations again")
+    measures: Mapping[str, Any] = record.summary["kits"]
+    return measures
+
+
 def main() -> None:
     """Draw the sheet of each kit of a config whose variations are made."""
     parser = argparse.ArgumentParser(prog="python -m stages.variations.sheet", description="Draw contact sheets.")
@@ -81,6 +98,7 @@ def main() -> None:
     shards = sorted(places.stage("variations").root.glob(f"{config.name}-*-*.tar"))
     if not shards:
         parser.error(f"{places.work} holds no variations; make them with: make variations CONFIG={asked.config}")
+    measures = _measures(places.stage("variations").records / f"{config.name}-assignment.json")
     samples = sorted((each for shard in shards for each in read_samples(shard)), key=lambda each: each.key)
     folder = asked.out / "sheets"
     folder.mkdir(parents=True, exist_ok=True)
@@ -88,8 +106,8 @@ def main() -> None:
         stem = places.stage("exemplars").root / name
         kit = load_kit(stem.with_suffix(".json"), stem.with_suffix(".tar"))
         own = [each for each in samples if each.kit == name]
-        path = folder / f"{config.name}-{name}.png"
-        write_whole(path, kit_variants_sheet(kit, own, decision_rng(config.seed, "sheet", name)))
+        path, rng = folder / f"{config.name}-{name}.png", decision_rng(config.seed, "sheet", name)
+        write_whole(path, kit_variants_sheet(kit, own, measures[name]["dull"], rng))
         print(path)
 
 

@@ -58,7 +58,10 @@ def report(plan: Plan) -> Sequence[str]:
             lines.append(f"{why}; {counts}")
             lines.append(f"{kit}: growth of histograms: {growth(state['curve'])}")
     assignment = plan.summary("variations", f"{plan.config.name}-assignment") or {"kits": {}}
-    lines += [f"{kit}: {described(chosen)}" for kit, chosen in assignment["kits"].items()]
+    for kit, chosen in assignment["kits"].items():
+        lines.append(f"{kit}: {described(chosen)}")
+        if chosen["dull"]:
+            lines.append(f"{kit}: {chosen['dull']}")
     return lines
 
 

@@ -16,7 +16,8 @@ def vary(kit: Kit, count: int, rng: np.random.Generator, config: SearchConfig | 
     """`count` new assemblies of the kit's parts, or fewer where `config.tries` tries find no more.
 
     Every neighbourhood and every contact of theirs was seen in the exemplars, by the kit's grammar; no two are the
-    same by `config.duplicates`, and none is a piece of an exemplar. Backdrops are not put back.
+    same by `config.duplicates`, and none is a piece of an exemplar unless `config.sub_assemblies`. Backdrops are not
+    put back.
     """
     search = Search(ContactAnswers(kit), config or SearchConfig())
     variants, _ = search.run(rng, search.config.tries, count, kit.name, lambda _: None)

@@ -15,6 +15,7 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import ContactConfig, KitConfig, ShapeFile
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
 from stages.shape.kit import Assembly, Kit
+from stages.variations.copied import CopyTest
 from stages.variations.exchange.checks import validate
 from stages.variations.exchange.joins import place_boxes
 from stages.variations.exchange.search import Search
@@ -56,6 +57,7 @@ def bench() -> Iterator[Measure]:
         if "castle" in name or "dungeon" in name:
             yield _validation(name, kit, line, found[-20:])
             yield _relatives(name, kit, found[-200:])
+            yield _copied(name, line, found[-20:])
 
 
 def _some(line: Search, rng: np.random.Generator, found: list[Assembly]) -> int:
@@ -83,6 +85,19 @@ def _relatives(name: str, kit: Kit, assemblies: list[Assembly]) -> Measure:
 
     parts = int(np.mean([len(each) for each in assemblies]))
     return Measure(f"near relatives, {name}", "pairs", rate(pairs, 1.5, 2), note=f"{parts} parts")
+
+
+def _copied(name: str, line: Search, assemblies: list[Assembly]) -> Measure:
+    """Variants of which is told what they have copied whole."""
+    test, table = CopyTest(line.kit, line.answers.dockings), line.answers.dockings
+    labelled = cycle([(each, table.label_edges(each.types, each.poses, each.edges)) for each in assemblies])
+
+    def variant() -> int:
+        test.copied(*next(labelled))
+        return 1
+
+    parts = int(np.mean([len(each) for each in assemblies]))
+    return Measure(f"copied whole, {name}", "variants", rate(variant, 1.5, 2), note=f"{parts} parts")
 
 
 def _validation(name: str, kit: Kit, line: Search, assemblies: list[Assembly]) -> Measure:

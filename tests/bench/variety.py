@@ -24,6 +24,7 @@ from pipeline.registry import find_stages
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit import Kit
 from stages.variations.exchange.search import Search
 from stages.variations.features import AXES, MIXED
@@ -36,14 +37,15 @@ CONFIGS = ("castle", "dungeon", "spacebase-hall", "ring-segments", "ball-track",
 SLICE = 2000
 WARM_UP = 300
 HEADER = (
-    "| kit | search | tries | variants | a CPU s | graphs | histograms | at quarters | mixed | blended | E | MB |\n"
-    "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|"
+    "| kit | search | tries | variants | a CPU s | graphs | histograms | at quarters | mixed | blended | E | copied "
+    "| MB |\n"
+    "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|---:|"
 )
 
 
 @dataclass
 class Finds:
-    """What searches have found. keys: graph and histogram of each variant; features: float32 (9,) of each; curve:
+    """What searches have found. keys: graph and histogram of each variant; features: float32 (10,) of each; curve:
     numbers of variants after each quarter of the time; megabytes: the most memory that a process held."""
 
     tries: int = 0
@@ -90,10 +92,12 @@ def _row(name: str, guided: bool, workers: Sequence[Finds], seconds: float) -> s
     mixed = np.mean(features[:, AXES.index("mixture")] >= MIXED) if keys else 0.0
     blended = np.mean(features[:, AXES.index("blend")] > 0) if keys else 0.0
     distance = features[:, AXES.index("distance")].mean() if keys else 0.0
+    copied = np.median(features[:, AXES.index("copied")]) if keys else 0.0
     return (
         f"| {name} | {'novelty' if guided else 'random'} | {sum(each.tries for each in workers):,} | {len(keys):,} | "
         f"{len(keys) / seconds / len(workers):,.0f} | {graphs:,} | {histograms:,} | "
         f"{' '.join(f'{each:,}' for each in quarters)} | {mixed:.0%} | {blended:.0%} | {distance:.2f} | "
+        f"{copied:.0%} | "
         f"{max(each.megabytes for each in workers):,.0f} |"
     )
 
@@ -104,7 +108,7 @@ def main() -> None:
     parser.add_argument("configs", nargs="*", help=f"names in configs/; all of {', '.join(CONFIGS)} if none is named")
     parser.add_argument("--seconds", type=float, default=120.0, help="CPU seconds of each worker")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--grammar", choices=("multiset", "count_and_set", "count_and_pairs"))
+    parser.add_argument("--grammar", choices=STRICTNESS)
     asked = parser.parse_args()
     print(HEADER, flush=True)
     notes: list[str] = []

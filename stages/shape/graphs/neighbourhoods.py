@@ -6,22 +6,28 @@ Each level admits all that the one before it admits:
 - `count_and_set`: as many neighbours, of the same set of types, as one observed multiset has; how many there are of
   each type is free as long as there is one;
 - `count_and_pairs`: as many neighbours as some observed multiset has, of types such that each was observed around the
-  part's type and each two of them were observed around one part of it.
+  part's type and each two of them were observed around one part of it;
+- `count_and_types`: as many neighbours as some observed multiset has, of types such that each was observed around the
+  part's type. This is the published rule.
+
+Beside them stand the levels of slots, which ask for poses (`stages.shape.graphs.slots`); of a shape's graph alone only
+this much of them can be told, that each neighbour's type was observed around the part's type.
 
 Hub types stand outside: a hub may have any neighbours, and hubs do not count among the neighbours of other parts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import combinations
 
 from stages.shape.kit import Grammar, Multiset, Strictness
 
-__all__ = ["STRICTNESS", "admits"]
+__all__ = ["SLOT_LEVELS", "STRICTNESS", "admits"]
 
-STRICTNESS: tuple[Strictness, ...] = ("multiset", "count_and_set", "count_and_pairs")
+STRICTNESS: tuple[Strictness, ...] = ("multiset", "count_and_set", "count_and_pairs", "count_and_types")
 """The levels, the strictest first."""
+SLOT_LEVELS: tuple[Strictness, ...] = ("slot_pairs", "slot_fillings", "slots")
+"""The levels of slots, the strictest first."""
 
 
 def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
@@ -35,17 +41,16 @@ def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
     total, types = _size(counted), {other for other, _ in counted}
     if grammar.strictness == "count_and_set":
         return any(total == _size(each) and types == {other for other, _ in each} for each in observed)
+    if not types <= {other for each in observed for other, _ in each}:
+        return False
+    if grammar.strictness in SLOT_LEVELS:
+        return True
     if total not in {_size(each) for each in observed}:
         return False
-    around, pairs = _together(observed)
-    return types <= around and all(pair in pairs for pair in combinations(sorted(types), 2))
-
-
-def _together(observed: Mapping[Multiset, int]) -> tuple[set[int], set[tuple[int, int]]]:
-    """The types observed around a type, and the pairs a < b of them observed around one part."""
-    around = {other for each in observed for other, _ in each}
-    pairs = {pair for each in observed for pair in combinations([other for other, _ in each], 2)}
-    return around, pairs
+    if grammar.strictness == "count_and_types":
+        return True
+    together = {pair for each in observed for pair in combinations([other for other, _ in each], 2)}
+    return all(pair in together for pair in combinations(sorted(types), 2))
 
 
 def _size(multiset: Multiset) -> int:

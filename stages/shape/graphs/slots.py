@@ -26,10 +26,8 @@ from stages.shape.geometry.pose import invert
 from stages.shape.graphs.patterns import SAME_UP, Pattern, observed_patterns
 from stages.shape.kit import Assembly, Kit, Strictness
 
-__all__ = ["SLOT_LEVELS", "SlotGrammar"]
+__all__ = ["SlotGrammar"]
 
-SLOT_LEVELS: tuple[Strictness, ...] = ("slot_pairs", "slot_fillings", "slots")
-"""The levels of slots, the strictest first."""
 OVERLAP = 0.3
 """Share of the smaller box from which on two places are one slot."""
 IMAGES = 512
@@ -52,7 +50,7 @@ class _Stance:
 
     up: float64 (3,), what is up in part coordinates; turns: float64 (k, 3, 3), symmetries that keep it; types int64
     (p,), poses float64 (p, 4, 4) of the places; slot_of: int64 (p,); images: (k, p), where each turn takes each place;
-    seen: observed neighbourhoods as sorted places, in all images, with how often, and the exemplar that showed it first.
+    seen: observed neighbourhoods as sorted places, in all images, with how often, and what exemplar showed it first.
     """
 
     part_type: int
@@ -210,18 +208,26 @@ class SlotGrammar:
 
     def misfits(self, assembly: Assembly) -> list[int]:
         """The parts of an assembly whose neighbours the grammar does not admit, ascending."""
-        return [part for part, near in enumerate(assembly.neighbours()) if not self.admits(assembly, part, near)]
+        return [part for part, near in self._free(assembly) if not self.admits(assembly, part, near)]
+
+    def _free(self, assembly: Assembly) -> Iterator[tuple[int, list[int]]]:
+        """The parts of an assembly that are no hubs, with those of their neighbours that are none."""
+        is_hub = np.isin(assembly.types, self.kit.grammar.hubs)
+        for part, near in enumerate(assembly.neighbours()):
+            if not is_hub[part]:
+                yield part, [other for other in near if not is_hub[other]]
 
     def familiar(self, assembly: Assembly) -> float:
         """The share of parts of which it was seen just so which slots are filled and which are empty: it tells whether
         a level is too loose for a kit."""
-        good = 0
-        for part, near in enumerate(assembly.neighbours()):
+        good = parts = 0
+        for part, near in self._free(assembly):
+            parts += 1
             found = self.around(assembly, part, near)
             if found is not None:
                 stance, places = found
                 good += tuple(bool(each) for each in stance.split(places)) in stance.vectors
-        return good / max(len(assembly), 1)
+        return good / max(parts, 1)
 
     def patterns(self) -> list[Pattern]:
         """Neighbourhoods that the grammar admits, as patterns, ordered by type: all that were observed, and others, at
@@ -279,7 +285,7 @@ class SlotGrammar:
         yield from fill(0)
 
     def _draw(self, stance: _Stance, rng: np.random.Generator) -> State | None:
-        """One neighbourhood: slot after slot in random order, states by how often they were seen; None at a dead end."""
+        """One neighbourhood, slot after slot, states by how often they were seen; None at a dead end."""
         split: list[State] = [()] * stance.slots
         done: list[int] = []
         for slot in rng.permutation(stance.slots).tolist():

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import Float32Array, IntArray
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
+from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
 from stages.variations.archive import Archive, Cell, Place, cell_of
+from stages.variations.copied import CopyTest
 from stages.variations.exchange.attempt import attempt, complete, cut_piece
 from stages.variations.exchange.centroids import match_centroids
 from stages.variations.exchange.checks import validate
@@ -62,9 +65,9 @@ LATE_WORK = 3.0
 @dataclass(frozen=True)
 class Variant:
     """A valid new shape. labels: int32 (m, 2), directed docking labels of its edges; graph and docked: its two keys
-    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (9,);
-    histogram: a hash of its type histogram; lineage: parents, number of parts from each, boundary and docking
-    motion, as JSON."""
+    by colour refinement; origins: int8 (n,), the exemplar that each part came from; features: float32 (10,);
+    histogram: a hash of its type histogram; lineage: parents, number of parts from each, boundary, docking motion and
+    what is copied whole, as JSON."""
 
     assembly: Assembly
     labels: IntArray
@@ -90,10 +93,13 @@ class Search:
         self.largest = max(3, round(config.largest * max(sizes)))
         self.tables = kit_tables(kit, config.upright)
         self._ws = workspace(max(self.largest, *sizes))
+        slotted = kit.grammar.strictness in SLOT_LEVELS
+        self._slots = SlotGrammar(kit, config.upright) if slotted else None
         self._grower = self._made_grower() if config.method != "exchange" else None
         self.archive = Archive(config.novelty.quota)
         self.steering = Steering(config)
         self._features = FeatureTest(kit)
+        self._copies = CopyTest(kit, answers.dockings)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
         self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.parents.exemplars}
         self.spares = 0
@@ -104,7 +110,7 @@ class Search:
         exemplar = self.kit.exemplars[number]
         assembly, origins = exemplar.assembly, np.full(len(exemplar.assembly), number, dtype=np.int8)
         shares = material_shares(origins, len(self.kit.exemplars))
-        features = self._features.features(assembly, shares, self._features.marks(assembly))
+        features = self._features.features(assembly, shares, self._features.marks(assembly), 1.0)
         place = self.archive.add(self._cell(features), self.histogram(assembly.types))
         return self.parent(exemplar.name, assembly, origins, place)
 
@@ -253,11 +259,14 @@ class Search:
         types = ws.types[: ws.counts[PARTS]]
         if (self.histogram(types) if self.config.duplicates == "histogram" else int(key)) in self.seen:
             return DUPLICATE
-        if any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
+        pieces_count = self.config.sub_assemblies
+        if not pieces_count and any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
         outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
+        if self._slots is not None and self._slots.misfits(self._assembly()):
+            return REASONS[Outcome.GRAMMAR]
         return self._variant(origins, lineage, int(graph_key(ws, False)), int(graph_key(ws, True)))
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
@@ -282,7 +291,8 @@ class Search:
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
                 return Outcome.CLASH
 
-    def _variant(self, origins: np.ndarray, lineage: dict[str, Any], graph: int, docked: int) -> Variant:
+    def _assembly(self) -> Assembly:
+        """What the workspace holds."""
         ws = self._ws
         parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
         poses = np.tile(np.eye(4), (parts, 1, 1))
@@ -290,12 +300,18 @@ class Search:
         poses[:, :3, 3] = ws.translations[:parts]
         edges = np.sort(ws.edges[:count], axis=1)
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
-        labels = np.stack([ws.label[edges[:, 0], edges[:, 1]], ws.label[edges[:, 1], edges[:, 0]]], axis=1)
-        assembly = Assembly(ws.types[:parts].astype(np.int16), poses, edges)
+        return Assembly(ws.types[:parts].astype(np.int16), poses, edges)
+
+    def _variant(self, origins: np.ndarray, lineage: dict[str, Any], graph: int, docked: int) -> Variant:
+        assembly, label = self._assembly(), self._ws.label
+        i, j = assembly.edges[:, 0], assembly.edges[:, 1]
+        labels = np.stack([label[i, j], label[j, i]], axis=1)
+        copied = self._copies.copied(assembly, labels)
         # A part whose neighbourhood tells its exemplar is of that one, whichever copy of it a piece brought along.
         marks = self._features.marks(assembly)
         origins = np.where(marks >= 0, marks, origins)
-        features = self._features.features(assembly, material_shares(origins, len(self.kit.exemplars)), marks)
+        shares = material_shares(origins, len(self.kit.exemplars))
+        features = self._features.features(assembly, shares, marks, copied.largest)
         return Variant(
             assembly,
             labels.astype(np.int32),
@@ -305,7 +321,7 @@ class Search:
             features,
             self._cell(features),
             self.histogram(assembly.types),
-            lineage,
+            {**lineage, "copied": copied.described()},
         )
 
     def _load(self, parent: Parent) -> None:

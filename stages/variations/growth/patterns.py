@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.patterns import Pattern, observed_patterns
-from stages.shape.graphs.slots import SLOT_LEVELS, SlotGrammar
+from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Kit
 from stages.variations.growth.layout import PatternTables
 

@@ -39,7 +39,8 @@ __all__ = [
 class Rules(NamedTuple):
     """Which neighbourhoods the grammar admits, by rule: what a loose grammar admits is too much to be listed.
 
-    level: 0 `multiset`, 1 `count_and_set`, 2 `count_and_pairs`.
+    level: 0 `multiset`, 1 `count_and_set`, 2 `count_and_pairs`, 3 `count_and_types`, 4 one of slots,
+    of which only the types around a part can be told here.
     keys uint64 (c,), verdicts int64 (c,): an open-addressing table of neighbourhoods that were asked for, 1 where they
     are admitted; at level 0 those observed, which are all. filled int64 (1,): how many it holds.
     sizes bool (types, k): whether a part of a type may have so many neighbours.

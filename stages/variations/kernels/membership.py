@@ -42,7 +42,7 @@ def admitted(kit, part_type, near, count):
 
 @numba.njit(cache=True)
 def _rule(rules, part_type, near, count):
-    if count >= rules.sizes.shape[1] or not rules.sizes[part_type, count]:
+    if rules.level < 4 and (count >= rules.sizes.shape[1] or not rules.sizes[part_type, count]):
         return 0
     if rules.level == 1:
         key = mix(np.uint64(part_type) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(count))
@@ -64,7 +64,7 @@ def _rule(rules, part_type, near, count):
         row = rules.local[part_type, near[n]]
         if row < 0:
             return 0
-        for m in range(n):
+        for m in range(n if rules.level == 2 else 0):
             column = rules.local[part_type, near[m]]
             if row != column and not rules.pairs[rules.pair_starts[part_type] + row * around + column]:
                 return 0

@@ -71,7 +71,7 @@ def _rules(grammar: Grammar, weights: np.ndarray) -> Rules:
             slot = (slot + 1) % room
         keys[slot], verdicts[slot] = key, 1
     return Rules(
-        level=STRICTNESS.index(grammar.strictness),
+        level=STRICTNESS.index(grammar.strictness) if grammar.strictness in STRICTNESS else len(STRICTNESS),
         keys=keys,
         verdicts=verdicts,
         filled=np.array([len(known)]),

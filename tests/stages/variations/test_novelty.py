@@ -24,10 +24,11 @@ def test_features_of_a_shape_that_can_be_measured_by_hand() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     test = FeatureTest(kit)
     shape = kit.exemplars[1].assembly
-    features = test.features(shape, np.array([0.25, 0.75]), test.marks(shape))
+    features = test.features(shape, np.array([0.25, 0.75]), test.marks(shape), 0.4)
     assert value(features, "parts") == 14
     assert value(features, "cycle_rank") == 1
     assert value(features, "mixture") == 0.25
+    assert value(features, "copied") == np.float32(0.4)
     assert value(features, "distance") == 0.0
     # Four by five tiles of one unit, from the middle of the corners half a tile out on each side.
     assert np.isclose(value(features, "footprint"), 20, rtol=0.02)
@@ -42,7 +43,7 @@ def test_distance_is_the_histogram_metric_to_the_nearest_exemplar() -> None:
     for variant in found:
         links = len(variant.assembly) - 2
         expected = min(abs(links - 3) / (links + 2 + 5), abs(links - 5) / (links + 2 + 7))
-        features = test.features(variant.assembly, np.ones(1), test.marks(variant.assembly))
+        features = test.features(variant.assembly, np.ones(1), test.marks(variant.assembly), 1.0)
         assert np.isclose(value(features, "distance"), expected)
 
 
@@ -136,6 +137,20 @@ def test_no_variant_is_a_piece_of_an_exemplar() -> None:
         ws.rotations[:n], ws.translations[:n] = variant.assembly.poses[:, :3, :3], variant.assembly.poses[:, :3, 3]
         assert not any(lies_in(line.tables, ws, each.tables) for each in line.parents.exemplars)
     assert line.rejects[SUBASSEMBLY] > 0
+
+
+def test_a_piece_of_an_exemplar_counts_where_it_is_asked_for() -> None:
+    row = [*chain(2), *((name, pose(3, 0, 0) @ at) for name, at in chain(4)), ("cap", pose(7.25, 0, 0))]
+    kit = kit_of(CHAIN, [row, [*chain(3), ("cap", pose(3.25, 0, 0))]])
+    line, found = search(kit, tries=3000, smallest=0.3, sub_assemblies=True)
+    assert SUBASSEMBLY not in line.rejects
+    whole = [variant for variant in found if variant.lineage["copied"]["largest"] == 1.0]
+    assert whole
+    for variant in whole:
+        assert variant.lineage["copied"]["pieces"] == 1
+        assert variant.lineage["copied"]["exemplar"] < 1.0
+    assert len(whole) < len(found)
+    assert all(np.isclose(value(each.features, "copied"), each.lineage["copied"]["largest"]) for each in found)
 
 
 def test_every_part_of_a_variant_has_an_exemplar_of_which_it_is() -> None:

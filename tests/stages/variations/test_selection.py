@@ -49,7 +49,7 @@ def test_what_is_wanted_beyond_the_spread_is_drawn_without_doubles() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     test = FeatureTest(kit)
     shape = kit.exemplars[0].assembly
-    pure = test.features(shape, material_shares(np.zeros(len(shape), int), 2), test.marks(shape))
+    pure = test.features(shape, material_shares(np.zeros(len(shape), int), 2), test.marks(shape), 1.0)
     features = np.tile(pure, (20, 1))
     features[:, AXES.index("parts")] += np.arange(20)
     counts = np.tile(np.bincount(shape.types, minlength=2), (20, 1))
@@ -67,6 +67,7 @@ def test_measures_of_a_set_that_can_be_counted_by_hand() -> None:
     features[:, AXES.index("mixture")] = [0.0, 0.05, 0.5]
     features[:, AXES.index("blend")] = [0.0, 0.01, 0.0]
     features[:, AXES.index("distance")] = [0.0, 0.5, 0.25]
+    features[:, AXES.index("copied")] = [0.25, 1.0, 0.5]
     digests = np.zeros((3, 2, 32), dtype=np.uint8)
     digests[2] = 1
     measures = pool_measures(counts, features, digests, NoveltyConfig(axes=("mixture",)))
@@ -74,6 +75,8 @@ def test_measures_of_a_set_that_can_be_counted_by_hand() -> None:
     assert (measures["mixed"], measures["blended"]) == (0.3333, 0.3333)
     assert (measures["distance"], measures["distances"]) == (0.25, [0.0, 0.0, 0.25, 0.25, 0.5])
     assert measures["parts"] == [3.0] * 5
+    # Of three pairs one is equal, and two differ by four of six parts.
+    assert (measures["copied"], measures["apart"]) == (0.5, 0.4444)
     nothing = pool_measures(counts[:0], features[:0], digests[:0], NoveltyConfig())
     assert (nothing["graphs"], nothing["mixed"], nothing["parts"]) == (0, 0.0, [])
 

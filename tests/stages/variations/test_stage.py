@@ -127,6 +127,16 @@ def test_by_graph_everything_found_is_shared_out_by_equal_graphs_alone(tmp_path:
     assert {kit: found["let_go"] for kit, found in kits.items()} == {"chain": 0, "road": 0}
 
 
+def test_what_is_copied_beyond_the_limit_is_refused_and_counted(tmp_path: Path) -> None:
+    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}
+    make(tmp_path, "one", 1, per_kit=2000, search=search, require={"copied": 0.6})
+    samples = [sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)]
+    assert samples
+    assert max(sample.lineage["copied"]["largest"] for sample in samples) <= 0.6
+    records = (tmp_path / "one" / ".work" / "toy" / "variations" / "records").glob("*-lane*.json")
+    assert sum(json.loads(each.read_text())["rejects"].get("too much copied whole", 0) for each in records) > 0
+
+
 def test_two_workers_make_the_same_bytes(made: tuple[Path, str]) -> None:
     folder, _ = made
     search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}

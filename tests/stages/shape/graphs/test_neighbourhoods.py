@@ -48,6 +48,10 @@ SEEN = (multiset(B, B, C), multiset(C, D))
                 *(multiset(B, C), multiset(B, B), multiset(C, C), multiset(D, D)),
             ],
         ),
+        (
+            "count_and_types",
+            [multiset(*each) for size in (2, 3) for each in combinations_with_replacement((B, C, D), size)],
+        ),
     ],
 )
 def test_each_level_admits_what_was_observed_and_what_it_says(strictness: Strictness, beside: list[Multiset]) -> None:

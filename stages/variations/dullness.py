@@ -1,0 +1,70 @@
+"""Whether a pool is dull: valid shapes that are copies, or all alike; and what would help."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stages.shape.graphs.neighbourhoods import STRICTNESS
+from stages.shape.kit import Kit
+
+__all__ = ["dullness", "mutual_distance"]
+
+COPIED = 0.9
+"""Median share of parts in the largest copied piece from which on a pool is dull."""
+NEAR = 0.02
+"""Mean distance E to the nearest exemplar under which it is."""
+ALIKE = 0.05
+"""Mean distance E of two of its shapes under which it is."""
+COMPARED = 128
+"""So many shapes are compared with each other at most."""
+
+
+def mutual_distance(counts: np.ndarray) -> float:
+    """Mean histogram distance E (strings §5.3) of two shapes, 0 where there are fewer. counts: int32 (k, types)."""
+    chosen = counts[np.linspace(0, len(counts) - 1, min(COMPARED, len(counts))).astype(np.int64)].astype(np.int64)
+    i, j = np.triu_indices(len(chosen), 1)
+    if not len(i):
+        return 0.0
+    return float((np.abs(chosen[i] - chosen[j]).sum(axis=1) / (chosen[i] + chosen[j]).sum(axis=1)).mean())
+
+
+def dullness(kit: Kit, measures: Mapping[str, Any]) -> str:
+    """Why a pool is dull and what would help, in one sentence; empty where it is not dull, or has fewer than two
+    shapes.
+
+    measures: `variants`, how many; `copied`, median share of parts in the largest copied piece; `distance`, mean E to
+    the nearest exemplar; `apart`, mean E of two.
+    """
+    if measures["variants"] < 2:
+        return ""
+    faults = []
+    if measures["copied"] >= COPIED:
+        faults.append(f"half of the shapes have {measures['copied']:.0%} or more of their parts copied whole")
+    if measures["distance"] < NEAR:
+        faults.append(f"parts lists are almost those of the exemplars (E {measures['distance']:.3f})")
+    if measures["apart"] < ALIKE:
+        faults.append(f"the shapes are alike (E of two {measures['apart']:.3f})")
+    if not faults:
+        return ""
+    return f"dull: {', '.join(faults)}; what would help: {', or '.join(_remedies(kit))}"
+
+
+def _remedies(kit: Kit) -> list[str]:
+    """What would make the variants of a kit more different, by the keys of a config."""
+    remedies = ["a second model" if len(kit.exemplars) == 1 else "one more model of the same parts"]
+    looser = [each for each in ("count_and_pairs", "count_and_types") if _is_looser(each, kit.grammar.strictness)]
+    if looser:
+        remedies.append(f"a looser grammar (grammar: {looser[0]})")
+    if set(kit.contact_kinds) != {"face"}:
+        remedies.append("neighbours by their faces alone (contact.kinds: [face])")
+    if not kit.grammar.hubs and not any(len(each.backdrop) for each in kit.exemplars):
+        remedies.append("leaving out parts that touch everything (hubs.types: auto)")
+    return remedies
+
+
+def _is_looser(level: str, other: str) -> bool:
+    order: tuple[str, ...] = STRICTNESS
+    return order.index(level) > order.index(other)
