@@ -143,6 +143,8 @@ class Search:
         while number < tries and telling < wanted and len(found) < SPARE * wanted:
             batch = self.steering.plan(rng, self.parents, self.archive, min(BATCH, tries - number))
             for choice in batch:
+                if number >= tries:  # what is grown takes many
+                    break
                 if choice.number == GROW:
                     variant, work = self._grow(rng)
                     number += max(round(work / TRY_WORK), 1)

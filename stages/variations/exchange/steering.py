@@ -94,7 +94,8 @@ class Steering:
     def _odds(self, exemplars: int) -> FloatArray:
         """How likely each choice is: of the exchange a share for all alike, the rest by the square of what it gains."""
         if self.config.method == "growth":
-            return np.eye(GROW + 1)[GROW]
+            only: FloatArray = np.eye(GROW + 1)[GROW]
+            return only
         possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, _ in CHOICES])
         rates = np.where(possible, (self._gains[:GROW] + 1.0) / (self._work[:GROW] + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.explore * possible / possible.sum()

@@ -17,7 +17,9 @@ from stages.variations.kernels.layout import PARTS, UNKNOWNS, KitTables, Outcome
 __all__ = ["Grower"]
 
 LONGEST = 2.5
-"""Longer by shorter side of a field at most."""
+"""How much longer, beside its other side, a field may be than the exemplar at most."""
+WIDEST = 4.0
+"""Area of a field at most, as a multiple of what so many parts take in the exemplar: loops need room to close."""
 TALLEST = 1.5
 """Height of a field as a multiple of the tallest exemplar's."""
 ROOM = 0.25
@@ -122,9 +124,9 @@ class Grower:
             if rng.random() < 0.5:
                 sides = sides[::-1]
         else:
-            area = np.prod(np.maximum(spans[self._level], 1e-9)) * target / len(assembly) * np.exp(self._room)
-            aspect = np.exp((2 * rng.random() - 1) * np.log(LONGEST))
-            sides = np.sqrt(area) * np.array([np.sqrt(aspect), 1 / np.sqrt(aspect)])
+            scale = target / len(assembly) * np.exp(self._room) * WIDEST ** rng.random()
+            aspect = LONGEST ** (2 * rng.random() - 1)
+            sides = spans[self._level] * np.sqrt(scale) * np.array([np.sqrt(aspect), 1 / np.sqrt(aspect)])
         # No narrower than a part needs, or nothing fits beside the first.
         field_low, field_high = low.copy(), high.copy()
         for axis, side in zip(self._level, sides, strict=True):

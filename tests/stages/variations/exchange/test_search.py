@@ -24,7 +24,7 @@ SHIPPED = sorted({shape.parent for shape in Path("datasets/exemplars").glob("*/*
 
 
 def search(kit: Kit, seed: int = 0, tries: int = 3000, **settings: object) -> tuple[Search, list[Variant]]:
-    line = Search(ContactAnswers(kit), SearchConfig.model_validate(settings))
+    line = Search(ContactAnswers(kit), SearchConfig.model_validate({"method": "exchange", **settings}))
     found, _ = line.run(np.random.default_rng(seed), tries, 10**9, "test", lambda count: None)
     return line, found
 
@@ -105,9 +105,9 @@ def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_cha
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     _, first = search(kit, seed=3, tries=800)
     warm = ContactAnswers(kit)
-    other = Search(warm, SearchConfig())
+    other = Search(warm, SearchConfig(method="exchange"))
     other.run(np.random.default_rng(99), 800, 10**9, "other", lambda count: None)
-    line = Search(warm, SearchConfig())
+    line = Search(warm, SearchConfig(method="exchange"))
     again, _ = line.run(np.random.default_rng(3), 800, 10**9, "test", lambda count: None)
     assert [each.docked for each in first] == [each.docked for each in again]
     for one, two in zip(first, again, strict=True):
@@ -119,20 +119,21 @@ def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_cha
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
 def test_neither_variants_nor_reasons_depend_on_which_contacts_are_known(folder: Path) -> None:
     kit = shipped_kit(folder)
-    cold, first = search(kit, seed=3, tries=700)
+    cold, first = search(kit, seed=3, tries=700, method="both")
     warm = ContactAnswers(kit)
     for seed in (99, 3):
-        line = Search(warm, SearchConfig())
+        line = Search(warm, SearchConfig(method="both"))
         again, _ = line.run(np.random.default_rng(seed), 700, 10**9, "test", lambda count: None)
     assert [each.docked for each in again] == [each.docked for each in first]
     assert line.rejects == cold.rejects
 
 
+@pytest.mark.parametrize("method", ["exchange", "growth"])
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
-def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path) -> None:
+def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path, method: str) -> None:
     kit = shipped_kit(folder)
-    line, found = search(kit, tries=1500)
-    assert len(found) >= 50
+    line, found = search(kit, tries=1500 if method == "exchange" else 8000, method=method)
+    assert len(found) >= 25
     contact = ContactTest(kit.types, kit.contact_tolerance)
     digests = set()
     for variant in found[::7]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stages.variations.exchange.search import Search
-from stages.variations.exchange.steering import CHOICES, PLAIN, RARE
+from stages.variations.exchange.steering import CHOICES, GROW, PLAIN, RARE
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.stages.variations.toy import CHAIN, chain, kit_of
@@ -16,7 +16,7 @@ from tests.stages.variations.toy import CHAIN, chain, kit_of
 
 def line_of(exemplars: int, **novelty: float) -> Search:
     kit = kit_of(CHAIN, [chain(3 + 2 * number) for number in range(exemplars)])
-    return Search(ContactAnswers(kit), SearchConfig(novelty=NoveltyConfig.model_validate(novelty)))
+    return Search(ContactAnswers(kit), SearchConfig(method="exchange", novelty=NoveltyConfig.model_validate(novelty)))
 
 
 def planned(line: Search, count: int = 4000) -> Counter[int]:
@@ -50,5 +50,24 @@ def test_one_exemplar_has_neither_families_nor_strangers() -> None:
 
 @pytest.mark.parametrize("growth_share", [0.0, 1.0])
 def test_without_guidance_parents_are_plain_and_cuts_as_the_config_says(growth_share: float) -> None:
-    line = Search(line_of(2).answers, SearchConfig(growth_share=growth_share, novelty=NoveltyConfig(guided=False)))
+    unguided = SearchConfig(method="exchange", growth_share=growth_share, novelty=NoveltyConfig(guided=False))
+    line = Search(line_of(2).answers, unguided)
     assert set(planned(line)) == {0 if growth_share else 1}
+
+
+@pytest.mark.parametrize("guided", [True, False])
+def test_growth_gets_the_share_of_the_work_that_its_finds_earn(guided: bool) -> None:
+    kit = kit_of(CHAIN, [chain(3), chain(5)])
+    config = SearchConfig(method="both", novelty=NoveltyConfig(guided=guided))
+    line, shares = Search(ContactAnswers(kit), config), []
+    for worth in (0.0, 1.0):
+        for choice in line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 4000):
+            grown = choice.number == GROW
+            line.steering.learn(choice, worth * 60.0 if grown else 0.2, 60.0 if grown else 1.5)
+        tried = planned(line, 20_000)
+        shares.append(60.0 * tried[GROW] / (60.0 * tried[GROW] + 1.5 * (20_000 - tried[GROW])))
+    if guided:
+        assert shares[0] == pytest.approx(0.2, abs=0.05)
+        assert shares[1] == pytest.approx(0.8, abs=0.05)
+    else:
+        assert shares == pytest.approx([0.5, 0.5], abs=0.1)

@@ -1,0 +1,96 @@
+"""Slots as seen, on a block with a place to its left and one to its right, and on shapes that growth makes of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
+from stages.shape.graphs.slots import SlotGrammar
+from stages.shape.kit import Assembly, Kit
+from stages.variations.exchange.search import Search
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import SearchConfig
+from tests.stages.variations.exchange.test_search import SHIPPED, shipped_kit
+from tests.stages.variations.toy import Placed, box, kit_of, pose, with_arrow
+
+BLOCKS = {"middle": with_arrow(box(1, 1, 1)), "red": box(1, 0.8, 0.8), "blue": box(1, 0.6, 0.7)}
+
+
+def row(left: str, right: str) -> list[Placed]:
+    beside = [(left, pose(-1, 0, 0)), (right, pose(1, 0, 0))]
+    return [("middle", pose(0, 0, 0)), *((name, at) for name, at in beside if name)]
+
+
+def built(kit: Kit, shape: list[Placed]) -> Assembly:
+    names = kit.type_names()
+    types = np.array([names.index(name) for name, _ in shape], dtype=np.int16)
+    poses = np.array([at for _, at in shape])
+    return Assembly(types, poses, ContactTest(kit.types, kit.contact_tolerance).contacts(types, poses))
+
+
+def admitted(seen: list[tuple[str, str]], asked: tuple[str, str]) -> list[str]:
+    """The levels that let the middle have `asked` to its left and right, where `seen` are all exemplars."""
+    kit = kit_of(BLOCKS, [row(*each) for each in seen])
+    shape = built(kit, row(*asked))
+    return [level for level in SLOT_LEVELS if 0 not in SlotGrammar(kit, True, level).misfits(shape)]
+
+
+@pytest.mark.parametrize(
+    ("asked", "levels"),
+    [
+        (("red", "blue"), ["slot_pairs", "slot_fillings", "slots"]),
+        (("blue", "red"), ["slot_pairs", "slot_fillings", "slots"]),
+        (("red", "red"), ["slot_fillings", "slots"]),
+        (("red", ""), []),
+    ],
+)
+def test_pairs_ask_for_states_and_fillings_for_what_is_filled(asked: tuple[str, str], levels: list[str]) -> None:
+    assert admitted([("red", "blue"), ("blue", "red")], asked) == levels
+
+
+@pytest.mark.parametrize(("asked", "levels"), [(("red", "red"), ["slots"]), (("", "red"), list(SLOT_LEVELS))])
+def test_slots_by_themselves_know_nothing_of_each_other(asked: tuple[str, str], levels: list[str]) -> None:
+    assert admitted([("red", ""), ("", "red")], asked) == levels
+
+
+def test_what_was_never_seen_at_a_place_is_refused_by_all() -> None:
+    assert admitted([("red", "blue"), ("red", "blue")], ("blue", "blue")) == []
+
+
+def test_symmetric_parts_are_seen_from_all_sides() -> None:
+    kit = kit_of({**BLOCKS, "middle": box(1, 1, 1)}, [row("red", ""), row("red", "")])
+    turned = [(name, pose(0, 0, 0, 1) @ at) for name, at in row("red", "")]
+    for shape in (row("", "red"), turned):
+        assert SlotGrammar(kit, True, "slot_pairs").misfits(built(kit, shape)) == []
+
+
+@pytest.mark.parametrize("folder", SHIPPED[:2], ids=lambda folder: folder.name)
+def test_levels_grow_and_growth_keeps_to_each(folder) -> None:  # type: ignore[no-untyped-def]
+    observed = shipped_kit(folder)
+    grammars = [SlotGrammar(observed, True, level) for level in SLOT_LEVELS]
+    for grammar in grammars:
+        assert all(grammar.misfits(each.assembly) == [] for each in observed.exemplars)
+        assert grammar.familiar(observed.exemplars[0].assembly) == 1.0
+    for place, level in enumerate(SLOT_LEVELS):
+        kit = replace(observed, grammar=replace(observed.grammar, strictness=level))
+        line = Search(ContactAnswers(kit), SearchConfig(method="growth"))
+        found, _ = line.run(np.random.default_rng(4), 4000, 4, "test", lambda count: None)
+        assert found
+        for variant in found[:4]:
+            for looser in grammars[place:]:
+                assert looser.misfits(variant.assembly) == []
+            for part, near in enumerate(variant.assembly.neighbours()):
+                assert admits(kit.grammar, int(variant.assembly.types[part]), variant.assembly.multiset(near))
+
+
+def test_exchange_keeps_to_slots_too() -> None:
+    observed = shipped_kit(next(each for each in SHIPPED if each.name == "castle"))
+    kit = replace(observed, grammar=replace(observed.grammar, strictness="slot_fillings"))
+    line = Search(ContactAnswers(kit), SearchConfig(method="exchange"))
+    found, _ = line.run(np.random.default_rng(4), 1500, 20, "test", lambda count: None)
+    assert found
+    assert all(SlotGrammar(kit, True).misfits(each.assembly) == [] for each in found)
