@@ -20,6 +20,7 @@ from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.geometry.pose import invert
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
+from stages.shape.shape import mesh_name
 
 __all__ = ["geometry_faults"]
 
@@ -37,7 +38,7 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     record = json.loads(members["json"])
     names = [part["name"] for part in record["parts"]]
     places = {name: place for place, name in enumerate(kit.type_names())}
-    types = np.array([places[part["label"]] for part in record["parts"]], dtype=np.int16)
+    types = np.array([places[mesh_name(name)] for name in names], dtype=np.int16)
     meshes, poses = _parts_of(members["glb"], names)
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
@@ -103,11 +104,11 @@ def _contacts(
 
 
 def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[str]:
-    known = kit.type_names()
+    known, labelled = kit.labels, kit.labelled(assembly)
     faults = []
     for part, neighbours in enumerate(assembly.neighbours()):
-        around = assembly.multiset(neighbours)
-        if not admits(kit.grammar, int(assembly.types[part]), around):
+        around = labelled.multiset(neighbours)
+        if not admits(kit.grammar, int(labelled.types[part]), around):
             listed = ", ".join(f"{count} {known[other]}" for other, count in around) or "nothing"
             faults.append(f"{names[part]} has a neighbourhood that the grammar does not admit: {listed}")
     return faults

@@ -24,7 +24,7 @@ from stages.variations.features import FeatureTest, material_shares
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, UNKNOWNS, Outcome
-from stages.variations.kernels.tables import kit_tables, shape_tables, workspace
+from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
 from stages.variations.settings import SearchConfig
 
 __all__ = ["SPARE", "Search", "Variant"]
@@ -85,6 +85,7 @@ class Search:
         self.smallest = max(2, round(config.smallest * min(sizes)))
         self.largest = max(3, round(config.largest * max(sizes)))
         self.tables = kit_tables(kit, config.upright)
+        self._histogram_weights = multiset_weights(len(kit.types))
         self._ws = workspace(max(self.largest, *sizes))
         self.archive = Archive(config.novelty.quota)
         self.steering = Steering(config)
@@ -116,7 +117,12 @@ class Search:
     def keys_of(self, parent: Parent) -> tuple[int, int]:
         """The two refinement keys of a shape."""
         self._load(parent)
-        return int(graph_key(self._ws, False)), int(graph_key(self._ws, True))
+        return self._graph_keys()
+
+    def _graph_keys(self) -> tuple[int, int]:
+        """The two refinement keys of the variant in hand."""
+        label_of = self.tables.label_of
+        return int(graph_key(label_of, self._ws, False)), int(graph_key(label_of, self._ws, True))
 
     def run(
         self, rng: np.random.Generator, tries: int, wanted: int, name: str, progress: Callable[[int], None]
@@ -200,7 +206,7 @@ class Search:
         outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
-        return self._variant(a, b, int(graph_key(ws, False)), int(graph_key(ws, True)))
+        return self._variant(a, b, *self._graph_keys())
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""
@@ -209,8 +215,8 @@ class Search:
         return graph if self.config.duplicates == "graph" else docked
 
     def histogram(self, types: np.ndarray) -> int:
-        """A hash of a type histogram."""
-        return int(self.tables.weights[types].sum(dtype=np.uint64))
+        """A hash of a type histogram, of meshes also where types go by meaning: what looks different is new."""
+        return int(self._histogram_weights[types].sum(dtype=np.uint64))
 
     def _cell(self, features: Float32Array) -> Cell:
         return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)

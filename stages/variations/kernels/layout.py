@@ -39,6 +39,7 @@ __all__ = [
 class Rules(NamedTuple):
     """Which neighbourhoods the grammar admits, by rule: what a loose grammar admits is too much to be listed.
 
+    Types are places of labels here, `KitTables.label_of`.
     level: 0 `multiset`, 1 `count_and_set`, 2 `count_and_pairs`.
     keys uint64 (c,), verdicts int64 (c,): an open-addressing table of neighbourhoods that were asked for, 1 where they
     are admitted; at level 0 those observed, which are all. filled int64 (1,): how many it holds.
@@ -65,7 +66,8 @@ class KitTables(NamedTuple):
 
     symmetry_starts int64 (types + 1,), symmetries float64 (s, 3, 3): rotations of each type's group;
     boxes float64 (types, 2, 3): centre and half extents in part coordinates; reach float64 (types,): half diagonals;
-    weights uint64 (types,): multiset weights; rules: the neighbourhoods that the grammar admits;
+    weights uint64 (types,): multiset weights of their labels; label_of int64 (types,): places of
+    the labels; rules: the neighbourhoods that the grammar admits;
     limits float64 (3,): pose tolerance, contact tolerance, quantum of the answers; up: the axis that docking motions
     must keep upright, or -1.
     """
@@ -75,6 +77,7 @@ class KitTables(NamedTuple):
     boxes: np.ndarray
     reach: np.ndarray
     weights: np.ndarray
+    label_of: np.ndarray
     rules: Rules
     limits: np.ndarray
     up: int
