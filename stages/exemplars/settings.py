@@ -89,6 +89,13 @@ class KitConfig(StrictModel):
         description="Largest displacement of relative poses that count as one docking, as a share of the median part "
         "diagonal.",
     )
+    fit_tolerance: float = Field(
+        0.02,
+        gt=0,
+        le=0.2,
+        description="With `types: meaning` how far contacts of parts that take each other's places may miss each "
+        "other, as a share of the median part diagonal; never more than a quarter of the contact.",
+    )
     contact: ContactConfig = Field(default_factory=ContactConfig, description="When two parts are neighbours.")
     grammar: Strictness = Field(
         "multiset",

@@ -144,11 +144,13 @@ NOTHING = Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), 
 
 @dataclass(frozen=True)
 class Docking:
-    """One observed way in which a part of type `b` touches a part of type `a` (a <= b): an edge category.
+    """One way in which a part of type `b` touches a part of type `a` (a <= b): an edge category.
 
     pose: float64 (4, 4) of the part of type `b` in the coordinates of the part of type `a`, one representative;
     poses that differ by symmetries of either part are the same docking.
     depth: deepest penetration seen in any pair of this docking, in the kit's units; 0 where they only touch.
+    slack: 0, or for a docking that was never seen (`count` 0) but follows from others, as parts of these labels dock
+    so: how far from `pose` it holds, in the kit's units.
     """
 
     a: int
@@ -157,6 +159,7 @@ class Docking:
     kind: ContactKind
     count: int
     depth: float
+    slack: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,7 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
                 "kind": each.kind,
                 "seen": each.count,
                 "depth": each.depth,
+                **({"slack": each.slack} if each.slack else {}),
                 "pose": each.pose.tolist(),
             }
             for each in kit.grammar.dockings
@@ -174,6 +175,7 @@ def _grammar(described: Mapping[str, Any], labels: Sequence[str]) -> Grammar:
             kind=each["kind"],
             count=each["seen"],
             depth=each["depth"],
+            slack=each.get("slack", 0.0),
         )
         for each in described["dockings"]
     )

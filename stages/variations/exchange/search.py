@@ -23,9 +23,10 @@ from stages.variations.exchange.steering import BATCH, Choice, Steering
 from stages.variations.features import FeatureTest, material_shares
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.graph_key import graph_key
-from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, UNKNOWNS, Outcome
+from stages.variations.kernels.layout import BOUNDARY, EDGES, MEANINGS, PARTS, UNKNOWNS, Outcome
 from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
 from stages.variations.settings import SearchConfig
+from stages.variations.substitution.substitute import substitute
 
 __all__ = ["SPARE", "Search", "Variant"]
 
@@ -46,6 +47,7 @@ REASONS = {
 
 DUPLICATE = "duplicate"
 SUBASSEMBLY = "nothing but a piece of an exemplar"
+APART = "falls apart"
 NEW = "new variant"
 
 KNOWN_GAIN = 0.2
@@ -88,7 +90,7 @@ class Search:
         self._histogram_weights = multiset_weights(len(kit.types))
         self._ws = workspace(max(self.largest, *sizes))
         self.archive = Archive(config.novelty.quota)
-        self.steering = Steering(config)
+        self.steering = Steering(config, by_meaning=len(kit.labels) < len(kit.types))
         self._features = FeatureTest(kit)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
         self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.parents.exemplars}
@@ -177,7 +179,11 @@ class Search:
         with_labels = self.config.duplicates == "docking"
         limits = self.smallest, self.largest
         known = self.answers.table
-        if self.config.matching == "pose":
+        if choice.way == MEANINGS:
+            outcome, key = substitute(rng, self.kit, kit, self.answers.dockings, a, b, ws, *limits), 0
+            if outcome == Outcome.OK:
+                outcome, key = complete(kit, known, ws, with_labels)
+        elif self.config.matching == "pose":
             outcome, key = attempt(
                 rng, kit, a.tables, b.tables, a is b, known, ws, choice.way, choice.large, *limits, with_labels
             )
@@ -203,10 +209,13 @@ class Search:
             return DUPLICATE
         if any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
+        if choice.way == MEANINGS and not self._is_connected():
+            return APART
         outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
-        return self._variant(a, b, *self._graph_keys())
+        method = "substitution" if choice.way == MEANINGS else "exchange"
+        return self._variant(a, b, method, *self._graph_keys())
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""
@@ -230,7 +239,15 @@ class Search:
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
                 return Outcome.CLASH
 
-    def _variant(self, a: Parent, b: Parent, graph: int, docked: int) -> Variant:
+    def _is_connected(self) -> bool:
+        """Whether the variant in hand is in one piece."""
+        ws = self._ws
+        leader = np.arange(ws.counts[PARTS])
+        for i, j in ws.edges[: ws.counts[EDGES]].tolist():
+            leader[leader == leader[i]] = leader[j]
+        return bool((leader == leader[0]).all())
+
+    def _variant(self, a: Parent, b: Parent, method: str, graph: int, docked: int) -> Variant:
         ws = self._ws
         parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
         poses = np.tile(np.eye(4), (parts, 1, 1))
@@ -241,6 +258,7 @@ class Search:
         labels = np.stack([ws.label[edges[:, 0], edges[:, 1]], ws.label[edges[:, 1], edges[:, 0]]], axis=1)
         origin = ws.origin[:parts]
         lineage = {
+            "method": method,
             "parents": [a.name, b.name],
             "parts_from": [int((origin != 1).sum()), int((origin == 1).sum())],
             "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),

@@ -15,7 +15,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.variations.archive import Archive
 from stages.variations.exchange.parents import Parent, Parents
-from stages.variations.kernels.layout import GROWN, JOINTS, PLANES
+from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, PLANES
 from stages.variations.settings import SearchConfig
 
 __all__ = ["BATCH", "CHOICES", "CUTS", "PLAIN", "RARE", "Choice", "Steering"]
@@ -25,7 +25,9 @@ CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
 PLAIN, RARE, FAMILY, CROSSED = range(4)
 """Ways of drawing parents: at random; rare ones likelier; rare ones of a random family; a rare one and, of some, that
 of most other ancestry."""
-CHOICES = tuple(product(range(4), range(len(CUTS))))
+CHOICES = tuple((draw, *cut) for draw, cut in product(range(4), CUTS))
+SUBSTITUTIONS = tuple((draw, MEANINGS, False) for draw in range(4))
+"""Choices beside these for kits whose types are told by meaning: no cut, but parts of some meanings."""
 BATCH = 64
 """Tries that are planned at once."""
 MEMORY = 4000.0
@@ -36,7 +38,7 @@ PARTNERS = 4
 
 @dataclass(frozen=True)
 class Choice:
-    """One try: its number among CHOICES, the parents, the way of cutting and whether the piece must be large."""
+    """One try: its number among the choices, the parents, the way of cutting and whether the piece must be large."""
 
     number: int
     a: Parent
@@ -48,19 +50,20 @@ class Choice:
 class Steering:
     """Plans tries in batches and learns from what they brought."""
 
-    def __init__(self, config: SearchConfig) -> None:
+    def __init__(self, config: SearchConfig, by_meaning: bool = False) -> None:
         self.config = config
-        self._gains = np.zeros(len(CHOICES))
-        self._work = np.zeros(len(CHOICES))
+        self.choices = (*CHOICES, *SUBSTITUTIONS) if by_meaning else CHOICES
+        self._gains = np.zeros(len(self.choices))
+        self._work = np.zeros(len(self.choices))
 
     def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[Choice]:
         """The next `count` tries."""
         if self.config.novelty.guided:
             odds = self._odds(len(parents.exemplars)).cumsum()
-            numbers = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, len(CHOICES) - 1)
+            numbers = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, len(odds) - 1)
         else:
             numbers = np.where(rng.random(count) < self.config.growth_share, 0, 1)
-        draws = np.array([CHOICES[number][0] for number in numbers.tolist()])
+        draws = np.array([self.choices[number][0] for number in numbers.tolist()])
         first = self._draw(rng, parents, archive, draws)
         second = self._draw(rng, parents, archive, np.where(draws == CROSSED, RARE, draws))
         crossed = np.flatnonzero(draws == CROSSED).tolist()
@@ -69,7 +72,7 @@ class Steering:
         self._gains *= np.exp(-count / MEMORY)
         self._work *= np.exp(-count / MEMORY)
         return [
-            Choice(number, a, b, *CUTS[CHOICES[number][1]])
+            Choice(number, a, b, *self.choices[number][1:])
             for number, a, b in zip(numbers.tolist(), first, second, strict=True)
         ]
 
@@ -80,7 +83,7 @@ class Steering:
 
     def _odds(self, exemplars: int) -> FloatArray:
         """How likely each choice is: a share for all alike, the rest by the square of what it gains for its work."""
-        possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, _ in CHOICES])
+        possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, *_ in self.choices])
         rates = np.where(possible, (self._gains + 1.0) / (self._work + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.explore * possible / possible.sum()
         chances: FloatArray = explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()

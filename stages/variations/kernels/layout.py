@@ -19,6 +19,7 @@ __all__ = [
     "GROWN",
     "JOINTS",
     "LABELS",
+    "MEANINGS",
     "MISSING",
     "NONE",
     "PARTS",
@@ -154,8 +155,8 @@ Outcome = _Outcomes()
 EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY, PIECE = 0, 1, 2, 3, 4, 5
 """Places in `Workspace.counts`: numbers of edges, unknown pairs, parts of the variant, boundary parts, tries so far
 and parts of the piece."""
-GROWN, PLANES, JOINTS = 0, 1, 2
-"""Ways of cutting."""
+GROWN, PLANES, JOINTS, MEANINGS = 0, 1, 2, 3
+"""Ways of cutting; by meanings is no cut of the exchange, but substitution."""
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 """Contact answers that are no pair of labels: apart, never to be, not asked yet."""
 LABELS = 1 << 20
