@@ -70,7 +70,11 @@ def _lineage(_: Config) -> Mapping[str, Field]:
             {**places, "description": "parts of the first of made_of along which it was cut, by their places there"}
         ),
         "images": Field(
-            {**places, "description": "parts of the second of made_of that each part of the boundary came to lie on"}
+            {
+                **places,
+                "description": "parts of the second of made_of that each part of the boundary came to lie on, or, by "
+                "substitution, to dock to",
+            }
         ),
         "motion": Field(
             {

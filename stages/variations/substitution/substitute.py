@@ -129,7 +129,8 @@ def _docked(
 def _fitted(dockings: DockingTable, giver: Assembly, docked: Docked) -> FloatArray:
     """The motion that brings the parts of the piece nearest to the poses that their dockings give them, in the least
     squares sense: each counts with its centroid and its three axes."""
-    source, target = [], []
+    source: list[FloatArray] = []
+    target: list[FloatArray] = []
     for inner, _, pose in docked:
         reach = dockings.types[giver.types[inner]].diagonal / 2
         frame = np.concatenate([np.zeros((1, 3)), np.eye(3) * reach])
