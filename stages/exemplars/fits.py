@@ -22,6 +22,8 @@ __all__ = ["fitting_dockings"]
 
 OF_CONTACT = 0.25
 """Anchors miss each other by at most this share of the smaller contact, or by the pose tolerance."""
+AS_LARGE = 0.5
+"""Contacts fit if the smaller is at least this share of the larger; what is no larger than it may miss always is."""
 SAME_TURN = 1e-3
 """Rotations whose entries differ by less are one."""
 FACING = -0.5
@@ -69,7 +71,7 @@ def fitting_dockings(
             near: list[tuple[FloatArray, float]] = []
             for one in of_a:
                 for two in of_b:
-                    pose = _meeting(one, two)
+                    pose = _meeting(one, two, tolerance)
                     slack = max(pose_tolerance, min(tolerance, OF_CONTACT * min(one.extent, two.extent)))
                     if pose is None or _is_known(near, pose, length):
                         continue
@@ -80,10 +82,11 @@ def fitting_dockings(
     return tuple(sorted(found, key=lambda each: (each.a, each.b)))
 
 
-def _meeting(one: _Anchor, two: _Anchor) -> FloatArray | None:
+def _meeting(one: _Anchor, two: _Anchor, tolerance: float) -> FloatArray | None:
     """The pose (4, 4) of the second part in coordinates of the first where both stand as they did and their anchors
-    meet, or None where these are of different kinds or do not face each other."""
-    if one.kind != two.kind:
+    meet, or None where these are of different kinds or sizes or do not face each other."""
+    small, large = sorted((one.extent, two.extent))
+    if one.kind != two.kind or (large > tolerance and small < AS_LARGE * large):
         return None
     pose = np.eye(4)
     pose[:3, :3] = one.turn.T @ two.turn

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stages.shape.arrays import Float32Array, IntArray
+from stages.shape.arrays import Float32Array, FloatArray, IntArray
 from stages.shape.kit import Assembly
 from stages.variations.archive import Archive, Cell, Place, cell_of
 from stages.variations.exchange.attempt import attempt, complete, cut_piece
@@ -26,6 +26,7 @@ from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.layout import BOUNDARY, EDGES, MEANINGS, PARTS, UNKNOWNS, Outcome
 from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
 from stages.variations.settings import SearchConfig
+from stages.variations.substitution.ground import GroundTest
 from stages.variations.substitution.substitute import substitute
 
 __all__ = ["SPARE", "Search", "Variant"]
@@ -48,6 +49,7 @@ REASONS = {
 DUPLICATE = "duplicate"
 SUBASSEMBLY = "nothing but a piece of an exemplar"
 APART = "falls apart"
+LIFTED = "lifted off the ground"
 NEW = "new variant"
 
 KNOWN_GAIN = 0.2
@@ -90,7 +92,9 @@ class Search:
         self._histogram_weights = multiset_weights(len(kit.types))
         self._ws = workspace(max(self.largest, *sizes))
         self.archive = Archive(config.novelty.quota)
-        self.steering = Steering(config, by_meaning=len(kit.labels) < len(kit.types))
+        by_meaning = len(kit.labels) < len(kit.types)
+        self.steering = Steering(config, by_meaning)
+        self._ground = GroundTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
         self._features = FeatureTest(kit)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
         self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.parents.exemplars}
@@ -211,6 +215,8 @@ class Search:
             return SUBASSEMBLY
         if choice.way == MEANINGS and not self._is_connected():
             return APART
+        if self._ground is not None and self._ground.is_lifted(types, self._poses()):
+            return LIFTED
         outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
@@ -239,6 +245,14 @@ class Search:
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
                 return Outcome.CLASH
 
+    def _poses(self) -> FloatArray:
+        """The poses (n, 4, 4) of the variant in hand."""
+        parts = self._ws.counts[PARTS]
+        poses = np.tile(np.eye(4), (parts, 1, 1))
+        poses[:, :3, :3] = self._ws.rotations[:parts]
+        poses[:, :3, 3] = self._ws.translations[:parts]
+        return poses
+
     def _is_connected(self) -> bool:
         """Whether the variant in hand is in one piece."""
         ws = self._ws
@@ -250,9 +264,6 @@ class Search:
     def _variant(self, a: Parent, b: Parent, method: str, graph: int, docked: int) -> Variant:
         ws = self._ws
         parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
-        poses = np.tile(np.eye(4), (parts, 1, 1))
-        poses[:, :3, :3] = ws.rotations[:parts]
-        poses[:, :3, 3] = ws.translations[:parts]
         edges = np.sort(ws.edges[:count], axis=1)
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
         labels = np.stack([ws.label[edges[:, 0], edges[:, 1]], ws.label[edges[:, 1], edges[:, 0]]], axis=1)
@@ -265,7 +276,7 @@ class Search:
             "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
             "motion": np.round(ws.motion, 9).tolist(),
         }
-        assembly = Assembly(ws.types[:parts].astype(np.int16), poses, edges)
+        assembly = Assembly(ws.types[:parts].astype(np.int16), self._poses(), edges)
         origins = np.empty(parts, dtype=np.int8)
         for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
             at = placed[: len(parent.assembly)]

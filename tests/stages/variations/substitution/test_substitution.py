@@ -65,10 +65,11 @@ def test_feet_stand_on_one_level_where_the_legs_are_as_long(found: list[Variant]
         assert np.ptp(heights) < 1e-6
 
 
-def test_legs_of_another_length_hang_from_the_top() -> None:
+def test_legs_of_another_length_hang_from_the_top_and_never_beside_longer_ones() -> None:
     kit = table_kit(table(THIN, SQUARE), table(THICK, SHORT))
-    _, found = search(kit)
-    assert len(found) == 8
+    line, found = search(kit)
+    assert sorted(sorted(each.assembly.types.tolist()) for each in found) == [[0, 3, 3, 3, 3], [1, 1, 1, 1, 2]]
+    assert line.rejects["lifted off the ground"] > 0
     for each in found:
         top = each.assembly.types % 2 == 0
         thickness = kit.types[int(each.assembly.types[top][0])].bounds[1, 1]
