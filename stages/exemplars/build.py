@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.findings import kit_warnings, pieces, refusals
+from stages.exemplars.fits import fitting_dockings
 from stages.exemplars.formats.scene import unique_name
 from stages.exemplars.grammar import observe_contacts, observe_grammar
 from stages.exemplars.hubs import chosen_hubs, set_hubs_aside, with_touching
@@ -120,6 +121,11 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
         assemblies, backdrops, grammar, kinds = set_hubs_aside(aside, contacts.counted, grammar, contacts.kinds, edges)
         names = [tuple(words[part] for part in keep.tolist()) for words, keep in zip(names, kept, strict=True)]
         touching = [each.select(keep) for each, keep in zip(touching, kept, strict=True)]
+    if config.types == "meaning":
+        fits = fitting_dockings(
+            types, assemblies, grammar.dockings, contact, config.fit_tolerance * median, pose_tolerance
+        )
+        grammar = replace(grammar, dockings=(*grammar.dockings, *fits))
     kit = Kit(
         name=config.name,
         types=types,

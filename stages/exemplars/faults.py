@@ -21,6 +21,7 @@ from stages.shape.geometry.pose import invert
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
+from stages.shape.shape import mesh_name
 
 __all__ = ["geometry_faults"]
 
@@ -38,7 +39,7 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     record = json.loads(members["json"])
     names = [part["name"] for part in record["parts"]]
     places = {name: place for place, name in enumerate(kit.type_names())}
-    types = np.array([places[part["label"]] for part in record["parts"]], dtype=np.int16)
+    types = np.array([places[mesh_name(name)] for name in names], dtype=np.int16)
     meshes, poses = _parts_of(members["glb"], names)
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
@@ -104,12 +105,12 @@ def _contacts(
 
 
 def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[str]:
-    known = kit.type_names()
+    known, labelled = kit.labels, kit.labelled(assembly)
     faults = []
     misfits = SlotGrammar(kit, upright=True).misfits(assembly) if kit.grammar.strictness in SLOT_LEVELS else ()
     for part, neighbours in enumerate(assembly.neighbours()):
-        around = assembly.multiset(neighbours)
-        if part in misfits or not admits(kit.grammar, int(assembly.types[part]), around):
+        around = labelled.multiset(neighbours)
+        if part in misfits or not admits(kit.grammar, int(labelled.types[part]), around):
             listed = ", ".join(f"{count} {known[other]}" for other, count in around) or "nothing"
             faults.append(f"{names[part]} has a neighbourhood that the grammar does not admit: {listed}")
     return faults

@@ -73,8 +73,10 @@ def refusals(
             yield f"{model.path}: the exemplar{without} falls into {_falls_apart(exemplar)}"
         elif len(assembly) < 2:
             yield f"{model.path}: only one part of it is connected or has area, an exemplar needs at least 2"
-        others = {int(index) for each in kit.exemplars if each is not exemplar for index in each.assembly.types}
-        if others and not others & set(assembly.types.tolist()):
+        others = {
+            int(index) for each in kit.exemplars if each is not exemplar for index in kit.label_of[each.assembly.types]
+        }
+        if others and not others & set(kit.label_of[assembly.types].tolist()):
             yield (
                 f"{model.path}: shares no part type with the other shapes of its kit, so nothing can be exchanged; "
                 "make it a kit of its own, or raise `congruence_tolerance` if the parts are meant to be alike"
@@ -86,14 +88,14 @@ def kit_warnings(kit: Kit) -> Iterator[str]:
     for exemplar in kit.exemplars:
         yield from _stand_twice(kit, exemplar)
         yield from _hub_warning(exemplar)
-    if np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars])).max() < 2:
+    if np.bincount(kit.label_of[np.concatenate([each.assembly.types for each in kit.exemplars])]).max() < 2:
         yield (
             "no part type occurs twice, so nothing can be exchanged; repeat parts, add a second shape of the same "
             "parts, or raise `congruence_tolerance` if parts are meant to be alike"
         )
-    if len(kit.types) > LETTERS:
+    if len(kit.labels) > LETTERS:
         yield (
-            f"{len(kit.types)} part types are more than the {LETTERS} letters, so strings write them as names in "
+            f"{len(kit.labels)} part types are more than the {LETTERS} letters, so strings write them as names in "
             "brackets; raise `congruence_tolerance` if parts are meant to be alike"
         )
 

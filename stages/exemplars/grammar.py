@@ -12,7 +12,7 @@ from stages.shape.geometry.contact import ContactTest, overlapping_boxes, world_
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest
 from stages.shape.geometry.pose import invert, pose_vectors
-from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType
+from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType, labels_of
 
 __all__ = ["Contacts", "observe_contacts", "observe_dockings", "observe_grammar", "observe_neighbourhoods"]
 
@@ -108,7 +108,9 @@ def observe_grammar(
         for each in contacts.dockings
         if each.kind in kinds
     )
-    return Grammar(observe_neighbourhoods(contacts.counted), dockings, _observe_nested(types, assemblies, penetration))
+    labels = labels_of(types)[1]
+    labelled = [replace(each, types=labels[each.types]) for each in contacts.counted]
+    return Grammar(observe_neighbourhoods(labelled), dockings, _observe_nested(types, assemblies, penetration))
 
 
 def _observe_nested(

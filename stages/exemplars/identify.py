@@ -1,4 +1,5 @@
-"""Part types: which parts of the models are alike, by congruence, or by congruence and the models' own labels."""
+"""Part types: which parts of the models are alike, by congruence, or by congruence and the models' own labels; by
+meaning, what is called alike is alike in all but its surface."""
 
 from __future__ import annotations
 
@@ -66,7 +67,7 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
         indices: list[int] = []
         poses: list[FloatArray] = []
         for part in model.parts:
-            label = part.label if config.types == "labels" else None
+            label = None if config.types == "congruence" else part.label
             key = (part.mesh_name, label)
             if key not in seen:
                 seen[key] = _identify(part, label, config, types, repairs)
@@ -119,6 +120,7 @@ def _identify(
         face_colors=colors,
         frame=extremal_frame(centred, np.zeros(3)),
         symmetries=symmetries,
+        meaning=_word(part) if config.types == "meaning" else "",
     )
     types.append(_Type(shape, part_type, label, {_word(part): None}))
     into_part = np.eye(4)

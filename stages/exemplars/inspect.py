@@ -202,7 +202,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("models", nargs="+", type=Path, metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF or DAE")
     parser.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     parser.add_argument("--parts", choices=get_args(Segmentation), default="auto", help="what makes a part")
-    parser.add_argument("--types", choices=["congruence", "labels"], help="what makes a part type")
+    parser.add_argument("--types", choices=["congruence", "labels", "meaning"], help="what makes a part type")
     parser.add_argument("--tolerance", type=float, help="contact tolerance, as a share of the median part's diagonal")
     parser.add_argument("--kinds", type=_kinds, help="kinds of contact that count, such as face or line,face")
     parser.add_argument("--up", choices=["y", "z"], help="the axis that points up, for the picture")

@@ -15,7 +15,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import load_kit
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
-from stages.shape.shape import Shape, kit_shape, part_count
+from stages.shape.shape import Shape, kit_shape, mesh_name, part_count
 
 __all__ = ["LANGUAGE", "Kits", "made_kits"]
 
@@ -55,9 +55,10 @@ class Kits:
 
 def _source(kit: Kit) -> Source:
     count = len(kit.exemplars)
-    colors = [np.median(each.face_colors, axis=0).astype(np.uint8).tolist() for each in kit.types]
+    _, first = np.unique(kit.label_of, return_index=True)
+    colors = [np.median(kit.types[each].face_colors, axis=0).astype(np.uint8).tolist() for each in first.tolist()]
     return Source(
-        kit.type_names(),
+        kit.labels,
         tuple((red, green, blue) for red, green, blue in colors),
         f"{count} exemplar{'' if count == 1 else 's'}, {len(kit.types)} part types",
         kit.contact_tolerance,
@@ -86,13 +87,16 @@ def _anew(places: Places) -> Anew:
         if record["kit"] not in kits:
             raise LookupError(f"kit {record['kit']} is not beside the dataset in .work")
         kit = kits[record["kit"]]
-        names = kit.type_names()
-        labels, poses = [each["label"] for each in record["parts"]], [each["pose"] for each in record["parts"]]
-        unknown = sorted(set(labels) - set(names))
+        places = {name: place for place, name in enumerate(kit.type_names())}
+        meshes, poses = (
+            [mesh_name(each["name"]) for each in record["parts"]],
+            [each["pose"] for each in record["parts"]],
+        )
+        unknown = sorted(set(meshes) - set(places))
         if unknown:
             raise ValueError(f"kit {kit.name} has no part type {', '.join(unknown)}")
-        types = np.array([names.index(label) for label in labels], dtype=np.int16)
-        return Shape(kit.types, Assembly(types, np.array(poses, dtype=np.float64), contacts), "y", names)
+        types = np.array([places[each] for each in meshes], dtype=np.int16)
+        return Shape(kit.types, Assembly(types, np.array(poses, dtype=np.float64), contacts), "y", kit.labels)
 
     return shape
 

@@ -73,9 +73,10 @@ class KitConfig(StrictModel):
         default_factory=Credit, exclude=True, description="Whose the models are; card and manifest say it."
     )
     parts: Segmentation = Field("auto", description="What makes a part; `auto` picks and says what it picked.")
-    types: Literal["congruence", "labels"] = Field(
+    types: Literal["congruence", "labels", "meaning"] = Field(
         "congruence",
-        description="What makes a part type: congruent geometry, or congruent geometry with the model's own label.",
+        description="What makes a part type: congruent geometry; congruent geometry with the model's own label; or "
+        "that label alone, whatever the geometry: parts of one meaning take each other's places where they fit.",
     )
     mirror_images_match: bool = Field(False, description="Whether a part and its mirror image are one type.")
     congruence_tolerance: float = Field(
@@ -87,6 +88,13 @@ class KitConfig(StrictModel):
         le=0.1,
         description="Largest displacement of relative poses that count as one docking, as a share of the median part "
         "diagonal.",
+    )
+    fit_tolerance: float = Field(
+        0.02,
+        gt=0,
+        le=0.2,
+        description="With `types: meaning` how far contacts of parts that take each other's places may miss each "
+        "other, as a share of the median part diagonal; never more than a quarter of the contact.",
     )
     contact: ContactConfig = Field(default_factory=ContactConfig, description="When two parts are neighbours.")
     grammar: Strictness = Field(
@@ -104,6 +112,12 @@ class KitConfig(StrictModel):
         "error", description="What to do with an exemplar in several pieces: stop, or keep its largest piece."
     )
     up: Literal["y", "z"] = Field("y", description="The axis that points up in the model files.")
+
+    @model_validator(mode="after")
+    def _hubs_are_surfaces(self) -> KitConfig:
+        if self.types == "meaning" and self.hubs.types != "none":
+            raise ValueError("with `types: meaning` no hubs can be left out; set `hubs.types: none`, or other types")
+        return self
 
 
 class ExemplarsConfig(StrictModel):

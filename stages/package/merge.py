@@ -16,9 +16,10 @@ from stages.package.classes import ClassTally
 from stages.package.glb import glb_bytes
 from stages.package.index import index_row, tar_bytes
 from stages.package.layout import shard_path
-from stages.package.record import describe_sample, rounded
+from stages.package.record import describe_sample
 from stages.shape.collection.collection import Collection
 from stages.shape.collection.members import TEXT
+from stages.shape.geometry.pose import rounded
 from stages.shape.sample import Sample
 
 __all__ = ["merge_shard"]

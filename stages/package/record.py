@@ -6,18 +6,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from stages.shape.arrays import FloatArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.geometry.pose import rounded
 from stages.shape.kit import Assembly
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
-__all__ = ["describe_sample", "piece_count", "rounded"]
-
-DECIMALS = 12
+__all__ = ["describe_sample", "piece_count"]
 
 
 def describe_sample(
@@ -63,11 +59,6 @@ def describe_sample(
         "text": sample.text or members["txt"].decode().split("\n", 1)[0],
         **added,
     }
-
-
-def rounded(numbers: FloatArray) -> FloatArray:
-    """`numbers` without the noise of their last digits, and without minus zeros: shorter and the same to the eye."""
-    return np.round(numbers, DECIMALS) + 0.0
 
 
 def piece_count(assembly: Assembly) -> int:

@@ -12,11 +12,12 @@ import numpy as np
 
 from pipeline.shards import bytes_array
 from stages.package.glb import glb_bytes
-from stages.package.record import piece_count, rounded
+from stages.package.record import piece_count
 from stages.shape.collection.declared import audits
 from stages.shape.collection.language import Anew
 from stages.shape.collection.packaged import Packaged
 from stages.shape.geometry.bounds import shape_bounds
+from stages.shape.geometry.pose import rounded
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 

@@ -1,9 +1,14 @@
-"""A kit: the part types of one or more exemplar shapes, and the tiling grammar observed in them (strings §3)."""
+"""A kit: the part types of one or more exemplar shapes, and the tiling grammar observed in them (strings §3).
+
+A type is a mesh, and what it is called is its label. Where types are told by meaning (substructures §3) several meshes
+share a label: which parts may be neighbours, the shape graph's colours and its strings go by the label; contacts,
+dockings and symmetries by the mesh.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -23,6 +28,7 @@ __all__ = [
     "PartMesh",
     "PartType",
     "Strictness",
+    "labels_of",
 ]
 
 ContactKind = Literal["point", "line", "face"]
@@ -41,7 +47,7 @@ Multiset = tuple[tuple[int, int], ...]
 class PartMesh:
     """The surface of a part, compared by identity. Its coordinates are its own; poses move them into the world.
 
-    name: what the part is called; parts of one name have one label.
+    name: what the surface is called; parts of one name have one label.
     vertices: float64 (v, 3); faces: int32 (f, 3); face_colors: uint8 (f, 3) sRGB.
     """
 
@@ -49,6 +55,11 @@ class PartMesh:
     vertices: FloatArray
     faces: IntArray
     face_colors: ByteArray
+
+    @property
+    def label(self) -> str:
+        """What a part of this surface is called."""
+        return self.name
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -75,10 +86,23 @@ class PartType(PartMesh):
 
     frame: float64 (4, 4), the extremal-point coordinate frame (strings §6), in part coordinates.
     symmetries: float64 (k, 4, 4), the rigid motions that map the part onto itself, the identity first.
+    meaning: the label that it shares with other surfaces, or empty: then its name is its label.
     """
 
     frame: FloatArray
     symmetries: FloatArray
+    meaning: str = ""
+
+    @property
+    def label(self) -> str:
+        return self.meaning or self.name
+
+
+def labels_of(types: Sequence[PartType]) -> tuple[tuple[str, ...], TypeArray]:
+    """The labels of some types, each once, in the order in which they come, and the place of each type's among them,
+    int16 (types,)."""
+    labels = tuple(dict.fromkeys(each.label for each in types))
+    return labels, np.array([labels.index(each.label) for each in types], dtype=np.int16)
 
 
 @dataclass(frozen=True)
@@ -123,11 +147,13 @@ NOTHING = Assembly(np.empty(0, np.int16), np.empty((0, 4, 4)), np.empty((0, 2), 
 
 @dataclass(frozen=True)
 class Docking:
-    """One observed way in which a part of type `b` touches a part of type `a` (a <= b): an edge category.
+    """One way in which a part of type `b` touches a part of type `a` (a <= b): an edge category.
 
     pose: float64 (4, 4) of the part of type `b` in the coordinates of the part of type `a`, one representative;
     poses that differ by symmetries of either part are the same docking.
     depth: deepest penetration seen in any pair of this docking, in the kit's units; 0 where they only touch.
+    slack: 0, or for a docking that was never seen (`count` 0) but follows from others, as parts of these labels dock
+    so: how far from `pose` it holds, in the kit's units.
     """
 
     a: int
@@ -136,13 +162,15 @@ class Docking:
     kind: ContactKind
     count: int
     depth: float
+    slack: float = 0.0
 
 
 @dataclass(frozen=True)
 class Grammar:
-    """The tiling grammar (strings §3): what was seen around each type, and how pairs of types dock.
+    """The tiling grammar (strings §3): what was seen around each label, and how pairs of types dock.
 
-    neighbourhoods: for each type index the observed neighbour multisets with the number of parts that had each.
+    neighbourhoods: for each label, by its place in `Kit.labels`, the observed multisets of neighbours' labels with the
+    number of parts that had each.
     nested: for pairs of types (a <= b) the greatest depth at which parts lay within each other without contact.
     strictness: which neighbourhoods beside the observed ones are allowed.
     hubs: types, ascending, that stand outside the neighbourhoods of others and may have any themselves.
@@ -188,3 +216,17 @@ class Kit:
     def type_names(self) -> tuple[str, ...]:
         """Names of the types, in order."""
         return tuple(part_type.name for part_type in self.types)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """What parts of the kit are called, each once; without types by meaning these are the names of the types."""
+        return labels_of(self.types)[0]
+
+    @cached_property
+    def label_of(self) -> TypeArray:
+        """For each type the place of its label in `labels`, int16 (types,)."""
+        return labels_of(self.types)[1]
+
+    def labelled(self, assembly: Assembly) -> Assembly:
+        """`assembly` with the places of labels instead of types: the shape graph that the grammar speaks of."""
+        return replace(assembly, types=self.label_of[assembly.types])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
 from stages.shape.geometry.docking import DockingTable
-from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType
+from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType, labels_of
 
 __all__ = ["describe_kit", "load_kit", "write_kit"]
 
 
 def describe_kit(kit: Kit) -> dict[str, Any]:
-    """The kit as JSON that a person can read: types, exemplars, neighbourhoods and dockings by type name."""
-    names = kit.type_names()
+    """The kit as JSON that a person can read: types, exemplars, neighbourhoods by label, dockings by type name."""
+    names, labels = kit.type_names(), kit.labels
     table = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
     return {
         "kit": kit.name,
@@ -29,6 +29,7 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         "types": [
             {
                 "name": each.name,
+                **({"meaning": each.meaning} if each.meaning else {}),
                 "triangles": len(each.faces),
                 "diagonal": round(each.diagonal, 6),
                 "symmetries": len(each.symmetries),
@@ -49,8 +50,8 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         "strictness": kit.grammar.strictness,
         "hubs": [names[index] for index in kit.grammar.hubs],
         "neighbourhoods": {
-            names[index]: [
-                {"neighbours": {names[other]: count for other, count in multiset}, "seen": seen}
+            labels[index]: [
+                {"neighbours": {labels[other]: count for other, count in multiset}, "seen": seen}
                 for multiset, seen in sorted(rules.items(), key=lambda rule: (-rule[1], rule[0]))
             ]
             for index, rules in sorted(kit.grammar.neighbourhoods.items())
@@ -62,6 +63,7 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
                 "kind": each.kind,
                 "seen": each.count,
                 "depth": each.depth,
+                **({"slack": each.slack} if each.slack else {}),
                 "pose": each.pose.tolist(),
             }
             for each in kit.grammar.dockings
@@ -105,19 +107,19 @@ def write_kit(kit: Kit, text: Any, arrays: Any) -> None:
 def load_kit(text: Path, arrays: Path) -> Kit:
     """The kit that `write_kit` wrote to these two files."""
     described = json.loads(text.read_text())
-    names = iter([each["name"] for each in described["types"]])
+    heads = iter([(each["name"], each.get("meaning", "")) for each in described["types"]])
     types: list[PartType] = []
     exemplars: list[Exemplar] = []
     for key, members in read_shard(arrays):
         if key.startswith("type-"):
-            types.append(_part_type(next(names), members))
+            types.append(_part_type(*next(heads), members))
         else:
             exemplars.append(_exemplar(members))
     return Kit(
         name=described["kit"],
         types=tuple(types),
         exemplars=tuple(exemplars),
-        grammar=_grammar(described),
+        grammar=_grammar(described, labels_of(types)[0]),
         contact_tolerance=described["contact_tolerance"],
         pose_tolerance=described["pose_tolerance"],
         contact_kinds=tuple(described["contact_kinds"]),
@@ -125,7 +127,7 @@ def load_kit(text: Path, arrays: Path) -> Kit:
     )
 
 
-def _part_type(name: str, members: Mapping[str, bytes]) -> PartType:
+def _part_type(name: str, meaning: str, members: Mapping[str, bytes]) -> PartType:
     return PartType(
         name=name,
         vertices=bytes_array(members["vertices.npy"]),
@@ -133,6 +135,7 @@ def _part_type(name: str, members: Mapping[str, bytes]) -> PartType:
         face_colors=bytes_array(members["colors.npy"]),
         frame=bytes_array(members["frame.npy"]),
         symmetries=bytes_array(members["symmetries.npy"]),
+        meaning=meaning,
     )
 
 
@@ -154,12 +157,12 @@ def _exemplar(members: Mapping[str, bytes]) -> Exemplar:
     )
 
 
-def _grammar(described: Mapping[str, Any]) -> Grammar:
-    """The grammar of a kit that `describe_kit` described."""
+def _grammar(described: Mapping[str, Any], labels: Sequence[str]) -> Grammar:
+    """The grammar of a kit with these labels that `describe_kit` described."""
     index_of = {each["name"]: index for index, each in enumerate(described["types"])}
     neighbourhoods = {
-        index_of[name]: {
-            tuple(sorted((index_of[other], count) for other, count in rule["neighbours"].items())): rule["seen"]
+        labels.index(name): {
+            tuple(sorted((labels.index(other), count) for other, count in rule["neighbours"].items())): rule["seen"]
             for rule in rules
         }
         for name, rules in described["neighbourhoods"].items()
@@ -172,6 +175,7 @@ def _grammar(described: Mapping[str, Any]) -> Grammar:
             kind=each["kind"],
             count=each["seen"],
             depth=each["depth"],
+            slack=each.get("slack", 0.0),
         )
         for each in described["dockings"]
     )

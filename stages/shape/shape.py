@@ -12,7 +12,7 @@ import numpy as np
 from stages.shape.arrays import TypeArray
 from stages.shape.kit import Assembly, Kit, PartMesh
 
-__all__ = ["Shape", "kit_shape", "part_count", "upright"]
+__all__ = ["Shape", "kit_shape", "mesh_name", "part_count", "upright"]
 
 Z_TO_Y = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
@@ -24,8 +24,8 @@ class Shape:
     meshes: what `assembly.types` counts into; of a kit all its types, of a program the meshes of this one shape.
     assembly: which mesh stands where, and which parts touch; its edges are empty where nobody has asked yet.
     up: the axis that points up, `"y"` or `"z"`; labels: the vocabulary of part labels, the same for every shape of
-    one kit or program, in a fixed order. The name of each mesh is one of them.
-    own_names: a name for each part that no other part of the shape has; without, its label and a number.
+    one kit or program, in a fixed order. The label of each mesh is one of them.
+    own_names: a name for each part that no other part of the shape has; without, its mesh's name and a number.
     first_class: in a dataset the id of the class of the first of `labels`; the others follow.
     """
 
@@ -38,9 +38,9 @@ class Shape:
 
     @cached_property
     def label_of(self) -> TypeArray:
-        """For each mesh the index of its name in `labels`, int16 (k,)."""
+        """For each mesh the index of its label in `labels`, int16 (k,)."""
         places = {name: index for index, name in enumerate(self.labels)}
-        return np.array([places[mesh.name] for mesh in self.meshes], dtype=np.int16)
+        return np.array([places[mesh.label] for mesh in self.meshes], dtype=np.int16)
 
     @cached_property
     def part_labels(self) -> TypeArray:
@@ -55,14 +55,15 @@ class Shape:
 
     @cached_property
     def part_names(self) -> tuple[str, ...]:
-        """A name for each part: its own, or its label and its number among the parts of that label, `tower.000`."""
+        """A name for each part: its own, or its mesh's name and a number, `tower.000`."""
         if self.own_names:
             return self.own_names
-        counts: Counter[int] = Counter()
+        counts: Counter[str] = Counter()
         names = []
-        for label in self.part_labels.tolist():
-            names.append(f"{self.labels[label]}.{counts[label]:03d}")
-            counts[label] += 1
+        for mesh in self.assembly.types.tolist():
+            name = self.meshes[mesh].name
+            names.append(f"{name}.{counts[name]:03d}")
+            counts[name] += 1
         return tuple(names)
 
     def __len__(self) -> int:
@@ -70,8 +71,13 @@ class Shape:
 
 
 def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
-    """The shape of an assembly of the kit's types; the label of a part is its type."""
-    return Shape(kit.types, assembly, kit.up, kit.type_names())
+    """The shape of an assembly of the kit's types."""
+    return Shape(kit.types, assembly, kit.up, kit.labels)
+
+
+def mesh_name(part_name: str) -> str:
+    """The name of the mesh of a part that has no name of its own, by what `Shape.part_names` calls it."""
+    return part_name.rpartition(".")[0]
 
 
 def part_count(shape: Shape) -> str:

@@ -21,7 +21,7 @@ def string_faults(sample: Packaged) -> Iterator[str]:
     """A sentence for a shape graph that is not the record's, and for strings that stand for another graph."""
     if not languages()[sample.record["language"]].graphs:
         return
-    types = sample.shape.assembly.types
+    types = sample.shape.part_labels
     if graph_digest(types, sample.contacts) != sample.record["graph"]:
         yield "its parts and contacts are another graph than its json names"
         return

@@ -107,7 +107,7 @@ def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]]) 
     described = {}
     for name, kit in sorted(input_kits(task).items()):
         if name in statistics:
-            types = make_alphabet(kit.type_names()).vocabulary()
+            types = make_alphabet(kit.labels).vocabulary()
             seen = {token for counted in statistics[name].values() for token in counted.seen}
             numbers = sorted(seen - set(types) - {"(", ")"}, key=_number)
             described[name] = {"types": types, "tokens": [*types, "(", ")", *numbers]}

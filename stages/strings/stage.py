@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -53,13 +54,15 @@ def write_strings(task: Task) -> Outcome:
     refused. Raises ShardFailed where a string does not stand for its graph, or a sample is filed under a wrong graph.
     """
     config = task.config.section(StringsConfig)
-    alphabets = {name: make_alphabet(kit.type_names()) for name, kit in input_kits(task).items()}
+    kits = input_kits(task)
+    alphabets = {name: make_alphabet(kit.labels) for name, kit in kits.items()}
     written, rows = 0, []
 
     def strings_of(_: Collection, sample: Sample) -> Mapping[str, bytes]:
         nonlocal written
         try:
-            strings = _strings(sample, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
+            labelled = replace(sample, assembly=kits[sample.kit].labelled(sample.assembly))
+            strings = _strings(labelled, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
         except NotConnectedError as error:
             raise Rejected("shape graph is not connected", str(error)) from error
         written += len(strings)
@@ -101,7 +104,8 @@ def _graph_shards(plan: Plan) -> list[Shard]:
 
 
 def _strings(sample: Sample, alphabet: Alphabet, count: int, rng: np.random.Generator) -> list[str]:
-    """The canonical string of a sample and `count` random ones, proved to stand for its graph."""
+    """The canonical string of a sample, its types being those of `alphabet`, and `count` random ones, proved to stand
+    for its graph."""
     types, edges = sample.assembly.types, sample.assembly.edges
     if graph_digest(types, edges) != sample.graph:
         raise ShardFailed(f"sample {sample.key} is filed under graph {sample.graph}, which is not its own")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
@@ -11,6 +12,7 @@ from pipeline.stage import Outcome, Plan, Stage, Task
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.pairs import CONTACTS, JOINTS, pair_bytes
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
+from stages.shape.geometry.pose import rounded
 from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample
@@ -29,15 +31,17 @@ def run_shard(task: Task) -> Outcome:
 
     def judged(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         shape = collection.shape(sample)
+        # as the record says it: near ties of statics may fall otherwise by the last digits of a pose
+        assembly = replace(shape.assembly, poses=rounded(shape.assembly.poses))
         judge = judge_of(shape.meshes, shape.up, config)
         # a shape graph says itself what counts as contact; of parts made from a text nobody has asked yet
         graphs = collection.language.graphs
-        known = shape.assembly.edges if graphs else judge.contacts(shape.assembly)
+        known = shape.assembly.edges if graphs else judge.contacts(assembly)
         try:
-            validity = judge.validity(shape.assembly)
+            validity = judge.validity(assembly)
         except ValueError as error:
             raise Rejected("no body to judge", str(error)) from error
-        touching, connected = judge.tolerances(shape.assembly)
+        touching, connected = judge.tolerances(assembly)
         if graphs:
             touching = collection.speaker.sources[sample.kit].contact_tolerance
         physics = physical_fields(validity)

@@ -204,10 +204,10 @@ def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, in
         split=split,
         producer="variations",
         kit=kit,
-        graph=graph_digest(assembly.types, assembly.edges) if added else found.digest(index),
+        graph=graph_digest(backdrop.kit.label_of[assembly.types], assembly.edges) if added else found.digest(index),
         assembly=assembly,
         lineage={
-            "method": "exchange",
+            "method": described["method"],
             "name": f"{found.name}-{index}",
             **described,
             "parents": parents,

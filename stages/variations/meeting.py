@@ -29,7 +29,11 @@ def meeting(kit: Kit) -> dict[str, Any]:
     if len(kit.exemplars) < 2:
         return {}
     seen = [
-        {(part_type, rule) for part_type, rules in observe_neighbourhoods([each.assembly]).items() for rule in rules}
+        {
+            (part_type, rule)
+            for part_type, rules in observe_neighbourhoods([kit.labelled(each.assembly)]).items()
+            for rule in rules
+        }
         for each in kit.exemplars
     ]
     types = [{part_type for part_type, _ in rules} for rules in seen]

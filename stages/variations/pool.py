@@ -26,7 +26,7 @@ from pipeline.shards import array_bytes, json_bytes
 from pipeline.stage import Task
 from stages.shape.arrays import IntArray
 from stages.shape.graphs.canonical import docking_digest, graph_digest
-from stages.shape.kit import Assembly
+from stages.shape.kit import Assembly, Kit
 from stages.variations.exchange.search import Variant
 from stages.variations.features import AXES
 
@@ -36,14 +36,14 @@ _INDEX = ("counts", "features", "keys", "digests")
 _LANE = ("types", "origins", "poses", "edges", "labels", "offsets", *_INDEX[1:])
 
 
-def write_variants(task: Task, variants: Sequence[Variant]) -> None:
-    """Write what a shard of the search has found."""
+def write_variants(task: Task, kit: Kit, variants: Sequence[Variant]) -> None:
+    """Write what a shard of the search has found, variants of `kit`."""
     name = task.shard.name
     assemblies = [each.assembly for each in variants]
     sizes = np.array([(len(each), len(each.edges)) for each in assemblies], dtype=np.int64).reshape(-1, 2)
     digests = [
         (
-            graph_digest(each.assembly.types, each.assembly.edges),
+            graph_digest(kit.label_of[each.assembly.types], each.assembly.edges),
             docking_digest(each.assembly.types, each.assembly.edges, each.labels),
         )
         for each in variants

@@ -55,23 +55,30 @@ def _lineage(_: Config) -> Mapping[str, Field]:
             {
                 "type": "array",
                 "items": {"type": "string", "minLength": 1},
-                "minItems": 2,
-                "maxItems": 2,
-                "description": "the two shapes that pieces were exchanged of: exemplars, or what the search calls them",
+                "minItems": 1,
+                "description": "the two shapes that pieces were exchanged of, exemplars or what the search calls them; "
+                "of a grown shape the exemplars that its patterns are of, that of its first part first",
             }
         ),
         "parts_from": Field(
             {
                 **places,
-                "maxItems": 2,
                 "description": "how many parts came from each of made_of",
             }
         ),
         "boundary": Field(
-            {**places, "description": "parts of the first of made_of along which it was cut, by their places there"}
+            {
+                **places,
+                "description": "parts of the first of made_of along which it was cut, by their places there; of a "
+                "grown shape the one that it was grown from",
+            }
         ),
         "images": Field(
-            {**places, "description": "parts of the second of made_of that each part of the boundary came to lie on"}
+            {
+                **places,
+                "description": "parts of the second of made_of that each part of the boundary came to lie on, or, by "
+                "substitution, to dock to; of a grown shape the place that its first part has in it",
+            }
         ),
         "motion": Field(
             {
@@ -80,7 +87,7 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "minItems": 4,
                 "maxItems": 4,
                 "description": "moved the piece of the first of made_of to the second: the rows of a rotation, then a "
-                "translation, in the coordinates of the model files",
+                "translation, in the coordinates of the model files; a grown shape is not moved",
             }
         ),
         "copied": Field(

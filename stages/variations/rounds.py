@@ -106,7 +106,7 @@ def run_lane(task: Task) -> Outcome:
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
     kept = _required(task, kit, section.require, variants)
-    write_variants(task, kept)
+    write_variants(task, kit, kept)
     for reason, count in sorted(search.rejects.items()):
         task.reject(task.shard.name, reason, count=count)
     crossings = dict(sorted(search.crossings.items()))

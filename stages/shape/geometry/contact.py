@@ -57,6 +57,22 @@ class ContactTest:
 
         return first_contact(self.mesh(a), self.mesh(b), pose, self.tolerance if tolerance is None else tolerance)
 
+    def area(self, a: int, b: int, pose: FloatArray) -> FloatArray:
+        """Points (q, 3) around which the touching area lies, as `kind` judges it, in coordinates of the part of type
+        `a`; none where there is no contact."""
+        points: FloatArray = self._patches(a, b, pose)[0]
+        return points
+
+    def _patches(self, a: int, b: int, pose: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
+        """Points, areas and crossings of `contact_patches`; areas and crossings are none where there is no contact."""
+        from stages.shape.geometry.triangles import contact_patches, near_pairs
+
+        pairs = near_pairs(self.mesh(a), self.mesh(b), pose, self.tolerance)
+        patches: tuple[FloatArray, FloatArray, np.ndarray] = contact_patches(
+            self.mesh(a)[0], self.mesh(b)[0], pairs, pose, self.tolerance
+        )
+        return patches
+
     def kind(self, a: int, b: int, pose: FloatArray) -> ContactKind | None:
         """What the contact is, judged by the extent of the touching area itself; None where there is no contact.
 
@@ -64,12 +80,9 @@ class ContactTest:
         that lies near the other. Its extents along its own principal axes decide, so the answer does not depend
         on how the parts stand in the world.
         """
-        from stages.shape.geometry.triangles import contact_patches, near_pairs
-
-        pairs = near_pairs(self.mesh(a), self.mesh(b), pose, self.tolerance)
-        if len(pairs) == 0:
+        points, areas, crossing = self._patches(a, b, pose)
+        if len(crossing) == 0:
             return None
-        points, areas, crossing = contact_patches(self.mesh(a)[0], self.mesh(b)[0], pairs, pose, self.tolerance)
         if len(points) < 3:
             return "point"
         centred = points - points.mean(axis=0)

@@ -31,14 +31,22 @@ class DockingTable:
     the same. Unobserved poses have label -1.
 
     `tolerance` is the largest displacement between poses of one docking, in the units of the kit: of the centroid,
-    and of a point half a diagonal away from it.
+    and of a point half a diagonal away from it. Dockings that were never seen but follow from others have their own,
+    `Docking.slack`; only `fit` knows them.
     """
 
     def __init__(self, types: Sequence[PartType], dockings: Sequence[Docking], tolerance: float) -> None:
         self.types = tuple(types)
         self.tolerance = tolerance
         entries: dict[tuple[int, int], list[tuple[FloatArray, int]]] = {}
+        self._fits: dict[tuple[int, int], list[tuple[FloatArray, float, int]]] = {}
+        self._fit_poses: dict[tuple[int, int], list[FloatArray]] = {}
+        self._poses: dict[tuple[int, int], tuple[FloatArray, FloatArray]] = {}
+        self.reach = 2 * max([tolerance, *(each.slack for each in dockings)])
         for index, docking in enumerate(dockings):
+            if docking.slack:
+                self._add_fit(index, docking)
+                continue
             forward = symmetric_images(self.types[docking.a], self.types[docking.b], docking.pose)
             entries.setdefault((docking.a, docking.b), []).append((forward, 2 * index))
             backward = symmetric_images(self.types[docking.b], self.types[docking.a], invert(docking.pose))
@@ -71,6 +79,52 @@ class DockingTable:
         nearest = gaps.argmin(axis=1)
         within = gaps[np.arange(len(poses)), nearest] <= (1.0 + SAME_IMAGE) * self.tolerance
         return np.where(within, labels[nearest], -1).astype(np.int32)
+
+    def _add_fit(self, index: int, docking: Docking) -> None:
+        a, b = self.types[docking.a], self.types[docking.b]
+        images = pose_vectors(symmetric_images(a, b, docking.pose), b.diagonal / 2)
+        self._fits.setdefault((docking.a, docking.b), []).append((images, docking.slack, index))
+        self._fit_poses.setdefault((docking.a, docking.b), []).append(docking.pose)
+
+    def fit(self, a: int, b: int, pose: FloatArray) -> tuple[int, int] | None:
+        """Directed labels of a docking that was never seen but holds for a part of type `b` at `pose` (4, 4) to one of
+        type `a`, seen from that part and from the other; the nearest for its slack, or None. The same from both
+        sides."""
+        forward = [(gap, index, 0) for gap, index in self._nearest_fit(a, b, pose)]
+        backward = [(gap, index, 1) for gap, index in self._nearest_fit(b, a, invert(pose))]
+        if not forward and not backward:
+            return None
+        _, index, turned = min(forward + backward)
+        if {each for _, each, _ in forward} == {each for _, each, _ in backward}:
+            return 2 * index, 2 * index
+        return 2 * index + turned, 2 * index + 1 - turned
+
+    def poses(self, a: int, b: int) -> FloatArray:
+        """All poses (k, 4, 4) in which a part of type `b` docks to one of type `a`, seen ones first."""
+        if (a, b) not in self._poses:
+            first, second = self.types[a], self.types[b]
+            fits = [*self._fit_poses.get((a, b), ()), *map(invert, self._fit_poses.get((b, a), ()))]
+            seen = self.images[a, b][0] if (a, b) in self.images else np.empty((0, 4, 4))
+            found = np.concatenate([seen, *(symmetric_images(first, second, pose) for pose in fits)])
+            self._poses[a, b] = found, pose_vectors(found, second.diagonal / 2)
+        return self._poses[a, b][0]
+
+    def nearest(self, a: int, b: int, pose: FloatArray) -> list[tuple[float, FloatArray]]:
+        """Of `poses` the one nearest to `pose` (4, 4), with the gap between them, if that is at most `reach`."""
+        poses = self.poses(a, b)
+        gaps = np.linalg.norm(self._poses[a, b][1] - pose_vectors(pose[None], self.types[b].diagonal / 2), axis=1)
+        if not len(gaps) or gaps.min() > self.reach:
+            return []
+        return [(float(gaps.min()), poses[int(gaps.argmin())])]
+
+    def _nearest_fit(self, a: int, b: int, pose: FloatArray) -> list[tuple[float, int]]:
+        """The fit of a pair of types, in this order, nearest to a pose, as its gap by its slack and its number."""
+        vector = pose_vectors(pose[None], self.types[b].diagonal / 2)
+        gaps = [
+            (float(np.linalg.norm(images - vector, axis=1).min()) / slack, index)
+            for images, slack, index in self._fits.get((a, b), ())
+        ]
+        return [min(gaps)] if gaps and min(gaps)[0] <= 1.0 else []
 
     def label_edges(self, types: np.ndarray, poses: FloatArray, edges: IntArray) -> IntArray:
         """Directed labels of all edges of an assembly, int32 (m, 2): seen from `edges[:, 0]` and from `edges[:, 1]`."""

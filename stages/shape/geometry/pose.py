@@ -6,7 +6,10 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["invert", "pose_vectors", "relative_poses", "rigid_fit", "rotation_angle", "transform_points"]
+__all__ = ["invert", "pose_vectors", "relative_poses", "rigid_fit", "rotation_angle", "rounded", "transform_points"]
+
+DECIMALS = 12
+"""So many of the numbers of a record are kept."""
 
 
 def invert(poses: FloatArray) -> FloatArray:
@@ -48,6 +51,11 @@ def pose_vectors(poses: FloatArray, length: float) -> FloatArray:
     vectors[:, :3] = poses[:, :3, 3]
     vectors[:, 3:] = poses[:, :3, :3].reshape(-1, 9) * length
     return vectors
+
+
+def rounded(numbers: FloatArray) -> FloatArray:
+    """`numbers` as a record has them, without the noise of their last digits and without minus zeros."""
+    return np.round(numbers, DECIMALS) + 0.0
 
 
 def rigid_fit(source: FloatArray, target: FloatArray) -> FloatArray:

@@ -50,4 +50,4 @@ def attempt(rng, kit, a, b, same_shape, answers, ws, way, large, smallest, large
 def complete(kit, answers, ws, with_labels):
     """Connect a joined variant; outcome and key as in `attempt`."""
     outcome = connect(kit, answers, ws)
-    return outcome, graph_key(ws, with_labels) if outcome == Outcome.OK else np.uint64(0)
+    return outcome, graph_key(kit.label_of, ws, with_labels) if outcome == Outcome.OK else np.uint64(0)

@@ -8,7 +8,7 @@ from stages.variations.exchange.components import choose_components, find_compon
 from stages.variations.exchange.matches import looks_same, rotate, squared_distance, transform
 from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, TRY, UNKNOWNS, Outcome
 
-__all__ = ["join", "place_boxes", "set_edge"]
+__all__ = ["inherit_edges", "join", "place_boxes", "set_edge"]
 
 
 @numba.njit(cache=True)
@@ -42,8 +42,8 @@ def join(rng, kit, a, b, ws, smallest, largest):
         return Outcome.TOO_LARGE
     if parts == piece:
         return Outcome.NOTHING_ATTACHED
-    _inherit_edges(a.starts, a.ends, a.labels, ws.from_a, ws)
-    _inherit_edges(b.starts, b.ends, b.labels, ws.from_b, ws)
+    inherit_edges(a.starts, a.ends, a.labels, ws.from_a, ws)
+    inherit_edges(b.starts, b.ends, b.labels, ws.from_b, ws)
     place_boxes(kit.boxes, ws.types, ws.rotations, ws.translations, parts, ws.boxes)
     return Outcome.OK
 
@@ -124,7 +124,7 @@ def _part_of_piece(by_type, first, last, from_a, translations, point, tolerance)
 
 
 @numba.njit(cache=True)
-def _inherit_edges(starts, ends, labels, index, ws):
+def inherit_edges(starts, ends, labels, index, ws):
     """Add the edges of a shape between parts that are in the variant; `index` says as which, or -1."""
     for part in range(len(starts) - 1):
         i = index[part]

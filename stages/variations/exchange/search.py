@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stages.shape.arrays import Float32Array, IntArray
+from stages.shape.arrays import Float32Array, FloatArray, IntArray
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
@@ -22,14 +22,16 @@ from stages.variations.exchange.correction import correct_orientations
 from stages.variations.exchange.joins import join
 from stages.variations.exchange.matches import lies_in
 from stages.variations.exchange.parents import Parent, Parents
-from stages.variations.exchange.steering import BATCH, GROW, TRY_WORK, Choice, Steering
+from stages.variations.exchange.steering import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.features import FeatureTest, material_shares
 from stages.variations.growth.grower import Grower
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.graph_key import graph_key
-from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, UNKNOWNS, Outcome
-from stages.variations.kernels.tables import kit_tables, shape_tables, workspace
+from stages.variations.kernels.layout import BOUNDARY, EDGES, MEANINGS, NOTHING, PARTS, UNKNOWNS, Outcome
+from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
 from stages.variations.settings import SearchConfig
+from stages.variations.substitution.ground import GroundTest
+from stages.variations.substitution.substitute import substitute
 
 __all__ = ["SPARE", "Search", "Variant"]
 
@@ -53,6 +55,8 @@ GROWN_REASONS = {
 
 DUPLICATE = "duplicate"
 SUBASSEMBLY = "nothing but a piece of an exemplar"
+APART = "falls apart"
+LIFTED = "lifted off the ground"
 NEW = "new variant"
 
 KNOWN_GAIN = 0.2
@@ -92,12 +96,15 @@ class Search:
         self.smallest = max(2, round(config.smallest * min(sizes)))
         self.largest = max(3, round(config.largest * max(sizes)))
         self.tables = kit_tables(kit, config.upright)
+        self._histogram_weights = multiset_weights(len(kit.types))
         self._ws = workspace(max(self.largest, *sizes))
         slotted = kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(kit, config.upright) if slotted else None
         self._grower = self._made_grower() if config.method != "exchange" else None
         self.archive = Archive(config.novelty.quota)
-        self.steering = Steering(config)
+        by_meaning = len(kit.labels) < len(kit.types)
+        self.steering = Steering(config, by_meaning)
+        self._ground = GroundTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
         self._features = FeatureTest(kit)
         self._copies = CopyTest(kit, answers.dockings)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
@@ -127,7 +134,12 @@ class Search:
     def keys_of(self, parent: Parent) -> tuple[int, int]:
         """The two refinement keys of a shape."""
         self._load(parent)
-        return int(graph_key(self._ws, False)), int(graph_key(self._ws, True))
+        return self._graph_keys()
+
+    def _graph_keys(self) -> tuple[int, int]:
+        """The two refinement keys of the variant in hand."""
+        label_of = self.tables.label_of
+        return int(graph_key(label_of, self._ws, False)), int(graph_key(label_of, self._ws, True))
 
     def run(
         self, rng: np.random.Generator, tries: int, wanted: int, name: str, progress: Callable[[int], None]
@@ -145,7 +157,7 @@ class Search:
             for choice in batch:
                 if number >= tries:  # what is grown takes many
                     break
-                if choice.number == GROW:
+                if choice.way == NOTHING:
                     variant, work = self._grow(rng)
                     number += max(round(work / TRY_WORK), 1)
                 else:
@@ -189,7 +201,11 @@ class Search:
         with_labels = self.config.duplicates == "docking"
         limits = self.smallest, self.largest
         known = self.answers.table
-        if self.config.matching == "pose":
+        if choice.way == MEANINGS:
+            outcome, key = substitute(rng, self.kit, kit, self.answers.dockings, a, b, ws, *limits), 0
+            if outcome == Outcome.OK:
+                outcome, key = complete(kit, known, ws, with_labels)
+        elif self.config.matching == "pose":
             outcome, key = attempt(
                 rng, kit, a.tables, b.tables, a is b, known, ws, choice.way, choice.large, *limits, with_labels
             )
@@ -210,12 +226,13 @@ class Search:
                 outcome, key = complete(kit, self.answers.table, ws, with_labels)
         if outcome != Outcome.OK:
             return REASONS[outcome]
+        if choice.way == MEANINGS and not self._is_connected():
+            return APART
+        from_b = int((ws.origin[: ws.counts[PARTS]] == 1).sum())
         lineage = {
+            "method": "substitution" if choice.way == MEANINGS else "exchange",
             "parents": [a.name, b.name],
-            "parts_from": [
-                int((ws.origin[: ws.counts[PARTS]] != 1).sum()),
-                int((ws.origin[: ws.counts[PARTS]] == 1).sum()),
-            ],
+            "parts_from": [int(ws.counts[PARTS]) - from_b, from_b],
             "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
             "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
             "motion": np.round(ws.motion, 9).tolist(),
@@ -264,12 +281,14 @@ class Search:
         pieces_count = self.config.sub_assemblies
         if not pieces_count and any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
+        if self._ground is not None and self._ground.is_lifted(types, self._poses()):
+            return LIFTED
         outcome = self._validate()
         if outcome != Outcome.OK:
             return REASONS[outcome]
         if self._slots is not None and self._slots.misfits(self._assembly()):
             return REASONS[Outcome.GRAMMAR]
-        return self._variant(origins, lineage, int(graph_key(ws, False)), int(graph_key(ws, True)))
+        return self._variant(origins, lineage, *self._graph_keys())
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""
@@ -278,8 +297,8 @@ class Search:
         return graph if self.config.duplicates == "graph" else docked
 
     def histogram(self, types: np.ndarray) -> int:
-        """A hash of a type histogram."""
-        return int(self.tables.weights[types].sum(dtype=np.uint64))
+        """A hash of a type histogram, of meshes also where types go by meaning: what looks different is new."""
+        return int(self._histogram_weights[types].sum(dtype=np.uint64))
 
     def _cell(self, features: Float32Array) -> Cell:
         return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)
@@ -293,16 +312,29 @@ class Search:
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
                 return Outcome.CLASH
 
+    def _poses(self) -> FloatArray:
+        """The poses (n, 4, 4) of the variant in hand."""
+        parts = self._ws.counts[PARTS]
+        poses = np.tile(np.eye(4), (parts, 1, 1))
+        poses[:, :3, :3] = self._ws.rotations[:parts]
+        poses[:, :3, 3] = self._ws.translations[:parts]
+        return poses
+
+    def _is_connected(self) -> bool:
+        """Whether the variant in hand is in one piece."""
+        ws = self._ws
+        leader = np.arange(ws.counts[PARTS])
+        for i, j in ws.edges[: ws.counts[EDGES]].tolist():
+            leader[leader == leader[i]] = leader[j]
+        return bool((leader == leader[0]).all())
+
     def _assembly(self) -> Assembly:
-        """What the workspace holds."""
+        """The variant in hand."""
         ws = self._ws
         parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
-        poses = np.tile(np.eye(4), (parts, 1, 1))
-        poses[:, :3, :3] = ws.rotations[:parts]
-        poses[:, :3, 3] = ws.translations[:parts]
         edges = np.sort(ws.edges[:count], axis=1)
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
-        return Assembly(ws.types[:parts].astype(np.int16), poses, edges)
+        return Assembly(ws.types[:parts].astype(np.int16), self._poses(), edges)
 
     def _variant(self, origins: np.ndarray, lineage: dict[str, Any], graph: int, docked: int) -> Variant:
         assembly, label = self._assembly(), self._ws.label

@@ -15,19 +15,21 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.variations.archive import Archive
 from stages.variations.exchange.parents import Parent, Parents
-from stages.variations.kernels.layout import GROWN, JOINTS, PLANES
+from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, NOTHING, PLANES
 from stages.variations.settings import SearchConfig
 
-__all__ = ["BATCH", "CHOICES", "CUTS", "GROW", "PLAIN", "RARE", "Choice", "Steering"]
+__all__ = ["BATCH", "CHOICES", "CUTS", "GROWTH", "PLAIN", "RARE", "Choice", "Steering"]
 
 CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
 """Ways of cutting, and whether the piece must be large."""
 PLAIN, RARE, FAMILY, CROSSED = range(4)
 """Ways of drawing parents: at random; rare ones likelier; rare ones of a random family; a rare one and, of some, that
 of most other ancestry."""
-CHOICES = tuple(product(range(4), range(len(CUTS))))
-GROW = len(CHOICES)
-"""The number of one more choice: to grow a shape from nothing."""
+CHOICES = tuple((draw, *cut) for draw, cut in product(range(4), CUTS))
+SUBSTITUTIONS = tuple((draw, MEANINGS, False) for draw in range(4))
+"""Choices beside these for kits whose types are told by meaning: no cut, but parts of some meanings."""
+GROWTH = (PLAIN, NOTHING, False)
+"""The last choice: no parents, but a shape grown from nothing."""
 BATCH = 64
 """Tries that are planned at once."""
 MEMORY = 4000.0
@@ -44,7 +46,7 @@ PARTNERS = 4
 
 @dataclass(frozen=True)
 class Choice:
-    """One try: its number among CHOICES, the parents, the way of cutting and whether the piece must be large."""
+    """One try: its number among the choices, the parents, the way of cutting and whether the piece must be large."""
 
     number: int
     a: Parent
@@ -56,10 +58,13 @@ class Choice:
 class Steering:
     """Plans tries in batches and learns from what they brought."""
 
-    def __init__(self, config: SearchConfig) -> None:
+    def __init__(self, config: SearchConfig, by_meaning: bool = False) -> None:
         self.config = config
-        self._gains = np.zeros(len(CHOICES) + 1)
-        self._work = np.zeros(len(CHOICES) + 1)
+        exchanged = (*CHOICES, *SUBSTITUTIONS) if by_meaning else CHOICES
+        self.choices = exchanged if config.method == "exchange" else (*exchanged, GROWTH)
+        self._exchanged = len(exchanged)
+        self._gains = np.zeros(len(self.choices))
+        self._work = np.zeros(len(self.choices))
         self._grown_work, self._grown = FIRST_GUESS, 1
 
     def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[Choice]:
@@ -70,7 +75,7 @@ class Steering:
             numbers = np.searchsorted(odds, rng.random(count) * odds[-1], side="right").clip(0, last)
         else:
             numbers = self._plain(rng, count)
-        draws = np.array([CHOICES[number][0] if number < GROW else PLAIN for number in numbers.tolist()])
+        draws = np.array([self.choices[number][0] for number in numbers.tolist()])
         first = self._draw(rng, parents, archive, draws)
         second = self._draw(rng, parents, archive, np.where(draws == CROSSED, RARE, draws))
         crossed = np.flatnonzero(draws == CROSSED).tolist()
@@ -79,7 +84,7 @@ class Steering:
         self._gains *= np.exp(-count / MEMORY)
         self._work *= np.exp(-count / MEMORY)
         return [
-            Choice(number, a, b, *CUTS[CHOICES[number][1] if number < GROW else 0])
+            Choice(number, a, b, *self.choices[number][1:])
             for number, a, b in zip(numbers.tolist(), first, second, strict=True)
         ]
 
@@ -87,26 +92,29 @@ class Steering:
         """What a try has brought, and what it cost."""
         self._gains[choice.number] += gain
         self._work[choice.number] += work
-        if choice.number == GROW:
+        if choice.way == NOTHING:
             self._grown_work += work
             self._grown += 1
 
     def _odds(self, exemplars: int) -> FloatArray:
         """How likely each choice is: of the exchange a share for all alike, the rest by the square of what it gains."""
+        end = self._exchanged
         if self.config.method == "growth":
-            only: FloatArray = np.eye(GROW + 1)[GROW]
+            only: FloatArray = np.eye(len(self.choices))[end]
             return only
-        possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, _ in CHOICES])
-        rates = np.where(possible, (self._gains[:GROW] + 1.0) / (self._work[:GROW] + 50.0), 0.0) ** 2
+        possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, *_ in self.choices[:end]])
+        rates = np.where(possible, (self._gains[:end] + 1.0) / (self._work[:end] + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.explore * possible / possible.sum()
         chances: FloatArray = explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()
-        grown = self._grown_share() / self._cost() if self.config.method == "both" else 0.0
-        return np.append(chances * (1.0 - self._grown_share()) if grown else chances, grown)
+        if self.config.method == "exchange":
+            return chances
+        share = self._grown_share()
+        return np.append(chances * (1.0 - share), share / self._cost())
 
     def _grown_share(self) -> float:
         """The share of the work that is given to growth: that of what it gains for its work, within limits."""
-        exchanged = (self._gains[:GROW].sum() + 1.0) / (self._work[:GROW].sum() + 50.0)
-        grown = (self._gains[GROW] + 1.0) / (self._work[GROW] + 50.0)
+        gains, work = self._gains[: self._exchanged].sum(), self._work[: self._exchanged].sum()
+        exchanged, grown = (gains + 1.0) / (work + 50.0), (self._gains[-1] + 1.0) / (self._work[-1] + 50.0)
         return float(np.clip(grown / (grown + exchanged), LEAST, 1.0 - LEAST))
 
     def _cost(self) -> float:
@@ -116,10 +124,10 @@ class Steering:
     def _plain(self, rng: np.random.Generator, count: int) -> np.ndarray:
         """Choices by no experience: both methods get half of the work where both may be used."""
         if self.config.method == "growth":
-            return np.full(count, GROW)
+            return np.full(count, self._exchanged)
         numbers = np.where(rng.random(count) < self.config.growth_share, 0, 1)
         if self.config.method == "both":
-            numbers[rng.random(count) < 1.0 / (1.0 + self._cost())] = GROW
+            numbers[rng.random(count) < 1.0 / (1.0 + self._cost())] = self._exchanged
         return numbers
 
     def _draw(self, rng: np.random.Generator, parents: Parents, archive: Archive, draws: np.ndarray) -> list[Parent]:

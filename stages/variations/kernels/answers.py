@@ -112,6 +112,10 @@ class ContactAnswers:
                 back[:3, :3] = pose[:3, :3].T
                 back[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
                 return label * LABELS + int(self.dockings.label(b, a, back[None])[0])
+            fit = self.dockings.fit(a, b, pose)
+            if fit is not None:
+                allowed = self.kit.grammar.dockings[fit[0] // 2].depth + self.contact.tolerance
+                return FORBIDDEN if self._is_deeper(a, b, pose, allowed) else fit[0] * LABELS + fit[1]
             if self.contact.kind(a, b, pose) in self.kit.contact_kinds:
                 return FORBIDDEN
         elif self.contact.touches(a, b, pose, BORDERLINE * self.contact.tolerance):
@@ -121,6 +125,10 @@ class ContactAnswers:
     def _nested(self, a: int, b: int, pose: FloatArray) -> bool:
         """Whether a part lies in the other without contact that counts, deeper than any of their types did before."""
         allowed = self.kit.grammar.nested.get((min(a, b), max(a, b)), 0.0) + self.contact.tolerance
+        return self._is_deeper(a, b, pose, allowed)
+
+    def _is_deeper(self, a: int, b: int, pose: FloatArray, allowed: float) -> bool:
+        """Whether one of the parts lies deeper in the other than is allowed."""
         first, second = self.kit.types[a].bounds, self.kit.types[b].bounds
         centre = pose[:3, :3] @ second.mean(axis=0) + pose[:3, 3]
         half = np.abs(pose[:3, :3]) @ (second[1] - second[0]) / 2

@@ -12,12 +12,12 @@ __all__ = ["graph_key"]
 
 
 @numba.njit(cache=True)
-def graph_key(ws, with_labels):
-    """A hash of the variant by colour refinement, of its graph alone or with docking labels. Equal graphs have equal
-    keys; different keys mean different graphs."""
+def graph_key(label_of, ws, with_labels):
+    """A hash of the variant by colour refinement, of its graph, coloured by the kit's `label_of`, alone or with docking
+    labels. Equal graphs have equal keys; different keys mean different graphs."""
     v, edges = ws.counts[PARTS], ws.counts[EDGES]
     for i in range(v):
-        ws.colour[i] = mix(np.uint64(ws.types[i]) + np.uint64(0x51ED270B))
+        ws.colour[i] = mix(np.uint64(label_of[ws.types[i]]) + np.uint64(0x51ED270B))
     classes = 0
     ranked = np.empty(v, dtype=np.uint64)
     for _ in range(v):

@@ -19,8 +19,10 @@ __all__ = [
     "GROWN",
     "JOINTS",
     "LABELS",
+    "MEANINGS",
     "MISSING",
     "NONE",
+    "NOTHING",
     "PARTS",
     "PIECE",
     "PLANES",
@@ -39,8 +41,9 @@ __all__ = [
 class Rules(NamedTuple):
     """Which neighbourhoods the grammar admits, by rule: what a loose grammar admits is too much to be listed.
 
-    level: 0 `multiset`, 1 `count_and_set`, 2 `count_and_pairs`, 3 `count_and_types`, 4 one of slots,
-    of which only the types around a part can be told here.
+    Types are places of labels here, `KitTables.label_of`.
+    level: 0 `multiset`, 1 `count_and_set`, 2 `count_and_pairs`, 3 `count_and_types`, 4 one of slots, of which only the
+    types around a part can be told here.
     keys uint64 (c,), verdicts int64 (c,): an open-addressing table of neighbourhoods that were asked for, 1 where they
     are admitted; at level 0 those observed, which are all. filled int64 (1,): how many it holds.
     sizes bool (types, k): whether a part of a type may have so many neighbours.
@@ -66,7 +69,8 @@ class KitTables(NamedTuple):
 
     symmetry_starts int64 (types + 1,), symmetries float64 (s, 3, 3): rotations of each type's group;
     boxes float64 (types, 2, 3): centre and half extents in part coordinates; reach float64 (types,): half diagonals;
-    weights uint64 (types,): multiset weights; rules: the neighbourhoods that the grammar admits;
+    weights uint64 (types,): multiset weights of their labels; label_of int64 (types,): places of
+    the labels; rules: the neighbourhoods that the grammar admits;
     limits float64 (3,): pose tolerance, contact tolerance, quantum of the answers; up: the axis that docking motions
     must keep upright, or -1.
     """
@@ -76,6 +80,7 @@ class KitTables(NamedTuple):
     boxes: np.ndarray
     reach: np.ndarray
     weights: np.ndarray
+    label_of: np.ndarray
     rules: Rules
     limits: np.ndarray
     up: int
@@ -152,8 +157,8 @@ Outcome = _Outcomes()
 EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY, PIECE = 0, 1, 2, 3, 4, 5
 """Places in `Workspace.counts`: numbers of edges, unknown pairs, parts of the variant, boundary parts, tries so far
 and parts of the piece."""
-GROWN, PLANES, JOINTS = 0, 1, 2
-"""Ways of cutting."""
+GROWN, PLANES, JOINTS, MEANINGS, NOTHING = 0, 1, 2, 3, 4
+"""Ways of cutting; by meanings is substitution, no cut of the exchange, and nothing is cut where shapes are grown."""
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 """Contact answers that are no pair of labels: apart, never to be, not asked yet."""
 LABELS = 1 << 20

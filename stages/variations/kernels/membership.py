@@ -35,13 +35,17 @@ def admitted(kit, part_type, near, count):
         key += kit.weights[near[n]]
     verdict = recalled(kit.rules, key)
     if verdict == MISSING:
-        verdict = _rule(kit.rules, part_type, near, count)
+        labels = np.empty(count, dtype=np.int64)
+        for n in range(count):
+            labels[n] = kit.label_of[near[n]]
+        verdict = _rule(kit.rules, kit.label_of[part_type], labels, count)
         _remember(kit.rules, key, verdict)
     return verdict == 1
 
 
 @numba.njit(cache=True)
 def _rule(rules, part_type, near, count):
+    """The rule on labels."""
     if rules.level < 4 and (count >= rules.sizes.shape[1] or not rules.sizes[part_type, count]):
         return 0
     if rules.level == 1:

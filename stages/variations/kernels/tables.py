@@ -9,7 +9,7 @@ from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit import Assembly, Grammar, Kit
 from stages.variations.kernels.layout import KitTables, Rules, ShapeTables, Workspace
 
-__all__ = ["QUANTUM", "kit_tables", "shape_tables", "workspace"]
+__all__ = ["QUANTUM", "kit_tables", "multiset_weights", "shape_tables", "workspace"]
 
 QUANTUM = 1 / 64
 """Step of the poses by which contact answers are looked up, as a share of the contact tolerance."""
@@ -21,21 +21,27 @@ def kit_tables(kit: Kit, upright: bool) -> KitTables:
     With `upright` a docking motion may rotate a piece about the vertical only.
     """
     bounds = np.stack([each.bounds for each in kit.types])
-    weights = np.random.Generator(np.random.PCG64(len(kit.types))).integers(1, 2**63, len(kit.types), dtype=np.uint64)
+    weights = multiset_weights(len(kit.labels))
     return KitTables(
         symmetry_starts=np.cumsum([0, *(len(each.symmetries) for each in kit.types)]),
         symmetries=np.concatenate([each.symmetries[:, :3, :3] for each in kit.types]),
         boxes=np.ascontiguousarray(np.stack([bounds.mean(axis=1), (bounds[:, 1] - bounds[:, 0]) / 2], axis=1)),
         reach=np.array([each.diagonal / 2 for each in kit.types]),
-        weights=weights,
+        weights=weights[kit.label_of],
+        label_of=kit.label_of.astype(np.int64),
         rules=_rules(kit.grammar, weights),
         limits=np.array([kit.pose_tolerance, kit.contact_tolerance, kit.contact_tolerance * QUANTUM]),
         up={"y": 1, "z": 2}[kit.up] if upright else -1,
     )
 
 
+def multiset_weights(types: int) -> np.ndarray:
+    """A weight for each of so many types, uint64 (types,): the sum over some parts is a hash of their types."""
+    return np.random.Generator(np.random.PCG64(types)).integers(1, 2**63, types, dtype=np.uint64)
+
+
 def _rules(grammar: Grammar, weights: np.ndarray) -> Rules:
-    """The neighbourhoods that `grammar` admits, for the kernels; weights: uint64 (types,) of the types."""
+    """The neighbourhoods that `grammar` admits, for the kernels; weights: uint64 (labels,)."""
     types = len(weights)
     observed = {part_type: list(each) for part_type, each in grammar.neighbourhoods.items()}
     sizes = {(part_type, sum(count for _, count in each)) for part_type, seen in observed.items() for each in seen}

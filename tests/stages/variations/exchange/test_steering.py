@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from stages.variations.exchange.search import Search
-from stages.variations.exchange.steering import CHOICES, GROW, PLAIN, RARE
+from stages.variations.exchange.steering import CHOICES, PLAIN, RARE
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.kernels.layout import NOTHING
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.stages.variations.toy import CHAIN, chain, kit_of
 
@@ -62,10 +63,10 @@ def test_growth_gets_the_share_of_the_work_that_its_finds_earn(guided: bool) -> 
     line, shares = Search(ContactAnswers(kit), config), []
     for worth in (0.0, 1.0):
         for choice in line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 4000):
-            grown = choice.number == GROW
+            grown = choice.way == NOTHING
             line.steering.learn(choice, worth * 60.0 if grown else 0.2, 60.0 if grown else 1.5)
         tried = planned(line, 20_000)
-        shares.append(60.0 * tried[GROW] / (60.0 * tried[GROW] + 1.5 * (20_000 - tried[GROW])))
+        shares.append(60.0 * tried[len(CHOICES)] / (60.0 * tried[len(CHOICES)] + 1.5 * (20_000 - tried[len(CHOICES)])))
     if guided:
         assert shares[0] == pytest.approx(0.2, abs=0.05)
         assert shares[1] == pytest.approx(0.8, abs=0.05)

@@ -1,0 +1,75 @@
+"""Chairs of a program, exported and taken apart by meaning: what is put together stands and is what its record says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from stages.exemplars.build import read_kit
+from stages.exemplars.faults import geometry_faults
+from stages.exemplars.settings import KitConfig, ShapeFile
+from stages.package.glb import glb_bytes
+from stages.package.record import describe_sample
+from stages.shape.collection.pairs import CONTACTS, pair_bytes
+from stages.shape.graphs.canonical import graph_digest
+from stages.shape.kit import Kit
+from stages.shape.physics.judge import judge_shape
+from stages.shape.physics.settings import PhysicsConfig
+from stages.shape.sample import Sample
+from stages.shape.shape import kit_shape
+from stages.strings.alphabet import make_alphabet
+from stages.strings.encoder import canonical_string
+from stages.strings.grammar import check
+from stages.variations.exchange.search import Search, Variant
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import SearchConfig
+from tests.stages.variations.chairs import write_chairs
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def kit(tmp_path_factory: pytest.TempPathFactory) -> Kit:
+    shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path_factory.mktemp("chairs"), 6))
+    return read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning"))
+
+
+@pytest.fixture(scope="module")
+def found(kit: Kit) -> list[Variant]:
+    line = Search(ContactAnswers(kit), SearchConfig())
+    return line.run(np.random.default_rng(0), 2000, 60, "test", lambda count: None)[0]
+
+
+def test_legs_backs_and_arms_are_exchanged_within_their_meanings(kit: Kit, found: list[Variant]) -> None:
+    assert {"seat", "leg", "back_post", "arm"} <= set(kit.labels) < set(kit.type_names())
+    assert len(found) == 60
+    assert {each.lineage["method"] for each in found} == {"exchange", "substitution"}
+    legs = {
+        tuple(sorted(kit.types[part].name for part in each.assembly.types if kit.types[part].label == "leg"))
+        for each in found
+    }
+    assert len(legs) > 6
+
+
+def test_chairs_put_together_stand_as_their_parents_do(kit: Kit, found: list[Variant]) -> None:
+    shapes = [*(each.assembly for each in kit.exemplars), *(each.assembly for each in found[::4])]
+    for assembly in shapes:
+        validity = judge_shape(kit_shape(kit, assembly), PhysicsConfig())
+        assert validity.rooted
+        assert validity.stable
+
+
+def test_an_independent_look_finds_no_fault_and_strings_are_in_the_grammar(kit: Kit, found: list[Variant]) -> None:
+    alphabet = make_alphabet(kit.labels)
+    for each in found[::6]:
+        shape, contacts = kit_shape(kit, each.assembly), pair_bytes(each.assembly.edges)
+        sample = Sample("chair-0", "train", "variations", "chairs", "0" * 64, {}, each.assembly)
+        record = describe_sample(sample, "kit", shape, {CONTACTS: contacts, "txt": b"A\n"}, {})
+        members = {"json": json.dumps(record).encode(), CONTACTS: contacts, "glb": glb_bytes(shape)}
+        assert geometry_faults(kit, members) == []
+        labelled = kit.labelled(each.assembly)
+        encoded = canonical_string(labelled.types, labelled.edges, alphabet)
+        decoded = check(encoded.string, alphabet, kit.grammar)
+        assert graph_digest(decoded.types, decoded.edges) == graph_digest(labelled.types, labelled.edges)
