@@ -35,6 +35,8 @@ class DockingTable:
     """
 
     def __init__(self, types: Sequence[PartType], dockings: Sequence[Docking], tolerance: float) -> None:
+        from scipy.spatial import cKDTree
+
         self.types = tuple(types)
         self.tolerance = tolerance
         entries: dict[tuple[int, int], list[tuple[FloatArray, int]]] = {}
@@ -49,16 +51,21 @@ class DockingTable:
             labels = np.concatenate([np.full(len(images), label, dtype=np.int32) for images, label in found])
             vectors = pose_vectors(poses, self.types[pair[1]].diagonal / 2)
             kept: list[int] = []
+            place = np.full(len(vectors), -1)
             # Equal images are written once. Where two images of one docking are within tolerance both get the lower
             # label, so that a docking that is nearly its own inverse is even; both stay, for what lies at their sides.
+            beside = cKDTree(vectors).query_ball_point(vectors, (1.0 + SAME_IMAGE) * tolerance)
             for candidate in np.argsort(labels, kind="stable").tolist():
-                gaps = np.linalg.norm(vectors[kept] - vectors[candidate], axis=1)
-                nearest = int(gaps.argmin()) if len(kept) else -1
-                if nearest < 0 or gaps[nearest] > SAME_IMAGE * tolerance:
-                    same = nearest >= 0 and labels[kept[nearest]] // 2 == labels[candidate] // 2
-                    if same and gaps[nearest] <= tolerance:
-                        labels[candidate] = labels[kept[nearest]]
-                    kept.append(candidate)
+                near = np.array([each for each in beside[candidate] if place[each] >= 0], dtype=np.int64)
+                gaps = np.linalg.norm(vectors[near] - vectors[candidate], axis=1)
+                if len(near) and gaps.min() <= tolerance:
+                    nearest = near[np.lexsort((place[near], gaps))[0]]
+                    if gaps.min() <= SAME_IMAGE * tolerance:
+                        continue
+                    if labels[nearest] // 2 == labels[candidate] // 2:
+                        labels[candidate] = labels[nearest]
+                place[candidate] = len(kept)
+                kept.append(candidate)
             self.images[pair] = poses[kept], labels[kept]
 
     def label(self, a: int, b: int, poses: FloatArray) -> IntArray:
