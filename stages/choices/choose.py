@@ -1,0 +1,140 @@
+"""What the keys of a kit that are left at `auto` come to, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from stages.choices.ladder import GRAMMARS, KINDS, Rails, Rung, climb, gives_enough, is_dull
+from stages.choices.probe import Finds
+from stages.choices.sight import Setting, Sight, contact_tolerance
+from stages.choices.up import upward
+from stages.exemplars.findings import pieces
+from stages.exemplars.hubs import chosen_hubs
+from stages.exemplars.identify import identify_parts
+from stages.exemplars.read import Model
+from stages.exemplars.settings import STRICTEST, KitConfig
+
+__all__ = ["Choices", "choose", "found_words"]
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What was chosen for a kit.
+
+    values: of the keys that the config left open, by OPEN_KEYS; reasons: a sentence for each; finds: of the probe under
+    what was chosen, None where there was nothing to probe; kept: share of the parts that stay in the shape graphs;
+    enough: whether the probe promises a pool of some size that is not dull; settings: how many were probed.
+    """
+
+    values: Mapping[str, Any]
+    reasons: Mapping[str, str]
+    finds: Finds | None
+    kept: float
+    enough: bool
+    settings: int
+
+    def as_json(self) -> dict[str, Any]:
+        """For the record, and for the stage that builds the kit."""
+        probe = None
+        if self.finds is not None:
+            finds = self.finds
+            probe = {
+                "tries": finds.tries,
+                "graphs": finds.graphs,
+                "histograms": finds.histograms,
+                "distance": finds.distance,
+                "spread": finds.spread,
+                "rejects": dict(finds.rejects),
+            }
+        return {
+            "chosen": {key: list(each) if isinstance(each, tuple) else each for key, each in self.values.items()},
+            "why": dict(self.reasons),
+            "probe": probe,
+            "kept": round(self.kept, 4),
+            "enough": self.enough,
+            "settings": self.settings,
+        }
+
+
+def choose(config: KitConfig, models: Sequence[Model], tries: int) -> Choices:
+    """Decide what `config` leaves open for a kit of `models`; what it states is obeyed.
+
+    In this order: the axis that points up, the contact tolerance, and the first rung of a ladder over kinds of contact,
+    grammar and hubs under which a short search, of `tries` or some times as many, finds enough. All that is random in
+    it depends on the models and on what is stated alone, so every run and `make inspect` choose alike.
+    Raises ConfigError for a model in which no part has any area, and for stated hubs that are no types.
+    """
+    open_keys = config.left_open()
+    values: dict[str, Any] = {key: STRICTEST[key] for key in open_keys}
+    reasons = dict.fromkeys(open_keys, "the default")
+    identified = identify_parts(models, config)
+    if "up" in open_keys:
+        values["up"], reasons["up"] = upward(models, identified)
+    if "contact.tolerance" in open_keys:
+        found = contact_tolerance(identified, STRICTEST["contact.tolerance"])
+        values["contact.tolerance"], reasons["contact.tolerance"] = found
+    stated = config.decide(values)
+    sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up)
+    rungs = climb(sight, _rails(stated, sight, open_keys), tries)
+    if not rungs:
+        return Choices(values, reasons, None, 1.0, False, 0)
+    chosen = rungs[-1]
+    setting = chosen.setting
+    hubs = tuple(sight.types[index].name for index in setting.hubs)
+    bare = sight.counted(setting)
+    is_apart = any(pieces(each).any() for each in bare)
+    ladder = {
+        "contact.kinds": setting.kinds,
+        "grammar": setting.grammar,
+        "hubs.types": hubs or "none",
+        "disconnected": "largest" if is_apart else "error",
+    }
+    left = sum(map(len, bare)) - round(chosen.kept * sight.parts)
+    for key, value in ladder.items():
+        if key in open_keys:
+            values[key] = value
+            reasons[key] = _reason(key, chosen, rungs)
+    if "disconnected" in open_keys:
+        stand = "1 part stands" if left == 1 else f"{left} parts stand"
+        reasons["disconnected"] = f"{stand} apart from the largest piece" if is_apart else "nothing stands apart"
+    return Choices(values, reasons, chosen.finds, chosen.kept, gives_enough(chosen.finds), len(rungs))
+
+
+def found_words(finds: Finds) -> str:
+    """What a probe found, in words."""
+    if not finds.graphs:
+        return f"nothing in {finds.tries:,} tries"
+    alike = ", much alike" if is_dull(finds) else ""
+    return f"{finds.graphs:,} graphs and {finds.histograms:,} histograms in {finds.tries:,} tries{alike}"
+
+
+def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str]) -> Rails:
+    """What the ladder may choose from: one value of each key that the config states."""
+    made = stated.decided()
+    return Rails(
+        kinds=KINDS if "contact.kinds" in open_keys else (made.kinds,),
+        grammars=GRAMMARS if "grammar" in open_keys else (made.grammar,),
+        hubs=None if "hubs.types" in open_keys else chosen_hubs(stated, sight.types),
+        largest="disconnected" in open_keys or made.disconnected == "largest",
+    )
+
+
+def _reason(key: str, chosen: Rung, rungs: Sequence[Rung]) -> str:
+    """Why the ladder ended at this value of a key: what it found there, and one step stricter in this key alone."""
+    setting = chosen.setting
+    stricter: list[Setting] = []
+    if key == "contact.kinds":
+        stricter = [replace(setting, kinds=kinds) for kinds in KINDS if len(kinds) > len(setting.kinds)]
+    elif key == "grammar" and setting.grammar in GRAMMARS:
+        stricter = [replace(setting, grammar=each) for each in GRAMMARS[: GRAMMARS.index(setting.grammar)]]
+    elif key == "hubs.types" and setting.hubs:
+        stricter = [replace(setting, hubs=())]
+    for other in reversed(stricter):
+        rung = next((each for each in rungs if each.setting == other), None)
+        if rung is not None:
+            return f"{found_words(chosen.finds)}; the next stricter: {found_words(rung.finds)}"
+    if gives_enough(chosen.finds):
+        return "the strictest, and it gives enough"
+    return f"nothing else gives more than {found_words(chosen.finds)}"
