@@ -12,7 +12,7 @@ from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
 from stages.exemplars.findings import pieces
 from stages.exemplars.hubs import chosen_hubs
-from stages.exemplars.identify import identify_parts
+from stages.exemplars.identify import Identified
 from stages.exemplars.read import Model
 from stages.exemplars.settings import STRICTEST, KitConfig
 
@@ -58,18 +58,17 @@ class Choices:
         }
 
 
-def choose(config: KitConfig, models: Sequence[Model], tries: int) -> Choices:
-    """Decide what `config` leaves open for a kit of `models`; what it states is obeyed.
+def choose(config: KitConfig, models: Sequence[Model], identified: Identified, tries: int) -> Choices:
+    """Decide what `config` leaves open for a kit of `models`, whose parts are `identified`; what it states is obeyed.
 
     In this order: the axis that points up, the contact tolerance, and the first rung of a ladder over kinds of contact,
     grammar and hubs under which a short search, of `tries` or some times as many, finds enough. All that is random in
     it depends on the models and on what is stated alone, so every run and `make inspect` choose alike.
-    Raises ConfigError for a model in which no part has any area, and for stated hubs that are no types.
+    Raises ConfigError for stated hubs that are no types.
     """
     open_keys = config.left_open()
     values: dict[str, Any] = {key: STRICTEST[key] for key in open_keys}
     reasons = dict.fromkeys(open_keys, "the default")
-    identified = identify_parts(models, config)
     if "up" in open_keys:
         values["up"], reasons["up"] = upward(models, identified)
     if "contact.tolerance" in open_keys:

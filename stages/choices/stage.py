@@ -12,6 +12,7 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.choices.choose import choose
 from stages.choices.settings import ChoicesConfig
+from stages.exemplars.identify import identify_parts
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
 
@@ -38,7 +39,8 @@ def run_shard(task: Task) -> Outcome:
     """Read the models and decide."""
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
     models = [read_model(shape.path, config.parts) for shape in config.shapes]
-    made = choose(config, models, task.config.section(ChoicesConfig).tries).as_json()
+    tries = task.config.section(ChoicesConfig).tries
+    made = choose(config, models, identify_parts(models, config), tries).as_json()
     with task.output(f"{config.name}.json") as stream:
         stream.write(json_bytes(made))
     return Outcome(samples=0, summary=made)

@@ -20,7 +20,7 @@ from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import NOTHING, Assembly, ContactKind, Exemplar, Kit
 
-__all__ = ["KitReport", "Observation", "build_kit", "observe_models", "read_kit"]
+__all__ = ["KitReport", "Observation", "build_kit", "observe_models", "observe_parts", "read_kit"]
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,12 @@ def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, KitRepor
 
 
 def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
-    """What Shapemill sees in `models`, also where it could make no kit of them.
+    """What Shapemill sees in `models`, also where it could make no kit of them; as `observe_parts`."""
+    return observe_parts(config, models, identify_parts(models, config))
+
+
+def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identified) -> Observation:
+    """What Shapemill sees in `models`, whose parts are `identified`, also where it could make no kit of them.
 
     Hubs that the config leaves out are not in the exemplars; those kept as backdrop are types of the kit, and what
     was seen around them and between them and others is in its grammar. With `disconnected: largest` only the largest
@@ -90,7 +95,6 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
     nothing but hubs, for hubs that are no types, and for a config that leaves a key at `auto`.
     """
     made = config.decided()
-    identified = identify_parts(models, config)
     types, aliases, names = identified.types, identified.aliases, list(identified.part_names)
     median = identified.median_diagonal
     contact = ContactTest(types, made.tolerance * median)

@@ -38,6 +38,7 @@ def _endings(plan: Plan) -> Sequence[str]:
     summaries = [plan.summary("variations", shard) or {} for shard in plan.shards("variations")]
     ended = [
         f"- {each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
+        + (f" What limits it: {each['advice']}." if each["advice"] else "")
         for each in summaries
         if each.get("why")
     ]

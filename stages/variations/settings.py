@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -77,8 +77,10 @@ class SearchConfig(StrictModel):
     parents: int = Field(2000, ge=1, description="Most earlier variants that one shard of the search holds as parents.")
     lanes: int = Field(2, ge=1, le=64, description="Shards of the search that run beside each other in a round.")
     tries: int = Field(20_000, ge=1, description="Most tries of one lane in one round.")
-    patience: int = Field(
-        200_000, ge=1, description="Tries of a kit without a new variant after which its search has ended."
+    patience: Literal["auto"] | Annotated[int, Field(ge=1)] = Field(
+        "auto",
+        description="Tries of a kit without a new variant after which its search has ended; `auto`: 200,000, and for "
+        "exemplars of over 100 parts the fewer the larger they are, 40,000 at least, which is a minute or two.",
     )
     rounds: int = Field(200, ge=1, description="Most rounds of a kit's search.")
     novelty: NoveltyConfig = Field(

@@ -56,6 +56,8 @@ def report(plan: Plan) -> Sequence[str]:
             counts = f"{state['graphs']:,} distinct graphs, {state['histograms']:,} distinct histograms"
             why = state["why"] or f"{kit}: {state['found']:,} found for {wanted:,} after {state['tries']:,} tries"
             lines.append(f"{why}; {counts}")
+            if state["advice"]:
+                lines.append(f"{kit}: {state['advice']}")
             lines.append(f"{kit}: growth of histograms: {growth(state['curve'])}")
     assignment = plan.summary("variations", f"{plan.config.name}-assignment") or {"kits": {}}
     lines += [f"{kit}: {described(chosen)}" for kit, chosen in assignment["kits"].items()]

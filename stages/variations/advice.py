@@ -1,0 +1,59 @@
+"""Why a search finds nothing in a kit, and what its user can do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from stages.exemplars.findings import HUB_SHARE, SMALL
+from stages.shape.kit import Kit
+from stages.variations.exchange.search import DUPLICATE, SUBASSEMBLY
+
+__all__ = ["what_keeps"]
+
+REGULAR = 0.01
+"""Share of tries that give an exemplar again, or a piece of one, from which on a kit is regular."""
+
+
+def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
+    """What keeps the search of a kit from finding anything, and what would help, in a sentence.
+
+    rejects: by reason, how many of the `tries` came to nothing.
+    """
+    counts = np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars]), minlength=len(kit.types))
+    used = int((counts > 0).sum())
+    if counts.max() < 2:
+        return (
+            "every part is its own type; bring a second model of the same parts, or name types by meaning "
+            "(`types: labels`)"
+        )
+    if used == 1:
+        return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
+    hub = _hub(kit)
+    if hub:
+        return f"{hub}; split it into several parts in the model, or bring a second model"
+    known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
+    if known > REGULAR * tries:
+        return (
+            "what can be exchanged gives the exemplar again, or a piece of it: it is regular; bring a second model of "
+            "the same parts, or write a program with its counts and sizes as parameters"
+        )
+    alone = int((counts == 1).sum())
+    if alone > used / 2:
+        return f"{alone} of {used} part types occur once; bring a second model of the same parts"
+    return "no piece fits where it does not stand already; bring a second model of the same parts"
+
+
+def _hub(kit: Kit) -> str:
+    """The part that touches most others, where that is very many; else nothing."""
+    worst: tuple[float, str] = (0.0, "")
+    for exemplar in kit.exemplars:
+        assembly = exemplar.assembly
+        degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
+        part = int(degrees.argmax())
+        share = degrees[part] / max(len(assembly) - 1, 1)
+        if len(assembly) > SMALL and share > max(HUB_SHARE, worst[0]):
+            name = exemplar.part_names[part]
+            worst = (share, f"part {name} touches {degrees[part]} of {len(assembly) - 1} others and pins them")
+    return worst[1]
