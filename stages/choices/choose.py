@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from stages.choices.ladder import GRAMMARS, KINDS, Rails, Rung, climb, gives_enough, is_dull
+import numpy as np
+
+from stages.choices.ladder import GRAMMARS, KINDS, Rails, Rung, climb, is_dull
 from stages.choices.probe import Finds
 from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
-from stages.exemplars.findings import pieces
 from stages.exemplars.hubs import chosen_hubs
 from stages.exemplars.identify import Identified
 from stages.exemplars.read import Model
@@ -82,23 +83,22 @@ def choose(config: KitConfig, models: Sequence[Model], identified: Identified, t
     chosen = rungs[-1]
     setting = chosen.setting
     hubs = tuple(sight.types[index].name for index in setting.hubs)
-    bare = sight.counted(setting)
-    is_apart = any(pieces(each).any() for each in bare)
+    bare = sum(int((~np.isin(each.types, setting.hubs)).sum()) for each in sight.counted(setting))
+    left = bare - sum(map(len, sight.staying(setting)))
     ladder = {
         "contact.kinds": setting.kinds,
         "grammar": setting.grammar,
         "hubs.types": hubs or "none",
-        "disconnected": "largest" if is_apart else "error",
+        "disconnected": "largest" if left else "error",
     }
-    left = sum(map(len, bare)) - round(chosen.kept * sight.parts)
     for key, value in ladder.items():
         if key in open_keys:
             values[key] = value
             reasons[key] = _reason(key, chosen, rungs)
     if "disconnected" in open_keys:
         stand = "1 part stands" if left == 1 else f"{left} parts stand"
-        reasons["disconnected"] = f"{stand} apart from the largest piece" if is_apart else "nothing stands apart"
-    return Choices(values, reasons, chosen.finds, chosen.kept, gives_enough(chosen.finds), len(rungs))
+        reasons["disconnected"] = f"{stand} apart from the largest piece" if left else "nothing stands apart"
+    return Choices(values, reasons, chosen.finds, chosen.kept, chosen.gives_enough, len(rungs))
 
 
 def found_words(finds: Finds) -> str:
@@ -134,6 +134,6 @@ def _reason(key: str, chosen: Rung, rungs: Sequence[Rung]) -> str:
         rung = next((each for each in rungs if each.setting == other), None)
         if rung is not None:
             return f"{found_words(chosen.finds)}; the next stricter: {found_words(rung.finds)}"
-    if gives_enough(chosen.finds):
+    if chosen.gives_enough:
         return "the strictest, and it gives enough"
     return f"nothing else gives more than {found_words(chosen.finds)}"

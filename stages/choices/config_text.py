@@ -71,7 +71,7 @@ def config_text(
         _line(2, "duplicates", "graph", "distinct shape graphs, not ways to turn a part in its place"),
     ]
     if made.hubs and config.hubs.keep == "backdrop":
-        lines += ["  # require: {hubs: 1}   # refuses variants on which no hub fits"]
+        lines += ["  require:", _line(2, "hubs", 1, "a variant on which none of them fits is refused")]
     return "\n".join(lines) + "\n"
 
 

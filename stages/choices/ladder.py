@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pipeline.randomness import decision_rng
 from stages.choices.probe import Finds, Probe
 from stages.choices.sight import Setting, Sight
 from stages.shape.kit import ContactKind, Strictness
+from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["Rails", "Rung", "climb", "gives_enough", "is_dull"]
+__all__ = ["Rails", "Rung", "climb", "is_dull"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -25,6 +28,10 @@ LONGER = 4
 """As many times the tries, for a setting that looks promising."""
 STAY = 0.6
 """Share of the parts that must stay where some are left out."""
+FITTED = 0.75
+"""Share of the most different finds on which hubs must fit again."""
+WORK = 10_000_000
+"""Tries times parts after which the ladder ends: a try takes the longer the more parts there are."""
 PEELED = 4
 """Most types of hubs that are peeled off."""
 GRAMMARS: tuple[Strictness, ...] = ("multiset", "count_and_pairs")
@@ -44,24 +51,28 @@ class Rails:
 
 @dataclass(frozen=True)
 class Rung:
-    """A setting, what a probe found under it, and the share of all parts that stay."""
+    """A setting, what a probe found under it, the share of all parts that stay, and the share of the most different
+    finds that get their hub back; 1 where none are left out."""
 
     setting: Setting
     finds: Finds
     kept: float
+    fitted: float
 
     @property
     def score(self) -> tuple[float, ...]:
-        """By which rungs that give too little are compared: histograms at their distance, in what is left of the
+        """By which rungs that give too little are compared: histograms at their distances, in what is left of the
         exemplars; then graphs."""
+        finds, worth = self.finds, self.kept * self.fitted
+        return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * worth, finds.graphs * worth)
+
+    @property
+    def gives_enough(self) -> bool:
+        """Whether it promises a pool of some size that is not dull, with most of the hubs behind it."""
         finds = self.finds
-        apart = min(finds.distance, 0.2) * min(finds.spread, 0.2)
-        return (finds.histograms * apart * self.kept, finds.graphs * self.kept)
-
-
-def gives_enough(finds: Finds) -> bool:
-    """Whether a probe promises a pool of some size that is not dull."""
-    return finds.graphs >= GRAPHS and finds.histograms >= HISTOGRAMS and not is_dull(finds)
+        return (
+            finds.graphs >= GRAPHS and finds.histograms >= HISTOGRAMS and self.fitted >= FITTED and not is_dull(finds)
+        )
 
 
 def is_dull(finds: Finds) -> bool:
@@ -73,37 +84,44 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     """The rungs that were tried, the chosen one last.
 
     Chosen is the first that gives enough; where none does, the one of the best score, the stricter one of equals.
+    Each has `tries`, and more if it looks promising; after so much WORK no more are tried.
     """
     tried: list[Rung] = []
     known: dict[tuple[ContactKind, ...], ContactAnswers] = {}
     for setting in _settings(sight, rails):
+        staying = sight.staying(setting)
+        kept = sum(map(len, staying)) / sight.parts
+        if min(map(len, staying)) < 2 or (kept < 1.0 and (not rails.largest or (tried and kept < STAY))):
+            continue
         kit = sight.kit(setting)
-        kept = sum(len(each.assembly) for each in kit.exemplars) / sight.parts
-        if kept < 1.0 and (not rails.largest or (tried and kept < STAY)):
-            continue
-        if min(len(each.assembly) for each in kit.exemplars) < 2:
-            continue
         if setting.kinds not in known:
             known[setting.kinds] = ContactAnswers(kit)
-        answers = known[setting.kinds].under(kit)
-        rung = Rung(setting, _probed(answers, setting, tries), kept)
-        tried.append(rung)
-        if gives_enough(rung.finds):
+        tried.append(_rung(known[setting.kinds].under(kit), setting, tries, kept, sight.widest(())))
+        if tried[-1].gives_enough:
             return tried
+        if sum(each.finds.tries for each in tried) * sight.parts > WORK:
+            break
     if tried:
         best = max(range(len(tried)), key=lambda place: (tried[place].score, -place))
         tried.append(tried.pop(best))
     return tried
 
 
-def _probed(answers: ContactAnswers, setting: Setting, tries: int) -> Finds:
-    """The first tries, and more where they found something."""
+def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, widest: int | None) -> Rung:
+    """The first tries, and more where they found something that differs. Where hubs are left out that the `widest` type
+    is of, finds must get one of that type back; else any."""
     names = [answers.kit.types[index].name for index in setting.hubs]
     probe = Probe(answers, decision_rng(0, "choices", setting.grammar, *setting.kinds, *names))
-    finds = probe.go_on(tries, GRAPHS)
-    if finds.graphs >= PROMISING and not gives_enough(finds):
-        finds = probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS)
-    return finds
+    rung = Rung(setting, probe.go_on(tries, GRAPHS), kept, 1.0)
+    if rung.finds.histograms >= PROMISING and not rung.gives_enough:
+        rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS), kept, 1.0)
+    if setting.hubs and rung.gives_enough:
+        backdrop = Backdrop(answers, upright=True)
+        chosen = [probe.variants[place].assembly for place in rung.finds.most_different]
+        awaited = [widest] if widest in setting.hubs else list(setting.hubs)
+        fitted = sum(bool(np.isin(backdrop.fit(each).types, awaited).any()) for each in chosen) / len(chosen)
+        rung = replace(rung, fitted=fitted)
+    return rung
 
 
 def _settings(sight: Sight, rails: Rails) -> Iterator[Setting]:
@@ -130,11 +148,6 @@ def _hubs(sight: Sight, rails: Rails) -> Iterator[tuple[int, ...]]:
         if widest is None:
             return
         hubs = tuple(sorted((*hubs, widest)))
-        if _left(sight, hubs) < STAY:
+        if sum(map(len, sight.staying(Setting(KINDS[0], GRAMMARS[0], hubs)))) < STAY * sight.parts:
             return
         yield hubs
-
-
-def _left(sight: Sight, hubs: Sequence[int]) -> float:
-    kit = sight.kit(Setting(KINDS[0], GRAMMARS[0], tuple(hubs)))
-    return sum(len(each.assembly) for each in kit.exemplars) / sight.parts

@@ -11,6 +11,7 @@ import numpy as np
 
 from stages.exemplars.findings import LOOSER, pieces
 from stages.exemplars.grammar import Contacts, observe_contacts, observe_neighbourhoods, observe_nested
+from stages.exemplars.hubs import set_hubs_aside, with_touching
 from stages.exemplars.identify import Identified
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Assembly, ContactKind, Exemplar, Grammar, Kit, Strictness
@@ -113,29 +114,50 @@ class Sight:
         return int(degrees.argmax()) if (degrees > 0).sum() > 1 else None
 
     def counted(self, setting: Setting) -> list[Assembly]:
-        """The assemblies with the contacts that count under a setting, without hubs."""
+        """The assemblies with the contacts that count under a setting, hubs among them."""
         found = []
         for assembly, kinds in zip(self._touching, self.contacts.kinds, strict=True):
             chosen = np.array([kind in setting.kinds for kind in kinds], dtype=bool)
-            joined = replace(assembly, edges=assembly.edges[chosen])
-            found.append(joined.select(np.flatnonzero(~np.isin(assembly.types, setting.hubs))))
+            found.append(replace(assembly, edges=assembly.edges[chosen]))
+        return found
+
+    def staying(self, setting: Setting) -> list[np.ndarray]:
+        """The parts of each assembly that a setting leaves in its shape graph: those of the largest piece without hubs,
+        int (k,), ascending."""
+        found = []
+        for assembly in self.counted(setting):
+            bare = np.flatnonzero(~np.isin(assembly.types, setting.hubs))
+            found.append(bare[pieces(assembly.select(bare)) == 0] if len(bare) else bare)
         return found
 
     def kit(self, setting: Setting) -> Kit:
-        """The kit under a setting, of the largest piece of each model: like the one that a run builds, but for types
-        that it lets go of and depths of dockings."""
-        whole = [each.select(np.flatnonzero(pieces(each) == 0)) for each in self.counted(setting)]
+        """The kit under a setting: like the one that a run builds, but for types that it lets go of and depths of
+        dockings. Raises ValueError where nothing stays of a model."""
+        counted, staying = self.counted(setting), self.staying(setting)
+        if not all(map(len, staying)):
+            raise ValueError("nothing stays of a model")
+        seen = [with_touching(each, keep, setting.hubs) for each, keep in zip(counted, staying, strict=True)]
+        everything = [each.select(parts) for each, parts in zip(counted, seen, strict=True)]
         dockings = tuple(each for each in self.contacts.dockings if each.kind in setting.kinds)
+        grammar = Grammar(observe_neighbourhoods(everything), dockings, self._nested, setting.grammar)
+        edges = [each.edges for each in everything]
+        kinds = [("face",) * len(each) for each in edges]
+        bare, backdrops, rules, _ = set_hubs_aside(self._used(setting, everything), everything, grammar, kinds, edges)
         return Kit(
             name="seen",
             types=self.types,
             exemplars=tuple(
-                Exemplar(f"exemplar-{number}", each, tuple(f"part-{part}" for part in range(len(each))))
-                for number, each in enumerate(whole)
+                Exemplar(f"exemplar-{number}", each, tuple(f"part-{part}" for part in range(len(each))), behind)
+                for number, (each, behind) in enumerate(zip(bare, backdrops, strict=True))
             ),
-            grammar=Grammar(observe_neighbourhoods(whole), dockings, self._nested, setting.grammar),
+            grammar=rules,
             contact_tolerance=self._contact.tolerance,
             pose_tolerance=self.pose_tolerance,
             contact_kinds=setting.kinds,
             up=self.up,
         )
+
+    def _used(self, setting: Setting, assemblies: Sequence[Assembly]) -> list[int]:
+        """The hubs of a setting that touch something which stays."""
+        there = {int(index) for each in assemblies for index in each.types}
+        return [index for index in setting.hubs if index in there]

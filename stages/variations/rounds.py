@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Task
+from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
@@ -122,18 +124,28 @@ def run_lane(task: Task) -> Outcome:
 
 def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequence[Variant]) -> Sequence[Variant]:
     """The variants that are, with their backdrop, what the config requires; the others are refused."""
-    if not (require.rooted or require.stable or require.hubs):
+    fewest = _fewest_hubs(task.config, kit)
+    if not (require.rooted or require.stable or fewest):
         return variants
     backdrop, kept = backdrop_of(task, kit.name), []
     for variant in variants:
         whole = backdrop.fit(variant.assembly)
         fitted = len(whole) - len(variant.assembly)
-        weak = unmet(require, kit_shape(kit, whole)) if fitted >= require.hubs else "no backdrop"
+        weak = unmet(require, kit_shape(kit, whole)) if fitted >= fewest else "no backdrop"
         if weak is None:
             kept.append(variant)
         else:
             task.reject(task.shard.name, weak)
     return kept
+
+
+def _fewest_hubs(config: Config, kit: Kit) -> int:
+    """How many hub parts a variant of `kit` must get back."""
+    said = config.section(VariationsConfig).require.hubs
+    if said != "auto":
+        return said
+    asked = next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name)
+    return int(asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs))
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:

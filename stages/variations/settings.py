@@ -131,11 +131,10 @@ class SplitConfig(StrictModel):
 class VariantRequirements(Requirements):
     """What a variant must be, its backdrop included, so that it is kept; what is not named is not required."""
 
-    hubs: int = Field(
-        0,
-        ge=0,
+    hubs: Literal["auto"] | Annotated[int, Field(ge=0)] = Field(
+        "auto",
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
-        "no bridge.",
+        "no bridge. `auto`: one, of a kit whose hubs were chosen and not stated.",
     )
 
 

@@ -66,7 +66,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def check(config: Config) -> None:
     """Raises ConfigError where hubs are required that a kit does not put back: nothing would ever be kept."""
-    if not config.section(VariationsConfig).require.hubs:
+    if config.section(VariationsConfig).require.hubs in ("auto", 0):
         return
     for kit in config.section(ExemplarsConfig).kits:
         if kit.hubs.types == "none" or kit.hubs.keep != "backdrop":

@@ -52,16 +52,19 @@ class DockingTable:
             vectors = pose_vectors(poses, self.types[pair[1]].diagonal / 2)
             kept: list[int] = []
             place = np.full(len(vectors), -1)
+            is_written = np.zeros(len(vectors), dtype=bool)
+            tree = cKDTree(vectors)
             # Equal images are written once. Where two images of one docking are within tolerance both get the lower
             # label, so that a docking that is nearly its own inverse is even; both stay, for what lies at their sides.
-            beside = cKDTree(vectors).query_ball_point(vectors, (1.0 + SAME_IMAGE) * tolerance)
             for candidate in np.argsort(labels, kind="stable").tolist():
-                near = np.array([each for each in beside[candidate] if place[each] >= 0], dtype=np.int64)
-                gaps = np.linalg.norm(vectors[near] - vectors[candidate], axis=1)
-                if len(near) and gaps.min() <= tolerance:
-                    nearest = near[np.lexsort((place[near], gaps))[0]]
-                    if gaps.min() <= SAME_IMAGE * tolerance:
-                        continue
+                if is_written[candidate]:
+                    continue
+                beside = np.array(tree.query_ball_point(vectors[candidate], (1.0 + SAME_IMAGE) * tolerance))
+                gaps = np.linalg.norm(vectors[beside] - vectors[candidate], axis=1)
+                is_written[beside[gaps <= SAME_IMAGE * tolerance]] = True
+                near = (place[beside] >= 0) & (gaps <= tolerance)
+                if near.any():
+                    nearest = beside[near][np.lexsort((place[beside[near]], gaps[near]))[0]]
                     if labels[nearest] // 2 == labels[candidate] // 2:
                         labels[candidate] = labels[nearest]
                 place[candidate] = len(kept)
