@@ -19,7 +19,7 @@ from stages.choices.settings import ChoicesConfig
 from stages.choices.sheet import forecast_sheet
 from stages.exemplars.inspect import inspection, inspection_lines
 from stages.exemplars.portrait import kit_sheet
-from stages.exemplars.read import Model, read_model
+from stages.exemplars.read import FORMATS, Model, read_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig
 from stages.shape.kit import ContactKind, Strictness
@@ -85,9 +85,10 @@ def _write(path: Path, content: bytes) -> Path:
 
 def _paths(text: str) -> list[Path]:
     """The models that one argument names: a file, or several with spaces between them, as in MESH="a.glb b.glb"."""
-    if Path(text).exists() or len(text.split()) < 2:
+    several = [Path(each) for each in text.split()]
+    if Path(text).exists() or not all(each.suffix.lower() in FORMATS for each in several):
         return [Path(text)]
-    return [Path(each) for each in text.split()]
+    return several
 
 
 def _config(asked: argparse.Namespace, paths: Sequence[Path]) -> KitConfig:
