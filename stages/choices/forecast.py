@@ -48,11 +48,12 @@ class Forecast:
         return [self.variants[place] for place in self.finds.most_different]
 
 
-def forecast(kit: Kit, answers: ContactAnswers, tries: int) -> Forecast:
-    """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone."""
+def forecast(kit: Kit, answers: ContactAnswers, tries: int, known: int = 0) -> Forecast:
+    """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone. `known`:
+    how many graphs a probe has found in it: where there are any, a first search in vain is no answer."""
     probe = Probe(answers, decision_rng(0, "choices", "forecast"))
     finds = probe.go_on(tries, MANY)
-    if finds.graphs:
+    if finds.graphs or known:
         finds = probe.go_on((LONG - 1) * tries, MANY)
     layouts = _layouts(finds)
     sizes = [len(each.assembly) for each in probe.variants]

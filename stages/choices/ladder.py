@@ -14,7 +14,7 @@ from stages.shape.kit import ContactKind, Strictness
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["Rails", "Rung", "climb", "is_dull"]
+__all__ = ["FITTED", "Rails", "Rung", "climb", "is_dull"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -29,7 +29,8 @@ LONGER = 4
 STAY = 0.6
 """Share of the parts that must stay where some are left out."""
 FITTED = 0.75
-"""Share of the most different finds on which hubs must fit again."""
+"""Share of finds on which hubs must fit again, of so many of the most different."""
+LOOKED_AT = 8
 WORK = 10_000_000
 """Tries times parts after which the ladder ends: a try takes the longer the more parts there are."""
 PEELED = 4
@@ -117,7 +118,7 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, wi
         rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS), kept, 1.0)
     if setting.hubs and rung.gives_enough:
         backdrop = Backdrop(answers, upright=True)
-        chosen = [probe.variants[place].assembly for place in rung.finds.most_different]
+        chosen = [probe.variants[place].assembly for place in rung.finds.most_different[:LOOKED_AT]]
         awaited = [widest] if widest in setting.hubs else list(setting.hubs)
         fitted = sum(bool(np.isin(backdrop.fit(each).types, awaited).any()) for each in chosen) / len(chosen)
         rung = replace(rung, fitted=fitted)

@@ -95,7 +95,8 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
     if not built.refusals:
         answers = ContactAnswers(built.kit)
         begun = time.perf_counter()
-        expected = forecast(built.kit, answers, tries)
+        known = choices.finds.graphs if choices.finds is not None else 0
+        expected = forecast(built.kit, answers, tries, known)
         rate = expected.finds.graphs / max(time.perf_counter() - begun, 1e-6)
         backdrop = Backdrop(answers, upright=True)
         assemblies = [backdrop.fit(each.assembly) for each in expected.chosen[:SHOWN]]
