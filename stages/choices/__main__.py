@@ -20,7 +20,7 @@ from stages.exemplars.settings import KitConfig
 __all__ = ["main"]
 
 HEADER = ("model", "parts", "types", "up", "tolerance", "kinds", "grammar", "hubs", "stay", "graphs", "histograms",
-          "distance", "seconds", "forecast")  # fmt: skip
+          "distance", "CPU s", "forecast")  # fmt: skip
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ from stages.exemplars.inspect import inspection, inspection_lines
 from stages.exemplars.portrait import kit_sheet
 from stages.exemplars.read import FORMATS, Model, read_model
 from stages.exemplars.segment import Segmentation
-from stages.exemplars.settings import ContactConfig, KitConfig
+from stages.exemplars.settings import ContactConfig, KitConfig, ShapeFile
 from stages.shape.kit import ContactKind, Strictness
 
 __all__ = ["main"]
@@ -97,7 +97,7 @@ def _config(asked: argparse.Namespace, paths: Sequence[Path]) -> KitConfig:
     try:
         return KitConfig(
             name="inspected",
-            shapes=tuple(paths),
+            shapes=tuple(ShapeFile(path=path) for path in paths),
             parts=asked.parts,
             contact=ContactConfig(**{key: value for key, value in contact.items() if value is not None}),
             **{key: value for key, value in settings.items() if value is not None},

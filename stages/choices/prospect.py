@@ -27,7 +27,7 @@ class Prospect:
 
     config: nothing left open; asked: the config that they were looked at with; seen: all parts under what was chosen,
     hubs and what falls apart among them; built: what a run builds; forecast: None where a run would refuse the models;
-    rate: variants found a second; seconds: of it all.
+    rate: variants found a CPU second; seconds: CPU seconds of it all.
     """
 
     config: KitConfig
@@ -60,10 +60,10 @@ class Prospect:
                 "distance": finds.distance,
                 "spread": finds.spread,
                 "layouts": self.forecast.layouts,
-                "variants_a_second": round(self.rate, 1),
+                "variants_a_cpu_second": round(self.rate, 1),
                 "seen_once": round(self.forecast.seen_once, 4),
             }
-        return {"choices": made, "forecast": expected, "seconds": round(self.seconds, 1)}
+        return {"choices": made, "forecast": expected, "cpu_seconds": round(self.seconds, 1)}
 
     def lines(self) -> list[tuple[str, str]]:
         """Title and text of each thing that was chosen and foreseen."""
@@ -72,7 +72,7 @@ class Prospect:
         if self.forecast is not None:
             once = f"{self.forecast.seen_once:.0%} of the parts stand in a pattern that occurs once"
             lines += [
-                ("search", f"{found_words(self.forecast.finds)}, {self.rate:.3g} variants a second"),
+                ("search", f"{found_words(self.forecast.finds)}, {self.rate:.3g} variants a CPU second"),
                 ("patterns", once),
             ]
         return lines
@@ -83,7 +83,7 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
 
     Raises ConfigError for a model in which no part has any area, and for stated hubs that are no types.
     """
-    start = time.perf_counter()
+    start = time.process_time()
     identified = identify_parts(models, config)
     choices = choose(config, models, identified, tries)
     decided = config.decide(choices.values)
@@ -94,13 +94,13 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
     expected, assemblies, rate = None, [], 0.0
     if not built.refusals:
         answers = ContactAnswers(built.kit)
-        begun = time.perf_counter()
+        begun = time.process_time()
         known = choices.finds.graphs if choices.finds is not None else 0
         expected = forecast(built.kit, answers, tries, known)
-        rate = expected.finds.graphs / max(time.perf_counter() - begun, 1e-6)
+        rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
         backdrop = Backdrop(answers, upright=True)
         assemblies = [backdrop.fit(each.assembly) for each in expected.chosen[:SHOWN]]
-    return Prospect(decided, config, choices, seen, built, expected, assemblies, rate, time.perf_counter() - start)
+    return Prospect(decided, config, choices, seen, built, expected, assemblies, rate, time.process_time() - start)
 
 
 def _shown(value: Any) -> str:

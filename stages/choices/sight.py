@@ -141,7 +141,8 @@ class Sight:
         dockings = tuple(each for each in self.contacts.dockings if each.kind in setting.kinds)
         grammar = Grammar(observe_neighbourhoods(everything), dockings, self._nested, setting.grammar)
         edges = [each.edges for each in everything]
-        kinds = [("face",) * len(each) for each in edges]
+        face: ContactKind = "face"  # no kinds are asked for
+        kinds = [(face,) * len(each) for each in edges]
         bare, backdrops, rules, _ = set_hubs_aside(self._used(setting, everything), everything, grammar, kinds, edges)
         return Kit(
             name="seen",
