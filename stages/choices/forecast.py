@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from stages.choices.ladder import is_dull
+from stages.choices.ladder import FEW, is_dull
 from stages.choices.probe import Finds, Probe
 from stages.shape.kit import Assembly, Kit
 from stages.variations.advice import what_keeps
@@ -22,8 +22,6 @@ MANY = 300
 """The search for a forecast ends at so many distinct graphs."""
 LONG = 4
 """It has so many times the tries of a probe, as long as it finds something in the first."""
-FEW = 20
-"""Fewer layouts than this are no dataset."""
 
 
 @dataclass(frozen=True)

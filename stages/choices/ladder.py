@@ -14,7 +14,7 @@ from stages.shape.kit import ContactKind, Strictness
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["FITTED", "Rails", "Rung", "climb", "is_dull"]
+__all__ = ["FEW", "FITTED", "Rails", "Rung", "climb", "is_dull"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -22,6 +22,8 @@ HISTOGRAMS = 16
 DISTANCE = 0.05
 SPREAD = 0.03
 """Of so many histograms, so far from the exemplars and from each other, is a pool that is not dull."""
+FEW = 20
+"""Fewer graphs than this are next to nothing."""
 PROMISING = 4
 """A setting that gave so many graphs in the first tries gets more of them."""
 LONGER = 4
@@ -63,8 +65,10 @@ class Rung:
     @property
     def score(self) -> tuple[float, ...]:
         """By which rungs that give too little are compared: histograms at their distances, in what is left of the
-        exemplars; then graphs."""
+        exemplars; then graphs. For next to nothing no hubs are left out."""
         finds, worth = self.finds, self.kept * self.fitted
+        if self.setting.hubs and finds.graphs < FEW:
+            return (0.0, 0.0)
         return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * worth, finds.graphs * worth)
 
     @property

@@ -33,6 +33,8 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     hub = _hub(kit)
     if hub:
         return f"{hub}; split it into several parts in the model, or bring a second model"
+    if counts.sum() <= SMALL:
+        return f"{counts.sum()} parts are too few to exchange any; bring more models of the same parts"
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
     if known > REGULAR * tries:
         return (
