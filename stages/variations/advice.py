@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stages.exemplars.findings import HUB_SHARE, SMALL
+from stages.exemplars.findings import SMALL, hubs
 from stages.shape.kit import Kit
 from stages.variations.exchange.search import DUPLICATE, SUBASSEMBLY
 
@@ -30,9 +30,9 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
         )
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
-    hub = _hub(kit)
-    if hub:
-        return f"{hub}; split it into several parts in the model, or bring a second model"
+    pinned = _hub(kit)
+    if pinned:
+        return f"{pinned}; split it into several parts in the model, or bring a second model"
     if counts.sum() <= SMALL:
         return f"{counts.sum()} parts are too few to exchange any; bring more models of the same parts"
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
@@ -48,14 +48,14 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
 
 
 def _hub(kit: Kit) -> str:
-    """The part that touches most others, where that is very many; else nothing."""
+    """The hub that touches the largest share of its exemplar's parts, in words; empty where there is no hub."""
     worst: tuple[float, str] = (0.0, "")
     for exemplar in kit.exemplars:
         assembly = exemplar.assembly
         degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
-        part = int(degrees.argmax())
-        share = degrees[part] / max(len(assembly) - 1, 1)
-        if len(assembly) > SMALL and share > max(HUB_SHARE, worst[0]):
-            name = exemplar.part_names[part]
-            worst = (share, f"part {name} touches {degrees[part]} of {len(assembly) - 1} others and pins them")
+        for part in hubs(assembly):
+            share = degrees[part] / (len(assembly) - 1)
+            if share > worst[0]:
+                name = exemplar.part_names[part]
+                worst = (share, f"part {name} touches {degrees[part]} of {len(assembly) - 1} others and pins them")
     return worst[1]
