@@ -26,7 +26,7 @@ OUT     ?= datasets
 WORKERS ?=
 ## SEED     a seed instead of the config's
 SEED    ?=
-## MESH     a model that `make inspect` looks at
+## MESH     a model that `make inspect` looks at, or several of one kit
 MESH    ?=
 ## PROGRAM  a shape program that `make inspect` looks at: a name, such as chair, or a module
 PROGRAM ?=
@@ -53,10 +53,12 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset exemplars variations programs shapeassembly validity strings points sketches package
+.PHONY: dataset choices exemplars variations programs shapeassembly validity strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
-exemplars: setup  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
+choices: setup  ## Choose what the config leaves at auto: up axis, contacts, grammar, hubs
+	$(RUN)
+exemplars: choices  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
 	$(RUN)
 variations: exemplars  ## Make new shapes from the exemplars' parts
 	$(RUN)
@@ -84,11 +86,10 @@ status: setup  ## Show what is done, failed, rejected and left
 	@$(PYTHON) -m pipeline status $(HOW)
 verify: setup  ## Look at the finished dataset: every file, every sample, and SAMPLES of them by all means
 	@$(PYTHON) -m pipeline verify $(HOW) --samples "$$SAMPLES"
-inspect: setup  ## Show what Shapemill sees in MESH, before hours are spent, or what PROGRAM can make
+inspect: setup  ## Show what MESH can become and write a config for it, or what PROGRAM can make
 	@[ -n "$$MESH$$PROGRAM" ] || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
 	@[ -z "$$PROGRAM" ] || $(PYTHON) -m stages.programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
-	@file=$${MESH##*/}; [ -z "$$MESH" ] || \
-	    $(PYTHON) -m pipeline inspect --picture "$$OUT/inspect/$${file%.*}.png" -- "$$MESH"
+	@[ -z "$$MESH" ] || $(PYTHON) -m pipeline inspect --out "$$OUT/inspect" -- "$$MESH"
 eval: setup  ## Print TABLE (physical: does it stand? near_twins: are splits apart?) about the finished dataset, and keep it
 	@$(PYTHON) -m eval $(ASKED) -- "$$TABLE"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails

@@ -14,7 +14,7 @@ from pipeline.errors import ConfigError
 from pipeline.shards import read_shard
 from stages.exemplars.build import observe_models
 from stages.exemplars.read import read_model
-from stages.exemplars.settings import KitConfig, ShapeFile
+from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shape.arrays import FloatArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.kit import Assembly, PartMesh
@@ -65,6 +65,7 @@ def model_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:
     """The shape in a model file, with the file's name, or its folder's where the file is just called `model`."""
     name = path.parent.name if path.stem == "model" else path.stem
     config = KitConfig(name="model", shapes=(ShapeFile(path=path),), up="z" if up == "z" else "y")
+    config = config.decide(STRICTEST)
     kit = observe_models(config, [read_model(path, config.parts)]).kit
     yield name, Shape(kit.types, kit.exemplars[0].assembly, kit.up, kit.type_names())
 

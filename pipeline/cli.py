@@ -134,8 +134,8 @@ def verify(
 
 @app.command(context_settings=_PASS_ON)
 def inspect(context: typer.Context) -> None:
-    """Show what Shapemill sees in a mesh: parts, types, contacts, grammar, warnings, a picture."""
-    raise typer.Exit(_entry(context, "exemplars.inspect")(context.args))
+    """Show what Shapemill sees in some meshes and what it can make of them, and write a config for it."""
+    raise typer.Exit(_entry(context, "choices.inspect")(context.args))
 
 
 @app.command()

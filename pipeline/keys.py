@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -59,7 +59,12 @@ def _inner_model(annotation: Any) -> tuple[type[StrictModel] | None, bool]:
 
 def _kind(field: FieldInfo) -> str:
     """The type of a key and its range, in words."""
-    limits = {type(each): each for each in field.metadata}
+    return f"{_words(field.annotation)}{_bounds(field.metadata)}"
+
+
+def _bounds(metadata: Sequence[Any]) -> str:
+    """A range in words, behind a comma; empty where there is none."""
+    limits = {type(each): each for each in metadata}
     low, high = "", ""
     for kind, sign in ((annotated_types.Ge, ">= "), (annotated_types.Gt, "> ")):
         if kind in limits:
@@ -67,14 +72,15 @@ def _kind(field: FieldInfo) -> str:
     for limit, sign in ((annotated_types.Le, "<= "), (annotated_types.Lt, "< ")):
         if limit in limits:
             high = f"{sign}{getattr(limits[limit], limit.__name__.lower())}"
-    bounds = ", ".join(each for each in (low, high) if each)
-    return f"{_words(field.annotation)}{f', {bounds}' if bounds else ''}"
+    return "".join(f", {each}" for each in (low, high) if each)
 
 
 def _words(annotation: Any) -> str:
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _words(arguments[0])
+        return _words(arguments[0]) + "".join(
+            _bounds(each.metadata) for each in arguments if isinstance(each, FieldInfo)
+        )
     if origin is Literal:
         return " or ".join(f"`{each}`" for each in arguments)
     if origin in (tuple, list):

@@ -17,7 +17,8 @@ The contract for who writes a stage:
   inputs. Code that is found at run time, by a name in the config, goes into `Shard.code`. Whatever else its bytes
   depend on goes into `params`: the sha256 of a mesh that it reads, the title that a card shows.
 - `task.config` and `plan.config` hold only the sections of the stage and of the stages it can read (its `inputs`,
-  and theirs), because a shard could not be made again for a change of any other.
+  and theirs), because a shard could not be made again for a change of any other. A stage that looks at a section of a
+  later stage names it in `sections`; what its shards depend on there goes into their `params`.
 - Files of a shard are named `<shard>.<anything>`. They appear all at once when `run_shard` returns, or not at all.
 - Raise ShardFailed when the shard cannot be made now and may succeed later: it is tried again, twice by default.
   ConfigError or Rejected set it aside at once. Any other exception counts as ShardFailed. An OSError that says
@@ -126,7 +127,7 @@ class Stage:
     """One stage of the mill. `module` is `__name__`: the code that its bytes depend on is what is reached from there.
 
     `inputs` are the stages that it reads, by name; `*/producer.py` stands for every stage whose folder holds a file of
-    that name.
+    that name. `sections` are stages whose sections of the config it looks at without reading them.
 
     `estimate_bytes` answers how much disk the whole stage will take at most about. `report`: lines about the
     finished part of the stage, for people, shown after a run and by `status`. `publish`: asked when every shard
@@ -152,4 +153,5 @@ class Stage:
     check: Callable[[Config], None] = _nothing_wrong
     check_machine: Callable[[Config], None] = _nothing_wrong
     asked: Callable[[Config], Sequence[int]] = _nothing_asked
+    sections: tuple[str, ...] = ()
     trial: Callable[[Config], StrictModel] | None = None

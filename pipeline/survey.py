@@ -61,7 +61,7 @@ class Survey:
         """What is known of stage `name`."""
         if name not in self._surveyed:
             reads = upstream(self._stages, name)
-            config = self.config.only(reads)
+            config = self.config.only(dict.fromkeys([*reads, *self._stages[name].sections]))
             view = _View(self, name, config, frozenset(reads))
             self._surveyed[name] = StageSurvey(self._stages[name], config, self._places.stage(name), view)
             self.refresh(name)
@@ -136,7 +136,7 @@ class Survey:
 
     def _input_fingerprint(self, name: str, known: Mapping[str, str], shard: Shard, wanted: str) -> str:
         stage, _, other = wanted.partition("/")
-        if stage != name and stage not in self._surveyed[name].config.sections:
+        if stage not in upstream(self._stages, name):
             raise ValueError(f"plan of {name}: shard {shard.name} reads {wanted}, but {stage} is no input of {name}")
         fingerprints = known if stage == name else self.stage(stage).fingerprints
         if other not in fingerprints:

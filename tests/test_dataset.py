@@ -20,6 +20,7 @@ from stages.shape.sample import read_samples
 from stages.strings.alphabet import make_alphabet
 from stages.strings.grammar import check
 from tests.mill import mill
+from tests.stated import stated
 
 STAGES = ("exemplars", "variations", "validity", "strings", "points", "sketches", "package")
 
@@ -28,7 +29,9 @@ pytestmark = pytest.mark.slow
 
 def write_config(folder: Path) -> Path:
     kits = [
-        {"name": name, "shapes": [str(shape) for shape in sorted(Path("datasets/exemplars", name).glob("*.glb"))]}
+        stated(
+            {"name": name, "shapes": [str(shape) for shape in sorted(Path("datasets/exemplars", name).glob("*.glb"))]}
+        )
         for name in ("castle", "playground")
     ]
     config = {

@@ -21,7 +21,7 @@ from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import NOTHING, Assembly, ContactKind, Exemplar, Kit
 
-__all__ = ["KitReport", "Observation", "build_kit", "observe_models", "read_kit"]
+__all__ = ["KitReport", "Observation", "build_kit", "observe_models", "observe_parts", "read_kit"]
 
 
 @dataclass(frozen=True)
@@ -83,22 +83,26 @@ def build_kit(config: KitConfig, models: Sequence[Model]) -> tuple[Kit, KitRepor
 
 
 def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
-    """What Shapemill sees in `models`, also where it could make no kit of them.
+    """What Shapemill sees in `models`, also where it could make no kit of them; as `observe_parts`."""
+    return observe_parts(config, models, identify_parts(models, config))
+
+
+def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identified) -> Observation:
+    """What Shapemill sees in `models`, whose parts are `identified`, also where it could make no kit of them.
 
     Hubs that the config leaves out are not in the exemplars; those kept as backdrop are types of the kit, and what
     was seen around them and between them and others is in its grammar. With `disconnected: largest` only the largest
     piece of what is left of each exemplar is seen. Raises ConfigError for a model in which no part has any area, or
-    nothing but hubs, and for hubs that are no types.
+    nothing but hubs, for hubs that are no types, and for a config that leaves a key at `auto`.
     """
-    identified = identify_parts(models, config)
+    made = config.decided()
     types, aliases, names = identified.types, identified.aliases, list(identified.part_names)
-    diagonals = np.concatenate([[types[each].diagonal for each in made.types] for made in identified.assemblies])
-    median = float(np.median(diagonals))
-    contact = ContactTest(types, config.contact.tolerance * median)
-    pose_tolerance, counted = config.pose_tolerance * median, config.contact.kinds
+    median = identified.median_diagonal
+    contact = ContactTest(types, made.tolerance * median)
+    pose_tolerance, counted = config.pose_tolerance * median, made.kinds
     touching = [replace(each, edges=contact.contacts(each.types, each.poses)) for each in identified.assemblies]
     contacts = observe_contacts(types, touching, contact, pose_tolerance, counted)
-    hubs = chosen_hubs(config, types, contacts.counted)
+    hubs = chosen_hubs(config, types)
     left_out = [types[index].name for index in hubs]
     kept, warnings = _kept_parts(config, models, identified, contacts.counted, hubs)
     is_whole = all(len(keep) == len(each) for keep, each in zip(kept, touching, strict=True))
@@ -130,11 +134,11 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
         name=config.name,
         types=types,
         exemplars=tuple(map(Exemplar, _exemplar_names(models), assemblies, names, backdrops)),
-        grammar=replace(grammar, strictness=config.grammar),
+        grammar=replace(grammar, strictness=made.grammar),
         contact_tolerance=contact.tolerance,
         pose_tolerance=pose_tolerance,
-        contact_kinds=config.contact.kinds,
-        up=config.up,
+        contact_kinds=made.kinds,
+        up=made.up,
     )
     return Observation(
         kit=kit,
@@ -165,7 +169,7 @@ def _kept_parts(
         if len(keep) < len(each):
             named = ", ".join(types[index].name for index in np.intersect1d(hubs, each.types))
             warnings.append(f"{model.path.name}: {len(each) - len(keep)} hubs are left out of the graph: {named}")
-    if config.disconnected == "largest":
+    if config.decided().disconnected == "largest":
         for index, (each, model) in enumerate(zip(assemblies, models, strict=True)):
             apart = kept[index][pieces(each.select(kept[index])) > 0]
             if len(apart):

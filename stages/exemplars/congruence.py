@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,11 +65,13 @@ def congruences(source: ComparableMesh, target: ComparableMesh, tolerance: float
     slack = tolerance * source.diagonal
     if abs(source.area - target.area) > max(8 * slack * source.diagonal, 1e-2 * source.area):
         return np.empty((0, 4, 4))
+    if np.ptp([np.linalg.norm(each.vertices, axis=1).max() for each in (source, target)]) > 4 * slack:
+        return np.empty((0, 4, 4))
     accepted: list[FloatArray] = []
-    for rotation in _candidate_rotations(source.vertices, target.vertices, slack, reflections):
-        if _maps_onto(source, target, rotation, slack) and not any(
-            np.abs(rotation - each).max() * source.diagonal < 4 * slack for each in accepted
-        ):
+    for rotation in _candidate_rotations(source, target, slack, reflections):
+        known = np.array(accepted).reshape(-1, 9)
+        is_known = (np.abs(known - rotation.ravel()).max(axis=1) * source.diagonal < 4 * slack).any()
+        if not is_known and _maps_onto(source, target, rotation, slack):
             accepted.append(rotation)
     motions = np.tile(np.eye(4), (len(accepted), 1, 1))
     for motion, rotation in zip(motions, accepted, strict=True):
@@ -84,42 +87,49 @@ def congruences(source: ComparableMesh, target: ComparableMesh, tolerance: float
 def _maps_onto(source: ComparableMesh, target: ComparableMesh, rotation: FloatArray, slack: float) -> bool:
     from stages.shape.geometry.triangles import points_on_surface
 
-    step = max(len(source.vertices) // QUICK_CHECK, 1)
-    for probes, onto, by in (
-        (source.vertices[::step], target, rotation),
-        (source.probes, target, rotation),
-        (target.probes, source, rotation.T),
-    ):
+    for probes, onto, by in ((source.probes, target, rotation), (target.probes, source, rotation.T)):
         if not points_on_surface(*onto.tree, np.ascontiguousarray(probes @ by.T), slack):
             return False
     return True
 
 
-def _candidate_rotations(source: FloatArray, target: FloatArray, slack: float, reflections: bool) -> list[FloatArray]:
-    """Rotations that take two chosen corners of `source`, both relative to the centroid, to corners of `target`."""
-    radius, target_radius = np.linalg.norm(source, axis=1), np.linalg.norm(target, axis=1)
+def _candidate_rotations(
+    source: ComparableMesh, target: ComparableMesh, slack: float, reflections: bool
+) -> Iterator[FloatArray]:
+    """Rotations that take two chosen corners of `source`, both relative to the centroid, to corners of `target`, and
+    some more corners onto its surface. Round parts have tens of thousands that do the first alone, so those are turned
+    all at once."""
+    from stages.shape.geometry.triangles import points_on_surface
+
+    corners, others = source.vertices, target.vertices
+    radius, target_radius = np.linalg.norm(corners, axis=1), np.linalg.norm(others, axis=1)
     reach = radius.max()
     off_centre = np.flatnonzero(radius > 0.1 * reach)
     sizes = _shell_sizes(radius, target_radius, slack)
     p = min(off_centre, key=lambda i: (sizes[i] == 0, sizes[i], -radius[i]))
-    sideways = np.linalg.norm(np.cross(source, source[p] / radius[p]), axis=1)
+    sideways = np.linalg.norm(np.cross(corners, corners[p] / radius[p]), axis=1)
     off_axis = np.flatnonzero(sideways > 0.1 * sideways.max())
     q = min(off_axis, key=lambda i: (sizes[i] == 0, sizes[i], -sideways[i]))
-    frame = _frame(source[p], source[q])
-    gap = np.linalg.norm(source[p] - source[q])
-    rotations: list[FloatArray] = []
+    frame = _frame(corners[p], corners[q])
+    gap = np.linalg.norm(corners[p] - corners[q])
+    turns = [np.eye(3), np.diag([1.0, 1.0, -1.0])] if reflections else [np.eye(3)]
+    quick = corners[:: max(len(corners) // QUICK_CHECK, 1)]
     second = np.flatnonzero(np.abs(target_radius - radius[q]) <= 2 * slack)
+    tried = 0
     for image in np.flatnonzero(np.abs(target_radius - radius[p]) <= 2 * slack):
-        distance = np.linalg.norm(target[second] - target[image], axis=1)
-        for other in second[np.abs(distance - gap) <= 4 * slack]:
-            if np.linalg.norm(np.cross(target[image], target[other])) > 1e-9 * reach * reach:
-                image_frame = _frame(target[image], target[other])
-                rotations.append(image_frame @ frame.T)
-                if reflections:
-                    rotations.append(image_frame @ np.diag([1.0, 1.0, -1.0]) @ frame.T)
-        if len(rotations) > CANDIDATES:
+        distance = np.linalg.norm(others[second] - others[image], axis=1)
+        found = second[np.abs(distance - gap) <= 4 * slack]
+        found = found[np.linalg.norm(np.cross(others[image], others[found]), axis=1) > 1e-9 * reach * reach]
+        frames = _frames(others[image], others[found])
+        for other, each in zip(found.tolist(), frames, strict=True):
+            for turn in turns:
+                # With a hair of slack: frames made all at once differ from one made alone in their last digits.
+                turned = np.ascontiguousarray(quick @ (each @ turn @ frame.T).T)
+                if points_on_surface(*target.tree, turned, 1.01 * slack):
+                    yield _frame(others[image], others[other]) @ turn @ frame.T
+        tried += len(turns) * len(found)
+        if tried > CANDIDATES:
             break
-    return rotations
 
 
 def _shell_sizes(radius: FloatArray, target_radius: FloatArray, slack: float) -> IntArray:
@@ -134,6 +144,14 @@ def _frame(p: FloatArray, q: FloatArray) -> FloatArray:
     z = np.cross(p, q)
     z /= np.linalg.norm(z)
     return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _frames(p: FloatArray, q: FloatArray) -> FloatArray:
+    """The frames (k, 3, 3) of one corner `p` (3,) with each of `q` (k, 3), as `_frame` has them."""
+    x = np.broadcast_to(p / np.linalg.norm(p), q.shape)
+    z = np.cross(p, q)
+    z /= np.linalg.norm(z, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=2)
 
 
 def _distinct(points: FloatArray, spacing: float) -> FloatArray:

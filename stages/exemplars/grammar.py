@@ -14,7 +14,14 @@ from stages.shape.geometry.penetration import PenetrationTest
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType, labels_of
 
-__all__ = ["Contacts", "observe_contacts", "observe_dockings", "observe_grammar", "observe_neighbourhoods"]
+__all__ = [
+    "Contacts",
+    "observe_contacts",
+    "observe_dockings",
+    "observe_grammar",
+    "observe_neighbourhoods",
+    "observe_nested",
+]
 
 IMAGES = 24
 """Most symmetric images of a docking whose penetration is measured; round parts have hundreds."""
@@ -110,13 +117,12 @@ def observe_grammar(
     )
     labels = labels_of(types)[1]
     labelled = [replace(each, types=labels[each.types]) for each in contacts.counted]
-    return Grammar(observe_neighbourhoods(labelled), dockings, _observe_nested(types, assemblies, penetration))
+    return Grammar(observe_neighbourhoods(labelled), dockings, observe_nested(types, assemblies))
 
 
-def _observe_nested(
-    types: Sequence[PartType], assemblies: Sequence[Assembly], penetration: PenetrationTest
-) -> dict[tuple[int, int], float]:
+def observe_nested(types: Sequence[PartType], assemblies: Sequence[Assembly]) -> dict[tuple[int, int], float]:
     """For pairs of types the greatest depth of parts that reach into each other without any contact of surfaces."""
+    penetration = PenetrationTest(types)
     nested: dict[tuple[int, int], float] = {}
     for assembly in assemblies:
         touching = set(map(tuple, assembly.edges.tolist()))

@@ -9,7 +9,6 @@ import numpy as np
 
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
-from stages.exemplars.findings import hubs
 from stages.exemplars.grammar import observe_neighbourhoods
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
@@ -20,15 +19,10 @@ __all__ = ["chosen_hubs", "set_hubs_aside", "with_touching"]
 NO_EDGES = np.empty((0, 2), dtype=np.int32)
 
 
-def chosen_hubs(config: KitConfig, types: Sequence[PartType], assemblies: Sequence[Assembly]) -> tuple[int, ...]:
-    """The types that the config leaves out of the graphs of `assemblies`, ascending; a type with one hub among its
-    parts is left out whole. Raises ConfigError for a name that no type has."""
-    wanted = config.hubs.types
-    if wanted == "none":
-        return ()
-    if wanted == "auto":
-        return tuple(sorted({int(each.types[part]) for each in assemblies for part in hubs(each)}))
+def chosen_hubs(config: KitConfig, types: Sequence[PartType]) -> tuple[int, ...]:
+    """The types that the config leaves out of the graphs, ascending. Raises ConfigError for a name that no type has."""
     names = [each.name for each in types]
+    wanted = config.decided().hubs
     for name in wanted:
         if name not in names:
             near = nearest(name, names)

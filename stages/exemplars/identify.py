@@ -38,6 +38,11 @@ class Identified:
     empty: tuple[tuple[Model, str], ...]
     aliases: tuple[tuple[str, ...], ...]
 
+    @property
+    def median_diagonal(self) -> float:
+        """The median of the parts' diagonals, by which tolerances are measured."""
+        return float(np.median([self.types[index].diagonal for each in self.assemblies for index in each.types]))
+
 
 @dataclass
 class _Type:

@@ -8,6 +8,7 @@ from stages.shape.arrays import ByteArray
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.shape.shape import kit_shape
 from stages.shape.views.camera import Camera
+from stages.shape.views.paint import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
@@ -51,7 +52,8 @@ def kit_sheet(kit: Kit) -> bytes:
 
 def _exemplar_cell(kit: Kit, exemplar: Exemplar, span: int) -> Cell:
     size = (CELL * span, min(CELL * span * 3 // 4, CELL * 3))
-    picture = portrait(scene_of(kit_shape(kit, exemplar.assembly)), EXEMPLAR, size)
+    shape = kit_shape(kit, exemplar.assembly)
+    picture = portrait(scene_of(shape), EXEMPLAR, size, part_paint(shape))
     parts, contacts = len(exemplar.assembly), len(exemplar.assembly.edges)
     return Cell(picture, f"{exemplar.name}: {_count(parts, 'part')}, {_count(contacts, 'contact')}")
 
@@ -68,7 +70,8 @@ def _type_picture(kit: Kit, index: int) -> ByteArray:
     poses = [each.assembly.poses[each.assembly.types == index] for each in kit.exemplars]
     pose = np.concatenate([*poses, np.eye(4)[None]])[:1]
     alone = Assembly(np.array([index], dtype=np.int16), pose, np.empty((0, 2), dtype=np.int32))
-    return portrait(scene_of(kit_shape(kit, alone)), PART, (CELL, CELL))
+    shape = kit_shape(kit, alone)
+    return portrait(scene_of(shape), PART, (CELL, CELL), part_paint(shape))
 
 
 def _rows(cells: list[Cell], columns: int) -> list[list[Cell]]:

@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -66,7 +67,8 @@ class RawPart:
 class Model:
     """The parts of a model file in the file's order.
 
-    segmentation: the source of the parts, what `auto` picked; why: one sentence on that; warnings: one sentence each.
+    segmentation: the source of the parts, what `auto` picked; why: one sentence on that; warnings: one sentence each;
+    up: the axis that points up by the file's own word, where its format lets files choose.
     """
 
     path: Path
@@ -74,6 +76,7 @@ class Model:
     segmentation: Segmentation
     why: str
     warnings: tuple[str, ...]
+    up: Literal["y", "z"] | None = None
 
 
 def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
@@ -106,7 +109,7 @@ def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
         parts.append(
             RawPart(name, surface.name, placement.label, pose, surface.vertices, surface.faces, surface.face_colors)
         )
-    return Model(path, tuple(parts), source, why, tuple(warnings))
+    return Model(path, tuple(parts), source, why, tuple(warnings), scene.up)
 
 
 def _read(path: Path) -> Scene:
@@ -171,6 +174,7 @@ def _solid_placements(path: Path, scene: Scene) -> Scene:
         surfaces=tuple(surfaces[index] for index in used),
         placements=tuple(replace(each, surface=used.index(each.surface)) for each in placements),
         warnings=tuple(warnings),
+        up=scene.up,
     )
 
 

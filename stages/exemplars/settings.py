@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from pipeline.config import ExistingFile, StrictModel
+from pipeline.errors import ConfigError
 from stages.shape.collection.origin import Credit
 from stages.shape.kit import ContactKind, Strictness
 
-__all__ = ["ContactConfig", "ExemplarsConfig", "HubConfig", "KitConfig", "ShapeFile"]
+__all__ = [
+    "OPEN_KEYS",
+    "STRICTEST",
+    "ContactConfig",
+    "Decided",
+    "ExemplarsConfig",
+    "HubConfig",
+    "KitConfig",
+    "ShapeFile",
+]
+
+OPEN_KEYS = ("up", "contact.tolerance", "contact.kinds", "grammar", "hubs.types", "disconnected")
+"""The keys of a kit that may be left at `auto`, in the order in which they are decided."""
+
+STRICTEST: Mapping[str, Any] = {
+    "up": "y",
+    "contact.tolerance": 1e-3,
+    "contact.kinds": ("point", "line", "face"),
+    "grammar": "multiset",
+    "hubs.types": "none",
+    "disconnected": "error",
+}
+"""Where every choice of these keys begins."""
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components"]
 
@@ -18,13 +43,15 @@ Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "compo
 class ContactConfig(StrictModel):
     """When two parts are neighbours."""
 
-    tolerance: float = Field(
-        1e-3, gt=0, le=0.05, description="Largest distance of parts in contact, as a share of the median part diagonal."
+    tolerance: Literal["auto"] | Annotated[float, Field(gt=0, le=0.05)] = Field(
+        "auto",
+        description="Largest distance of parts in contact, as a share of the median part diagonal; `auto` takes 0.001, "
+        "or as much more as makes one piece of every exemplar.",
     )
-    kinds: tuple[ContactKind, ...] = Field(
-        ("point", "line", "face"),
-        min_length=1,
-        description="Kinds of contact that make neighbours; leave out `point` and `line` to demand faces.",
+    kinds: Literal["auto"] | Annotated[tuple[ContactKind, ...], Field(min_length=1)] = Field(
+        "auto",
+        description="Kinds of contact that make neighbours; leave out `point` and `line` to demand faces. `auto` "
+        "takes as many as leave something to find.",
     )
 
 
@@ -32,12 +59,12 @@ class HubConfig(StrictModel):
     """Part types that touch so much that nothing around them can be exchanged."""
 
     types: Literal["none", "auto"] | tuple[str, ...] = Field(
-        "none",
-        description="Part types left out of the shape graph of the search: none, those that `make inspect` calls hubs, "
-        "or a list of type names (in quotes where they are numbers).",
+        "auto",
+        description="Part types left out of the shape graph of the search: none, a list of type names (in quotes where "
+        "they are numbers), or, with `auto`, those of the highest degree, one after another, as far as it helps.",
     )
     keep: Literal["drop", "backdrop"] = Field(
-        "drop",
+        "backdrop",
         description="What becomes of hub parts: they are not in the shapes, or every finished variant gets them back "
         "where they fit: where a hub has three quarters of the neighbours that one of its type had in an exemplar, "
         "and touches nothing in a way that no exemplar shows.",
@@ -97,27 +124,88 @@ class KitConfig(StrictModel):
         "other, as a share of the median part diagonal; never more than a quarter of the contact.",
     )
     contact: ContactConfig = Field(default_factory=ContactConfig, description="When two parts are neighbours.")
-    grammar: Strictness = Field(
-        "multiset",
+    grammar: Literal["auto"] | Strictness = Field(
+        "auto",
         description="Which neighbours a part may have: the very numbers of neighbours of each type that were observed "
         "around its type; as many neighbours, of the same set of types, as observed once; as many neighbours as "
         "observed, each two of their types observed together around its type; or as many neighbours as observed, each "
-        "of their types observed around its type (the published rule). Each admits all that the former admits.",
+        "of their types observed around its type (the published rule). Each of these admits all that the former "
+        "admits. Beside them, by place and not by number: in each slot around a part a state that was seen there "
+        "(`slots`), of each two slots also which are filled and which empty (`slot_fillings`), or their very states "
+        "(`slot_pairs`). `auto` takes the strictest under which a short search finds enough.",
     )
     hubs: HubConfig = Field(
         default_factory=HubConfig,
         description="Part types that touch so much that nothing around them can be exchanged.",
     )
-    disconnected: Literal["error", "largest"] = Field(
-        "error", description="What to do with an exemplar in several pieces: stop, or keep its largest piece."
+    disconnected: Literal["auto", "error", "largest"] = Field(
+        "auto",
+        description="What to do with an exemplar in several pieces: stop, or keep its largest piece; `auto` keeps it "
+        "where the other choices leave the exemplar in pieces.",
     )
-    up: Literal["y", "z"] = Field("y", description="The axis that points up in the model files.")
+    up: Literal["auto", "y", "z"] = Field(
+        "auto",
+        description="The axis that points up in the model files; `auto` looks at what they say and at how they stand.",
+    )
 
     @model_validator(mode="after")
     def _hubs_are_surfaces(self) -> KitConfig:
-        if self.types == "meaning" and self.hubs.types != "none":
+        if self.types == "meaning" and isinstance(self.hubs.types, tuple):
             raise ValueError("with `types: meaning` no hubs can be left out; set `hubs.types: none`, or other types")
         return self
+
+    def left_open(self) -> tuple[str, ...]:
+        """Those of OPEN_KEYS that are `auto`."""
+        return tuple(key for key in OPEN_KEYS if self._value(key) == "auto")
+
+    def decide(self, chosen: Mapping[str, Any]) -> KitConfig:
+        """This kit with the values `chosen`, by OPEN_KEYS, of the keys that it leaves open; what it states stays."""
+        listed = {key: tuple(each) if isinstance(each, list) else each for key, each in chosen.items()}
+        left = {key: listed[key] for key in self.left_open() if key in listed}
+        contact = {key.removeprefix("contact."): each for key, each in left.items() if key.startswith("contact.")}
+        hubs = {"types": left["hubs.types"]} if "hubs.types" in left else {}
+        own = {key: each for key, each in left.items() if "." not in key}
+        return self.model_copy(
+            update={
+                **own,
+                "contact": self.contact.model_copy(update=contact),
+                "hubs": self.hubs.model_copy(update=hubs),
+            }
+        )
+
+    def decided(self) -> Decided:
+        """The values of OPEN_KEYS. Raises ConfigError where one of them is still `auto`."""
+        tolerance, kinds, hubs = self.contact.tolerance, self.contact.kinds, self.hubs.types
+        up, grammar, disconnected = self.up, self.grammar, self.disconnected
+        if (
+            up == "auto"
+            or tolerance == "auto"
+            or kinds == "auto"
+            or grammar == "auto"
+            or hubs == "auto"
+            or disconnected == "auto"
+        ):
+            raise ConfigError(f"kit {self.name}: nobody has decided {', '.join(self.left_open())}")
+        return Decided(up, tolerance, kinds, grammar, () if hubs == "none" else hubs, disconnected)
+
+    def _value(self, key: str) -> Any:
+        found: Any = self
+        for step in key.split("."):
+            found = getattr(found, step)
+        return found
+
+
+@dataclass(frozen=True)
+class Decided:
+    """What a kit's config says of the keys that could be left open. tolerance: a share of the median part diagonal;
+    hubs: names of the types that are left out."""
+
+    up: Literal["y", "z"]
+    tolerance: float
+    kinds: tuple[ContactKind, ...]
+    grammar: Strictness
+    hubs: tuple[str, ...]
+    disconnected: Literal["error", "largest"]
 
 
 class ExemplarsConfig(StrictModel):

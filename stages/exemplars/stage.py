@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from typing import Any
 
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -20,10 +22,15 @@ BYTES_A_KIT = 8_000_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard a kit; the digests of its model files make it anew when they change."""
-    kits = plan.config.section(ExemplarsConfig).kits
+    """One shard a kit; the digests of its model files make it anew when they change. It reads what was chosen for it
+    where its config leaves a key open."""
     return [
-        Shard(kit.name, {"kit": kit.name, "digests": [file_digest(shape.path) for shape in kit.shapes]}) for kit in kits
+        Shard(
+            kit.name,
+            {"kit": kit.name, "digests": [file_digest(shape.path) for shape in kit.shapes]},
+            (f"choices/{kit.name}",) if kit.left_open() else (),
+        )
+        for kit in plan.config.section(ExemplarsConfig).kits
     ]
 
 
@@ -31,6 +38,10 @@ def run_shard(task: Task) -> Outcome:
     """Read, repair, identify, observe, write."""
     kits = task.config.section(ExemplarsConfig).kits
     config = next(kit for kit in kits if kit.name == task.shard.params["kit"])
+    chosen: dict[str, Any] = {"chosen": {}, "why": {}}
+    if config.left_open():
+        chosen = json.loads(task.input("choices", f"{config.name}.json").read_bytes())
+        config = config.decide(chosen["chosen"])
     models = [read_model(shape.path, config.parts) for shape in config.shapes]
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
@@ -51,6 +62,8 @@ def run_shard(task: Task) -> Outcome:
             "aliases": {name: list(words) for name, words in report.aliases.items()},
             "hubs": [kit.types[index].name for index in kit.grammar.hubs],
             "warnings": list(report.warnings),
+            "chosen": chosen["chosen"],
+            "why": chosen["why"],
         },
     )
 
@@ -76,7 +89,7 @@ STAGE = Stage(
     name="exemplars",
     module=__name__,
     config=ExemplarsConfig,
-    inputs=(),
+    inputs=("choices",),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=lambda plan: BYTES_A_KIT * len(plan.config.section(ExemplarsConfig).kits),

@@ -17,6 +17,7 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape, part_count, upright
 from stages.shape.views.buffers import Backend, drawn_by
 from stages.shape.views.camera import Camera
+from stages.shape.views.paint import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
@@ -95,7 +96,7 @@ def _members(task: Task, stage: str, shards: Sequence[str]) -> dict[str, dict[st
 
 
 def _picture(shape: Shape, camera: Camera, backend: Backend) -> ByteArray:
-    return portrait(scene_of(upright(shape)), camera, (CELL, CELL), backend=backend)
+    return portrait(scene_of(upright(shape)), camera, (CELL, CELL), part_paint(shape), backend)
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[Cell]]:

@@ -193,6 +193,13 @@ class Exemplar:
     part_names: tuple[str, ...]
     backdrop: Assembly = field(default_factory=lambda: NOTHING)
 
+    @property
+    def whole(self) -> Assembly:
+        """The assembly and its backdrop, without the contacts of the latter: for pictures."""
+        front, behind = self.assembly, self.backdrop
+        types, poses = np.concatenate([front.types, behind.types]), np.concatenate([front.poses, behind.poses])
+        return Assembly(types, poses, front.edges)
+
 
 @dataclass(frozen=True)
 class Kit:

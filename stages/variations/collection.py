@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.errors import ShardFailed
+from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
@@ -35,7 +35,8 @@ def assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
     kits = [kit.name for kit in plan.config.section(ExemplarsConfig).kits]
     inputs = (*(f"exemplars/{kit}" for kit in kits), *(f"variations/{each.name}" for each in search))
     ends = {kit: last_pool(plan, kit) for kit in kits}
-    searched = {kit: {"curve": end["curve"], "crossings": end["crossings"]} for kit, end in ends.items()}
+    said = ("curve", "crossings", "advice")
+    searched = {kit: {key: end[key] for key in said} for kit, end in ends.items()}
     params = {"job": "assignment", "kits": kits, "searched": searched}
     return Shard(f"{plan.config.name}-assignment", params, inputs)
 
@@ -73,7 +74,8 @@ def run_assignment(task: Task) -> Outcome:
         chosen = _by_graph(task, kits, pools)
     total = sum(len(each.variants) for each in chosen)
     if not total:
-        raise ShardFailed("the search found no variant of any kit; see `python -m pipeline status` for the reasons")
+        found = [f"{name}: {task.shard.params['searched'][name]['advice']}" for name in kits]
+        raise ConfigError("\n".join(["the search found no variant of any kit", *found]))
     rows: list[tuple[int, int, int, int]] = []
     parents: list[list[str]] = []
     lanes: dict[str, int] = {}

@@ -38,10 +38,28 @@ def _endings(plan: Plan) -> Sequence[str]:
     summaries = [plan.summary("variations", shard) or {} for shard in plan.shards("variations")]
     ended = [
         f"- {each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
+        + (f" What limits it: {each['advice']}." if each["advice"] else "")
         for each in summaries
         if each.get("why")
     ]
     return ["\n".join(ended)] if ended else []
+
+
+def _made(plan: Plan) -> Sequence[str]:
+    return [*_choices(plan), *_endings(plan)]
+
+
+def _choices(plan: Plan) -> Sequence[str]:
+    """What was chosen for each kit whose config left keys open, and why, as a table."""
+    rows = []
+    for kit in plan.shards("exemplars"):
+        summary = plan.summary("exemplars", kit) or {"chosen": {}}
+        for key, value in summary["chosen"].items():
+            shown = ", ".join(value) if isinstance(value, list) else value
+            rows.append(f"| {kit} | `{key}` | {shown} | {summary['why'][key]} |")
+    if not rows:
+        return []
+    return ["\n".join(["| kit | key | chosen | why |", "|---|---|---|---|", *rows])]
 
 
 def _lineage(_: Config) -> Mapping[str, Field]:
@@ -125,7 +143,7 @@ PRODUCER = Producer(
         "need not hold for other castles, temples or tracks.",
         "A variant is made of pieces of its parents and resembles them.",
     ),
-    card=_endings,
+    card=_made,
     variety=_variety,
     measures=_measures,
 )

@@ -14,11 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Task
+from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
+from stages.variations.advice import what_keeps
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import backdrop_of
 from stages.variations.exchange.search import SPARE, Search, Variant
@@ -33,6 +36,9 @@ ROUND_FIND = 400
 """Most variants that one lane finds in a round before the lanes exchange what they have."""
 ROUND_SHARE = 40
 """Unless that would make more rounds than about so many: a large pool grows in larger steps."""
+PATIENCE, LEAST_PATIENCE = 200_000, 40_000
+PATIENT_PARTS = 100
+"""A try takes the longer the more parts there are: exemplars of more than so many have less than PATIENCE tries."""
 FEWEST = 32
 """A lane looks for at least so many variants, so that the last rounds are not mere starts and stops."""
 
@@ -42,7 +48,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     config = plan.config.section(VariationsConfig)
     shards: list[Shard] = []
     found: list[str] = []
-    state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], "crossings": {}}
+    state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], "crossings": {}, "rejects": {}}
     target = math.ceil(config.selection.oversample * config.per_kit)
     for number in range(config.search.rounds):
         name = f"{kit}-r{number:03d}"
@@ -68,8 +74,9 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
             "tried": sum(each["tries"] for each in done),
             "spares": sum(each["spares"] for each in done),
             "crossed": _added(*(each["crossings"] for each in done)),
+            "refused": _added(*(each["rejects"] for each in done)),
             "last": number == config.search.rounds - 1,
-            **{key: state[key] for key in ("telling", "tries", "idle", "curve", "crossings")},
+            **{key: state[key] for key in ("telling", "tries", "idle", "curve", "crossings", "rejects")},
         }
         pool = Shard(f"{name}-pool", params, (f"exemplars/{kit}", *found))
         shards.append(pool)
@@ -107,10 +114,11 @@ def run_lane(task: Task) -> Outcome:
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
     kept = _required(task, kit, section.require, variants)
     write_variants(task, kit, kept)
-    for reason, count in sorted(search.rejects.items()):
+    rejects = dict(sorted(search.rejects.items()))
+    for reason, count in rejects.items():
         task.reject(task.shard.name, reason, count=count)
     crossings = dict(sorted(search.crossings.items()))
-    summary = {"found": len(kept), "tries": tries, "spares": search.spares, "crossings": crossings}
+    summary = {"found": len(kept), "tries": tries, "spares": search.spares, "crossings": crossings, "rejects": rejects}
     return Outcome(0, summary)
 
 
@@ -119,18 +127,28 @@ def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequ
     telling = [each for each in variants if each.lineage["copied"]["largest"] <= require.copied]
     if len(telling) < len(variants):
         task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
-    if not (require.rooted or require.stable or require.hubs):
+    fewest = _fewest_hubs(task.config, kit)
+    if not (require.rooted or require.stable or fewest):
         return telling
     backdrop, kept = backdrop_of(task, kit.name), []
     for variant in telling:
         whole = backdrop.fit(variant.assembly)
         fitted = len(whole) - len(variant.assembly)
-        weak = unmet(require, kit_shape(kit, whole)) if fitted >= require.hubs else "no backdrop"
+        weak = unmet(require, kit_shape(kit, whole)) if fitted >= fewest else "no backdrop"
         if weak is None:
             kept.append(variant)
         else:
             task.reject(task.shard.name, weak)
     return kept
+
+
+def _fewest_hubs(config: Config, kit: Kit) -> int:
+    """How many hub parts a variant of `kit` must get back."""
+    said = config.section(VariationsConfig).require.hubs
+    if said != "auto":
+        return said
+    asked = next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name)
+    return int(asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs))
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:
@@ -182,7 +200,9 @@ def run_pool(task: Task) -> Outcome:
     idle = 0 if kept else params["idle"] + params["tried"]
     telling = params["telling"] + max(len(kept) - params["spares"], 0)
     target = math.ceil(config.selection.oversample * config.per_kit)
-    ended = telling >= target or total >= SPARE * target or idle >= config.search.patience or params["last"]
+    ended = telling >= target or total >= SPARE * target or idle >= _patience(kit, config) or params["last"]
+    rejects = _added(params["rejects"], params["refused"])
+    poor = ended and total < config.per_kit
     return Outcome(
         0,
         {
@@ -194,6 +214,8 @@ def run_pool(task: Task) -> Outcome:
             **measures,
             "curve": [*params["curve"], [tries, total, measures["histograms"]]],
             "crossings": _added(params["crossings"], params["crossed"]),
+            "rejects": rejects,
+            "advice": what_keeps(kit, rejects, tries) if poor else "",
             "ended": ended,
             "why": _why(kit, config, total, tries, idle) if ended else "",
         },
@@ -212,9 +234,18 @@ def _why(kit: Kit, config: VariationsConfig, found: int, tries: int, idle: int) 
     if found >= config.selection.oversample * config.per_kit:
         return f"{start} variants, chosen from {found:,} after {tries:,} tries"
     chosen = f", chosen from {found:,}" if found > config.per_kit else ""
-    if idle >= config.search.patience:
+    if idle >= _patience(kit, config):
         return f"{start}{chosen}: no new variant in the last {idle:,} tries"
     return f"{start}{chosen}: the search ended after {config.search.rounds} rounds"
+
+
+def _patience(kit: Kit, config: VariationsConfig) -> int:
+    """Tries without a new variant after which the search of a kit has ended."""
+    said = config.search.patience
+    if said != "auto":
+        return said
+    largest = max(len(each.assembly) for each in kit.exemplars)
+    return min(PATIENCE, max(LEAST_PATIENCE, PATIENCE * PATIENT_PARTS // largest))
 
 
 def _identity(counts: np.ndarray, digests: np.ndarray, duplicates: str) -> bytes:

@@ -97,8 +97,10 @@ class SearchConfig(StrictModel):
     parents: int = Field(2000, ge=1, description="Most earlier variants that one shard of the search holds as parents.")
     lanes: int = Field(2, ge=1, le=64, description="Shards of the search that run beside each other in a round.")
     tries: int = Field(20_000, ge=1, description="Most tries of one lane in one round.")
-    patience: int = Field(
-        200_000, ge=1, description="Tries of a kit without a new variant after which its search has ended."
+    patience: Literal["auto"] | Annotated[int, Field(ge=1)] = Field(
+        "auto",
+        description="Tries of a kit without a new variant after which its search has ended; `auto`: 200,000, and for "
+        "exemplars of over 100 parts the fewer the larger they are, 40,000 at least, which is a minute or two.",
     )
     rounds: int = Field(200, ge=1, description="Most rounds of a kit's search.")
     novelty: NoveltyConfig = Field(
@@ -149,11 +151,10 @@ class SplitConfig(StrictModel):
 class VariantRequirements(Requirements):
     """What a variant must be, its backdrop included, so that it is kept; what is not named is not required."""
 
-    hubs: int = Field(
-        0,
-        ge=0,
+    hubs: Literal["auto"] | Annotated[int, Field(ge=0)] = Field(
+        "auto",
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
-        "no bridge.",
+        "no bridge. `auto`: one, of a kit whose hubs were chosen and not stated.",
     )
     copied: float = Field(
         1.0,

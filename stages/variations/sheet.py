@@ -20,11 +20,12 @@ from pipeline.randomness import decision_rng
 from pipeline.records import read_record
 from pipeline.registry import find_stages
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.kit import Assembly, Exemplar, Kit
+from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import Sample, read_samples
 from stages.shape.shape import kit_shape, upright
 from stages.shape.views.camera import Camera
+from stages.shape.views.paint import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
@@ -43,7 +44,7 @@ def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], dull: str, rng: np.r
     each of the first stands beside the exemplar of which it has copied most."""
     rest = rng.permutation(np.arange(min(SHOWN, len(samples)), len(samples)))[:SHOWN]
     drawn = [samples[place] for place in sorted(rest.tolist())]
-    exemplars = {each.name: (_whole(each), each.name) for each in kit.exemplars}
+    exemplars = {each.name: (each.whole, each.name) for each in kit.exemplars}
     first = [(each.assembly, each.key) for each in samples[:SHOWN]]
     if dull:
         pairs = zip(first[: SHOWN // 2], samples, strict=False)
@@ -59,7 +60,8 @@ def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], dull: str, rng: np.r
     ]
 
     def cell(assembly: Assembly, name: str) -> Cell:
-        picture = portrait(scene_of(upright(kit_shape(kit, assembly))), CAMERA, (CELL, CELL))
+        shape = upright(kit_shape(kit, assembly))
+        picture = portrait(scene_of(shape), CAMERA, (CELL, CELL), part_paint(shape))
         return Cell(picture, f"{name}, {len(assembly)} parts")
 
     sections = []
@@ -69,13 +71,6 @@ def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], dull: str, rng: np.r
         sections.append(Section(title, rows, note))
     title = f"{kit.name}: {len(samples):,} variants"
     return picture_png(contact_sheet([each for each in sections if each.rows], title, CELL))
-
-
-def _whole(exemplar: Exemplar) -> Assembly:
-    """An exemplar with its backdrop, whose contacts no picture shows."""
-    front, behind = exemplar.assembly, exemplar.backdrop
-    types, poses = np.concatenate([front.types, behind.types]), np.concatenate([front.poses, behind.poses])
-    return Assembly(types, poses, front.edges)
 
 
 def _measures(path: Path) -> Mapping[str, Any]:

@@ -56,6 +56,8 @@ def report(plan: Plan) -> Sequence[str]:
             counts = f"{state['graphs']:,} distinct graphs, {state['histograms']:,} distinct histograms"
             why = state["why"] or f"{kit}: {state['found']:,} found for {wanted:,} after {state['tries']:,} tries"
             lines.append(f"{why}; {counts}")
+            if state["advice"]:
+                lines.append(f"{kit}: {state['advice']}")
             lines.append(f"{kit}: growth of histograms: {growth(state['curve'])}")
     assignment = plan.summary("variations", f"{plan.config.name}-assignment") or {"kits": {}}
     for kit, chosen in assignment["kits"].items():
@@ -67,7 +69,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def check(config: Config) -> None:
     """Raises ConfigError where hubs are required that a kit does not put back: nothing would ever be kept."""
-    if not config.section(VariationsConfig).require.hubs:
+    if config.section(VariationsConfig).require.hubs in ("auto", 0):
         return
     for kit in config.section(ExemplarsConfig).kits:
         if kit.hubs.types == "none" or kit.hubs.keep != "backdrop":

@@ -12,7 +12,7 @@ import numpy as np
 
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
-from stages.exemplars.settings import ContactConfig, KitConfig, ShapeFile
+from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
 from stages.shape.kit import Assembly, Kit
 from stages.variations.copied import CopyTest
@@ -69,7 +69,7 @@ def _some(line: Search, rng: np.random.Generator, found: list[Assembly]) -> int:
 def _kit(paths: tuple[Path, ...], kinds: tuple[Any, ...]) -> Kit:
     config = KitConfig(
         name="bench", shapes=tuple(ShapeFile(path=path) for path in paths), contact=ContactConfig(kinds=kinds)
-    )
+    ).decide(STRICTEST)
     kit, _ = build_kit(config, [read_model(path) for path in paths])
     return kit
 

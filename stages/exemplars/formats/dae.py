@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,15 @@ __all__ = ["read_dae"]
 
 _DEEPEST = 200
 
+X_TO_Y = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""The turn after which y points up where x did."""
+
 
 def read_dae(path: Path, enclosure: Enclosure) -> Scene:
     """The scene of a `.dae` file; placements stand in depth-first order of its node tree.
 
-    Everything that one node places is one surface. Coordinates are the file's own, whatever its unit and up axis.
+    Everything that one node places is one surface. Coordinates are in metres, by the file's own unit; up is the axis
+    that it says, and y where that is x, for then all is turned.
     Raises ConfigError for a file that is no COLLADA, declares XML entities, or names images outside its folder.
     """
     import collada
@@ -69,7 +74,23 @@ class _Reader:
                 surfaces.append(self.surface(geometries))
             name = getattr(node, "name", None) or node.id or surfaces[place_of[key]].name
             placements.append(Placement(name, type_label(name), place_of[key], pose))
-        return Scene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
+        said = getattr(self.document.assetInfo, "upaxis", None)
+        placed = self.in_metres(surfaces, placements, X_TO_Y if said == "X_UP" else np.eye(4))
+        warnings = tuple(dict.fromkeys(self.warnings))
+        return Scene("nodes", *placed, warnings, "z" if said == "Z_UP" else "y")
+
+    def in_metres(
+        self, surfaces: list[Surface], placements: list[Placement], turn: FloatArray
+    ) -> tuple[tuple[Surface, ...], tuple[Placement, ...]]:
+        """Everything scaled by the file's unit, and then turned."""
+        unit = float(getattr(self.document.assetInfo, "unitmeter", None) or 1.0)
+        moved = []
+        for each in placements:
+            pose = each.pose.copy()
+            pose[:3, 3] *= unit
+            moved.append(replace(each, pose=turn @ pose))
+        scaled = surfaces if unit == 1.0 else [replace(each, vertices=unit * each.vertices) for each in surfaces]
+        return tuple(scaled), tuple(moved)
 
     def walk(self, nodes: Any, parent: FloatArray, depth: int) -> Iterator[tuple[Any, FloatArray, list[Any]]]:
         """Nodes that place geometry, with their world matrix and what they place."""

@@ -68,12 +68,14 @@ class Scene:
     """The surfaces of a file and their placements, in the order of the file.
 
     kind: whether placements are nodes of a scene graph or named objects of one mesh.
+    up: the axis that points up by the file's own word, where the format lets files choose.
     """
 
     kind: Literal["nodes", "objects"]
     surfaces: tuple[Surface, ...]
     placements: tuple[Placement, ...]
     warnings: tuple[str, ...] = ()
+    up: Literal["y", "z"] | None = None
 
 
 def type_label(name: str) -> str:

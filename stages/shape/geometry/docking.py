@@ -36,6 +36,8 @@ class DockingTable:
     """
 
     def __init__(self, types: Sequence[PartType], dockings: Sequence[Docking], tolerance: float) -> None:
+        from scipy.spatial import cKDTree
+
         self.types = tuple(types)
         self.tolerance = tolerance
         entries: dict[tuple[int, int], list[tuple[FloatArray, int]]] = {}
@@ -57,16 +59,24 @@ class DockingTable:
             labels = np.concatenate([np.full(len(images), label, dtype=np.int32) for images, label in found])
             vectors = pose_vectors(poses, self.types[pair[1]].diagonal / 2)
             kept: list[int] = []
+            place = np.full(len(vectors), -1)
+            is_written = np.zeros(len(vectors), dtype=bool)
+            tree = cKDTree(vectors)
             # Equal images are written once. Where two images of one docking are within tolerance both get the lower
             # label, so that a docking that is nearly its own inverse is even; both stay, for what lies at their sides.
             for candidate in np.argsort(labels, kind="stable").tolist():
-                gaps = np.linalg.norm(vectors[kept] - vectors[candidate], axis=1)
-                nearest = int(gaps.argmin()) if len(kept) else -1
-                if nearest < 0 or gaps[nearest] > SAME_IMAGE * tolerance:
-                    same = nearest >= 0 and labels[kept[nearest]] // 2 == labels[candidate] // 2
-                    if same and gaps[nearest] <= tolerance:
-                        labels[candidate] = labels[kept[nearest]]
-                    kept.append(candidate)
+                if is_written[candidate]:
+                    continue
+                beside = np.array(tree.query_ball_point(vectors[candidate], (1.0 + SAME_IMAGE) * tolerance))
+                gaps = np.linalg.norm(vectors[beside] - vectors[candidate], axis=1)
+                is_written[beside[gaps <= SAME_IMAGE * tolerance]] = True
+                near = (place[beside] >= 0) & (gaps <= tolerance)
+                if near.any():
+                    nearest = beside[near][np.lexsort((place[beside[near]], gaps[near]))[0]]
+                    if labels[nearest] // 2 == labels[candidate] // 2:
+                        labels[candidate] = labels[nearest]
+                place[candidate] = len(kept)
+                kept.append(candidate)
             self.images[pair] = poses[kept], labels[kept]
 
     def label(self, a: int, b: int, poses: FloatArray) -> IntArray:

@@ -27,6 +27,7 @@ RAYS = np.array(
     ]
 )
 """Directions in which a probe looks for surfaces, askew to what people model along."""
+MAJORITY = len(RAYS) // 2 + 1
 
 
 def depth_bound(first: FloatArray, second: FloatArray) -> float:
@@ -64,13 +65,25 @@ class PenetrationTest:
         if len(near) == 0:
             return 0.0
         scene = self._scene(index)
-        rays = np.concatenate([np.repeat(near, len(RAYS), axis=0), np.tile(RAYS, (len(near), 1))], axis=1)
-        hits = scene.count_intersections(o3d.core.Tensor(rays.astype(np.float32)), nthreads=1).numpy()
-        inside = (hits.reshape(-1, len(RAYS)) % 2).sum(axis=1) > len(RAYS) // 2
+        # Four of seven are a majority: only points on which the first four disagree need the others.
+        odd = self._odd(scene, near, RAYS[:MAJORITY])
+        doubtful = (odd > 0) & (odd < MAJORITY)
+        odd[doubtful] += self._odd(scene, near[doubtful], RAYS[MAJORITY:])
+        inside = odd >= MAJORITY
         if not inside.any():
             return 0.0
         distances = scene.compute_distance(o3d.core.Tensor(near[inside]), nthreads=1).numpy()
         return float(distances.max())
+
+    def _odd(self, scene: Any, points: np.ndarray, directions: FloatArray) -> np.ndarray:
+        """Along how many of the `directions` (d, 3) each of the points (p, 3) sees an odd number of surfaces, (p,)."""
+        import open3d as o3d
+
+        turned = np.tile(directions, (len(points), 1))
+        rays = np.concatenate([np.repeat(points, len(directions), axis=0), turned], axis=1).astype(np.float32)
+        hits = scene.count_intersections(o3d.core.Tensor(rays), nthreads=1).numpy()
+        odd: np.ndarray = (hits.reshape(-1, len(directions)) % 2).sum(axis=1)
+        return odd
 
     def _scene(self, index: int) -> Any:
         import open3d as o3d

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import ctypes
 from typing import Any
 
@@ -42,6 +43,14 @@ class ContactAnswers:
         self._penetration = PenetrationTest(kit.types)
         self._of_geometry: dict[bytes, int] = {}
         self._quantum = kit.contact_tolerance * QUANTUM
+
+    def under(self, kit: Kit) -> ContactAnswers:
+        """These answers, with all that is known, for a kit that differs in its exemplars and in which neighbourhoods it
+        admits, and in nothing else."""
+        other = copy.copy(self)
+        other.kit = kit
+        other.table = Answers(self.table.keys.copy(), self.table.values.copy())
+        return other
 
     def answer_unknown(self, ws: Workspace, count: int) -> bool:
         """Answer the first `count` pairs of `ws.unknown`; False as soon as one of them is FORBIDDEN."""

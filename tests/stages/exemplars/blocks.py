@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import Model, RawPart
-from stages.exemplars.settings import KitConfig
+from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.kit import Kit
 from tests.stages.shape.geometry.bodies import Body, box, placed
 
@@ -38,12 +38,12 @@ def ring() -> Model:
 
 
 def block_config(**settings: Any) -> KitConfig:
-    """A config of a kit whose models are handed in, so that no file is looked for."""
+    """A config of a kit whose models are handed in, so that no file is looked for; what it does not say is decided."""
     return KitConfig.model_construct(
         **{key: field.get_default(call_default_factory=True) for key, field in KitConfig.model_fields.items()}
         | {"name": "blocks", "shapes": ()}
         | settings
-    )
+    ).decide(STRICTEST)
 
 
 def block_kit(*models: Model, **settings: Any) -> Kit:

@@ -30,7 +30,7 @@ def observe(shapes: list[list[Placed]], meshes: dict[str, trimesh.Trimesh] = MES
 
 def test_dropped_hubs_are_neither_in_the_exemplars_nor_among_the_types() -> None:
     with_plate, without = on_plate(3), chain(3)
-    seen = observe([with_plate], hubs=HubConfig(types=("plate",)))
+    seen = observe([with_plate], hubs=HubConfig(types=("plate",), keep="drop"))
     plain = observe([without])
     assert not seen.refusals
     assert seen.kit.type_names() == plain.kit.type_names() == ("cap", "link")
@@ -65,7 +65,7 @@ def test_a_kit_with_hubs_and_a_loose_grammar_is_the_same_after_a_round_through_f
 def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() -> None:
     legs = [("cap", pose(-2, 0, 0)), ("cap", pose(2, 0, 0)), ("link", pose(-1.25, 0, 0))]
     legs.append(("plate", pose(0, -0.55, 0)))
-    hubs = HubConfig(types=("plate",))
+    hubs = HubConfig(types=("plate",), keep="drop")
     (refusal,) = observe([legs], hubs=hubs).refusals
     assert "the exemplar without its hubs plate falls into 2 pieces of 2, 1 parts" in refusal
     kept = observe([legs], hubs=hubs, disconnected="largest")
@@ -76,13 +76,9 @@ def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() ->
     assert behind.kit.grammar.neighbourhoods[behind.kit.type_names().index("plate")] == {((0, 1),): 1}
 
 
-def test_auto_takes_the_types_that_inspect_calls_hubs() -> None:
-    row = [("cap", pose(x, 0, z)) for x in range(20) for z in (0, 1)]
-    meshes = {"cap": box(1.0, 1.0, 1.0), "floor": box(20.0, 0.1, 2.0)}
-    shape = [*row, ("floor", pose(9.5, -0.55, 0.5))]
-    seen = observe([shape], meshes, hubs=HubConfig(types="auto"))
-    assert seen.kit.type_names() == ("cap",)
-    assert observe([shape], meshes).kit.type_names() == ("cap", "floor")
+def test_nothing_is_built_while_hubs_are_undecided() -> None:
+    with pytest.raises(ConfigError, match=r"kit toy: nobody has decided hubs\.types"):
+        observe([on_plate(3)], hubs=HubConfig())
 
 
 def test_a_hub_that_is_no_type_is_refused_with_the_nearest_name() -> None:

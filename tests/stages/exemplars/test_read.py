@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -352,6 +353,28 @@ end_header
         )
         assert read_model(tmp_path / "f.off", "objects").parts[0].face_colors.tolist() == [[255, 0, 0], [0, 128, 255]]
         assert read_model(tmp_path / "v.off", "objects").parts[0].face_colors.tolist() == [[10, 20, 30], [10, 20, 30]]
+
+    @pytest.mark.parametrize(
+        ("said", "up", "corner"), [("Y_UP", "y", (1, 2, 3)), ("Z_UP", "z", (1, 2, 3)), ("X_UP", "y", (-2, 1, 3))]
+    )
+    def test_dae_is_read_in_metres_with_the_axis_that_it_calls_up(
+        self, said: str, up: str, corner: tuple[float, ...], tmp_path: Path
+    ) -> None:
+        import trimesh
+        from trimesh.exchange.dae import export_collada
+
+        mesh = trimesh.creation.box((2, 4, 6))
+        mesh.apply_translation((1, 2, 3))  # from the origin to 2, 4, 6 of a unit of half a metre
+        text = export_collada(mesh).decode()
+        head, tail = text.split("<asset>", 1)
+        units = f'<unit name="half" meter="0.5"/><up_axis>{said}</up_axis>'
+        (tmp_path / "m.dae").write_text(f"{head}<asset>{re.sub('<up_axis>.*</up_axis>', units, tail, count=1)}")
+        model = read_model(tmp_path / "m.dae")
+        (part,) = model.parts
+        world = part.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
+        assert model.up == up
+        far = world[np.abs(world).sum(axis=1).argmax()]
+        np.testing.assert_allclose(far, corner, atol=1e-6)
 
     def test_dae_diffuse_colours_are_kept(self, tmp_path: Path) -> None:
         import trimesh

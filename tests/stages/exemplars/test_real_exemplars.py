@@ -13,7 +13,7 @@ import pytest
 
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
-from stages.exemplars.settings import ContactConfig, KitConfig
+from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig
 from stages.shape.kit import ContactKind, Kit
 
 EXEMPLARS = Path(__file__).resolve().parents[4] / "shared" / "exemplars"
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars lie be
 def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] = ALL_KINDS) -> Kit:
     path = folder / "model.glb"
     contact = ContactConfig(tolerance=TOLERANCES.get(folder.name[:3], 1e-3), kinds=kinds)
-    config = KitConfig(name="real", shapes=(path,), contact=contact, mirror_images_match=mirrored)
+    config = KitConfig(name="real", shapes=(path,), contact=contact, mirror_images_match=mirrored).decide(STRICTEST)
     return build_kit(config, [read_model(path)])[0]
 
 

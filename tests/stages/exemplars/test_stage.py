@@ -15,14 +15,16 @@ from pipeline.errors import ConfigError
 from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.status import status_lines
+from stages.choices.stage import STAGE as CHOICES
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.exemplars.stage import STAGE
 from stages.shape.kit_files import describe_kit, load_kit
 from tests.stages.exemplars.model_files import box, write_obj
+from tests.stated import stated
 
-STAGES = {"exemplars": STAGE}
+STAGES = {"choices": CHOICES, "exemplars": STAGE}
 
 pytestmark = pytest.mark.slow
 
@@ -35,8 +37,8 @@ def write_config(folder: Path, kits: list[dict[str, Any]]) -> Config:
     import yaml
 
     path = folder / "toy.yaml"
-    path.write_text(yaml.safe_dump({"name": "toy", "exemplars": {"kits": kits}}))
-    return load_config(path, {"exemplars": ExemplarsConfig})
+    path.write_text(yaml.safe_dump({"name": "toy", "exemplars": {"kits": [stated(kit) for kit in kits]}}))
+    return load_config(path, {name: stage.config for name, stage in STAGES.items()})
 
 
 def run(folder: Path, config: Config, out: str = "out") -> tuple[str, ...]:

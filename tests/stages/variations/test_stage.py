@@ -19,6 +19,7 @@ from stages.shape.splits import SPLITS, share_out
 from stages.variations.shared_surface import PackedShapes
 from tests.mill import mill
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
+from tests.stated import stated
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +37,7 @@ def make(folder: Path, out: str, workers: int, **variations: object) -> str:
     kits = []
     for name, meshes, shapes in (("chain", CHAIN, [chain(3), chain(5)]), ("road", ROAD, [ring(1, 1), ring(2, 3)])):
         paths = [write_model(folder / f"{name}{k}.glb", meshes, shape) for k, shape in enumerate(shapes)]
-        kits.append({"name": name, "shapes": paths, "contact": {"kinds": ["face"]}, "parts": "nodes"})
+        kits.append(stated({"name": name, "shapes": paths, "contact": {"kinds": ["face"]}, "parts": "nodes"}))
     config = {"name": "toy", "seed": 5, "exemplars": {"kits": kits}, "variations": variations}
     (folder / "toy.yaml").write_text(yaml.safe_dump(config))
     printed = ""
@@ -157,7 +158,7 @@ def test_only_towers_that_bear_the_required_push_are_kept(tmp_path: Path) -> Non
     config = {
         "name": "toy",
         "seed": 5,
-        "exemplars": {"kits": [{"name": "tower", "shapes": paths, "parts": "nodes"}]},
+        "exemplars": {"kits": [stated({"name": "tower", "shapes": paths, "parts": "nodes"})]},
         # a tower of n links is n + 1 high and one wide: it tips at a push of 1 / (n + 1) of its weight
         "variations": {"per_kit": 50, "search": search, "require": {"stable": True, "physics": {"push": 0.135}}},
     }
@@ -185,7 +186,7 @@ def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: P
     config = {
         "name": "toy",
         "seed": 5,
-        "exemplars": {"kits": [kit]},
+        "exemplars": {"kits": [stated(kit)]},
         "variations": {"per_kit": 50, "search": search, "require": {"hubs": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
@@ -200,7 +201,7 @@ def test_hubs_that_no_kit_puts_back_cannot_be_required(tmp_path: Path) -> None:
     model = write_model(tmp_path / "three.glb", CHAIN, chain(3))
     config = {
         "name": "toy",
-        "exemplars": {"kits": [{"name": "chain", "shapes": [model]}]},
+        "exemplars": {"kits": [stated({"name": "chain", "shapes": [model]})]},
         "variations": {"require": {"hubs": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))

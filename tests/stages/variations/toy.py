@@ -11,7 +11,7 @@ import trimesh
 
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import Model, RawPart
-from stages.exemplars.settings import ContactConfig, KitConfig
+from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Kit
 
@@ -56,12 +56,12 @@ def models_of(meshes: dict[str, trimesh.Trimesh], shapes: Sequence[Sequence[Plac
 
 
 def config_of(shapes: Sequence[Sequence[Placed]], kinds: Sequence[str] = ("face",)) -> KitConfig:
-    """The config of a kit of so many shapes."""
+    """The config of a kit of so many shapes, which leaves nothing open."""
     return KitConfig(
         name="toy",
         shapes=tuple(Path(__file__) for _ in shapes),
         contact=ContactConfig(kinds=tuple(kinds)),  # type: ignore[arg-type]
-    )
+    ).decide(STRICTEST)
 
 
 def kit_of(

@@ -19,6 +19,7 @@ from stages.package.verify_samples import read_packaged, read_record, sample_fau
 from stages.package.verify_shard import shard_samples
 from stages.programs.language import LANGUAGE
 from tests.mill import mill
+from tests.stated import stated
 
 STAGES = (
     "exemplars",
@@ -41,7 +42,7 @@ STOOLS = {
     "sketches": {"size": 64, "backend": "raycast", "views": [{"name": "front"}]},
     "package": {"previewed": 4},
 }
-KITS = {"exemplars": {"kits": [{"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]}]}}
+KITS = {"exemplars": {"kits": [stated({"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]})]}}
 
 pytestmark = pytest.mark.slow
 

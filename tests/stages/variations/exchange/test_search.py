@@ -11,7 +11,7 @@ import pytest
 
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
-from stages.exemplars.settings import KitConfig
+from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.shape.kit import Kit
@@ -37,7 +37,9 @@ def histogram(kit: Kit, variant: Variant) -> tuple[int, ...]:
 @cache
 def shipped_kit(folder: Path) -> Kit:
     shapes = tuple(sorted(folder.glob("*.glb")))
-    kit, _ = build_kit(KitConfig(name=folder.name, shapes=shapes), [read_model(shape) for shape in shapes])
+    kit, _ = build_kit(
+        KitConfig(name=folder.name, shapes=shapes).decide(STRICTEST), [read_model(shape) for shape in shapes]
+    )
     return kit
 
 

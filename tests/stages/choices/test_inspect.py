@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from stages.exemplars.inspect import main
+from stages.choices.inspect import main
 from tests.stages.exemplars.model_files import box, write_obj
 
 
@@ -21,8 +21,8 @@ def ring(folder: Path, name: str = "ring.obj") -> Path:
 
 
 def seen(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
-    """What `--json` prints: one object on one line, and nothing else."""
-    assert main([*map(str, arguments), "--json"]) == 0
+    """What `--json` prints after a short probe: one object on one line, and nothing else."""
+    assert main([*map(str, arguments), "--json", "--tries", "100"]) == 0
     printed = capsys.readouterr()
     assert printed.err == ""
     assert printed.out.count("\n") == 1
@@ -60,7 +60,7 @@ class TestJson:
 
     def test_the_tolerance_is_a_share_of_the_median_part(self, tmp_path: Path, capsys: Any) -> None:
         path = write_obj(tmp_path / "gap.obj", {"a": box(), "b": box(at=(1.02, 0, 0))})
-        assert seen(capsys, path)["contacts"] == []
+        assert seen(capsys, path, "--tolerance", "0.001")["contacts"] == []
         assert seen(capsys, path, "--tolerance", "0.02")["contacts"] == [[0, 1]]
 
     def test_parts_can_be_taken_from_elsewhere(self, tmp_path: Path, capsys: Any) -> None:
@@ -99,7 +99,7 @@ class TestWhatARunRefuses:
 
     def test_pieces_are_shown_with_what_would_join_them(self, tmp_path: Path, capsys: Any) -> None:
         path = write_obj(tmp_path / "gap.obj", {"a": box(), "b": box(at=(1, 0, 0)), "c": box(at=(2.01, 0, 0))})
-        found = seen(capsys, path)
+        found = seen(capsys, path, "--tolerance", "0.001")
         assert found["pieces"] == [[0, 1], [2]]
         assert "2 pieces of 2, 1 parts (apart: c)" in found["warnings"][0]
         assert "10 times the contact tolerance" in found["warnings"][1]
@@ -123,8 +123,8 @@ class TestWhatARunRefuses:
 
 class TestText:
     def test_people_read_a_table_and_get_a_picture(self, tmp_path: Path, capsys: Any) -> None:
-        picture = tmp_path / "new" / "ring.png"
-        assert main([str(ring(tmp_path)), "--picture", str(picture), "--up", "z"]) == 0
+        out = tmp_path / "new"
+        assert main([str(ring(tmp_path)), "--out", str(out), "--up", "z", "--tries", "100"]) == 0
         lines = capsys.readouterr().out.splitlines()
         assert lines[0] == str(tmp_path / "ring.obj")
         text = "\n".join(" ".join(line.split()) for line in lines)
@@ -133,8 +133,9 @@ class TestText:
         assert "connected yes" in text
         assert "cube 4 12 24" in text
         assert "grammar 1 neighbourhoods, 2 dockings of 1 part types" in text
-        assert lines[-1] == f"picture: {picture}"
-        with Image.open(picture) as image:
+        assert f"picture {out / 'ring.png'}" in text
+        assert text.endswith(f"config {out / 'ring.yaml'}")
+        with Image.open(out / "ring.png") as image:
             assert min(image.size) > 400
 
     def test_without_a_place_the_picture_goes_to_the_output_folder(
@@ -142,11 +143,12 @@ class TestText:
     ) -> None:
         path = ring(tmp_path)
         monkeypatch.chdir(tmp_path)
-        assert main([str(path)]) == 0
-        assert (tmp_path / "datasets" / "inspect" / "ring.png").is_file()
+        assert main([str(path), "--tries", "100"]) == 0
+        assert {each.name for each in (tmp_path / "datasets" / "inspect").iterdir()} >= {"ring.png", "ring.yaml"}
 
     def test_several_models_have_a_column_each(self, tmp_path: Path, capsys: Any) -> None:
-        assert main([str(ring(tmp_path)), str(ring(tmp_path, "again.obj")), "--picture", str(tmp_path / "p.png")]) == 0
+        pair = f"{ring(tmp_path)} {ring(tmp_path, 'again.obj')}"  # as in MESH="ring.obj again.obj"
+        assert main([pair, "--out", str(tmp_path / "out"), "--tries", "100"]) == 0
         text = " ".join(capsys.readouterr().out.split())
         assert "type in 1 in 2 triangles symmetries cube 4 4 12 24" in text
 
@@ -170,8 +172,8 @@ class TestMistakes:
 
     def test_a_picture_that_cannot_be_written_is_refused(self, tmp_path: Path, capsys: Any) -> None:
         path = ring(tmp_path)
-        assert main([str(path), "--picture", str(path / "p.png")]) == 2
-        assert "the picture cannot be written" in capsys.readouterr().err
+        assert main([str(path), "--out", str(path), "--tries", "100"]) == 2
+        assert "cannot be written" in capsys.readouterr().err
 
     @pytest.mark.parametrize("arguments", [["--kinds", "edge"], ["--parts", "things"], ["--types", "x"], []])
     def test_a_wrong_option_shows_the_usage(self, arguments: list[str], tmp_path: Path, capsys: Any) -> None:
@@ -184,9 +186,10 @@ class TestMistakes:
 
 def test_the_command_prints_one_json_object_and_nothing_else(tmp_path: Path) -> None:
     path = ring(tmp_path)
-    command = [sys.executable, "-m", "pipeline", "inspect", str(path), "--json", "--picture", str(tmp_path / "p.png")]
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "pipeline", "inspect", str(path), "--json", "--tries", "100", "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout)["picture"] == str(tmp_path / "p.png")
-    assert (tmp_path / "p.png").stat().st_size > 10_000
+    assert json.loads(done.stdout)["files"]["picture"] == str(out / "ring.png")
+    assert (out / "ring.png").stat().st_size > 10_000
     missing = subprocess.run([*command[:4], str(tmp_path / "no.obj")], capture_output=True, text=True, check=False)
     assert (missing.returncode, missing.stdout) == (2, "")

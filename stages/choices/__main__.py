@@ -1,0 +1,62 @@
+"""A table of many models, each looked at by itself: what is chosen for it, and what it will give.
+
+python -m stages.choices MODEL...
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from pipeline.errors import ConfigError
+from stages.choices.config_text import dataset_name
+from stages.choices.prospect import Prospect, look_at
+from stages.choices.settings import ChoicesConfig
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import KitConfig
+
+__all__ = ["main"]
+
+HEADER = ("model", "parts", "types", "up", "tolerance", "kinds", "grammar", "hubs", "stay", "graphs", "histograms",
+          "distance", "CPU s", "forecast")  # fmt: skip
+
+
+def main() -> None:
+    """Print a Markdown table, a row for each model as soon as it is looked at."""
+    parser = argparse.ArgumentParser(prog="python -m stages.choices", description=__doc__.splitlines()[0])
+    parser.add_argument("models", nargs="+", type=Path, metavar="MODEL")
+    parser.add_argument("--tries", type=int, default=ChoicesConfig().tries, help="as choices.tries in a config")
+    asked = parser.parse_args()
+    print(f"| {' | '.join(HEADER)} |\n|{'---|' * len(HEADER)}", flush=True)
+    for path in asked.models:
+        try:
+            config = KitConfig(name="inspected", shapes=(path,))
+            found = look_at(config, [read_model(path)], asked.tries)
+            print(f"| {' | '.join(_row(dataset_name([path]), found))} |", flush=True)
+        except ConfigError as error:
+            print(error, file=sys.stderr)
+
+
+def _row(name: str, found: Prospect) -> Iterator[str]:
+    made, seen = found.config.decided(), found.seen.kit
+    yield name
+    yield str(sum(len(each.assembly) for each in seen.exemplars))
+    yield str(len(seen.types))
+    yield made.up
+    yield f"{made.tolerance:g}"
+    yield ", ".join(made.kinds)
+    yield made.grammar
+    yield ", ".join(made.hubs) or "none"
+    yield f"{found.choices.kept:.0%}"
+    finds = found.forecast.finds if found.forecast is not None else None
+    yield f"{finds.graphs:,}" if finds else "0"
+    yield f"{finds.histograms:,}" if finds else "0"
+    yield f"{finds.distance:.2f}" if finds else ""
+    yield f"{found.seconds:.0f}"
+    yield found.sentence
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,144 @@
+"""What the keys of a kit that are left at `auto` come to, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stages.choices.ladder import FITTED, GRAMMARS, KINDS, Rails, Rung, climb, is_dull
+from stages.choices.probe import Finds
+from stages.choices.sight import Setting, Sight, contact_tolerance
+from stages.choices.up import upward
+from stages.exemplars.hubs import chosen_hubs
+from stages.exemplars.identify import Identified
+from stages.exemplars.read import Model
+from stages.exemplars.settings import STRICTEST, KitConfig
+
+__all__ = ["Choices", "choose", "found_words"]
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What was chosen for a kit.
+
+    values: of the keys that the config left open, by OPEN_KEYS; reasons: a sentence for each; finds: of the probe under
+    what was chosen, None where there was nothing to probe; kept: share of the parts that stay in the shape graphs;
+    enough: whether the probe promises a pool of some size that is not dull; settings: how many were probed.
+    """
+
+    values: Mapping[str, Any]
+    reasons: Mapping[str, str]
+    finds: Finds | None
+    kept: float
+    enough: bool
+    settings: int
+
+    def as_json(self) -> dict[str, Any]:
+        """For the record, and for the stage that builds the kit."""
+        probe = None
+        if self.finds is not None:
+            finds = self.finds
+            probe = {
+                "tries": finds.tries,
+                "graphs": finds.graphs,
+                "histograms": finds.histograms,
+                "distance": finds.distance,
+                "spread": finds.spread,
+                "rejects": dict(finds.rejects),
+            }
+        return {
+            "chosen": {key: list(each) if isinstance(each, tuple) else each for key, each in self.values.items()},
+            "why": dict(self.reasons),
+            "probe": probe,
+            "kept": round(self.kept, 4),
+            "enough": self.enough,
+            "settings": self.settings,
+        }
+
+
+def choose(config: KitConfig, models: Sequence[Model], identified: Identified, tries: int) -> Choices:
+    """Decide what `config` leaves open for a kit of `models`, whose parts are `identified`; what it states is obeyed.
+
+    In this order: the axis that points up, the contact tolerance, and the first rung of a ladder over kinds of contact,
+    grammar and hubs under which a short search, of `tries` or some times as many, finds enough. All that is random in
+    it depends on the models and on what is stated alone, so every run and `make inspect` choose alike.
+    Raises ConfigError for stated hubs that are no types.
+    """
+    open_keys = config.left_open()
+    values: dict[str, Any] = {key: STRICTEST[key] for key in open_keys}
+    reasons = dict.fromkeys(open_keys, "the default")
+    if "up" in open_keys:
+        values["up"], reasons["up"] = upward(models, identified)
+    if "contact.tolerance" in open_keys:
+        found = contact_tolerance(identified, STRICTEST["contact.tolerance"])
+        values["contact.tolerance"], reasons["contact.tolerance"] = found
+    stated = config.decide(values)
+    sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up)
+    rungs = climb(sight, _rails(stated, sight, open_keys), tries)
+    if not rungs:
+        return Choices(values, reasons, None, 1.0, False, 0)
+    chosen = rungs[-1]
+    setting = chosen.setting
+    hubs = tuple(sight.types[index].name for index in setting.hubs)
+    bare = sum(int((~np.isin(each.types, setting.hubs)).sum()) for each in sight.counted(setting))
+    left = bare - sum(map(len, sight.staying(setting)))
+    ladder = {
+        "contact.kinds": setting.kinds,
+        "grammar": setting.grammar,
+        "hubs.types": hubs or "none",
+        "disconnected": "largest" if left else "error",
+    }
+    for key, value in ladder.items():
+        if key in open_keys:
+            values[key] = value
+            reasons[key] = _reason(key, chosen, rungs)
+    if "disconnected" in open_keys:
+        stand = "1 part stands" if left == 1 else f"{left} parts stand"
+        reasons["disconnected"] = f"{stand} apart from the largest piece" if left else "nothing stands apart"
+    return Choices(values, reasons, chosen.finds, chosen.kept, chosen.gives_enough, len(rungs))
+
+
+def found_words(finds: Finds) -> str:
+    """What a probe found, in words."""
+    if not finds.graphs:
+        return f"nothing in {finds.tries:,} tries"
+    alike = ", much alike" if is_dull(finds) else ""
+    return f"{finds.graphs:,} graphs and {finds.histograms:,} histograms in {finds.tries:,} tries{alike}"
+
+
+def _rung_words(rung: Rung) -> str:
+    back = f", with their hub on {rung.fitted:.0%} of them" if rung.fitted < FITTED else ""
+    return found_words(rung.finds) + back
+
+
+def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str]) -> Rails:
+    """What the ladder may choose from: one value of each key that the config states."""
+    made = stated.decided()
+    return Rails(
+        kinds=KINDS if "contact.kinds" in open_keys else (made.kinds,),
+        grammars=GRAMMARS if "grammar" in open_keys else (made.grammar,),
+        hubs=None if "hubs.types" in open_keys else chosen_hubs(stated, sight.types),
+        largest="disconnected" in open_keys or made.disconnected == "largest",
+    )
+
+
+def _reason(key: str, chosen: Rung, rungs: Sequence[Rung]) -> str:
+    """Why the ladder ended at this value of a key: what it found there, and one step stricter in this key alone."""
+    setting = chosen.setting
+    stricter: list[Setting] = []
+    if key == "contact.kinds":
+        stricter = [replace(setting, kinds=kinds) for kinds in KINDS if len(kinds) > len(setting.kinds)]
+    elif key == "grammar" and setting.grammar in GRAMMARS:
+        stricter = [replace(setting, grammar=each) for each in GRAMMARS[: GRAMMARS.index(setting.grammar)]]
+    elif key == "hubs.types" and setting.hubs:
+        stricter = [replace(setting, hubs=())]
+    for other in reversed(stricter):
+        rung = next((each for each in rungs if each.setting == other), None)
+        if rung is not None:
+            return f"{_rung_words(chosen)}; the next stricter: {_rung_words(rung)}"
+    if chosen.gives_enough:
+        return "the strictest, and it gives enough"
+    return f"nothing else gives more than {found_words(chosen.finds)}"

@@ -1,0 +1,88 @@
+"""The config that `make inspect` writes: every choice typed out, with its reason as a comment."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from stages.exemplars.read import Model
+from stages.exemplars.settings import KitConfig
+
+__all__ = ["config_text", "dataset_name"]
+
+MOST = 200
+"""Variants that the config asks for, if there are as many."""
+
+
+def dataset_name(models: Sequence[Path]) -> str:
+    """A name for a dataset of some model files: that of the first, or of its folder where the file has no telling one.
+
+    Lower-case letters, digits and single dashes, as a config demands.
+    """
+    first = models[0]
+    stem = first.resolve().parent.name if first.stem in {"model", "scene", "mesh"} else first.stem
+    return re.sub(r"[^a-z0-9]+", "-", stem.lower()).strip("-")[:64].rstrip("-") or "shapes"
+
+
+def config_text(
+    name: str, config: KitConfig, models: Sequence[Model], reasons: Mapping[str, str], layouts: int | None, said: str
+) -> str:
+    """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key; `layouts`: about how many
+    there are, None for very many; `said`: the forecast in a sentence."""
+    made = config.decided()
+    segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
+    why = "; ".join(dict.fromkeys(model.why for model in models))
+    wanted = MOST if layouts is None else max(1, min(MOST, layouts))
+    kit: list[tuple[int, str, Any, str]] = [
+        (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else ""),
+        (3, "types", config.types, "what makes a part type"),
+        (3, "up", made.up, reasons.get("up", "")),
+        (3, "contact", None, ""),
+        (4, "tolerance", made.tolerance, reasons.get("contact.tolerance", "")),
+        (4, "kinds", list(made.kinds), reasons.get("contact.kinds", "")),
+        (3, "grammar", made.grammar, reasons.get("grammar", "")),
+        (3, "hubs", None, ""),
+        (4, "types", list(made.hubs) or "none", reasons.get("hubs.types", "")),
+        (4, "keep", config.hubs.keep, "hubs are put back behind finished shapes where they fit" if made.hubs else ""),
+        (3, "disconnected", made.disconnected, reasons.get("disconnected", "")),
+    ]
+    lines = [
+        "# Written by `make inspect`; ready for `make dataset CONFIG=` this file. Every key is in configs/README.md.",
+        f"# Forecast: {said}.",
+        f"name: {name}",
+        "seed: 1",
+        "license: unknown   # of the dataset, as an SPDX id such as CC-BY-4.0",
+        "exemplars:",
+        "  kits:",
+        f"    - name: {name}",
+        "      shapes:",
+        *(f"        - {json.dumps(str(shape.path), ensure_ascii=False)}" for shape in config.shapes),
+        "      credit:   # whose the models are: fill this in, card and manifest say it",
+        '        author: ""',
+        '        source: ""',
+        '        license: ""',
+        *(_line(*each) for each in kit),
+        "variations:",
+        _line(1, "per_kit", wanted, "as many as there may be" if wanted < MOST else "raise it for more"),
+        "  search:",
+        _line(2, "duplicates", "graph", "distinct shape graphs, not ways to turn a part in its place"),
+    ]
+    if made.hubs and config.hubs.keep == "backdrop":
+        lines += ["  require:", _line(2, "hubs", 1, "a variant on which none of them fits is refused")]
+    return "\n".join(lines) + "\n"
+
+
+def _line(depth: int, key: str, value: Any, comment: str) -> str:
+    shown = "" if value is None else " " + _value(value)
+    return f"{'  ' * depth}{key}:{shown}" + (f"   # {comment}" if comment else "")
+
+
+def _value(value: Any) -> str:
+    """A value as YAML: lists in one line, text in quotes where it could be read as a number."""
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(each) for each in value) + "]"
+    text = str(value)
+    return text if not isinstance(value, str) or re.fullmatch(r"[A-Za-z_][A-Za-z_-]*", text) else json.dumps(text)

@@ -1,0 +1,118 @@
+"""What a run will come to, from a short search of the kit that it will build: numbers, and a sentence for people."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.randomness import decision_rng
+from stages.choices.ladder import FEW, is_dull
+from stages.choices.probe import Finds, Probe
+from stages.shape.kit import Assembly, Kit
+from stages.variations.advice import what_keeps
+from stages.variations.exchange.search import DUPLICATE, Variant
+from stages.variations.kernels.answers import ContactAnswers
+
+__all__ = ["Forecast", "forecast", "patterns_seen_once"]
+
+MANY = 300
+"""The search for a forecast ends at so many distinct graphs."""
+LONG = 4
+"""It has so many times the tries of a probe, as long as it finds something in the first."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a short search of a kit found, and what it says of a long one.
+
+    layouts: about how many distinct graphs there are, None where the end is not in sight; parts: fewest and most parts
+    of the finds; seen_once: share of parts whose pattern occurs once; sentence: what to expect, mend; variants: the
+    finds; chosen: those that differ most, most different first.
+    """
+
+    finds: Finds
+    layouts: int | None
+    parts: tuple[int, int]
+    seen_once: float
+    sentence: str
+    variants: Sequence[Variant]
+
+    @property
+    def chosen(self) -> list[Variant]:
+        """The most different finds."""
+        return [self.variants[place] for place in self.finds.most_different]
+
+
+def forecast(kit: Kit, answers: ContactAnswers, tries: int, known: int = 0) -> Forecast:
+    """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone. `known`:
+    how many graphs a probe has found in it: where there are any, a first search in vain is no answer."""
+    probe = Probe(answers, decision_rng(0, "choices", "forecast"))
+    finds = probe.go_on(tries, MANY)
+    if finds.graphs or known:
+        finds = probe.go_on((LONG - 1) * tries, MANY)
+    layouts = _layouts(finds)
+    sizes = [len(each.assembly) for each in probe.variants]
+    parts = (min(sizes, default=0), max(sizes, default=0))
+    return Forecast(
+        finds, layouts, parts, patterns_seen_once(kit, answers), _sentence(kit, finds, layouts, parts), probe.variants
+    )
+
+
+def patterns_seen_once(kit: Kit, answers: ContactAnswers) -> float:
+    """Share of the exemplars' parts whose pattern occurs once: a part's type, and at which docking a part of which type
+    stands to it. Where it is high, little can be exchanged."""
+    seen: Counter[tuple[int, tuple[tuple[int, int], ...]]] = Counter()
+    for exemplar in kit.exemplars:
+        seen.update(_patterns(exemplar.assembly, answers))
+    return sum(count for count in seen.values() if count == 1) / max(sum(seen.values()), 1)
+
+
+def _patterns(assembly: Assembly, answers: ContactAnswers) -> list[tuple[int, tuple[tuple[int, int], ...]]]:
+    labels = answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
+    around: list[list[tuple[int, int]]] = [[] for _ in range(len(assembly))]
+    for (i, j), (there, back) in zip(assembly.edges.tolist(), labels.tolist(), strict=True):
+        around[i].append((int(assembly.types[j]), there))
+        around[j].append((int(assembly.types[i]), back))
+    return [(int(part), tuple(sorted(each))) for part, each in zip(assembly.types, around, strict=True)]
+
+
+def _layouts(finds: Finds) -> int | None:
+    """About how many distinct graphs there are, from how often the search found what it had: n finds of which g differ
+    are to be expected of N equally likely ones where N (1 - exp(-n / N)) = g. None where few came twice."""
+    graphs, again = finds.graphs, finds.rejects.get(DUPLICATE, 0)
+    if graphs == 0:
+        return 0
+    if graphs >= MANY or again < graphs:
+        return None
+    low, high = float(graphs), 1e6
+    while high / low > 1.01:
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if middle * -np.expm1(-(graphs + again) / middle) < graphs else (low, middle)
+    return round(low)
+
+
+def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int]) -> str:
+    if not finds.graphs:
+        return f"nothing: {what_keeps(kit, finds.rejects, finds.tries)}"
+    size = f"{parts[0]} to {parts[1]} parts" if parts[0] < parts[1] else f"{parts[0]} parts each"
+    count = "hundreds of layouts" if layouts is None else f"about {_round(layouts)} layout{'s'[: layouts != 1]}"
+    if layouts is not None and layouts < FEW:
+        return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
+    if is_dull(finds):
+        alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
+        return (
+            f"{count} of {size} that look {alike}; look at the sheet before you make many, and bring a second model of "
+            "the same parts"
+        )
+    return f"{count} of {size}, {_round(finds.histograms)} or more of them of different parts lists"
+
+
+def _round(number: int) -> str:
+    """A number with one or two digits that mean something."""
+    if number < 20:
+        return str(number)
+    digits = 10 ** (len(str(number)) - 1) if number < 100 else 10 ** (len(str(number)) - 2)
+    return f"{round(number / digits) * digits:,}"

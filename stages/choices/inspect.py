@@ -1,0 +1,136 @@
+"""`make inspect`: what Shapemill sees in model files and what it can make of them, and a config that makes it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+from pydantic import ValidationError
+
+from pipeline.errors import ConfigError
+from stages.choices.config_text import config_text, dataset_name
+from stages.choices.prospect import Prospect, look_at
+from stages.choices.settings import ChoicesConfig
+from stages.choices.sheet import forecast_sheet
+from stages.exemplars.inspect import inspection, inspection_lines
+from stages.exemplars.portrait import kit_sheet
+from stages.exemplars.read import FORMATS, Model, read_model
+from stages.exemplars.segment import Segmentation
+from stages.exemplars.settings import ContactConfig, KitConfig, ShapeFile
+from stages.shape.kit import ContactKind, Strictness
+
+__all__ = ["main"]
+
+FOLDER = Path("datasets", "inspect")
+"""Where the config and the pictures go if nobody says where."""
+
+
+def main(arguments: list[str]) -> int:
+    """Show what is in the models that the command line `arguments` name, and write a config for them. Returns the exit
+    code: 0, also for models that a run would refuse; 2 for files that cannot be read."""
+    asked = _parser().parse_args(arguments)
+    try:
+        paths = [path for text in asked.models for path in _paths(text)]
+        models = [read_model(path, asked.parts) for path in paths]
+        config = _config(asked, paths)
+        found = look_at(config, models, asked.tries)
+        seen = inspection(found.seen, models, found.config)
+        if asked.json:
+            written = {} if asked.out is None else dict(_written(asked.out, paths, models, found))
+            files = {title: str(path) for title, path in written.items()}
+            print(json.dumps({**seen, **found.as_json(), "files": files}, ensure_ascii=False, allow_nan=False))
+            return 0
+        for line in inspection_lines(seen, found.config):
+            print(line)
+        print()
+        for title, line in found.lines():
+            print(f"{title:<18} {line}")
+        sys.stdout.flush()
+        for title, path in _written(asked.out or FOLDER, paths, models, found):
+            print(f"{title:<18} {path}")
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+def _written(
+    folder: Path, paths: Sequence[Path], models: Sequence[Model], found: Prospect
+) -> Iterator[tuple[str, Path]]:
+    """Write the picture of what was seen, the sheet of what it can become and the config; what each is, and where."""
+    name = dataset_name(paths)
+    kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
+    yield "picture", _write(folder / f"{name}.png", kit_sheet(kit))
+    layouts = found.forecast.layouts if found.forecast is not None else 0
+    if found.forecast is not None and found.assemblies:
+        sheet = forecast_sheet(found.built.kit, found.assemblies, name, found.sentence)
+        yield "sheet", _write(folder / f"{name}-forecast.png", sheet)
+    text = config_text(name, found.config, models, found.choices.reasons, layouts, found.sentence)
+    yield "config", _write(folder / f"{name}.yaml", text.encode())
+
+
+def _write(path: Path, content: bytes) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written there: {error.strerror}") from None
+    return path
+
+
+def _paths(text: str) -> list[Path]:
+    """The models that one argument names: a file, or several with spaces between them, as in MESH="a.glb b.glb"."""
+    several = [Path(each) for each in text.split()]
+    if Path(text).exists() or not all(each.suffix.lower() in FORMATS for each in several):
+        return [Path(text)]
+    return several
+
+
+def _config(asked: argparse.Namespace, paths: Sequence[Path]) -> KitConfig:
+    contact = {"tolerance": asked.tolerance, "kinds": asked.kinds}
+    settings = {"types": asked.types, "up": asked.up, "grammar": asked.grammar}
+    try:
+        return KitConfig(
+            name="inspected",
+            shapes=tuple(ShapeFile(path=path) for path in paths),
+            parts=asked.parts,
+            contact=ContactConfig(**{key: value for key, value in contact.items() if value is not None}),
+            **{key: value for key, value in settings.items() if value is not None},
+        )
+    except ValidationError as error:
+        lines = [f"--{each['loc'][0]}: {each['msg']}" for each in error.errors(include_url=False)]
+        raise ConfigError("\n".join(lines)) from None
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="pipeline inspect",
+        description="Show what Shapemill sees in one model, or in several models of one kit: parts, part types, "
+        "contacts, grammar, what may go wrong, and what will come of it; and write a config for it.",
+    )
+    parser.add_argument("models", nargs="+", metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF or DAE")
+    parser.add_argument("--json", action="store_true", help="print one JSON object, for programs")
+    parser.add_argument("--parts", choices=get_args(Segmentation), default="auto", help="what makes a part")
+    parser.add_argument("--types", choices=["congruence", "labels", "meaning"], help="what makes a part type")
+    parser.add_argument("--tolerance", type=float, help="contact tolerance, as a share of the median part's diagonal")
+    parser.add_argument("--kinds", type=_kinds, help="kinds of contact that count, such as face or line,face")
+    parser.add_argument("--grammar", choices=get_args(Strictness), help="which neighbours a part may have")
+    parser.add_argument("--up", choices=["y", "z"], help="the axis that points up")
+    parser.add_argument("--tries", type=int, default=ChoicesConfig().tries, help="as choices.tries in a config")
+    parser.add_argument(
+        "--out", type=Path, metavar="FOLDER", help=f"where config and pictures go; {FOLDER}, with --json nowhere"
+    )
+    return parser
+
+
+def _kinds(text: str) -> tuple[ContactKind, ...]:
+    known = get_args(ContactKind)
+    asked = [each.strip() for each in text.split(",")]
+    if not set(asked) <= set(known):
+        raise argparse.ArgumentTypeError(f"{text!r} is no list of {', '.join(known)}")
+    return tuple(kind for kind in known if kind in asked)

@@ -1,0 +1,158 @@
+"""The ladder: settings from the strictest on, each probed, until one gives enough."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.randomness import decision_rng
+from stages.choices.probe import Finds, Probe
+from stages.choices.sight import Setting, Sight
+from stages.shape.kit import ContactKind, Strictness
+from stages.variations.backdrop import Backdrop
+from stages.variations.kernels.answers import ContactAnswers
+
+__all__ = ["FEW", "FITTED", "Rails", "Rung", "climb", "is_dull"]
+
+GRAPHS = 80
+"""So many distinct graphs in a probe promise hundreds in a search."""
+HISTOGRAMS = 16
+DISTANCE = 0.05
+SPREAD = 0.03
+"""Of so many histograms, so far from the exemplars and from each other, is a pool that is not dull."""
+FEW = 20
+"""Fewer graphs than this are next to nothing."""
+PROMISING = 4
+"""A setting that gave so many graphs in the first tries gets more of them."""
+LONGER = 4
+"""As many times the tries, for a setting that looks promising."""
+STAY = 0.6
+"""Share of the parts that must stay where some are left out."""
+FITTED = 0.75
+"""Share of finds on which hubs must fit again, of so many of the most different."""
+LOOKED_AT = 8
+WORK = 10_000_000
+"""Tries times parts after which the ladder ends: a try takes the longer the more parts there are."""
+PEELED = 4
+"""Most types of hubs that are peeled off."""
+GRAMMARS: tuple[Strictness, ...] = ("multiset", "count_and_pairs")
+KINDS: tuple[tuple[ContactKind, ...], ...] = (("point", "line", "face"), ("line", "face"), ("face",))
+
+
+@dataclass(frozen=True)
+class Rails:
+    """What the ladder may not leave: the kinds, grammars and hubs to choose from; hubs None where it may peel.
+    largest: whether exemplars may lose what falls apart from their largest piece."""
+
+    kinds: tuple[tuple[ContactKind, ...], ...] = KINDS
+    grammars: tuple[Strictness, ...] = GRAMMARS
+    hubs: tuple[int, ...] | None = None
+    largest: bool = True
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A setting, what a probe found under it, the share of all parts that stay, and the share of the most different
+    finds that get their hub back; 1 where none are left out."""
+
+    setting: Setting
+    finds: Finds
+    kept: float
+    fitted: float
+
+    @property
+    def score(self) -> tuple[float, ...]:
+        """By which rungs that give too little are compared: histograms at their distances, in what is left of the
+        exemplars; then graphs. For next to nothing no hubs are left out."""
+        finds, worth = self.finds, self.kept * self.fitted
+        if self.setting.hubs and finds.graphs < FEW:
+            return (0.0, 0.0)
+        return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * worth, finds.graphs * worth)
+
+    @property
+    def gives_enough(self) -> bool:
+        """Whether it promises a pool of some size that is not dull, with most of the hubs behind it."""
+        finds = self.finds
+        return (
+            finds.graphs >= GRAPHS and finds.histograms >= HISTOGRAMS and self.fitted >= FITTED and not is_dull(finds)
+        )
+
+
+def is_dull(finds: Finds) -> bool:
+    """Whether the most different finds look like an exemplar, or like each other."""
+    return finds.distance < DISTANCE or finds.spread < SPREAD
+
+
+def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
+    """The rungs that were tried, the chosen one last.
+
+    Chosen is the first that gives enough; where none does, the one of the best score, the stricter one of equals.
+    Each has `tries`, and more if it looks promising; after so much WORK no more are tried.
+    """
+    tried: list[Rung] = []
+    known: dict[tuple[ContactKind, ...], ContactAnswers] = {}
+    for setting in _settings(sight, rails):
+        staying = sight.staying(setting)
+        kept = sum(map(len, staying)) / sight.parts
+        if min(map(len, staying)) < 2 or (kept < 1.0 and (not rails.largest or (tried and kept < STAY))):
+            continue
+        kit = sight.kit(setting)
+        if setting.kinds not in known:
+            known[setting.kinds] = ContactAnswers(kit)
+        tried.append(_rung(known[setting.kinds].under(kit), setting, tries, kept, sight.widest(())))
+        if tried[-1].gives_enough:
+            return tried
+        if sum(each.finds.tries for each in tried) * sight.parts > WORK:
+            break
+    if tried:
+        best = max(range(len(tried)), key=lambda place: (tried[place].score, -place))
+        tried.append(tried.pop(best))
+    return tried
+
+
+def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, widest: int | None) -> Rung:
+    """The first tries, and more where they found something that differs. Where hubs are left out that the `widest` type
+    is of, finds must get one of that type back; else any."""
+    names = [answers.kit.types[index].name for index in setting.hubs]
+    probe = Probe(answers, decision_rng(0, "choices", setting.grammar, *setting.kinds, *names))
+    rung = Rung(setting, probe.go_on(tries, GRAPHS), kept, 1.0)
+    if rung.finds.histograms >= PROMISING and not rung.gives_enough:
+        rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS), kept, 1.0)
+    if setting.hubs and rung.gives_enough:
+        backdrop = Backdrop(answers, upright=True)
+        chosen = [probe.variants[place].assembly for place in rung.finds.most_different[:LOOKED_AT]]
+        awaited = [widest] if widest in setting.hubs else list(setting.hubs)
+        fitted = sum(bool(np.isin(backdrop.fit(each).types, awaited).any()) for each in chosen) / len(chosen)
+        rung = replace(rung, fitted=fitted)
+    return rung
+
+
+def _settings(sight: Sight, rails: Rails) -> Iterator[Setting]:
+    """Settings, the strictest first; those that differ in nothing that the models have are one."""
+    for hubs in _hubs(sight, rails):
+        seen: set[tuple[ContactKind, ...]] = set()
+        for kinds in rails.kinds:
+            there = tuple(kind for kind in kinds if kind in sight.kinds)
+            if there and there not in seen:
+                seen.add(there)
+                for grammar in rails.grammars:
+                    yield Setting(kinds, grammar, hubs)
+
+
+def _hubs(sight: Sight, rails: Rails) -> Iterator[tuple[int, ...]]:
+    """None, then one type more at a time, of the part that touches most; as long as most parts stay."""
+    if rails.hubs is not None:
+        yield rails.hubs
+        return
+    hubs: tuple[int, ...] = ()
+    yield hubs
+    for _ in range(PEELED):
+        widest = sight.widest(hubs)
+        if widest is None:
+            return
+        hubs = tuple(sorted((*hubs, widest)))
+        if sum(map(len, sight.staying(Setting(KINDS[0], GRAMMARS[0], hubs)))) < STAY * sight.parts:
+            return
+        yield hubs

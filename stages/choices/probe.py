@@ -1,0 +1,116 @@
+"""A short search, and what it says of a long one: distinct graphs and histograms, and how far they are apart."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.kit import Kit
+from stages.variations.exchange.search import Search, Variant
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.selection import farthest_first
+from stages.variations.settings import SearchConfig
+
+__all__ = ["METHODS", "SHOWN", "Finds", "Method", "Probe"]
+
+SHOWN = 24
+"""So many of the finds, those most different, say how different finds can be."""
+
+
+class Method(Protocol):
+    """A way of finding variants."""
+
+    rejects: Counter[str]
+
+    def run(
+        self, rng: np.random.Generator, tries: int, wanted: int, name: str, progress: Callable[[int], None]
+    ) -> tuple[list[Variant], int]:
+        """Try until `wanted` variants are found or `tries` are used up; the new variants and the number of tries."""
+
+
+METHODS: Mapping[str, Callable[[ContactAnswers, SearchConfig], Method]] = {"exchange": Search}
+"""Each way of finding variants, by name."""
+
+SEARCH = SearchConfig(duplicates="graph")
+"""A probe counts distinct graphs, whatever the config calls a duplicate."""
+
+
+@dataclass(frozen=True)
+class Finds:
+    """What a probe found.
+
+    tries: how many; graphs, histograms: distinct ones; distance: mean histogram metric E (strings §5.3) of the most
+    different finds to their nearest exemplar; spread: median of E between two of them; most_different: their places
+    among the variants, most different first; rejects: tries that came to nothing, by reason.
+    """
+
+    tries: int
+    graphs: int
+    histograms: int
+    distance: float
+    spread: float
+    most_different: tuple[int, ...] = ()
+    rejects: Mapping[str, int] = field(default_factory=dict)
+
+
+class Probe:
+    """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone."""
+
+    def __init__(self, answers: ContactAnswers, rng: np.random.Generator) -> None:
+        self.kit = answers.kit
+        self.variants: list[Variant] = []
+        self._rng = rng
+        self._tries = 0
+        self._methods = {name: make(answers, SEARCH) for name, make in METHODS.items()}
+
+    def go_on(self, tries: int, wanted: int) -> Finds:
+        """Search on with every method until there are `wanted` variants, or each has had so many more `tries`."""
+        graphs = {each.graph for each in self.variants}
+        for name, method in self._methods.items():
+            missing = wanted - len(self.variants)
+            if missing > 0:
+                found, used = method.run(self._rng, tries, missing, f"{name}-{self._tries}", lambda _: None)
+                self._tries += used
+                for each in found:
+                    if each.graph not in graphs:
+                        graphs.add(each.graph)
+                        self.variants.append(each)
+        return self.finds()
+
+    def finds(self) -> Finds:
+        """What was found so far."""
+        rejects = sum((method.rejects for method in self._methods.values()), Counter[str]())
+        counts = _counts(self.kit, [each.assembly.types for each in self.variants])
+        exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
+        if not self.variants:
+            return Finds(self._tries, 0, 0, 0.0, 0.0, (), dict(rejects.most_common()))
+        taken = farthest_first(counts, exemplars, min(SHOWN, len(counts)))
+        chosen = counts[taken]
+        near = _metric(chosen, exemplars).min(axis=1)
+        apart = _metric(chosen, chosen)[np.triu_indices(len(chosen), 1)]
+        return Finds(
+            tries=self._tries,
+            graphs=len(self.variants),
+            histograms=len(np.unique(counts, axis=0)),
+            distance=round(float(near.mean()), 4),
+            spread=round(float(np.median(apart)), 4) if len(apart) else 0.0,
+            most_different=tuple(taken.tolist()),
+            rejects=dict(rejects.most_common()),
+        )
+
+
+def _counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:
+    """Parts by type, float64 (k, types)."""
+    return np.array([np.bincount(each, minlength=len(kit.types)) for each in shapes], dtype=np.float64)
+
+
+def _metric(some: FloatArray, others: FloatArray) -> FloatArray:
+    """The histogram metric E of each two, (k, m)."""
+    gaps = np.abs(some[:, None] - others[None]).sum(axis=2)
+    metric: FloatArray = gaps / (some.sum(axis=1)[:, None] + others.sum(axis=1)[None])
+    return metric

@@ -1,0 +1,107 @@
+"""Models looked at from end to end: what is seen in them, what is chosen for them, and what they will give."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from stages.choices.choose import Choices, choose, found_words
+from stages.choices.forecast import Forecast, forecast
+from stages.choices.sheet import SHOWN
+from stages.exemplars.build import Observation, observe_parts
+from stages.exemplars.identify import identify_parts
+from stages.exemplars.read import Model
+from stages.exemplars.settings import KitConfig
+from stages.shape.kit import Assembly
+from stages.variations.backdrop import Backdrop
+from stages.variations.kernels.answers import ContactAnswers
+
+__all__ = ["Prospect", "look_at"]
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """What some models will give.
+
+    config: nothing left open; asked: the config that they were looked at with; seen: all parts under what was chosen,
+    hubs and what falls apart among them; built: what a run builds; forecast: None where a run would refuse the models;
+    rate: variants found a CPU second; seconds: CPU seconds of it all.
+    """
+
+    config: KitConfig
+    asked: KitConfig
+    choices: Choices
+    seen: Observation
+    built: Observation
+    forecast: Forecast | None
+    assemblies: Sequence[Assembly]
+    rate: float
+    seconds: float
+
+    @property
+    def sentence(self) -> str:
+        """What to expect."""
+        if self.forecast is None:
+            return f"nothing, for a run refuses the models: {self.built.refusals[0]}"
+        return self.forecast.sentence
+
+    def as_json(self) -> Mapping[str, Any]:
+        """Choices and forecast, beside what `inspection` finds."""
+        made = self.choices.as_json()
+        expected: dict[str, Any] = {"sentence": self.sentence}
+        if self.forecast is not None:
+            finds = self.forecast.finds
+            expected |= {
+                "tries": finds.tries,
+                "graphs": finds.graphs,
+                "histograms": finds.histograms,
+                "distance": finds.distance,
+                "spread": finds.spread,
+                "layouts": self.forecast.layouts,
+                "variants_a_cpu_second": round(self.rate, 1),
+                "seen_once": round(self.forecast.seen_once, 4),
+            }
+        return {"choices": made, "forecast": expected, "cpu_seconds": round(self.seconds, 1)}
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Title and text of each thing that was chosen and foreseen."""
+        chosen = [(key, f"{_shown(each)}: {self.choices.reasons[key]}") for key, each in self.choices.values.items()]
+        lines = [*chosen, ("forecast", self.sentence)]
+        if self.forecast is not None:
+            once = f"{self.forecast.seen_once:.0%} of the parts stand in a pattern that occurs once"
+            lines += [
+                ("search", f"{found_words(self.forecast.finds)}, {self.rate:.3g} variants a CPU second"),
+                ("patterns", once),
+            ]
+        return lines
+
+
+def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
+    """Decide what `config` leaves open, and forecast what comes of it.
+
+    Raises ConfigError for a model in which no part has any area, and for stated hubs that are no types.
+    """
+    start = time.process_time()
+    identified = identify_parts(models, config)
+    choices = choose(config, models, identified, tries)
+    decided = config.decide(choices.values)
+    built = seen = observe_parts(decided, models, identified)
+    if decided.decided().hubs or decided.decided().disconnected == "largest":
+        whole = config.decide({**choices.values, "hubs.types": "none", "disconnected": "error"})
+        seen = observe_parts(whole, models, identified)
+    expected, assemblies, rate = None, [], 0.0
+    if not built.refusals:
+        answers = ContactAnswers(built.kit)
+        begun = time.process_time()
+        known = choices.finds.graphs if choices.finds is not None else 0
+        expected = forecast(built.kit, answers, tries, known)
+        rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
+        backdrop = Backdrop(answers, upright=True)
+        assemblies = [backdrop.fit(each.assembly) for each in expected.chosen[:SHOWN]]
+    return Prospect(decided, config, choices, seen, built, expected, assemblies, rate, time.process_time() - start)
+
+
+def _shown(value: Any) -> str:
+    return ", ".join(value) if isinstance(value, tuple) else str(value)

@@ -1,0 +1,21 @@
+"""The `choices` section of a config."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pipeline.config import StrictModel
+
+__all__ = ["ChoicesConfig"]
+
+
+class ChoicesConfig(StrictModel):
+    """How keys of kits that are `auto` are chosen."""
+
+    tries: int = Field(
+        2500,
+        ge=100,
+        le=1_000_000,
+        description="Tries of a search after which a setting under which it finds next to nothing is given up; a "
+        "promising one gets four times as many.",
+    )

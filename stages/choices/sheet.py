@@ -1,0 +1,39 @@
+"""A sheet of what a kit can become: its exemplars, then the finds that differ most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stages.shape.kit import Assembly, Kit
+from stages.shape.shape import kit_shape, upright
+from stages.shape.views.camera import Camera
+from stages.shape.views.paint import part_paint
+from stages.shape.views.portrait import portrait
+from stages.shape.views.scene import scene_of
+from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
+
+__all__ = ["SHOWN", "forecast_sheet"]
+
+SHOWN = 12
+COLUMNS = 4
+CELL = 300
+CAMERA = Camera(azimuth=-40.0, elevation=25.0)
+
+
+def forecast_sheet(kit: Kit, assemblies: Sequence[Assembly], title: str, note: str) -> bytes:
+    """A PNG of the exemplars of a kit and of at most SHOWN `assemblies` of its types."""
+    whole = [_cell(kit, each.whole, each.name) for each in kit.exemplars]
+    found = [_cell(kit, each, f"{len(each)} parts") for each in assemblies[:SHOWN]]
+    sections = [Section("Exemplars", _rows(whole), "what goes in")]
+    if found:
+        sections.append(Section("Most different finds of a short search", _rows(found), note))
+    return picture_png(contact_sheet(sections, title, CELL))
+
+
+def _cell(kit: Kit, assembly: Assembly, caption: str) -> Cell:
+    shape = upright(kit_shape(kit, assembly))
+    return Cell(portrait(scene_of(shape), CAMERA, (CELL, CELL), part_paint(shape)), caption)
+
+
+def _rows(cells: list[Cell]) -> list[list[Cell]]:
+    return [cells[first : first + COLUMNS] for first in range(0, len(cells), COLUMNS)]

@@ -1,0 +1,77 @@
+"""Stage `choices`: kits with keys left at `auto` in, what those come to out: `<kit>.json`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from pipeline.config import Config
+from pipeline.places import file_digest
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.choices.choose import choose
+from stages.choices.settings import ChoicesConfig
+from stages.exemplars.identify import identify_parts
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ExemplarsConfig, KitConfig
+
+__all__ = ["STAGE"]
+
+BYTES_A_KIT = 4_000
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """One shard for each kit that leaves a key open; its params hold the kit's config and its models' digests."""
+    return [
+        Shard(
+            kit.name,
+            {
+                "kit": kit.model_dump(mode="json"),
+                "digests": [file_digest(shape.path) for shape in kit.shapes],
+            },
+        )
+        for kit in _open_kits(plan.config)
+    ]
+
+
+def run_shard(task: Task) -> Outcome:
+    """Read the models and decide."""
+    config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
+    models = [read_model(shape.path, config.parts) for shape in config.shapes]
+    tries = task.config.section(ChoicesConfig).tries
+    made = choose(config, models, identify_parts(models, config), tries).as_json()
+    with task.output(f"{config.name}.json") as stream:
+        stream.write(json_bytes(made))
+    return Outcome(samples=0, summary=made)
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """A line for each key that was chosen."""
+    lines = []
+    for name in plan.shards("choices"):
+        made = plan.summary("choices", name)
+        if made is not None:
+            lines += [f"{name}: {key}: {_shown(each)}: {made['why'][key]}" for key, each in made["chosen"].items()]
+    return lines
+
+
+def _shown(value: Any) -> str:
+    return f"[{', '.join(value)}]" if isinstance(value, list) else str(value)
+
+
+def _open_kits(config: Config) -> list[KitConfig]:
+    return [kit for kit in config.section(ExemplarsConfig).kits if kit.left_open()]
+
+
+STAGE = Stage(
+    name="choices",
+    module=__name__,
+    config=ChoicesConfig,
+    inputs=(),
+    sections=("exemplars",),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=lambda plan: BYTES_A_KIT * len(_open_kits(plan.config)),
+    report=report,
+)

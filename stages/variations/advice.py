@@ -1,0 +1,61 @@
+"""Why a search finds nothing in a kit, and what its user can do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from stages.exemplars.findings import SMALL, hubs
+from stages.shape.kit import Kit
+from stages.variations.exchange.search import DUPLICATE, SUBASSEMBLY
+
+__all__ = ["what_keeps"]
+
+REGULAR = 0.01
+"""Share of tries that give an exemplar again, or a piece of one, from which on a kit is regular."""
+
+
+def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
+    """What keeps the search of a kit from finding anything, and what would help, in a sentence.
+
+    rejects: by reason, how many of the `tries` came to nothing.
+    """
+    counts = np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars]), minlength=len(kit.types))
+    used = int((counts > 0).sum())
+    if counts.max() < 2:
+        return (
+            "every part is its own type; bring a second model of the same parts, or name types by meaning "
+            "(`types: labels`)"
+        )
+    if used == 1:
+        return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
+    pinned = _hub(kit)
+    if pinned:
+        return f"{pinned}; split it into several parts in the model, or bring a second model"
+    if counts.sum() <= SMALL:
+        return f"{counts.sum()} parts are too few to exchange any; bring more models of the same parts"
+    known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
+    if known > REGULAR * tries:
+        return (
+            "what can be exchanged gives the exemplar again, or a piece of it: it is regular; bring a second model of "
+            "the same parts, or write a program with its counts and sizes as parameters"
+        )
+    alone = int((counts == 1).sum())
+    if alone > used / 2:
+        return f"{alone} of {used} part types occur once; bring a second model of the same parts"
+    return "no piece fits where it does not stand already; bring a second model of the same parts"
+
+
+def _hub(kit: Kit) -> str:
+    """The hub that touches the largest share of its exemplar's parts, in words; empty where there is no hub."""
+    worst: tuple[float, str] = (0.0, "")
+    for exemplar in kit.exemplars:
+        assembly = exemplar.assembly
+        degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
+        for part in hubs(assembly):
+            share = degrees[part] / (len(assembly) - 1)
+            if share > worst[0]:
+                name = exemplar.part_names[part]
+                worst = (share, f"part {name} touches {degrees[part]} of {len(assembly) - 1} others and pins them")
+    return worst[1]

@@ -1,0 +1,143 @@
+"""What is chosen for kits whose languages are known by heart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stages.choices.choose import Choices, choose
+from stages.choices.forecast import forecast, patterns_seen_once
+from stages.choices.sight import contact_tolerance
+from stages.choices.up import upward
+from stages.exemplars.build import build_kit
+from stages.exemplars.identify import identify_parts
+from stages.exemplars.read import Model, read_model
+from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
+from stages.variations.kernels.answers import ContactAnswers
+from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, config_of, models_of, pose, ring
+
+ROOT = Path(__file__).resolve().parents[3]
+TRIES = 300
+Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
+
+def left_open(shapes: Sequence[Sequence[Placed]], **stated: Any) -> KitConfig:
+    """A config that leaves everything open but what is `stated`."""
+    return KitConfig(name="toy", shapes=tuple(config_of(shapes).shapes), **stated)
+
+
+def chosen(shapes: Sequence[Sequence[Placed]], meshes: dict[str, Any], **stated: Any) -> Choices:
+    config, models = left_open(shapes, **stated), models_of(meshes, shapes)
+    return choose(config, models, identify_parts(models, config), TRIES)
+
+
+def turned(shape: Sequence[Placed]) -> list[Placed]:
+    return [(name, Z_UP @ at) for name, at in shape]
+
+
+class TestUp:
+    @pytest.mark.parametrize(("turn", "axis"), [(False, "y"), (True, "z")])
+    def test_a_model_stands_on_its_broad_side(self, turn: bool, axis: str) -> None:
+        shape = turned(ring(2, 3)) if turn else ring(2, 3)
+        models = models_of(ROAD, [shape])
+        assert upward(models, identify_parts(models, config_of([shape])))[0] == axis
+
+    def test_the_word_of_a_file_that_chose_it_is_believed(self) -> None:
+        models = [replace(each, up="z") for each in models_of(ROAD, [ring(2, 3)])]
+        assert upward(models, identify_parts(models, config_of([ring(2, 3)]))) == ("z", "the file says so")
+
+    def test_where_feet_are_alike_equal_parts_are_turned_about_the_vertical(self) -> None:
+        # a cube of eight bricks stands on the same foot along every axis; four of them are quarter turns about z
+        brick = {"brick": box(1.0, 1.0, 1.0), "fin": ROAD["corner"]}
+        corners = [(x, y, z) for x in (0, 4) for y in (0, 4) for z in (0, 4)]
+        shape = [("brick", pose(*at)) for at in corners]
+        shape += [("fin", pose(2, 2, 2) @ Z_UP @ pose(0, 0, 0, turns)) for turns in range(4)]
+        models = models_of(brick, [shape])
+        axis, why = upward(models, identify_parts(models, config_of([shape])))
+        assert (axis, "3 of 3 times" in why) == ("z", True)
+
+
+class TestTolerance:
+    @staticmethod
+    def row(*gaps: float) -> list[Model]:
+        places = np.cumsum([0.0, *(1.0 + gap for gap in gaps)])
+        return models_of({"cube": box(1.0, 1.0, 1.0)}, [[("cube", pose(x, 0, 0)) for x in places]])
+
+    def tolerance(self, *gaps: float) -> float:
+        models = self.row(*gaps)
+        return contact_tolerance(identify_parts(models, config_of([[]])), 1e-3)[0]
+
+    def test_the_default_stays_where_it_makes_one_piece(self) -> None:
+        assert self.tolerance(0.0, 0.0) == 1e-3
+
+    def test_the_least_multiple_that_makes_one_piece_is_taken(self) -> None:
+        assert self.tolerance(0.0, 6e-3, 0.0, 0.0) == 5e-3  # of a diagonal of 1.73
+
+    def test_what_no_multiple_joins_gets_the_least_that_joins_as_much(self) -> None:
+        assert self.tolerance(0.0, 6e-3, 3.0) == 5e-3
+
+
+class TestLadder:
+    def test_a_kit_that_gives_enough_as_it_is_keeps_the_strictest_rules(self) -> None:
+        paths = sorted((ROOT / "datasets" / "exemplars" / "playground").glob("*.glb"))
+        config = KitConfig(name="playground", shapes=tuple(paths))
+        models = [read_model(path) for path in paths]
+        made = choose(config, models, identify_parts(models, config), 2500)
+        assert (dict(made.values), made.settings, made.enough) == (STRICTEST, 1, True)
+
+    def test_what_the_config_states_is_obeyed_and_not_chosen(self) -> None:
+        stated = {"up": "z", "grammar": "count_and_set", "disconnected": "error", "hubs": HubConfig(types="none")}
+        made = chosen([chain(3), chain(5)], CHAIN, **stated)
+        assert set(made.values) == {"contact.tolerance", "contact.kinds"} == set(made.reasons)
+
+    def test_choices_are_the_same_every_time(self) -> None:
+        shapes = [ring(1, 1), ring(2, 3)]
+        assert chosen(shapes, ROAD).as_json() == chosen(shapes, ROAD).as_json()
+
+    def test_a_chosen_config_builds_the_kit(self) -> None:
+        shapes = [ring(1, 1), ring(2, 3)]
+        config = left_open(shapes)
+        kit, _ = build_kit(config.decide(chosen(shapes, ROAD).values), models_of(ROAD, shapes))
+        assert sum(len(each.assembly) for each in kit.exemplars) == sum(map(len, shapes))
+
+    def test_what_stands_apart_is_left_out_and_the_reason_says_so(self) -> None:
+        shape = [*chain(5), ("link", pose(2, 30, 0))]
+        made = chosen([shape], CHAIN)
+        assert made.values["disconnected"] == "largest"
+        assert made.reasons["disconnected"] == "1 part stands apart from the largest piece"
+
+
+class TestForecast:
+    def kit(self, shapes: Sequence[Sequence[Placed]], meshes: dict[str, Any]) -> Any:
+        return build_kit(config_of(shapes), models_of(meshes, shapes))[0]
+
+    def test_chains_are_as_many_as_there_are_lengths(self) -> None:
+        kit = self.kit([chain(3), chain(5)], CHAIN)
+        found = forecast(kit, ContactAnswers(kit), 2000)
+        # 2.5 to 14 parts, the exemplars' 5 and 7 aside, and no link without a cap: 1 to 12 links
+        assert found.finds.graphs == found.finds.histograms == found.layouts
+        assert found.sentence.startswith(f"about {found.layouts} layouts, no dataset")
+
+    def test_every_part_its_own_type_is_said_with_the_mend(self) -> None:
+        meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
+        kit = self.kit([[("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]], meshes)
+        found = forecast(kit, ContactAnswers(kit), TRIES)
+        assert (found.finds.graphs, found.layouts) == (0, 0)
+        assert "every part is its own type; bring a second model" in found.sentence
+
+    def test_patterns_are_counted_by_type_and_dockings(self) -> None:
+        kit = self.kit([chain(4)], CHAIN)  # two caps, unlike ends of the arrow; two inner links alike, two outer not
+        assert patterns_seen_once(kit, ContactAnswers(kit)) == pytest.approx(4 / 6)
+
+
+def test_an_undecided_kit_says_what_is_open() -> None:
+    config = KitConfig(name="toy", shapes=(Path(__file__),), grammar="multiset")
+    assert config.left_open() == ("up", "contact.tolerance", "contact.kinds", "hubs.types", "disconnected")
+    assert config.decide({"up": "z", "grammar": "count_and_pairs"}).grammar == "multiset"
+    assert config.decide({"up": "z"}).left_open() == config.left_open()[1:]
+    assert config.decide(STRICTEST).decided().kinds == ("point", "line", "face")

@@ -1,0 +1,89 @@
+"""Kits with keys at `auto` through the real mill: decided once, recorded, and built as inspect would."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from stages.choices.inspect import main
+from tests.mill import mill
+from tests.stages.variations.test_stage import write_model
+from tests.stages.variations.toy import ROAD, ring
+from tests.stated import stated
+
+pytestmark = pytest.mark.slow
+
+Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
+
+def run(folder: Path, stages: tuple[str, ...], out: str = "out") -> str:
+    printed = ""
+    for stage in stages:
+        arguments = ("--config", folder / "toy.yaml", "--out", folder / out, "--workers", 1)
+        code, said = mill("run", stage, *arguments)
+        assert code == 0, said
+        printed += said
+    return printed
+
+
+def record(folder: Path, stage: str, shard: str, out: str = "out") -> dict[str, Any]:
+    path = folder / out / ".work" / "toy" / stage / "records" / f"{shard}.json"
+    content: dict[str, Any] = json.loads(path.read_text())
+    return content
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A kit of rings that leaves all open, beside one that leaves nothing."""
+    folder = tmp_path_factory.mktemp("choices")
+    shapes = [[(name, Z_UP @ at) for name, at in ring(*size)] for size in ((1, 1), (2, 3))]
+    paths = [write_model(folder / f"ring{k}.glb", ROAD, shape) for k, shape in enumerate(shapes)]
+    kits = [{"name": "open", "shapes": paths}, stated({"name": "stated", "shapes": paths})]
+    config = {"name": "toy", "seed": 5, "choices": {"tries": 200}, "exemplars": {"kits": kits}}
+    (folder / "toy.yaml").write_text(yaml.safe_dump(config))
+    return folder, run(folder, ("choices", "exemplars"))
+
+
+def test_only_a_kit_that_leaves_something_open_is_probed(made: tuple[Path, str]) -> None:
+    records = made[0] / "out" / ".work" / "toy" / "choices" / "records"
+    assert [path.name for path in records.iterdir()] == ["open.json"]
+
+
+def test_the_kit_is_built_as_was_chosen_and_the_record_says_why(made: tuple[Path, str]) -> None:
+    chosen = record(made[0], "choices", "open")["summary"]
+    built = record(made[0], "exemplars", "open")["summary"]
+    assert chosen["chosen"]["up"] == "z"
+    assert (built["chosen"], built["why"]) == (chosen["chosen"], chosen["why"])
+    kit = json.loads((made[0] / "out" / ".work" / "toy" / "exemplars" / "open.json").read_text())
+    assert (kit["up"], kit["strictness"]) == ("z", chosen["chosen"]["grammar"])
+    assert record(made[0], "exemplars", "stated")["summary"]["chosen"] == {}
+
+
+def test_people_are_told_what_was_chosen(made: tuple[Path, str]) -> None:
+    assert "open: up: z: the lowest points span" in made[1]
+
+
+def test_inspect_chooses_the_same(made: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
+    paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
+    capsys.readouterr()
+    assert main([*paths, "--json", "--tries", "200"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["choices"]["chosen"] == record(made[0], "choices", "open")["summary"]["chosen"]
+
+
+def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
+    paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
+    assert main([*paths, "--tries", "200", "--out", str(tmp_path)]) == 0
+    written = yaml.safe_load((tmp_path / "ring0.yaml").read_text())
+    written["name"] = "toy"
+    written["variations"] |= {"per_kit": 8}
+    written["variations"]["search"] |= {"tries": 400, "patience": 800}
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
+    run(tmp_path, ("choices", "exemplars", "variations"))
+    assert not list((tmp_path / "out" / ".work" / "toy" / "choices").glob("*.json"))
+    assert list((tmp_path / "out" / ".work" / "toy" / "variations").glob("toy-train-*.tar"))
