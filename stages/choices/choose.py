@@ -47,6 +47,7 @@ class Choices:
                 "histograms": finds.histograms,
                 "distance": finds.distance,
                 "spread": finds.spread,
+                "copied": finds.copied,
                 "rejects": dict(finds.rejects),
             }
         return {

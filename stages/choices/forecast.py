@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,12 +10,13 @@ import numpy as np
 from pipeline.randomness import decision_rng
 from stages.choices.ladder import FEW, is_dull
 from stages.choices.probe import Finds, Probe
-from stages.shape.kit import Assembly, Kit
+from stages.shape.graphs.patterns import observed_patterns, seen_once
+from stages.shape.kit import Kit
 from stages.variations.advice import what_keeps
 from stages.variations.exchange.search import DUPLICATE, Variant
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["Forecast", "forecast", "patterns_seen_once"]
+__all__ = ["Forecast", "forecast"]
 
 MANY = 300
 """The search for a forecast ends at so many distinct graphs."""
@@ -56,27 +56,8 @@ def forecast(kit: Kit, answers: ContactAnswers, tries: int, known: int = 0) -> F
     layouts = _layouts(finds)
     sizes = [len(each.assembly) for each in probe.variants]
     parts = (min(sizes, default=0), max(sizes, default=0))
-    return Forecast(
-        finds, layouts, parts, patterns_seen_once(kit, answers), _sentence(kit, finds, layouts, parts), probe.variants
-    )
-
-
-def patterns_seen_once(kit: Kit, answers: ContactAnswers) -> float:
-    """Share of the exemplars' parts whose pattern occurs once: a part's type, and at which docking a part of which type
-    stands to it. Where it is high, little can be exchanged."""
-    seen: Counter[tuple[int, tuple[tuple[int, int], ...]]] = Counter()
-    for exemplar in kit.exemplars:
-        seen.update(_patterns(exemplar.assembly, answers))
-    return sum(count for count in seen.values() if count == 1) / max(sum(seen.values()), 1)
-
-
-def _patterns(assembly: Assembly, answers: ContactAnswers) -> list[tuple[int, tuple[tuple[int, int], ...]]]:
-    labels = answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
-    around: list[list[tuple[int, int]]] = [[] for _ in range(len(assembly))]
-    for (i, j), (there, back) in zip(assembly.edges.tolist(), labels.tolist(), strict=True):
-        around[i].append((int(assembly.types[j]), there))
-        around[j].append((int(assembly.types[i]), back))
-    return [(int(part), tuple(sorted(each))) for part, each in zip(assembly.types, around, strict=True)]
+    once = seen_once(observed_patterns(kit, upright=True))
+    return Forecast(finds, layouts, parts, once, _sentence(kit, finds, layouts, parts), probe.variants)
 
 
 def _layouts(finds: Finds) -> int | None:

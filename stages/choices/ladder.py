@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.randomness import decision_rng
 from stages.choices.probe import Finds, Probe
 from stages.choices.sight import Setting, Sight
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import ContactKind, Strictness
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
@@ -22,6 +23,10 @@ HISTOGRAMS = 16
 DISTANCE = 0.05
 SPREAD = 0.03
 """Of so many histograms, so far from the exemplars and from each other, is a pool that is not dull."""
+COPIED = 0.9
+"""Median share copied whole from which on a pool is dull."""
+FAMILIAR = 0.85
+"""Share of parts with fillings as seen below which a grammar of slots is too loose for a kit."""
 FEW = 20
 """Fewer graphs than this are next to nothing."""
 PROMISING = 4
@@ -37,7 +42,7 @@ WORK = 10_000_000
 """Tries times parts after which the ladder ends: a try takes the longer the more parts there are."""
 PEELED = 4
 """Most types of hubs that are peeled off."""
-GRAMMARS: tuple[Strictness, ...] = ("multiset", "count_and_pairs")
+GRAMMARS: tuple[Strictness, ...] = ("multiset", "count_and_pairs", *SLOT_LEVELS)
 KINDS: tuple[tuple[ContactKind, ...], ...] = (("point", "line", "face"), ("line", "face"), ("face",))
 
 
@@ -67,7 +72,7 @@ class Rung:
         """By which rungs that give too little are compared: histograms at their distances, in what is left of the
         exemplars; then graphs. For next to nothing no hubs are left out."""
         finds, worth = self.finds, self.kept * self.fitted
-        if self.setting.hubs and finds.graphs < FEW:
+        if (self.setting.hubs and finds.graphs < FEW) or finds.familiar < FAMILIAR:
             return (0.0, 0.0)
         return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * worth, finds.graphs * worth)
 
@@ -76,13 +81,17 @@ class Rung:
         """Whether it promises a pool of some size that is not dull, with most of the hubs behind it."""
         finds = self.finds
         return (
-            finds.graphs >= GRAPHS and finds.histograms >= HISTOGRAMS and self.fitted >= FITTED and not is_dull(finds)
+            finds.graphs >= GRAPHS
+            and finds.histograms >= HISTOGRAMS
+            and finds.familiar >= FAMILIAR
+            and self.fitted >= FITTED
+            and not is_dull(finds)
         )
 
 
 def is_dull(finds: Finds) -> bool:
-    """Whether the most different finds look like an exemplar, or like each other."""
-    return finds.distance < DISTANCE or finds.spread < SPREAD
+    """Whether finds look like an exemplar, or like each other."""
+    return finds.distance < DISTANCE or finds.spread < SPREAD or finds.copied >= COPIED
 
 
 def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:

@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.kit import Kit
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
+from stages.shape.graphs.slots import SlotGrammar
+from stages.shape.kit import Assembly, Kit
 from stages.variations.exchange.search import Search, Variant
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.selection import farthest_first
 from stages.variations.settings import SearchConfig
 
-__all__ = ["METHODS", "SHOWN", "Finds", "Method", "Probe"]
+__all__ = ["SHOWN", "Finds", "Probe"]
 
 SHOWN = 24
 """So many of the finds, those most different, say how different finds can be."""
 
-
-class Method(Protocol):
-    """A way of finding variants."""
-
-    rejects: Counter[str]
-
-    def run(
-        self, rng: np.random.Generator, tries: int, wanted: int, name: str, progress: Callable[[int], None]
-    ) -> tuple[list[Variant], int]:
-        """Try until `wanted` variants are found or `tries` are used up; the new variants and the number of tries."""
-
-
-METHODS: Mapping[str, Callable[[ContactAnswers, SearchConfig], Method]] = {"exchange": Search}
-"""Each way of finding variants, by name."""
 
 SEARCH = SearchConfig(duplicates="graph")
 """A probe counts distinct graphs, whatever the config calls a duplicate."""
@@ -45,8 +31,10 @@ class Finds:
     """What a probe found.
 
     tries: how many; graphs, histograms: distinct ones; distance: mean histogram metric E (strings §5.3) of the most
-    different finds to their nearest exemplar; spread: median of E between two of them; most_different: their places
-    among the variants, most different first; rejects: tries that came to nothing, by reason.
+    different finds to their nearest exemplar; spread: median of E between two of them; copied: median of the largest
+    share of a find that stands just so in an exemplar; familiar: with a grammar of slots the share of their parts of
+    which it was seen just so which slots are filled, else 1; most_different: their places among the variants, most
+    different first; rejects: tries that came to nothing, by reason.
     """
 
     tries: int
@@ -54,6 +42,8 @@ class Finds:
     histograms: int
     distance: float
     spread: float
+    copied: float = 1.0
+    familiar: float = 1.0
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
 
@@ -66,29 +56,28 @@ class Probe:
         self.variants: list[Variant] = []
         self._rng = rng
         self._tries = 0
-        self._methods = {name: make(answers, SEARCH) for name, make in METHODS.items()}
+        self._search = Search(answers, SEARCH)
 
     def go_on(self, tries: int, wanted: int) -> Finds:
-        """Search on with every method until there are `wanted` variants, or each has had so many more `tries`."""
-        graphs = {each.graph for each in self.variants}
-        for name, method in self._methods.items():
-            missing = wanted - len(self.variants)
-            if missing > 0:
-                found, used = method.run(self._rng, tries, missing, f"{name}-{self._tries}", lambda _: None)
-                self._tries += used
-                for each in found:
-                    if each.graph not in graphs:
-                        graphs.add(each.graph)
-                        self.variants.append(each)
+        """Search on until there are `wanted` variants, or so many more `tries` are used up."""
+        missing = wanted - len(self.variants)
+        if missing > 0:
+            found, used = self._search.run(self._rng, tries, missing, f"probe-{self._tries}", lambda _: None)
+            self._tries += used
+            graphs = {each.graph for each in self.variants}
+            for each in found:
+                if each.graph not in graphs:
+                    graphs.add(each.graph)
+                    self.variants.append(each)
         return self.finds()
 
     def finds(self) -> Finds:
         """What was found so far."""
-        rejects = sum((method.rejects for method in self._methods.values()), Counter[str]())
+        rejects = self._search.rejects
         counts = _counts(self.kit, [each.assembly.types for each in self.variants])
         exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:
-            return Finds(self._tries, 0, 0, 0.0, 0.0, (), dict(rejects.most_common()))
+            return Finds(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
         taken = farthest_first(counts, exemplars, min(SHOWN, len(counts)))
         chosen = counts[taken]
         near = _metric(chosen, exemplars).min(axis=1)
@@ -99,9 +88,17 @@ class Probe:
             histograms=len(np.unique(counts, axis=0)),
             distance=round(float(near.mean()), 4),
             spread=round(float(np.median(apart)), 4) if len(apart) else 0.0,
+            copied=round(float(np.median([each.lineage["copied"]["largest"] for each in self.variants])), 4),
+            familiar=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
             most_different=tuple(taken.tolist()),
             rejects=dict(rejects.most_common()),
         )
+
+    def _familiar(self, assemblies: Sequence[Assembly]) -> float:
+        if self.kit.grammar.strictness not in SLOT_LEVELS:
+            return 1.0
+        grammar = SlotGrammar(self.kit, SEARCH.upright)
+        return round(float(np.mean([grammar.familiar(each) for each in assemblies])), 4)
 
 
 def _counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:

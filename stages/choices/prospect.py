@@ -59,6 +59,7 @@ class Prospect:
                 "histograms": finds.histograms,
                 "distance": finds.distance,
                 "spread": finds.spread,
+                "copied": finds.copied,
                 "layouts": self.forecast.layouts,
                 "variants_a_cpu_second": round(self.rate, 1),
                 "seen_once": round(self.forecast.seen_once, 4),
@@ -70,9 +71,11 @@ class Prospect:
         chosen = [(key, f"{_shown(each)}: {self.choices.reasons[key]}") for key, each in self.choices.values.items()]
         lines = [*chosen, ("forecast", self.sentence)]
         if self.forecast is not None:
+            whole = f"half of the finds have {self.forecast.finds.copied:.0%} or more in one piece of an exemplar"
             once = f"{self.forecast.seen_once:.0%} of the parts stand in a pattern that occurs once"
             lines += [
                 ("search", f"{found_words(self.forecast.finds)}, {self.rate:.3g} variants a CPU second"),
+                ("copied", whole),
                 ("patterns", once),
             ]
         return lines

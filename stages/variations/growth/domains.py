@@ -243,7 +243,7 @@ def _has(member_starts, members, candidate, spot):
     return k < end
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def _keep_only_with(g, part, spot):
     """Strike the candidates of a part that lack a spot; False where none is left."""
     candidate, count = g.first_candidates[part], g.alive_counts[part]
@@ -257,7 +257,7 @@ def _keep_only_with(g, part, spot):
     return True
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def strike(g, candidate):
     """Take a candidate out of its part's domain; False where the domain is empty then."""
     part = g.candidate_parts[candidate]
@@ -312,7 +312,7 @@ def propagate(kit, patterns, answers, g, field):
             return outcome
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def _rid(g, spot):
     """Strike every candidate that has a bad spot; False where a domain is empty then."""
     if g.spot_parts[spot] >= 0:
@@ -331,7 +331,7 @@ def _rid(g, spot):
     return True
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def _forced(g, part):
     """A spot that all candidates of a part have and where none stands, or -1."""
     candidate, alive, count = g.first_candidates[part], g.alive, g.alive_counts[part]

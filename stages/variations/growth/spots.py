@@ -100,7 +100,7 @@ def add_spot(kit, answers, g, part_type, rotation, translation):
     return spot
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def relation(kit, answers, g, a, b):
     """What the parts of two spots whose boxes meet are to each other: NONE, FORBIDDEN or a packed pair of labels.
     Python is asked for what is not known yet."""
@@ -129,7 +129,7 @@ def boxes_meet(boxes, a, b, slack):
     )
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def add_node(g, spot, part, count):
     """Join a spot with a part; False where there is no room."""
     node = g.counts[FREE]
