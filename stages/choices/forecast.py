@@ -13,8 +13,8 @@ from stages.choices.probe import Finds, Probe
 from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.shape.kit import Kit
 from stages.variations.advice import what_keeps
-from stages.variations.exchange.search import DUPLICATE, Variant
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import DUPLICATE, Variant
 
 __all__ = ["Forecast", "forecast"]
 

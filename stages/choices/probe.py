@@ -11,8 +11,8 @@ from stages.shape.arrays import FloatArray
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
-from stages.variations.exchange.search import Search, Variant
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search, Variant
 from stages.variations.selection import farthest_first
 from stages.variations.settings import SearchConfig
 

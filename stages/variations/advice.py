@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.exemplars.findings import SMALL, hubs
 from stages.shape.kit import Kit
-from stages.variations.exchange.search import DUPLICATE, SUBASSEMBLY
+from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
 __all__ = ["what_keeps"]
 

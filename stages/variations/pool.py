@@ -27,8 +27,8 @@ from pipeline.stage import Task
 from stages.shape.arrays import IntArray
 from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.shape.kit import Assembly, Kit
-from stages.variations.exchange.search import Variant
 from stages.variations.features import AXES
+from stages.variations.search.search import Variant
 
 __all__ = ["FoundVariants", "PoolIndex", "write_kept", "write_variants"]
 

@@ -24,10 +24,10 @@ from stages.shape.shape import kit_shape
 from stages.variations.advice import what_keeps
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import backdrop_of
-from stages.variations.exchange.search import SPARE, Search, Variant
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
+from stages.variations.search.search import SPARE, Search, Variant
 from stages.variations.settings import VariantRequirements, VariationsConfig
 
 __all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.kit import Assembly, Kit
-from stages.variations.exchange.search import Search
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 
 __all__ = ["vary"]

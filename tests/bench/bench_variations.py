@@ -16,11 +16,11 @@ from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, Shape
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
 from stages.shape.kit import Assembly, Kit
 from stages.variations.copied import CopyTest
-from stages.variations.exchange.checks import validate
-from stages.variations.exchange.joins import place_boxes
-from stages.variations.exchange.search import Search
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.kernels.checks import validate
 from stages.variations.kernels.layout import TRY, Outcome
+from stages.variations.kernels.variant import place_boxes
+from stages.variations.search.search import Search
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from stages.variations.shared_surface import PackedShapes
 from tests.bench.measure import Measure, rate

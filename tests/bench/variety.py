@@ -26,9 +26,9 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit import Kit
-from stages.variations.exchange.search import Search
 from stages.variations.features import AXES, MIXED
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig, VariationsConfig
 
 __all__ = ["Finds", "configured", "explore"]

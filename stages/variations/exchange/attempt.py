@@ -5,10 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.checks import connect
 from stages.variations.exchange.cuts import cut
 from stages.variations.exchange.joins import join
 from stages.variations.exchange.matches import match_poses
+from stages.variations.kernels.checks import connect
 from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.layout import PIECE, Outcome
 

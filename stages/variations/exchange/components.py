@@ -6,10 +6,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.matches import squared_distance, transform
 from stages.variations.kernels.layout import BOUNDARY, CHOICES
 from stages.variations.kernels.lookup import random_below
 from stages.variations.kernels.membership import admitted
+from stages.variations.kernels.poses import squared_distance, transform
 
 __all__ = ["choose_components", "find_components"]
 

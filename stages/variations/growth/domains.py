@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.matches import looks_same, squared_distance
 from stages.variations.growth.layout import (
     CANDIDATES,
     EVENTS,
@@ -18,6 +17,7 @@ from stages.variations.growth.layout import (
 from stages.variations.growth.spots import FORBIDS, add_node, add_spot, boxes_meet, find_node, find_spot, relation
 from stages.variations.kernels.layout import FORBIDDEN, NONE, UPRIGHT
 from stages.variations.kernels.lookup import mix
+from stages.variations.kernels.poses import looks_same, squared_distance
 
 __all__ = ["CONFLICT", "FINE", "NO_ROOM", "narrow", "place", "propagate", "strike", "undo"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.joins import place_boxes, set_edge
 from stages.variations.growth.domains import FINE, NO_ROOM, narrow, place, propagate, strike, undo
 from stages.variations.growth.layout import (
     CONFLICTS,
@@ -17,6 +16,7 @@ from stages.variations.growth.layout import (
 from stages.variations.growth.spots import add_spot
 from stages.variations.kernels.layout import EDGES, FORBIDDEN, LABELS, MISSING, PARTS, TRY, UNKNOWNS, Outcome
 from stages.variations.kernels.lookup import ask, hash_key, quantise, random_below
+from stages.variations.kernels.variant import place_boxes, set_edge
 
 __all__ = ["grow", "take_over"]
 

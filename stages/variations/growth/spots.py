@@ -5,10 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.matches import same_rotation, squared_distance
 from stages.variations.growth.layout import FREE, GROWN_PARTS, NODES, SPOTS, WORK
 from stages.variations.kernels.layout import FORBIDDEN, MISSING, NONE
 from stages.variations.kernels.lookup import ask, ask_python, hash_key, mix, quantise
+from stages.variations.kernels.poses import same_rotation, squared_distance
 
 __all__ = ["FORBIDS", "add_node", "add_spot", "boxes_meet", "find_node", "find_spot", "relation"]
 

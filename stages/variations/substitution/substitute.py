@@ -12,8 +12,6 @@ from stages.shape.arrays import FloatArray, TypeArray
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert, rigid_fit, rotation_angle
 from stages.shape.kit import Assembly, Kit
-from stages.variations.exchange.joins import inherit_edges, place_boxes
-from stages.variations.exchange.parents import Parent
 from stages.variations.kernels.layout import (
     BOUNDARY,
     EDGES,
@@ -26,6 +24,8 @@ from stages.variations.kernels.layout import (
     Outcome,
     Workspace,
 )
+from stages.variations.kernels.variant import inherit_edges, place_boxes
+from stages.variations.search.parents import Parent
 from stages.variations.substitution.pieces import Exchanged, draw_pieces
 
 __all__ = ["substitute"]

@@ -22,8 +22,8 @@ from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar import check
-from stages.variations.exchange.search import Search, Variant
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.chairs import write_chairs
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stages.variations.meeting import meeting, meeting_words
-from tests.stages.variations.exchange.test_search import search
+from tests.stages.variations.search.test_search import search
 from tests.stages.variations.toy import CHAIN, box, chain, kit_of, pose, with_arrow
 
 

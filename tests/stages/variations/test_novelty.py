@@ -7,12 +7,12 @@ import numpy as np
 from stages.shape.kit import Assembly
 from stages.variations.archive import Archive, cell_of
 from stages.variations.exchange.matches import lies_in
-from stages.variations.exchange.search import SPARE, SUBASSEMBLY, Search
 from stages.variations.features import AXES, FeatureTest, material_shares
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import EDGES, PARTS
+from stages.variations.search.search import SPARE, SUBASSEMBLY, Search
 from stages.variations.settings import NoveltyConfig, SearchConfig
-from tests.stages.variations.exchange.test_search import search
+from tests.stages.variations.search.test_search import search
 from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, pose, ring
 
 

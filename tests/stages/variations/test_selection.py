@@ -8,7 +8,7 @@ from stages.variations.features import AXES, FeatureTest, material_shares
 from stages.variations.measures import growth, pool_measures
 from stages.variations.selection import farthest_first, select, selection_space
 from stages.variations.settings import NoveltyConfig, SelectionConfig
-from tests.stages.variations.exchange.test_search import search
+from tests.stages.variations.search.test_search import search
 from tests.stages.variations.toy import ROAD, kit_of, ring
 
 

@@ -10,7 +10,7 @@ import pytest
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.variations.shared_surface import TOLERANCE, PackedShapes
-from tests.stages.variations.exchange.test_search import search
+from tests.stages.variations.search.test_search import search
 from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, pose, ring
 
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 from stages.shape.sample import Sample
 from stages.variations.sheet import kit_variants_sheet
-from tests.stages.variations.exchange.test_search import search
+from tests.stages.variations.search.test_search import search
 from tests.stages.variations.toy import ROAD, kit_of, ring
 
 

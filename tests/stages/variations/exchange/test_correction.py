@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stages.variations.exchange.correction import correct_orientations
-from stages.variations.exchange.search import Search
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.toy import ROAD, kit_of, pose, ring
 

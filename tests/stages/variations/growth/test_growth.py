@@ -10,10 +10,10 @@ import pytest
 
 from stages.shape.graphs.patterns import Pattern, observed_patterns, seen_once
 from stages.shape.kit import Assembly, Exemplar, Kit
-from stages.variations.exchange.search import Search, Variant
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.exchange.test_search import SHIPPED, shipped_kit
+from tests.stages.variations.search.test_search import SHIPPED, shipped_kit
 from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, ring
 
 

@@ -7,14 +7,14 @@ import pytest
 
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
-from stages.variations.exchange.checks import connect
 from stages.variations.exchange.cuts import cut
 from stages.variations.exchange.joins import join
-from stages.variations.exchange.search import Search
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.kernels.checks import connect
 from stages.variations.kernels.layout import BOUNDARY, EDGES, FORBIDDEN, LABELS, NONE, PARTS, UNKNOWNS, Outcome
 from stages.variations.kernels.lookup import ask, hash_key, quantise
 from stages.variations.kernels.tables import shape_tables
+from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, pose, ring
 

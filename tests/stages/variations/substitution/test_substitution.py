@@ -10,9 +10,9 @@ import pytest
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
-from stages.variations.exchange.search import Search, Variant
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import MEANINGS
+from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import draw_pieces
 from tests.stages.variations.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit

@@ -7,10 +7,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from stages.variations.exchange.search import Search
-from stages.variations.exchange.steering import CHOICES, PLAIN, RARE
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import NOTHING
+from stages.variations.search.search import Search
+from stages.variations.search.steering import CHOICES, PLAIN, RARE
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.stages.variations.toy import CHAIN, chain, kit_of
 

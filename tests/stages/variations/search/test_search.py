@@ -15,8 +15,8 @@ from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.shape.kit import Kit
-from stages.variations.exchange.search import Search, Variant
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, ring
 

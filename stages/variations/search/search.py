@@ -17,18 +17,18 @@ from stages.variations.archive import Archive, Cell, Place, cell_of
 from stages.variations.copied import CopyTest
 from stages.variations.exchange.attempt import attempt, complete, cut_piece
 from stages.variations.exchange.centroids import match_centroids
-from stages.variations.exchange.checks import validate
 from stages.variations.exchange.correction import correct_orientations
 from stages.variations.exchange.joins import join
 from stages.variations.exchange.matches import lies_in
-from stages.variations.exchange.parents import Parent, Parents
-from stages.variations.exchange.steering import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.features import FeatureTest, material_shares
 from stages.variations.growth.grower import Grower
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.kernels.checks import validate
 from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.layout import BOUNDARY, EDGES, MEANINGS, NOTHING, PARTS, UNKNOWNS, Outcome
 from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
+from stages.variations.search.parents import Parent, Parents
+from stages.variations.search.steering import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.ground import GroundTest
 from stages.variations.substitution.substitute import substitute

@@ -14,8 +14,8 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.variations.archive import Archive
-from stages.variations.exchange.parents import Parent, Parents
 from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, NOTHING, PLANES
+from stages.variations.search.parents import Parent, Parents
 from stages.variations.settings import SearchConfig
 
 __all__ = ["BATCH", "CHOICES", "CUTS", "GROWTH", "PLAIN", "RARE", "Choice", "Steering"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.exchange.joins import set_edge
 from stages.variations.kernels.layout import EDGES, FORBIDDEN, LABELS, MISSING, PARTS, TRY, UNKNOWNS, Outcome
 from stages.variations.kernels.lookup import ask, hash_key, quantise
 from stages.variations.kernels.membership import admitted, neighbourhood_key, recalled
+from stages.variations.kernels.variant import set_edge
 
 __all__ = ["connect", "validate"]
 
