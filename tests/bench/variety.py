@@ -1,6 +1,6 @@
-"""What the search finds in a given CPU time: led by its archive beside plain random, for every config of real models.
+"""What the search finds in a given CPU time, by each method and by both, or led by its archive beside plain random.
 
-python -m tests.bench.variety [--seconds 120] [--workers 2] [--grammar multiset] [CONFIG...]
+python -m tests.bench.variety [--seconds 120] [--workers 2] [--grammar multiset] [--guidance] [CONFIG...]
 
 CPU seconds of each worker are counted, not those of the clock, so a busy machine changes little. Workers do not
 exchange what they find, as the lanes of a real search do after each round. Prints one Markdown table.
@@ -24,7 +24,7 @@ from pipeline.registry import find_stages
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.graphs.neighbourhoods import STRICTNESS
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Kit
 from stages.variations.features import AXES, MIXED
 from stages.variations.kernels.answers import ContactAnswers
@@ -33,7 +33,18 @@ from stages.variations.settings import SearchConfig, VariationsConfig
 
 __all__ = ["Finds", "configured", "explore"]
 
-CONFIGS = ("castle", "dungeon", "spacebase-hall", "ring-segments", "ball-track", "racetrack", "bridge", "temple")
+OWN = ("default/castle", "default/temple", "default/space-base", "default/playground")
+CONFIGS = (
+    *OWN,
+    "castle",
+    "dungeon",
+    "spacebase-hall",
+    "ring-segments",
+    "ball-track",
+    "racetrack",
+    "bridge",
+    "temple",
+)
 SLICE = 2000
 WARM_UP = 300
 HEADER = (
@@ -57,10 +68,13 @@ class Finds:
 
 
 def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig]:
-    """The first kit of `configs/<name>.yaml`, with another strictness if asked, and how it is searched."""
+    """The first kit of `configs/<name>.yaml`, or the one after a stroke in its name, with another strictness if asked,
+    and how it is searched."""
+    name, _, chosen = name.partition("/")
     sections = {name: stage.config for name, stage in find_stages().items()}
     config = load_config(Path(f"configs/{name}.yaml"), sections)
-    kit_config = config.section(ExemplarsConfig).kits[0]
+    kits = config.section(ExemplarsConfig).kits
+    kit_config = next((each for each in kits if each.name == chosen), kits[0])
     if grammar is not None:
         kit_config = kit_config.model_copy(update={"grammar": grammar})
     kit, _ = build_kit(kit_config, [read_model(shape.path, kit_config.parts) for shape in kit_config.shapes])
@@ -84,7 +98,7 @@ def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int) -> Finds:
     return finds
 
 
-def _row(name: str, guided: bool, workers: Sequence[Finds], seconds: float) -> str:
+def _row(name: str, how: str, workers: Sequence[Finds], seconds: float) -> str:
     keys = [key for each in workers for key in each.keys]
     features = np.array([each for worker in workers for each in worker.features]).reshape(-1, len(AXES))
     graphs, histograms = len({graph for graph, _ in keys}), len({histogram for _, histogram in keys})
@@ -94,7 +108,7 @@ def _row(name: str, guided: bool, workers: Sequence[Finds], seconds: float) -> s
     distance = features[:, AXES.index("distance")].mean() if keys else 0.0
     copied = np.median(features[:, AXES.index("copied")]) if keys else 0.0
     return (
-        f"| {name} | {'novelty' if guided else 'random'} | {sum(each.tries for each in workers):,} | {len(keys):,} | "
+        f"| {name} | {how} | {sum(each.tries for each in workers):,} | {len(keys):,} | "
         f"{len(keys) / seconds / len(workers):,.0f} | {graphs:,} | {histograms:,} | "
         f"{' '.join(f'{each:,}' for each in quarters)} | {mixed:.0%} | {blended:.0%} | {distance:.2f} | "
         f"{copied:.0%} | "
@@ -103,23 +117,26 @@ def _row(name: str, guided: bool, workers: Sequence[Finds], seconds: float) -> s
 
 
 def main() -> None:
-    """Search every kit twice and print the table, and for kits of several exemplars why their crossings fail."""
+    """Search every kit in several ways and print the table, and for kits of several exemplars why crossings fail."""
     parser = argparse.ArgumentParser(prog="python -m tests.bench.variety", description="What the search finds.")
     parser.add_argument("configs", nargs="*", help=f"names in configs/; all of {', '.join(CONFIGS)} if none is named")
     parser.add_argument("--seconds", type=float, default=120.0, help="CPU seconds of each worker")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--grammar", choices=STRICTNESS)
+    parser.add_argument("--grammar", choices=(*STRICTNESS, *SLOT_LEVELS))
+    parser.add_argument("--guidance", action="store_true", help="random and led by the archive, instead of methods")
     asked = parser.parse_args()
     print(HEADER, flush=True)
     notes: list[str] = []
     for name in asked.configs or CONFIGS:
         kit, config = configured(name, asked.grammar)
-        for guided in (False, True):
-            novelty = config.novelty.model_copy(update={"guided": guided})
-            led = config.model_copy(update={"novelty": novelty})
-            jobs = [delayed(explore)(kit, led, asked.seconds, seed) for seed in range(asked.workers)]
+        random = config.novelty.model_copy(update={"guided": False})
+        ways = {method: config.model_copy(update={"method": method}) for method in ("exchange", "growth", "both")}
+        if asked.guidance:
+            ways = {"random": config.model_copy(update={"novelty": random}), "novelty": config}
+        for how, asked_for in ways.items():
+            jobs = [delayed(explore)(kit, asked_for, asked.seconds, seed) for seed in range(asked.workers)]
             workers: list[Finds] = Parallel(n_jobs=asked.workers)(jobs)
-            print(_row(name, guided, workers, asked.seconds), flush=True)
+            print(_row(name, how, workers, asked.seconds), flush=True)
         if len(kit.exemplars) > 1:
             crossings = sum((each.crossings for each in workers), Counter[str]()).most_common()
             notes.append(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba
 import numpy as np
 from llvmlite import ir
@@ -56,11 +58,11 @@ def ask(keys, values, key):
 
 
 @intrinsic
-def ask_python(typing_context, address, a, b):
+def ask_python(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any, Any]:
     """Call the C function of two int64 that returns one and lies at an address: an answer that only Python has, in the
     middle of a kernel."""
 
-    def code(context, builder, signature, arguments):
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = ir.IntType(64)
         function = builder.inttoptr(arguments[0], ir.FunctionType(word, [word, word]).as_pointer())
         return builder.call(function, arguments[1:])
