@@ -118,10 +118,11 @@ def _rung_words(rung: Rung) -> str:
 def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str]) -> Rails:
     """What the ladder may choose from: one value of each key that the config states."""
     made = stated.decided()
+    peels = "hubs.types" in open_keys and stated.types != "meaning"
     return Rails(
         kinds=KINDS if "contact.kinds" in open_keys else (made.kinds,),
         grammars=GRAMMARS if "grammar" in open_keys else (made.grammar,),
-        hubs=None if "hubs.types" in open_keys else chosen_hubs(stated, sight.types),
+        hubs=None if peels else chosen_hubs(stated, sight.types),
         largest="disconnected" in open_keys or made.disconnected == "largest",
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,16 +55,36 @@ def choose_by_family(
     rng: np.random.Generator,
 ) -> Chosen:  # fmt: skip
     """The samples of a kit, no two of different splits near: alike in graph, parent and child, siblings of one cut, or
-    sharing `config.splits.near` of their surface or more. Train is what differs most among what may stand there."""
+    sharing `config.splits.near` of their surface or more. Train is what differs most among what may stand there.
+
+    Of a pool that spares have made larger than was asked for, what differs most is cut: all are laid upon each other,
+    which takes time by the square of their number.
+    """
     wanted = wanted_sizes(min(config.per_kit, len(pool)), config.splits)
-    cut = cut_families(_near(pool, ancestry, shapes, config.splits.near), len(pool), wanted, rng)
+    most = min(math.ceil(config.selection.oversample * config.per_kit), len(pool))
+    held = np.sort(select(kit, pool.counts, pool.features, most, config.selection, rng)) if most < len(pool) else None
+    cut = cut_families(_among(_near(pool, ancestry, shapes, config.splits.near), held), most, wanted, rng)
     taken = [np.flatnonzero(cut.split_of == SPLITS.index(split)) for split in SPLITS]
+    if held is not None:
+        taken = [held[each] for each in taken]
     able = taken[0]
     taken[0] = able[select(kit, pool.counts[able], pool.features[able], wanted["train"], config.selection, rng)]
     variants = np.concatenate(taken)
     split_of = np.repeat(np.arange(len(SPLITS)), [len(each) for each in taken])
     order = select(kit, pool.counts[variants], pool.features[variants], len(variants), config.selection, rng)
     return Chosen(variants[order], split_of[order], int((cut.split_of == LET_GO).sum()))
+
+
+def _among(near: Near, held: Indices | None) -> Near:
+    """`near` for the variants that are `held`, by their places there; all where that is None."""
+    if held is None:
+        return near
+
+    def near_held(variant: int, among: Indices) -> Indices:
+        found: Indices = among[np.isin(held[among], near(int(held[variant]), held[among]))]
+        return found
+
+    return near_held
 
 
 def _near(pool: PoolIndex, ancestry: Ancestry, shapes: PackedShapes, least: float) -> Near:

@@ -57,7 +57,7 @@ def ask(keys, values, key):
     return MISSING
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def ask_python(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any, Any]:
     """Call the C function of two int64 that returns one and lies at an address: an answer that only Python has, in the
     middle of a kernel."""

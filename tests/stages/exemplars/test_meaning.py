@@ -90,7 +90,7 @@ def test_the_independent_look_takes_labels_for_neighbourhoods_and_surfaces_for_c
 def test_hubs_cannot_be_left_out_by_meaning() -> None:
     with pytest.raises(ValidationError, match=r"set `hubs\.types: none`"):
         KitConfig.model_validate(
-            {"name": "toy", "shapes": (Path(__file__),), "types": "meaning", "hubs": {"types": "auto"}}
+            {"name": "toy", "shapes": (Path(__file__),), "types": "meaning", "hubs": {"types": ("leg",)}}
         )
 
 

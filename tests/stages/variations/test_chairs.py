@@ -9,7 +9,7 @@ import pytest
 
 from stages.exemplars.build import read_kit
 from stages.exemplars.faults import geometry_faults
-from stages.exemplars.settings import KitConfig, ShapeFile
+from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.package.glb import glb_bytes
 from stages.package.record import describe_sample
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def kit(tmp_path_factory: pytest.TempPathFactory) -> Kit:
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path_factory.mktemp("chairs"), 6))
-    return read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning"))
+    return read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").decide(STRICTEST))
 
 
 @pytest.fixture(scope="module")
