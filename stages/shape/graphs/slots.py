@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -30,8 +30,9 @@ __all__ = ["SlotGrammar"]
 
 OVERLAP = 0.3
 """Share of the smaller box from which on two places are one slot."""
-IMAGES = 512
-"""A way to stand with more symmetric images than this is taken as observed: round parts have hundreds, all alike."""
+IMAGES = 8192
+"""Where the symmetric images of what was seen of a way to stand have more members than this, symmetry is left out of
+account: round parts have hundreds, all alike."""
 PATTERNS = 256
 """Most patterns of a way to stand that are offered to growth."""
 DRAWS = 2048
@@ -49,8 +50,9 @@ class _Stance:
     """One way of standing of a part type: the places around it, and what was seen of them.
 
     up: float64 (3,), what is up in part coordinates; turns: float64 (k, 3, 3), symmetries that keep it; types int64
-    (p,), poses float64 (p, 4, 4) of the places; slot_of: int64 (p,); images: (k, p), where each turn takes each place;
-    seen: observed neighbourhoods as sorted places, in all images, with how often, and what exemplar showed it first.
+    (p,), poses float64 (p, 4, 4) of the places, in cells by type and position; slot_of: int64 (p,); images: (k, p),
+    where each turn takes each place; seen: observed neighbourhoods as sorted places, in all images where it is closed,
+    with how often, and what exemplar showed it first.
     """
 
     part_type: int
@@ -59,7 +61,9 @@ class _Stance:
     types: list[int] = field(default_factory=list)
     poses: list[FloatArray] = field(default_factory=list)
     slot_of: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    cells: dict[tuple[int, ...], list[int]] = field(default_factory=dict)
     slots: int = 0
+    closed: bool = True
     images: np.ndarray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     seen: dict[State, tuple[float, int]] = field(default_factory=dict)
     states: list[dict[State, float]] = field(default_factory=list)
@@ -104,19 +108,21 @@ class SlotGrammar:
         known.append(_Stance(pattern.part_type, pattern.up, kept))
         return known[-1]
 
-    def _turn_to(self, stance: _Stance, up: FloatArray) -> FloatArray | None:
-        """A symmetry that brings a part's way up to that of the stance."""
-        turns = self.kit.types[stance.part_type].symmetries[:, :3, :3]
-        gaps = np.linalg.norm(turns @ up - stance.up, axis=1)
-        best = int(gaps.argmin())
-        return turns[best] if gaps[best] < SAME_UP or not self.upright else None
+    def _turns_to(self, stance: _Stance, up: FloatArray) -> FloatArray:
+        """The symmetries (k, 3, 3) that bring a part's way up to that of the stance; all where nothing is upright."""
+        turns: FloatArray = self.kit.types[stance.part_type].symmetries[:, :3, :3]
+        if self.upright:
+            turns = turns[np.linalg.norm(turns @ up - stance.up, axis=1) < SAME_UP]
+        return turns
 
     def _observe(self, stance: _Stance) -> None:
         """Read the places, slots and states of a stance off its patterns."""
-        if len(stance.turns) * len(stance.patterns) > IMAGES:
-            stance.turns = stance.turns[:1]
+        members = sum(1 + len(pattern.types) for pattern in stance.patterns)
+        widest = max(len(pattern.types) for pattern in stance.patterns)
+        if len(stance.turns) * max(members, widest**2) > IMAGES:
+            stance.turns, stance.closed = stance.turns[:1], False
         for pattern in stance.patterns:
-            first = self._turn_to(stance, pattern.up) if self.upright else np.eye(3)
+            first = self._turns_to(stance, pattern.up)[0]
             for turn in stance.turns:
                 places = tuple(
                     sorted(
@@ -149,16 +155,21 @@ class SlotGrammar:
 
     def _place(self, stance: _Stance, kind: int, pose: FloatArray, add: bool = False) -> int:
         """The number of a place, new if it may be added, else -1."""
-        part_type = self.kit.types[kind]
-        for number, (other, known) in enumerate(zip(stance.types, stance.poses, strict=True)):
-            if other == kind and np.linalg.norm(known[:3, 3] - pose[:3, 3]) <= self._limit:
-                gaps = part_type.symmetries[:, :3, :3] - known[:3, :3].T @ pose[:3, :3]
-                if np.linalg.norm(gaps.reshape(-1, 9), axis=1).min() * part_type.diagonal / 2 <= self._limit:
-                    return number
+        part_type, at = self.kit.types[kind], pose[:3, 3]
+        low, high = (np.floor((at + gap) / (4 * self._limit)).astype(int) for gap in (-self._limit, self._limit))
+        for cell in product(*(range(first, last + 1) for first, last in zip(low.tolist(), high.tolist(), strict=True))):
+            for number in stance.cells.get((kind, *cell), ()):
+                known = stance.poses[number]
+                if np.linalg.norm(known[:3, 3] - at) <= self._limit:
+                    gaps = part_type.symmetries[:, :3, :3] - known[:3, :3].T @ pose[:3, :3]
+                    if np.linalg.norm(gaps.reshape(-1, 9), axis=1).min() * part_type.diagonal / 2 <= self._limit:
+                        return number
         if not add:
             return -1
         stance.types.append(kind)
         stance.poses.append(pose)
+        own = np.floor(at / (4 * self._limit)).astype(int).tolist()
+        stance.cells.setdefault((kind, *own), []).append(len(stance.types) - 1)
         return len(stance.types) - 1
 
     def _slots(self, stance: _Stance) -> tuple[np.ndarray, int]:
@@ -179,32 +190,26 @@ class SlotGrammar:
         _, slot_of = np.unique(owner, return_inverse=True)
         return slot_of.astype(np.int64), int(slot_of.max()) + 1 if count else 0
 
-    def around(self, assembly: Assembly, part: int, neighbours: list[int]) -> tuple[_Stance, State] | None:
-        """How a part of an assembly stands and the places around it that are taken; None where one was never seen."""
-        pose = assembly.poses[part]
-        up = pose[self._axis, :3]
-        inverse = invert(pose)
+    def around(self, assembly: Assembly, part: int, neighbours: list[int]) -> Iterator[tuple[_Stance, State]]:
+        """How a part of an assembly may be seen to stand, with the places around it that are taken; nothing where one
+        was never seen. Once, where all symmetric images of what was seen are known; else by each symmetry."""
+        up, inverse = assembly.poses[part][self._axis, :3], invert(assembly.poses[part])
+        relative = [(int(assembly.types[other]), inverse @ assembly.poses[other]) for other in neighbours]
         for stance in self._stances.get(int(assembly.types[part]), []):
-            turn = self._turn_to(stance, up) if self.upright else np.eye(3)
-            if turn is None:
-                continue
-            places = [
-                self._place(stance, int(assembly.types[other]), _turned(turn, inverse @ assembly.poses[other]))
-                for other in neighbours
-            ]
-            return (stance, tuple(sorted(places))) if min(places, default=0) >= 0 else None
-        return None
+            for turn in self._turns_to(stance, up)[: 1 if stance.closed else None]:
+                places = [self._place(stance, kind, _turned(turn, pose)) for kind, pose in relative]
+                if min(places, default=0) >= 0:
+                    yield stance, tuple(sorted(places))
 
     def admits(self, assembly: Assembly, part: int, neighbours: list[int]) -> bool:
         """Whether a part of an assembly may have these neighbours, by their places."""
-        found = self.around(assembly, part, neighbours)
-        if found is None:
-            return False
-        stance, places = found
-        split = stance.split(places)
-        known = all(state in states for state, states in zip(split, stance.states, strict=True))
-        pairs = combinations(range(stance.slots), 2)
-        return known and all(self._together(stance, split, i, j) for i, j in pairs)
+        for stance, places in self.around(assembly, part, neighbours):
+            split = stance.split(places)
+            known = all(state in states for state, states in zip(split, stance.states, strict=True))
+            pairs = combinations(range(stance.slots), 2)
+            if known and all(self._together(stance, split, i, j) for i, j in pairs):
+                return True
+        return False
 
     def misfits(self, assembly: Assembly) -> list[int]:
         """The parts of an assembly whose neighbours the grammar does not admit, ascending."""
@@ -223,10 +228,10 @@ class SlotGrammar:
         good = parts = 0
         for part, near in self._free(assembly):
             parts += 1
-            found = self.around(assembly, part, near)
-            if found is not None:
-                stance, places = found
-                good += tuple(bool(each) for each in stance.split(places)) in stance.vectors
+            good += any(
+                tuple(bool(each) for each in stance.split(places)) in stance.vectors
+                for stance, places in self.around(assembly, part, near)
+            )
         return good / max(parts, 1)
 
     def patterns(self) -> list[Pattern]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
@@ -66,6 +67,23 @@ def test_symmetric_parts_are_seen_from_all_sides() -> None:
     turned = [(name, pose(0, 0, 0, 1) @ at) for name, at in row("red", "")]
     for shape in (row("", "red"), turned):
         assert SlotGrammar(kit, True, "slot_pairs").misfits(built(kit, shape)) == []
+
+
+def test_round_parts_with_too_many_images_are_seen_from_all_sides_all_the_same() -> None:
+    drum = trimesh.creation.cylinder(1.0, 1.0, sections=256)
+    drum.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    quarter = 2 * np.pi / 256 * 37
+
+    def around(start: float, angles: list[int]) -> list[Placed]:
+        turns = [trimesh.transformations.rotation_matrix(start + 2 * np.pi * each / 256, [0, 1, 0]) for each in angles]
+        return [("drum", pose(0, 0, 0)), *(("red", turn @ pose(1.45, 0, 0)) for turn in turns)]
+
+    seen = [0, 40, 90, 131, 170, 215]
+    kit = kit_of({**BLOCKS, "drum": drum}, [around(0.0, seen), around(quarter, seen)])
+    assert len(kit.types[0].symmetries) >= 512
+    grammar = SlotGrammar(kit, True, "slot_fillings")
+    assert grammar.misfits(built(kit, around(5 * quarter, seen))) == []
+    assert 0 in grammar.misfits(built(kit, around(0.0, [0, 40, 90, 131, 170, 200])))
 
 
 @pytest.mark.parametrize("folder", SHIPPED[:2], ids=lambda folder: folder.name)
