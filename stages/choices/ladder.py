@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from stages.choices.probe import Finds, Probe
+from stages.choices.probe import HUB, Finds, Probe
 from stages.choices.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import ContactKind, Strictness
@@ -38,8 +38,8 @@ STAY = 0.6
 FITTED = 0.75
 """Share of finds on which hubs must fit again, of so many of the most different."""
 LOOKED_AT = 8
-WORK = 10_000_000
-"""Tries times parts after which the ladder ends: a try takes the longer the more parts there are."""
+WORK = 15_000_000
+"""Tries times parts after which no more are tried but slots: a try takes the longer the more parts there are."""
 PEELED = 4
 """Most types of hubs that are peeled off."""
 GRAMMARS: tuple[Strictness, ...] = ("multiset", "count_and_pairs", *SLOT_LEVELS)
@@ -98,11 +98,13 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     """The rungs that were tried, the chosen one last.
 
     Chosen is the first that gives enough; where none does, the one of the best score, the stricter one of equals.
-    Each has `tries`, and more if it looks promising; after so much WORK no more are tried.
+    Each has `tries` by each method, and more if it looks promising; after so much WORK none but slots are tried.
     """
     tried: list[Rung] = []
     known: dict[tuple[ContactKind, ...], ContactAnswers] = {}
     for setting in _settings(sight, rails):
+        if setting.grammar not in SLOT_LEVELS and sum(each.finds.tries for each in tried) * sight.parts > WORK:
+            continue
         staying = sight.staying(setting)
         kept = sum(map(len, staying)) / sight.parts
         if min(map(len, staying)) < 2 or (kept < 1.0 and (not rails.largest or (tried and kept < STAY))):
@@ -113,8 +115,6 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
         tried.append(_rung(known[setting.kinds].under(kit), setting, tries, kept, sight.widest(())))
         if tried[-1].gives_enough:
             return tried
-        if sum(each.finds.tries for each in tried) * sight.parts > WORK:
-            break
     if tried:
         best = max(range(len(tried)), key=lambda place: (tried[place].score, -place))
         tried.append(tried.pop(best))
@@ -139,15 +139,20 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, wi
 
 
 def _settings(sight: Sight, rails: Rails) -> Iterator[Setting]:
-    """Settings, the strictest first; those that differ in nothing that the models have are one."""
+    """Settings, the strictest first, slots last of all; those that differ in nothing that the models have are one."""
+    different: dict[tuple[ContactKind, ...], tuple[ContactKind, ...]] = {}
+    for kinds in rails.kinds:
+        there = tuple(kind for kind in kinds if kind in sight.kinds)
+        if there:
+            different.setdefault(there, kinds)
+    counted = [each for each in rails.grammars if each not in SLOT_LEVELS]
     for hubs in _hubs(sight, rails):
-        seen: set[tuple[ContactKind, ...]] = set()
-        for kinds in rails.kinds:
-            there = tuple(kind for kind in kinds if kind in sight.kinds)
-            if there and there not in seen:
-                seen.add(there)
-                for grammar in rails.grammars:
-                    yield Setting(kinds, grammar, hubs)
+        yield from (Setting(kinds, each, hubs) for kinds in different.values() for each in counted)
+    hubs = rails.hubs or ()
+    edges = sight.counted(Setting(KINDS[0], GRAMMARS[0], hubs))
+    widest = max(int(np.bincount(each.edges.ravel(), minlength=1).max()) for each in edges)
+    slots = [each for each in rails.grammars if each in SLOT_LEVELS and widest <= HUB]
+    yield from (Setting(kinds, each, hubs) for kinds in different.values() for each in slots)
 
 
 def _hubs(sight: Sight, rails: Rails) -> Iterator[tuple[int, ...]]:

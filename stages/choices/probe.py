@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +24,10 @@ SHOWN = 24
 """So many of the finds, those most different, say how different finds can be."""
 
 
+METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
+"""Each has tries of its own, for a grown shape of a large kit costs as much as hundreds of exchanges."""
+HUB = 40
+"""Where a part has more neighbours than this, nothing is grown: all around it is a copy, and dear."""
 SEARCH = SearchConfig(duplicates="graph")
 """A probe counts distinct graphs, whatever the config calls a duplicate."""
 
@@ -56,24 +62,27 @@ class Probe:
         self.variants: list[Variant] = []
         self._rng = rng
         self._tries = 0
-        self._search = Search(answers, SEARCH)
+        widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
+        methods = METHODS if widest <= HUB else METHODS[:1]
+        self._searches = [Search(answers, SEARCH.model_copy(update={"method": method})) for method in methods]
 
     def go_on(self, tries: int, wanted: int) -> Finds:
-        """Search on until there are `wanted` variants, or so many more `tries` are used up."""
-        missing = wanted - len(self.variants)
-        if missing > 0:
-            found, used = self._search.run(self._rng, tries, missing, f"probe-{self._tries}", lambda _: None)
-            self._tries += used
-            graphs = {each.graph for each in self.variants}
-            for each in found:
-                if each.graph not in graphs:
-                    graphs.add(each.graph)
-                    self.variants.append(each)
+        """Search on by each method until there are `wanted` variants, or it has had so many more `tries`."""
+        graphs = {each.graph for each in self.variants}
+        for search in self._searches:
+            missing = wanted - len(self.variants)
+            if missing > 0:
+                found, used = search.run(self._rng, tries, missing, f"probe-{self._tries}", lambda _: None)
+                self._tries += used
+                for each in found:
+                    if each.graph not in graphs:
+                        graphs.add(each.graph)
+                        self.variants.append(each)
         return self.finds()
 
     def finds(self) -> Finds:
         """What was found so far."""
-        rejects = self._search.rejects
+        rejects = sum((each.rejects for each in self._searches), Counter[str]())
         counts = _counts(self.kit, [each.assembly.types for each in self.variants])
         exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:

@@ -106,7 +106,10 @@ class CopyTest:
         by_label = np.argsort(shape.labels, kind="stable")
         rooms = dockings.spot_counts[shape.types]
         at_starts, at = np.cumsum(rooms) - rooms, np.full(rooms.sum(), -1, dtype=np.int32)
-        at[at_starts[tails] + dockings.spots[dockings.rows[joints.labels] + joints.near]] = np.arange(len(tails))
+        # Contacts between two dockings, which are neither within tolerance, have no label and no spot.
+        told = np.flatnonzero(joints.labels >= 0)
+        spots = dockings.spots[dockings.rows[joints.labels[told]] + joints.near[told]]
+        at[at_starts[tails[told]] + spots] = told
         directed = np.arange(2 * len(kit.grammar.dockings) + 1)
         return Target(
             rank=rank,

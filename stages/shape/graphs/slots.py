@@ -39,6 +39,8 @@ DRAWS = 2048
 """Random neighbourhoods that are drawn where there are too many to list."""
 STEPS = 4096
 """Most steps of one listing of neighbourhoods."""
+SLOTS = 32
+"""Parts with more slots than this, which are hubs, have no neighbourhoods offered but those that were observed."""
 UNSEEN = 0.5
 """Weight of a neighbourhood that no part shows, beside one that is shown once."""
 
@@ -258,7 +260,7 @@ class SlotGrammar:
 
     def _others(self, stance: _Stance) -> Iterator[State]:
         """Neighbourhoods that the grammar admits: all in order where they are few, else drawn at random."""
-        if not stance.slots:
+        if not 0 < stance.slots <= SLOTS:
             return
         listed = list(self._list(stance))
         if len(listed) < PATTERNS * len(stance.turns):

@@ -13,6 +13,7 @@ from stages.variations.growth.layout import (
     MEMBERS,
     SPOTS,
     TRAIL,
+    WORK,
 )
 from stages.variations.growth.spots import FORBIDS, add_node, add_spot, boxes_meet, find_node, find_spot, relation
 from stages.variations.kernels.layout import FORBIDDEN, NONE, UPRIGHT
@@ -23,6 +24,8 @@ __all__ = ["CONFLICT", "FINE", "NO_ROOM", "narrow", "place", "propagate", "strik
 
 FINE, CONFLICT, NO_ROOM = 0, 1, 2
 """How a step ended."""
+LIGHT = 32
+"""So many looks at a member of a pattern, or at a spot, count as one contact asked for."""
 SEED_TURNS = 16
 """Symmetric images of the first part that are tried at most: round parts have hundreds, all alike."""
 
@@ -43,9 +46,11 @@ def place(kit, patterns, answers, g, field, spot):
     g.have[g.spot_types[spot]] += 1
     g.alive_counts[part] = 0
     g.first_candidates[part] = g.counts[CANDIDATES]
+    counts = g.counts
+    counts[WORK] += counts[SPOTS] // LIGHT
     room, slack = True, 1.1 * kit.limits[1]
     boxes, heads, node_parts, node_counts = g.spot_boxes, g.heads, g.node_parts, g.node_counts
-    bad, spot_parts, events, counts = g.bad, g.spot_parts, g.events, g.counts
+    bad, spot_parts, events = g.bad, g.spot_parts, g.events
     for other in range(counts[SPOTS]):
         if other == spot or not boxes_meet(boxes, spot, other, slack):
             continue
@@ -107,6 +112,8 @@ def _find_candidates(kit, patterns, answers, g, field, part):
         last = min(last, first + SEED_TURNS)
     distance = np.sqrt((relative**2).sum())
     tolerance = kit.limits[0]
+    own, end_of_own = patterns.of_type[part_type], patterns.of_type[part_type + 1]
+    g.counts[WORK] += (last - first) * (patterns.starts[end_of_own] - patterns.starts[own]) // LIGHT
     starts, ups, types, places = patterns.starts, patterns.ups, patterns.types, patterns.translations
     symmetries, anchor_type = kit.symmetries, g.spot_types[max(anchor, 0)]
     for pattern in range(patterns.of_type[part_type], patterns.of_type[part_type + 1]):

@@ -32,8 +32,8 @@ __all__ = [
 
 SPOTS, NODES, FREE, GROWN_PARTS, CANDIDATES, MEMBERS, TRAIL, EVENTS, WORK, DECISIONS, CONFLICTS = range(11)
 """Places in `Growing.counts`: numbers of spots, nodes, parts, candidates, members of candidates, entries of the trail,
-spots that wait to be struck from domains, contacts asked for, decisions and conflicts; FREE is the first free node, or
--1."""
+spots that wait to be struck from domains, work in contacts asked for, decisions and conflicts; FREE is the first free
+node, or -1."""
 
 
 class PatternTables(NamedTuple):
