@@ -21,7 +21,7 @@ from stages.variations.backdrop import Backdrop, backdrop_of
 from stages.variations.dullness import dullness
 from stages.variations.measures import SAMPLE, edit_measures, pool_measures
 from stages.variations.meeting import meeting
-from stages.variations.partition import Chosen, choose_by_family, nearness_of, packed_shapes, wanted_sizes
+from stages.variations.partition import Chosen, candidates, choose_by_family, nearness_of, packed_shapes, wanted_sizes
 from stages.variations.pool import FoundVariants, PoolIndex
 from stages.variations.rounds import last_pool
 from stages.variations.selection import select
@@ -112,11 +112,9 @@ def run_assignment(task: Task) -> Outcome:
 
 
 def _by_family(task: Task, name: str, pool: PoolIndex, ancestry: Ancestry) -> Chosen:
-    kit = input_kit(task, name)
-    shapes = packed_shapes(task, kit, pool, np.arange(len(pool)))
-    return choose_by_family(
-        kit, pool, ancestry, shapes, task.config.section(VariationsConfig), task.rng("selection", name)
-    )
+    kit, config, rng = input_kit(task, name), task.config.section(VariationsConfig), task.rng("selection", name)
+    held = candidates(kit, pool, config, rng)
+    return choose_by_family(kit, pool, ancestry, held, packed_shapes(task, kit, pool, held), config, rng)
 
 
 def _by_graph(task: Task, kits: list[str], pools: list[PoolIndex]) -> list[Chosen]:

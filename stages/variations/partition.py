@@ -19,7 +19,7 @@ from stages.variations.selection import select
 from stages.variations.settings import SplitConfig, VariationsConfig
 from stages.variations.shared_surface import PackedShapes
 
-__all__ = ["Chosen", "choose_by_family", "nearness_of", "packed_shapes", "wanted_sizes"]
+__all__ = ["Chosen", "candidates", "choose_by_family", "nearness_of", "packed_shapes", "wanted_sizes"]
 
 COMPARED = 64
 """So many shapes of val and of test at most are compared with train."""
@@ -50,23 +50,29 @@ def packed_shapes(task: Task, kit: Kit, pool: PoolIndex, variants: Indices) -> P
     return PackedShapes(kit, assemblies, task.config.section(VariationsConfig).search.upright)
 
 
+def candidates(kit: Kit, pool: PoolIndex, config: VariationsConfig, rng: np.random.Generator) -> Indices:
+    """The variants of a pool that are cut into families: all; but of a pool that spares have made larger than was asked
+    for, those that differ most, since all are laid upon each other, which takes time by the square of their number.
+    """
+    most = min(math.ceil(config.selection.oversample * config.per_kit), len(pool))
+    if most == len(pool):
+        return np.arange(most)
+    chosen: Indices = np.sort(select(kit, pool.counts, pool.features, most, config.selection, rng))
+    return chosen
+
+
 def choose_by_family(
-    kit: Kit, pool: PoolIndex, ancestry: Ancestry, shapes: PackedShapes, config: VariationsConfig,
+    kit: Kit, pool: PoolIndex, ancestry: Ancestry, held: Indices, shapes: PackedShapes, config: VariationsConfig,
     rng: np.random.Generator,
 ) -> Chosen:  # fmt: skip
     """The samples of a kit, no two of different splits near: alike in graph, parent and child, siblings of one cut, or
     sharing `config.splits.near` of their surface or more. Train is what differs most among what may stand there.
 
-    Of a pool that spares have made larger than was asked for, what differs most is cut: all are laid upon each other,
-    which takes time by the square of their number.
+    held: int64 (n,), the variants of the pool that are cut, as `candidates` gives them; shapes: theirs, in that order.
     """
     wanted = wanted_sizes(min(config.per_kit, len(pool)), config.splits)
-    most = min(math.ceil(config.selection.oversample * config.per_kit), len(pool))
-    held = np.sort(select(kit, pool.counts, pool.features, most, config.selection, rng)) if most < len(pool) else None
-    cut = cut_families(_among(_near(pool, ancestry, shapes, config.splits.near), held), most, wanted, rng)
-    taken = [np.flatnonzero(cut.split_of == SPLITS.index(split)) for split in SPLITS]
-    if held is not None:
-        taken = [held[each] for each in taken]
+    cut = cut_families(_near(pool, ancestry, held, shapes, config.splits.near), len(held), wanted, rng)
+    taken = [held[cut.split_of == SPLITS.index(split)] for split in SPLITS]
     able = taken[0]
     taken[0] = able[select(kit, pool.counts[able], pool.features[able], wanted["train"], config.selection, rng)]
     variants = np.concatenate(taken)
@@ -75,28 +81,17 @@ def choose_by_family(
     return Chosen(variants[order], split_of[order], int((cut.split_of == LET_GO).sum()))
 
 
-def _among(near: Near, held: Indices | None) -> Near:
-    """`near` for the variants that are `held`, by their places there; all where that is None."""
-    if held is None:
-        return near
-
-    def near_held(variant: int, among: Indices) -> Indices:
-        found: Indices = among[np.isin(held[among], near(int(held[variant]), held[among]))]
-        return found
-
-    return near_held
-
-
-def _near(pool: PoolIndex, ancestry: Ancestry, shapes: PackedShapes, least: float) -> Near:
+def _near(pool: PoolIndex, ancestry: Ancestry, held: Indices, shapes: PackedShapes, least: float) -> Near:
+    """What is near among the variants that are held, all by their places there."""
     kin = ancestry.kin()
-    _, graph_of = np.unique(pool.digests[:, 0], axis=0, return_inverse=True)
+    _, graph_of = np.unique(pool.digests[held, 0], axis=0, return_inverse=True)
     graph_of = graph_of.reshape(-1)
 
-    def near(variant: int, among: Indices) -> Indices:
-        close = np.isin(among, kin[variant]) | (graph_of[among] == graph_of[variant])
+    def near(place: int, among: Indices) -> Indices:
+        close = np.isin(held[among], kin[held[place]]) | (graph_of[among] == graph_of[place])
         rest = np.flatnonzero(~close)
-        close[rest[shapes.shares(variant, among[rest], least, least) > 0.0]] = True
-        found: Indices = among[close & (among != variant)]
+        close[rest[shapes.shares(place, among[rest], least, least) > 0.0]] = True
+        found: Indices = among[close & (among != place)]
         return found
 
     return near
