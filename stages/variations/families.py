@@ -26,8 +26,10 @@ TRIES, NEARLY = 6, 0.9
 RIVALS, MIDDLES = 4, 16
 """Variants drawn at random for each place, and for the middle of a region, that with least around it is taken; a middle
 with little enough at once."""
-SOUNDED = 512
+SOUNDED = 128
 """Variants of the pool on which is estimated how much is around a rival."""
+REHEARSED = 256
+"""Variants of a larger pool that are cut first, in proportion, to learn what number of regions it allows."""
 
 Indices = npt.NDArray[np.int64]
 Near = Callable[[int, Indices], Indices]
@@ -52,23 +54,39 @@ def cut_families(near: Near, count: int, wanted: Mapping[str, int], rng: np.rand
 
     Val and test have as many as wanted and train at least as many, if any number of regions leaves so many; else val
     and test are halved until train has its share; and where the pool does not allow that either, the cut that gives
-    most of its share to the split that gets least.
+    most of its share to the split that gets least. How many regions a large pool allows is tried on a few of it first.
     """
+    most = max(REGIONS)
+    if count > 2 * REHEARSED:
+        some = np.sort(rng.permutation(count)[:REHEARSED])
+        fewer = {split: max(round(number * REHEARSED / count), min(number, 1)) for split, number in wanted.items()}
+        most = _cut(lambda place, among: _places(near, some, place, among), REHEARSED, fewer, max(REGIONS), rng)[1]
+    return _cut(near, count, wanted, most, rng)[0]
+
+
+def _places(near: Near, some: Indices, place: int, among: Indices) -> Indices:
+    """`near` of some of the variants, by their places among these."""
+    found: Indices = among[np.isin(some[among], near(int(some[place]), some[among]))]
+    return found
+
+
+def _cut(near: Near, count: int, wanted: Mapping[str, int], most: int, rng: np.random.Generator) -> tuple[Cut, int]:
+    """The best of several cuts, and the number of regions asked of it; no more than `most` are."""
     ground = _Ground(near, count, np.sort(rng.permutation(count)[:SOUNDED]))
-    best, best_worth = Cut(np.zeros(count, dtype=np.int8), 0), (-1.0, -1)
-    for sizes, regions in _attempts(wanted):
+    best, best_worth, asked = Cut(np.zeros(count, dtype=np.int8), 0), (-1.0, -1), 1
+    for sizes, regions in _attempts(wanted, most):
         for _ in range(TRIES):
             cut = _grow(ground, sizes, wanted, regions, rng)
             got = cut.sizes(wanted)
             shares = [got[split] / wanted[split] for split in SPLITS if wanted[split]]
             worth = min(shares, default=1.0), sum(got.values())
             if worth > best_worth:
-                best, best_worth = cut, worth
+                best, best_worth, asked = cut, worth, regions
             if got["train"] == wanted["train"]:
-                return best
+                return best, asked
             if regions > 1 and got["train"] < NEARLY * wanted["train"]:
                 break
-    return best
+    return best, asked
 
 
 @dataclass(frozen=True)
@@ -78,14 +96,20 @@ class _Ground:
     near: Near
     count: int
     sounded: Indices
-    _around: dict[int, Indices] = field(default_factory=dict)
+    _around: dict[int, npt.NDArray[np.uint8]] = field(default_factory=dict)
     _heard: dict[int, Indices] = field(default_factory=dict)
 
     def around(self, variant: int) -> Indices:
-        """All that is near a variant."""
+        """All that is near a variant. What another's answer tells already is not asked again."""
         if variant not in self._around:
-            self._around[variant] = self.near(variant, np.arange(self.count))
-        return self._around[variant]
+            is_near = np.zeros(self.count, dtype=np.bool_)
+            known = np.array(list(self._around), dtype=np.int64)
+            byte, bit = divmod(variant, 8)
+            is_near[known] = [bool(row[byte] >> bit & 1) for row in self._around.values()]
+            open_ = np.setdiff1d(np.arange(self.count), known)
+            is_near[self.near(variant, open_)] = True
+            self._around[variant] = np.packbits(is_near, bitorder="little")
+        return np.flatnonzero(np.unpackbits(self._around[variant], count=self.count, bitorder="little"))
 
     def cost(self, variant: int, spent: npt.NDArray[np.bool_]) -> float:
         """About how many that are not `spent` yet are near a variant."""
@@ -94,10 +118,10 @@ class _Ground:
         return float((~spent[self._heard[variant]]).sum() * self.count / len(self.sounded))
 
 
-def _attempts(wanted: Mapping[str, int]) -> list[tuple[dict[str, int], int]]:
-    """Sizes of val and test with numbers of regions, what is asked for first, nothing at all last."""
+def _attempts(wanted: Mapping[str, int], most: int) -> list[tuple[dict[str, int], int]]:
+    """Sizes of val and test with numbers of regions, `most` at most, what is asked for first, nothing at all last."""
     sizes = {split: wanted[split] for split in ("test", "val")}
-    attempts = [(dict(sizes), regions) for regions in REGIONS]
+    attempts = [(dict(sizes), regions) for regions in REGIONS if regions <= most]
     while any(sizes.values()):
         sizes = {split: size // 2 for split, size in sizes.items()}
         attempts.append((dict(sizes), 1))

@@ -158,7 +158,7 @@ def _shares(tables, shape, others, least, enough):
     found = np.zeros(len(others))
     motion = np.empty((3, 4))
     work = np.empty(SEEDS, dtype=np.int64)
-    own, area = tables.seeds[shape], tables.areas[shape]
+    area = tables.areas[shape]
     for place in range(len(others)):
         other = others[place]
         larger = max(area, tables.areas[other])
@@ -168,62 +168,82 @@ def _shares(tables, shape, others, least, enough):
             kind = tables.kinds[shape, seed]
             targets = tables.firsts[other, kind + 1] - tables.firsts[other, kind]
             work[seed] = targets * (tables.symmetries_from[kind + 1] - tables.symmetries_from[kind])
-        best = 0.0
-        for seed in np.argsort(work, kind="mergesort")[: misses + 1]:
-            met = _most_of_seed(tables, shape, other, own[seed], misses, min(enough * larger, 0.999 * area), motion)
-            best = max(best, met)
-            if best >= min(enough * larger, 0.999 * area):
+        order = np.argsort(work, kind="mergesort")
+        best = floor = np.nextafter(least * larger, 0.0)
+        stop = max(min(enough * larger, 0.999 * area), least * larger)
+        for first in range(misses + 1):
+            best = _best_of_seed(tables, shape, other, order, first, misses, best, stop, motion)
+            if best >= stop:
                 break
-        if best >= least * larger:
+        if best > floor:
             found[place] = best / larger
     return found
 
 
 @numba.njit(cache=True)
-def _most_of_seed(tables, shape, other, part, misses, enough, motion):
-    """The largest area that coincides, or the first that is `enough`, under a motion that lays a part of a shape upon
-    one of the other's."""
-    best = 0.0
-    kind = np.searchsorted(tables.firsts[shape], part, side="right") - 1
+def _best_of_seed(tables, shape, other, order, first, misses, best, stop, motion):
+    """The largest area above `best` that coincides under a motion that lays the `first` seed of a shape in this order
+    upon a part of the other's, or the first of at least `stop`; else `best`.
+
+    The seeds are held against the other shape in the same order: what few parts can answer tells soonest that a motion
+    is wrong. Those before `first` have missed with every motion that is any good, so they count as misses.
+    """
+    part, kind = tables.seeds[shape, order[first]], tables.kinds[shape, order[first]]
     for target in range(tables.firsts[other, kind], tables.firsts[other, kind + 1]):
         for symmetry in range(tables.symmetries_from[kind], tables.symmetries_from[kind + 1]):
-            _lay_upon(tables, part, target, tables.symmetries[symmetry], motion)
-            if tables.up >= 0 and motion[tables.up, tables.up] < UPRIGHT:
+            if not _lay_upon(tables, part, target, tables.symmetries[symmetry], motion):
                 continue
-            missed = 0
-            for seed in range(SEEDS):
+            missed = first
+            for place in range(first + 1, SEEDS):
+                seed = order[place]
                 if not _meets(tables, motion, tables.seeds[shape, seed], other, tables.kinds[shape, seed]):
                     missed += 1
                     if missed > misses:
                         break
-            if missed > misses:
-                continue
-            met = 0.0
-            for each_kind in range(len(tables.area)):
-                for each in range(tables.firsts[shape, each_kind], tables.firsts[shape, each_kind + 1]):
-                    if _meets(tables, motion, each, other, each_kind):
-                        met += tables.area[each_kind]
-            best = max(best, met)
-            if best >= enough:
-                return best
+            if missed <= misses:
+                best = max(best, _met(tables, shape, other, best, motion))
+                if best >= stop:
+                    return best
     return best
 
 
 @numba.njit(cache=True)
+def _met(tables, shape, other, best, motion):
+    """The area of a shape that coincides with the other's under a motion; 0 as soon as it cannot be above `best`."""
+    left = tables.areas[shape]
+    for kind in range(len(tables.area)):
+        for part in range(tables.firsts[shape, kind], tables.firsts[shape, kind + 1]):
+            if not _meets(tables, motion, part, other, kind):
+                left -= tables.area[kind]
+                if left <= best:
+                    return 0.0
+    return left
+
+
+@numba.njit(cache=True)
 def _lay_upon(tables, part, target, symmetry, motion):
-    """The motion (3, 4) that takes a part to another of its type, turned by a symmetry."""
+    """The motion (3, 4) that takes a part to another of its type, turned by a symmetry; False where it tilts what must
+    stay upright."""
     rotation, onto = tables.rotations[tables.turns[part]], tables.rotations[tables.turns[target]]
+    up = tables.up
+    if up >= 0:
+        level = 0.0
+        for k in range(3):
+            for m in range(3):
+                level += onto[up, k] * symmetry[k, m] * rotation[up, m]
+        if level < UPRIGHT:
+            return False
     centre, there = tables.centres[part], tables.centres[target]
     for i in range(3):
+        a = onto[i, 0] * symmetry[0, 0] + onto[i, 1] * symmetry[1, 0] + onto[i, 2] * symmetry[2, 0]
+        b = onto[i, 0] * symmetry[0, 1] + onto[i, 1] * symmetry[1, 1] + onto[i, 2] * symmetry[2, 1]
+        c = onto[i, 0] * symmetry[0, 2] + onto[i, 1] * symmetry[1, 2] + onto[i, 2] * symmetry[2, 2]
         for j in range(3):
-            total = 0.0
-            for k in range(3):
-                for m in range(3):
-                    total += onto[i, k] * symmetry[k, m] * rotation[j, m]
-            motion[i, j] = total
+            motion[i, j] = a * rotation[j, 0] + b * rotation[j, 1] + c * rotation[j, 2]
     for i in range(3):
         moved = motion[i, 0] * centre[0] + motion[i, 1] * centre[1] + motion[i, 2] * centre[2]
         motion[i, 3] = there[i] - moved
+    return True
 
 
 @numba.njit(cache=True)

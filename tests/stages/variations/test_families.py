@@ -49,6 +49,23 @@ def test_a_chain_of_cousins_is_cut_with_a_gap_between_splits() -> None:
     assert (cut.split_of == LET_GO).any()
 
 
+def test_of_a_large_pool_no_pair_is_asked_about_twice_and_a_few_tell_what_it_allows() -> None:
+    count, asked = 1500, 0
+    places = np.random.default_rng(1).permutation(count)
+    matrix = np.abs(places[:, None] - places[None]) <= 60
+
+    def near(variant: int, among: np.ndarray) -> np.ndarray:
+        nonlocal asked
+        asked += len(among)
+        return near_by(matrix)(variant, among)
+
+    wanted = {"train": 600, "val": 60, "test": 60}
+    cut = cut_families(near, count, wanted, np.random.default_rng(0))
+    assert cut.sizes(wanted) == wanted
+    assert crossings(matrix, cut) == 0
+    assert asked < count**2 / 2
+
+
 def test_where_all_are_twins_there_is_only_train_and_that_is_said() -> None:
     wanted = {"train": 8, "val": 1, "test": 1}
     cut = cut_families(near_by(np.ones((10, 10), dtype=bool)), 10, wanted, np.random.default_rng(0))
