@@ -68,8 +68,7 @@ def run(
         close = nearest(stage, stages)
         hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
         raise ConfigError(f"there is no stage {stage}; {hint}")
-    loaded = _load(stages, config, seed)
-    result = run_stage(stage, stages, loaded, Places(out, loaded.name), workers, part, retries)
+    result = run_stage(stage, stages, *_load(stages, config, out, seed), workers, part, retries)
     if result.failed:
         print(f"{stage}: set aside: {', '.join(result.failed)}; run again to try them again", file=sys.stderr)
         raise typer.Exit(1)
@@ -87,8 +86,8 @@ def plan(
     from pipeline.estimate import plan_lines
 
     stages = find_stages(context.obj)
-    loaded = _load(stages, config, seed)
-    for line in plan_lines(loaded, stages, Places(out, loaded.name), workers):
+    loaded, places = _load(stages, config, out, seed)
+    for line in plan_lines(loaded, stages, places, workers):
         print(line, flush=True)
 
 
@@ -104,8 +103,8 @@ def status(
     from pipeline.status import status_lines
 
     stages = find_stages(context.obj)
-    loaded = _load(stages, config, seed)
-    for line in status_lines(loaded, stages, Places(out, loaded.name), workers):
+    loaded, places = _load(stages, config, out, seed)
+    for line in status_lines(loaded, stages, places, workers):
         print(line)
 
 
@@ -121,8 +120,8 @@ def verify(
     from pipeline.check import damaged_shards
 
     stages = find_stages(context.obj)
-    loaded = _load(stages, config, seed)
-    damages = list(damaged_shards(loaded, stages, Places(out, loaded.name)))
+    loaded, places = _load(stages, config, out, seed)
+    damages = list(damaged_shards(loaded, stages, places))
     for line in damages:
         print(line)
     arguments = ["--config", str(config), "--out", str(out), "--workers", str(workers), *context.args]
@@ -157,8 +156,8 @@ def keys(context: typer.Context) -> None:
 @app.command()
 def clean(context: typer.Context, config: ConfigOption = DEFAULT_CONFIG, out: OutOption = DEFAULT_OUT) -> None:
     """Remove the work folder of a dataset: records and shards, not the finished dataset."""
-    loaded = _load(find_stages(context.obj), config, None)
-    work = Places(out, loaded.name).work
+    _, places = _load(find_stages(context.obj), config, out, None)
+    work = places.work
     if work.is_dir():
         shutil.rmtree(work)
     print(f"removed {work}")
@@ -172,12 +171,13 @@ def _slice(text: str) -> tuple[int, int]:
     return index, count
 
 
-def _load(stages: Mapping[str, Stage], config: Path, seed: int | None) -> Config:
+def _load(stages: Mapping[str, Stage], config: Path, out: Path, seed: int | None) -> tuple[Config, Places]:
+    """The dataset's config, which every stage has checked, and its folders."""
     overrides = {} if seed is None else {"seed": seed}
     loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
     for stage in stages.values():
         stage.check(loaded)
-    return loaded
+    return loaded, Places(out, loaded.name)
 
 
 def _entry(context: typer.Context, module: str) -> Callable[[list[str]], int]:

@@ -22,9 +22,18 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.errors import Fatal
+from pipeline.errors import ConfigError, Fatal
 
-__all__ = ["Places", "StagePlaces", "file_digest", "stops_everything", "sync_folder", "temporary", "write_whole"]
+__all__ = [
+    "Places",
+    "StagePlaces",
+    "file_digest",
+    "stops_everything",
+    "sync_folder",
+    "temporary",
+    "write_file",
+    "write_whole",
+]
 
 _FATAL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM}
 
@@ -122,6 +131,19 @@ def write_whole(path: Path, content: bytes) -> None:
         beside.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def write_file(path: Path, content: bytes) -> Path:
+    """Write a file that a command was asked for, whole, and the folders above it; `path`.
+
+    Raises ConfigError where that cannot be.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written there: {error.strerror}") from None
+    return path
 
 
 def file_digest(path: Path) -> str:

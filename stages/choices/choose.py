@@ -40,16 +40,7 @@ class Choices:
         """For the record, and for the stage that builds the kit."""
         probe = None
         if self.finds is not None:
-            finds = self.finds
-            probe = {
-                "tries": finds.tries,
-                "graphs": finds.graphs,
-                "histograms": finds.histograms,
-                "distance": finds.distance,
-                "spread": finds.spread,
-                "copied": finds.copied,
-                "rejects": dict(finds.rejects),
-            }
+            probe = {**self.finds.as_json(), "rejects": dict(self.finds.rejects)}
         return {
             "chosen": {key: list(each) if isinstance(each, tuple) else each for key, each in self.values.items()},
             "why": dict(self.reasons),

@@ -13,6 +13,7 @@ from typing import get_args
 from pydantic import ValidationError
 
 from pipeline.errors import ConfigError
+from pipeline.places import write_file
 from stages.choices.config_text import config_text, dataset_name
 from stages.choices.prospect import Prospect, look_at
 from stages.choices.settings import ChoicesConfig
@@ -65,22 +66,13 @@ def _written(
     """Write the picture of what was seen, the sheet of what it can become and the config; what each is, and where."""
     name = dataset_name(paths)
     kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
-    yield "picture", _write(folder / f"{name}.png", kit_sheet(kit))
+    yield "picture", write_file(folder / f"{name}.png", kit_sheet(kit))
     layouts = found.forecast.layouts if found.forecast is not None else 0
     if found.forecast is not None and found.assemblies:
         sheet = forecast_sheet(found.built.kit, found.assemblies, name, found.sentence)
-        yield "sheet", _write(folder / f"{name}-forecast.png", sheet)
+        yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
     text = config_text(name, found.config, models, found.choices.reasons, layouts, found.sentence)
-    yield "config", _write(folder / f"{name}.yaml", text.encode())
-
-
-def _write(path: Path, content: bytes) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written there: {error.strerror}") from None
-    return path
+    yield "config", write_file(folder / f"{name}.yaml", text.encode())
 
 
 def _paths(text: str) -> list[Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -52,6 +52,17 @@ class Finds:
     familiar: float = 1.0
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """What it says of a long search, for records and programs."""
+        return {
+            "tries": self.tries,
+            "graphs": self.graphs,
+            "histograms": self.histograms,
+            "distance": self.distance,
+            "spread": self.spread,
+            "copied": self.copied,
+        }
 
 
 class Probe:

@@ -52,14 +52,8 @@ class Prospect:
         made = self.choices.as_json()
         expected: dict[str, Any] = {"sentence": self.sentence}
         if self.forecast is not None:
-            finds = self.forecast.finds
             expected |= {
-                "tries": finds.tries,
-                "graphs": finds.graphs,
-                "histograms": finds.histograms,
-                "distance": finds.distance,
-                "spread": finds.spread,
-                "copied": finds.copied,
+                **self.forecast.finds.as_json(),
                 "layouts": self.forecast.layouts,
                 "variants_a_cpu_second": round(self.rate, 1),
                 "seen_once": round(self.forecast.seen_once, 4),

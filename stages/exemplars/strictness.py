@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.places import write_whole
+from pipeline.places import write_file
 from stages.shape.graphs.neighbourhoods import STRICTNESS, admits
 from stages.shape.kit import Grammar, Multiset, Strictness
 
@@ -63,8 +63,7 @@ def main() -> None:
     """Draw the picture."""
     parser = argparse.ArgumentParser(prog="python -m stages.exemplars.strictness", description="Draw what is admitted.")
     parser.add_argument("--picture", type=Path, default=Path("datasets/exemplars/strictness.png"))
-    path = parser.parse_args().picture
-    write_whole(path, _picture())
+    path = write_file(parser.parse_args().picture, _picture())
     print(f"{path}  {path.stat().st_size:,} bytes")
 
 

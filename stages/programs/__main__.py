@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.errors import ConfigError, ShardFailed
+from pipeline.places import write_file
 from stages.programs.editing import interpolate, mix
-from stages.programs.files import named_values, random_shapes, shape_glb, write_file
+from stages.programs.files import named_values, random_shapes, shape_glb
 from stages.programs.parameters import ParameterError
 from stages.programs.program import Program, find_program
 from stages.programs.recipe import recipe_markdown

@@ -1,4 +1,4 @@
-"""Shapes of programs as files: parameters from JSON, shapes to GLB."""
+"""Shapes of programs as files: parameters from JSON, shapes as GLB."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stages.programs.sampling import Sampler
 from stages.programs.schema import Values
 from stages.shape.views.palette import srgb_to_linear
 
-__all__ = ["named_values", "random_shapes", "shape_glb", "write_file"]
+__all__ = ["named_values", "random_shapes", "shape_glb"]
 
 
 def named_values(program: Program, name: str) -> dict[str, Value]:
@@ -59,13 +59,3 @@ def shape_glb(program: Program, values: Values) -> bytes:
         scene.add_geometry(part, node_name=name, geom_name=name, transform=pose)
     glb: bytes = scene.export(file_type="glb")
     return glb
-
-
-def write_file(path: Path, content: bytes) -> Path:
-    """Write a file and the folders above it; `path`. Raises ConfigError where that cannot be."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    except OSError as error:
-        raise ConfigError(f"{path}: it cannot be written there: {error.strerror}") from None
-    return path

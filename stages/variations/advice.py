@@ -21,12 +21,13 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
 
     rejects: by reason, how many of the `tries` came to nothing.
     """
-    counts = np.bincount(np.concatenate([each.assembly.types for each in kit.exemplars]), minlength=len(kit.types))
+    labelled = [kit.labelled(each.assembly).types for each in kit.exemplars]
+    counts = np.bincount(np.concatenate(labelled), minlength=len(kit.labels))
     used = int((counts > 0).sum())
     if counts.max() < 2:
         return (
             "every part is its own type; bring a second model of the same parts, or name types by meaning "
-            "(`types: labels`)"
+            "(`types: meaning`)"
         )
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"

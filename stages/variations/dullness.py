@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from stages.shape.graphs.neighbourhoods import STRICTNESS
-from stages.shape.kit import Kit
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
+from stages.shape.kit import Kit, Strictness
 
 __all__ = ["dullness", "mutual_distance"]
 
@@ -55,9 +55,9 @@ def dullness(kit: Kit, measures: Mapping[str, Any]) -> str:
 def _remedies(kit: Kit) -> list[str]:
     """What would make the variants of a kit more different, by the keys of a config."""
     remedies = ["a second model" if len(kit.exemplars) == 1 else "one more model of the same parts"]
-    looser = [each for each in ("count_and_pairs", "count_and_types") if _is_looser(each, kit.grammar.strictness)]
-    if looser:
-        remedies.append(f"a looser grammar (grammar: {looser[0]})")
+    looser = _looser(kit.grammar.strictness)
+    if looser is not None:
+        remedies.append(f"a looser grammar (grammar: {looser})")
     if set(kit.contact_kinds) != {"face"}:
         remedies.append("neighbours by their faces alone (contact.kinds: [face])")
     if not kit.grammar.hubs and not any(len(each.backdrop) for each in kit.exemplars):
@@ -65,6 +65,7 @@ def _remedies(kit: Kit) -> list[str]:
     return remedies
 
 
-def _is_looser(level: str, other: str) -> bool:
-    order: tuple[str, ...] = STRICTNESS
-    return order.index(level) > order.index(other)
+def _looser(strictness: Strictness) -> Strictness | None:
+    """The next looser level of the same kind, by numbers of neighbours or by slots, that admits clearly more."""
+    levels = SLOT_LEVELS if strictness in SLOT_LEVELS else STRICTNESS
+    return next((each for each in levels[levels.index(strictness) + 1 :] if each != "count_and_set"), None)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.config import load_config
-from pipeline.places import Places, write_whole
+from pipeline.places import Places, write_file
 from pipeline.randomness import decision_rng
 from pipeline.records import read_record
 from pipeline.registry import find_stages
@@ -95,15 +95,12 @@ def main() -> None:
         parser.error(f"{places.work} holds no variations; make them with: make variations CONFIG={asked.config}")
     measures = _measures(places.stage("variations").records / f"{config.name}-assignment.json")
     samples = sorted((each for shard in shards for each in read_samples(shard)), key=lambda each: each.key)
-    folder = asked.out / "sheets"
-    folder.mkdir(parents=True, exist_ok=True)
     for name in [each.name for each in config.section(ExemplarsConfig).kits]:
         stem = places.stage("exemplars").root / name
         kit = load_kit(stem.with_suffix(".json"), stem.with_suffix(".tar"))
         own = [each for each in samples if each.kit == name]
-        path, rng = folder / f"{config.name}-{name}.png", decision_rng(config.seed, "sheet", name)
-        write_whole(path, kit_variants_sheet(kit, own, measures[name]["dull"], rng))
-        print(path)
+        sheet = kit_variants_sheet(kit, own, measures[name]["dull"], decision_rng(config.seed, "sheet", name))
+        print(write_file(asked.out / "sheets" / f"{config.name}-{name}.png", sheet))
 
 
 if __name__ == "__main__":

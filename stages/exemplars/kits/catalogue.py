@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from pipeline.places import write_file
 from stages.exemplars.kits import castle, playground, space_base, temple
 from stages.exemplars.kits.layout import Layout, glb_bytes
 
@@ -23,8 +24,5 @@ def write_kits(out: Path) -> list[Path]:
     written = []
     for kit, shapes in KITS.items():
         for shape, layout in shapes().items():
-            path = out / kit / f"{shape}.glb"
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(glb_bytes(layout))
-            written.append(path)
+            written.append(write_file(out / kit / f"{shape}.glb", glb_bytes(layout)))
     return written

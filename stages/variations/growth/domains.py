@@ -5,16 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.growth.layout import (
-    CANDIDATES,
-    EVENTS,
-    FREE,
-    GROWN_PARTS,
-    MEMBERS,
-    SPOTS,
-    TRAIL,
-    WORK,
-)
+from stages.variations.growth.layout import CANDIDATES, EVENTS, FREE, GROWN_PARTS, MEMBERS, SPOTS, TRAIL, WORK
 from stages.variations.growth.spots import FORBIDS, add_node, add_spot, boxes_meet, find_node, find_spot, relation
 from stages.variations.kernels.layout import FORBIDDEN, NONE, UPRIGHT
 from stages.variations.kernels.lookup import mix
@@ -113,10 +104,10 @@ def _find_candidates(kit, patterns, answers, g, field, part):
     distance = np.sqrt((relative**2).sum())
     tolerance = kit.limits[0]
     own, end_of_own = patterns.of_type[part_type], patterns.of_type[part_type + 1]
-    g.counts[WORK] += (last - first) * (patterns.starts[end_of_own] - patterns.starts[own]) // LIGHT
     starts, ups, types, places = patterns.starts, patterns.ups, patterns.types, patterns.translations
     symmetries, anchor_type = kit.symmetries, g.spot_types[max(anchor, 0)]
-    for pattern in range(patterns.of_type[part_type], patterns.of_type[part_type + 1]):
+    g.counts[WORK] += (last - first) * (starts[end_of_own] - starts[own]) // LIGHT
+    for pattern in range(own, end_of_own):
         start, end = starts[pattern], starts[pattern + 1]
         for symmetry in range(first, last):
             turn = symmetries[symmetry]

@@ -6,17 +6,12 @@ import numba
 import numpy as np
 
 from stages.variations.growth.domains import FINE, NO_ROOM, narrow, place, propagate, strike, undo
-from stages.variations.growth.layout import (
-    CONFLICTS,
-    DECISIONS,
-    FREE,
-    GROWN_PARTS,
-    TRAIL,
-)
+from stages.variations.growth.layout import CONFLICTS, DECISIONS, FREE, GROWN_PARTS, TRAIL
 from stages.variations.growth.spots import add_spot
-from stages.variations.kernels.layout import EDGES, FORBIDDEN, LABELS, MISSING, PARTS, TRY, UNKNOWNS, Outcome
-from stages.variations.kernels.lookup import ask, hash_key, quantise, random_below
-from stages.variations.kernels.variant import place_boxes, set_edge
+from stages.variations.kernels.checks import find_contacts
+from stages.variations.kernels.layout import EDGES, PARTS, TRY
+from stages.variations.kernels.lookup import random_below
+from stages.variations.kernels.variant import place_boxes
 
 __all__ = ["grow", "take_over"]
 
@@ -119,10 +114,9 @@ def _draw(rng, patterns, g, field, part):
 
 @numba.njit(cache=True)
 def take_over(kit, patterns, answers, g, ws):
-    """Put the grown shape into the workspace of a try, with its edges; OK, CLASH or UNKNOWN as a join says it."""
+    """Put the grown shape into the workspace of a try, with its edges; the outcome of `find_contacts`."""
     ws.counts[TRY] += 1
     ws.counts[EDGES] = 0
-    ws.counts[UNKNOWNS] = 0
     parts = g.counts[GROWN_PARTS]
     ws.counts[PARTS] = parts
     for part in range(parts):
@@ -137,31 +131,4 @@ def take_over(kit, patterns, answers, g, ws):
             for j in range(3):
                 ws.rotations[part, i, j] = g.spot_rotations[spot, i, j]
     place_boxes(kit.boxes, ws.types, ws.rotations, ws.translations, parts, ws.boxes)
-    quanta = np.empty(12, dtype=np.int64)
-    slack = 1.1 * kit.limits[1]
-    for i in range(parts):
-        for j in range(i + 1, parts):
-            apart = False
-            for axis in range(3):
-                gap = abs(ws.boxes[i, 0, axis] - ws.boxes[j, 0, axis])
-                apart = apart or gap > ws.boxes[i, 1, axis] + ws.boxes[j, 1, axis] + slack
-            if apart:
-                continue
-            quantise(
-                ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], kit.reach[ws.types[j]],
-                kit.limits[2], quanta,
-            )  # fmt: skip
-            answer = ask(answers.keys, answers.values, hash_key(ws.types[i], ws.types[j], quanta))
-            if answer == FORBIDDEN:
-                return Outcome.CLASH
-            if answer == MISSING:
-                if ws.counts[UNKNOWNS] == len(ws.unknown):
-                    return Outcome.UNKNOWN
-                ws.unknown[ws.counts[UNKNOWNS], 0] = i
-                ws.unknown[ws.counts[UNKNOWNS], 1] = j
-                ws.counts[UNKNOWNS] += 1
-            elif answer >= 0:
-                if ws.counts[EDGES] == len(ws.edges):
-                    return Outcome.TOO_LARGE
-                set_edge(ws.stamp, ws.label, ws.edges, ws.counts, i, j, answer // LABELS, answer % LABELS)
-    return Outcome.UNKNOWN if ws.counts[UNKNOWNS] > 0 else Outcome.OK
+    return find_contacts(kit, answers, ws)

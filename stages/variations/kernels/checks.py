@@ -10,7 +10,7 @@ from stages.variations.kernels.lookup import ask, hash_key, quantise
 from stages.variations.kernels.membership import admitted, neighbourhood_key, recalled
 from stages.variations.kernels.variant import set_edge
 
-__all__ = ["connect", "validate"]
+__all__ = ["connect", "find_contacts", "validate"]
 
 
 @numba.njit(cache=True, inline="always")
@@ -48,6 +48,38 @@ def _contact(kit, answers, ws, i, j, quanta):
     reach, quantum = kit.reach[ws.types[j]], kit.limits[2]
     quantise(ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], reach, quantum, quanta)
     return ask(answers.keys, answers.values, hash_key(ws.types[i], ws.types[j], quanta))
+
+
+@numba.njit(cache=True)
+def _must_ask(ws, i, j):
+    """List a pair whose answer is missing; False where there is no room for more."""
+    if ws.counts[UNKNOWNS] == len(ws.unknown):
+        return False
+    ws.unknown[ws.counts[UNKNOWNS], 0] = i
+    ws.unknown[ws.counts[UNKNOWNS], 1] = j
+    ws.counts[UNKNOWNS] += 1
+    return True
+
+
+@numba.njit(cache=True)
+def _add_contacts(kit, answers, ws, pairs):
+    """Add the contacts among the first `pairs` rows of `ws.near` to the edges; UNKNOWN as `connect` says it."""
+    quanta = np.empty(12, dtype=np.int64)
+    for k in range(pairs):
+        i, j = ws.near[k, 0], ws.near[k, 1]
+        if ws.stamp[i, j] == ws.counts[TRY]:
+            continue
+        answer = _contact(kit, answers, ws, i, j, quanta)
+        if answer == FORBIDDEN:
+            return Outcome.CLASH
+        if answer == MISSING:
+            if not _must_ask(ws, i, j):
+                return Outcome.UNKNOWN
+        elif answer >= 0:
+            if ws.counts[EDGES] == len(ws.edges):
+                return Outcome.TOO_LARGE
+            set_edge(ws.stamp, ws.label, ws.edges, ws.counts, i, j, answer // LABELS, answer % LABELS)
+    return Outcome.UNKNOWN if ws.counts[UNKNOWNS] > 0 else Outcome.OK
 
 
 @numba.njit(cache=True)
@@ -94,34 +126,27 @@ def connect(kit, answers, ws):
     refusal, is the same whatever was known: first the grammar of the parts that no such contact can change, then
     forbidden contacts, then the grammar of all parts.
     """
-    v = ws.counts[PARTS]
     ws.counts[UNKNOWNS] = 0
-    quanta = np.empty(12, dtype=np.int64)
-    pairs = _overlaps(ws.boxes, v, ws.origin, True, 1.1 * kit.limits[1], ws.near)
+    pairs = _overlaps(ws.boxes, ws.counts[PARTS], ws.origin, True, 1.1 * kit.limits[1], ws.near)
     if pairs < 0:
         return Outcome.TOO_LARGE
     if not _grammar_holds(kit, ws, pairs):
         return Outcome.GRAMMAR
-    for k in range(pairs):
-        i, j = ws.near[k, 0], ws.near[k, 1]
-        if ws.stamp[i, j] == ws.counts[TRY]:
-            continue
-        answer = _contact(kit, answers, ws, i, j, quanta)
-        if answer == FORBIDDEN:
-            return Outcome.CLASH
-        if answer == MISSING:
-            if ws.counts[UNKNOWNS] == len(ws.unknown):
-                return Outcome.UNKNOWN
-            ws.unknown[ws.counts[UNKNOWNS], 0] = i
-            ws.unknown[ws.counts[UNKNOWNS], 1] = j
-            ws.counts[UNKNOWNS] += 1
-        elif answer >= 0:
-            if ws.counts[EDGES] == len(ws.edges):
-                return Outcome.TOO_LARGE
-            set_edge(ws.stamp, ws.label, ws.edges, ws.counts, i, j, answer // LABELS, answer % LABELS)
-    if ws.counts[UNKNOWNS] > 0:
-        return Outcome.UNKNOWN
+    outcome = _add_contacts(kit, answers, ws, pairs)
+    if outcome != Outcome.OK:
+        return outcome
     return Outcome.OK if _grammar_holds(kit, ws, 0) else Outcome.GRAMMAR
+
+
+@numba.njit(cache=True)
+def find_contacts(kit, answers, ws):
+    """Add all contacts between the parts of a variant whose boxes are placed, where `ws` has none of its edges yet, or
+    some; OK, CLASH, TOO_LARGE, or UNKNOWN as `connect` says it."""
+    ws.counts[UNKNOWNS] = 0
+    pairs = _overlaps(ws.boxes, ws.counts[PARTS], ws.origin, False, 1.1 * kit.limits[1], ws.near)
+    if pairs < 0:
+        return Outcome.TOO_LARGE
+    return _add_contacts(kit, answers, ws, pairs)
 
 
 @numba.njit(cache=True)
@@ -130,22 +155,18 @@ def validate(kit, answers, ws):
 
     OK where they are the same, CLASH where they differ, UNKNOWN where pairs must be answered first.
     """
-    v = ws.counts[PARTS]
     ws.counts[UNKNOWNS] = 0
     quanta = np.empty(12, dtype=np.int64)
     seen = 0
-    pairs = _overlaps(ws.boxes, v, ws.origin, False, 1.1 * kit.limits[1], ws.near)
+    pairs = _overlaps(ws.boxes, ws.counts[PARTS], ws.origin, False, 1.1 * kit.limits[1], ws.near)
     if pairs < 0:
         return Outcome.TOO_LARGE
     for k in range(pairs):
         i, j = ws.near[k, 0], ws.near[k, 1]
         answer = _contact(kit, answers, ws, i, j, quanta)
         if answer == MISSING:
-            if ws.counts[UNKNOWNS] == len(ws.unknown):
+            if not _must_ask(ws, i, j):
                 return Outcome.UNKNOWN
-            ws.unknown[ws.counts[UNKNOWNS], 0] = i
-            ws.unknown[ws.counts[UNKNOWNS], 1] = j
-            ws.counts[UNKNOWNS] += 1
             continue
         predicted = ws.stamp[i, j] == ws.counts[TRY]
         if answer == FORBIDDEN or (answer >= 0) != predicted:

@@ -18,7 +18,6 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.read import Model, read_model
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
-from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, config_of, models_of, pose, ring
 
@@ -130,10 +129,6 @@ class TestForecast:
         found = forecast(kit, ContactAnswers(kit), TRIES)
         assert (found.finds.graphs, found.layouts) == (0, 0)
         assert "every part is its own type; bring a second model" in found.sentence
-
-    def test_patterns_are_counted_by_type_and_dockings(self) -> None:
-        kit = self.kit([chain(4)], CHAIN)  # two caps, unlike ends of the arrow; two inner links alike, two outer not
-        assert seen_once(observed_patterns(kit, upright=True)) == pytest.approx(4 / 6)
 
 
 def test_an_undecided_kit_says_what_is_open() -> None:

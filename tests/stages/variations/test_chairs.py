@@ -39,12 +39,12 @@ def kit(tmp_path_factory: pytest.TempPathFactory) -> Kit:
 @pytest.fixture(scope="module")
 def found(kit: Kit) -> list[Variant]:
     line = Search(ContactAnswers(kit), SearchConfig())
-    return line.run(np.random.default_rng(0), 2000, 60, "test", lambda count: None)[0]
+    return line.run(np.random.default_rng(0), 4000, 60, "test", lambda count: None)[0]
 
 
 def test_legs_backs_and_arms_are_exchanged_within_their_meanings(kit: Kit, found: list[Variant]) -> None:
     assert {"seat", "leg", "back_post", "arm"} <= set(kit.labels) < set(kit.type_names())
-    assert len(found) >= 50
+    assert len(found) == 60
     assert {each.lineage["method"] for each in found} == {"exchange", "substitution"}
     legs = {
         tuple(sorted(kit.types[part].name for part in each.assembly.types if kit.types[part].label == "leg"))

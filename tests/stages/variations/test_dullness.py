@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from stages.shape.kit import Kit
+from stages.shape.kit import Kit, Strictness
 from stages.variations.dullness import dullness, mutual_distance
 from tests.stages.variations.toy import CHAIN, chain, kit_of
 
@@ -50,3 +50,23 @@ def test_what_would_help_is_what_the_kit_has_not_done_already() -> None:
     loosest = replace(one_chain().grammar, strictness="count_and_types", hubs=(0,))
     kit = replace(kit_of(CHAIN, [chain(3), chain(5)]), grammar=loosest)
     assert dullness(kit, dull).endswith("what would help: one more model of the same parts")
+
+
+@pytest.mark.parametrize(
+    ("strictness", "looser"),
+    [
+        ("multiset", "count_and_pairs"),
+        ("count_and_set", "count_and_pairs"),
+        ("count_and_pairs", "count_and_types"),
+        ("count_and_types", None),
+        ("slot_pairs", "slot_fillings"),
+        ("slot_fillings", "slots"),
+        ("slots", None),
+    ],
+)
+def test_a_looser_grammar_would_help_where_there_is_one_of_its_kind(strictness: Strictness, looser: str | None) -> None:
+    kit = one_chain()
+    said = dullness(replace(kit, grammar=replace(kit.grammar, strictness=strictness)), {**LIVELY, "copied": 1.0})
+    assert said.startswith("dull: ")
+    assert ("a looser grammar" in said) == (looser is not None)
+    assert looser is None or f"(grammar: {looser})" in said

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,7 +88,7 @@ def test_round_parts_with_too_many_images_are_seen_from_all_sides_all_the_same()
 
 
 @pytest.mark.parametrize("folder", SHIPPED[:2], ids=lambda folder: folder.name)
-def test_levels_grow_and_growth_keeps_to_each(folder) -> None:  # type: ignore[no-untyped-def]
+def test_levels_grow_and_growth_keeps_to_each(folder: Path) -> None:
     observed = shipped_kit(folder)
     grammars = [SlotGrammar(observed, True, level) for level in SLOT_LEVELS]
     for grammar in grammars:

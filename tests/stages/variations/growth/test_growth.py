@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from stages.shape.graphs.patterns import Pattern, observed_patterns, seen_once
-from stages.shape.kit import Assembly, Exemplar, Kit
+from stages.shape.graphs.patterns import observed_patterns
+from stages.shape.kit import Exemplar, Kit
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
@@ -21,12 +22,6 @@ def grown(kit: Kit, tries: int = 20_000, wanted: int = 10**9, **settings: object
     line = Search(ContactAnswers(kit), SearchConfig.model_validate({"method": "growth", **settings}))
     found, _ = line.run(np.random.default_rng(5), tries, wanted, "test", lambda count: None)
     return line, found
-
-
-def patterns_alone(kit: Kit, assembly: Assembly) -> list[Pattern]:
-    """What stands around the parts of an assembly, each pattern once."""
-    names = tuple(str(part) for part in range(len(assembly)))
-    return observed_patterns(replace(kit, exemplars=(Exemplar("variant", assembly, names),)), upright=True)
 
 
 def test_every_chain_within_the_limits_is_grown() -> None:
@@ -53,7 +48,7 @@ def test_every_rectangle_of_one_way_road_is_grown_and_nothing_but_closed_rings()
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
-def test_grown_shapes_have_observed_patterns_alone(folder) -> None:  # type: ignore[no-untyped-def]
+def test_grown_shapes_have_observed_patterns_alone(folder: Path) -> None:
     kit = shipped_kit(folder)
     known = len(observed_patterns(kit, upright=True))
     _, found = grown(kit, wanted=12)
@@ -93,11 +88,3 @@ def test_what_goes_wrong_while_a_kernel_asks_is_raised() -> None:
     line.answers.contact.touches = None  # type: ignore[assignment,method-assign]
     with pytest.raises(TypeError):
         line.run(np.random.default_rng(0), 100, 1, "test", lambda count: None)
-
-
-def test_patterns_of_a_chain_are_counted_modulo_symmetry() -> None:
-    kit = kit_of(CHAIN, [chain(3), chain(5)])
-    patterns = observed_patterns(kit, upright=True)
-    counts = sorted(each.seen for each in patterns)
-    assert sum(counts) == sum(len(each.assembly) for each in kit.exemplars)
-    assert seen_once(patterns) == sum(each == 1 for each in counts) / sum(counts)

@@ -1,0 +1,33 @@
+"""Files that a command was asked for: there whole, or not at all and with a word why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import ConfigError
+from pipeline.places import write_file
+
+
+def test_a_file_comes_with_its_folders_and_its_path(tmp_path: Path) -> None:
+    path = tmp_path / "some" / "where" / "a.txt"
+    assert write_file(path, b"first") == path
+    assert path.read_bytes() == b"first"
+
+
+def test_who_reads_the_old_file_meanwhile_reads_all_of_it(tmp_path: Path) -> None:
+    path = write_file(tmp_path / "a.txt", b"first")
+    with path.open("rb") as stream:
+        write_file(path, b"second")
+        assert stream.read() == b"first"
+    assert path.read_bytes() == b"second"
+
+
+@pytest.mark.parametrize("name", ["folder", "file/a.txt"])
+def test_a_file_that_cannot_be_written_is_named_and_leaves_nothing(tmp_path: Path, name: str) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").touch()
+    with pytest.raises(ConfigError, match=f"{name}: cannot be written there: "):
+        write_file(tmp_path / name, b"x")
+    assert sorted(each.name for each in tmp_path.rglob("*")) == ["file", "folder"]

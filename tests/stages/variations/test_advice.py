@@ -1,0 +1,31 @@
+"""What is said to the user of a kit in which nothing is found: the advice can be taken, and what it names then ends."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from stages.exemplars.build import build_kit
+from stages.shape.kit import Kit
+from stages.variations.advice import what_keeps
+from tests.stages.variations.toy import box, config_of, models_of, pose
+
+BLOCKS = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
+ROW = [("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]
+
+
+def row(types: str) -> Kit:
+    """Three blocks of three lengths in a row; a and c are called alike."""
+    (model,) = models_of(BLOCKS, [ROW])
+    called = tuple(replace(part, label="middle" if part.mesh_name == "b" else "end") for part in model.parts)
+    return build_kit(config_of([ROW]).model_copy(update={"types": types}), [replace(model, parts=called)])[0]
+
+
+@pytest.mark.parametrize("types", ["congruence", "labels"])
+def test_where_every_part_is_its_own_type_the_key_that_is_advised_changes_that(types: str) -> None:
+    said = what_keeps(row(types), {}, 100)
+    assert said.startswith("every part is its own type; ")
+    (advised,) = re.findall(r"`types: (\w+)`", said)
+    assert "own type" not in what_keeps(row(advised), {}, 100)
