@@ -56,7 +56,7 @@ def forecast(kit: Kit, answers: ContactAnswers, tries: int, known: int = 0) -> F
     layouts = _layouts(finds)
     sizes = [len(each.assembly) for each in probe.variants]
     parts = (min(sizes, default=0), max(sizes, default=0))
-    once = seen_once(observed_patterns(kit, upright=True))
+    once = seen_once(observed_patterns(kit, answers.dockings, upright=True))
     return Forecast(finds, layouts, parts, once, _sentence(kit, finds, layouts, parts), probe.variants)
 
 

@@ -29,8 +29,8 @@ FAMILIAR = 0.85
 """Share of parts with fillings as seen below which a grammar of slots is too loose for a kit."""
 FEW = 20
 """Fewer graphs than this are next to nothing."""
-PROMISING = 4
-"""A setting that gave so many graphs in the first tries gets more of them."""
+PROMISING = 10
+"""A setting that gave so many histograms in the first tries gets more of them."""
 LONGER = 4
 """As many times the tries, for a setting that looks promising."""
 STAY = 0.6

@@ -28,6 +28,8 @@ METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
 """Each has tries of its own, for a grown shape of a large kit costs as much as hundreds of exchanges."""
 HUB = 40
 """Where a part has more neighbours than this, nothing is grown: all around it is a copy, and dear."""
+FIRST = 5
+"""Growth that finds nothing in one of so many parts of its tries is given up."""
 SEARCH = SearchConfig(duplicates="graph")
 """A probe counts distinct graphs, whatever the config calls a duplicate."""
 
@@ -72,23 +74,32 @@ class Probe:
         self.kit = answers.kit
         self.variants: list[Variant] = []
         self._rng = rng
+        self._graphs: set[int] = set()
         self._tries = 0
         widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
         methods = METHODS if widest <= HUB else METHODS[:1]
-        self._searches = [Search(answers, SEARCH.model_copy(update={"method": method})) for method in methods]
+        slotted = self.kit.grammar.strictness in SLOT_LEVELS
+        self._slots = SlotGrammar(self.kit, answers.dockings, SEARCH.upright) if slotted else None
+        self._searches = [
+            Search(answers, SEARCH.model_copy(update={"method": method}), self._slots) for method in methods
+        ]
 
     def go_on(self, tries: int, wanted: int) -> Finds:
-        """Search on by each method until there are `wanted` variants, or it has had so many more `tries`."""
-        graphs = {each.graph for each in self.variants}
+        """Search on by each method until there are `wanted` variants, or it has had so many more `tries`. Growth, whose
+        shapes are all complete, gives up as soon as the first of them show nothing new."""
         for search in self._searches:
-            missing = wanted - len(self.variants)
-            if missing > 0:
-                found, used = search.run(self._rng, tries, missing, f"probe-{self._tries}", lambda _: None)
+            left = tries
+            while left > 0 and len(self.variants) < wanted:
+                asked = max(tries // FIRST, 1) if search.config.method == "growth" and left == tries else left
+                found, used = search.run(
+                    self._rng, asked, wanted - len(self.variants), f"probe-{self._tries}", lambda _: None
+                )
                 self._tries += used
-                for each in found:
-                    if each.graph not in graphs:
-                        graphs.add(each.graph)
-                        self.variants.append(each)
+                left -= used
+                self.variants.extend(each for each in found if each.graph not in self._graphs)
+                self._graphs.update(each.graph for each in found)
+                if not found:
+                    break
         return self.finds()
 
     def finds(self) -> Finds:
@@ -115,10 +126,9 @@ class Probe:
         )
 
     def _familiar(self, assemblies: Sequence[Assembly]) -> float:
-        if self.kit.grammar.strictness not in SLOT_LEVELS:
+        if self._slots is None:
             return 1.0
-        grammar = SlotGrammar(self.kit, SEARCH.upright)
-        return round(float(np.mean([grammar.familiar(each) for each in assemblies])), 4)
+        return round(float(np.mean([self._slots.familiar(each) for each in assemblies])), 4)
 
 
 def _counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:

@@ -16,6 +16,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.contact import ContactTest, overlapping_boxes
+from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.geometry.pose import invert
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
@@ -107,13 +108,23 @@ def _contacts(
 def _grammar_faults(kit: Kit, assembly: Assembly, names: Sequence[str]) -> list[str]:
     known, labelled = kit.labels, kit.labelled(assembly)
     faults = []
-    misfits = SlotGrammar(kit, upright=True).misfits(assembly) if kit.grammar.strictness in SLOT_LEVELS else ()
+    misfits = _slot_misfits(kit, assembly) if kit.grammar.strictness in SLOT_LEVELS else ()
     for part, neighbours in enumerate(assembly.neighbours()):
         around = labelled.multiset(neighbours)
         if part in misfits or not admits(kit.grammar, int(labelled.types[part]), around):
             listed = ", ".join(f"{count} {known[other]}" for other, count in around) or "nothing"
             faults.append(f"{names[part]} has a neighbourhood that the grammar does not admit: {listed}")
     return faults
+
+
+def _slot_misfits(kit: Kit, assembly: Assembly) -> list[int]:
+    """Parts around which slots are filled as the grammar does not admit, neither as parts stood in the exemplars nor
+    however they may be turned: a search need not be upright."""
+    dockings = DockingTable.of(kit)
+    misfits = SlotGrammar(kit, dockings, upright=True).misfits(assembly)
+    if not misfits:
+        return []
+    return sorted({*misfits} & {*SlotGrammar(kit, dockings, upright=False).misfits(assembly)})
 
 
 def _penetration_faults(

@@ -19,7 +19,7 @@ __all__ = ["describe_kit", "load_kit", "write_kit"]
 def describe_kit(kit: Kit) -> dict[str, Any]:
     """The kit as JSON that a person can read: types, exemplars, neighbourhoods by label, dockings by type name."""
     names, labels = kit.type_names(), kit.labels
-    table = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
+    table = DockingTable.of(kit)
     return {
         "kit": kit.name,
         "up": kit.up,

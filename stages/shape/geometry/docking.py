@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, pose_vectors
-from stages.shape.kit import Docking, PartType
+from stages.shape.kit import Docking, Kit, PartType
 
 __all__ = ["DockingTable", "symmetric_images"]
 
@@ -78,6 +78,11 @@ class DockingTable:
                 place[candidate] = len(kept)
                 kept.append(candidate)
             self.images[pair] = poses[kept], labels[kept]
+
+    @classmethod
+    def of(cls, kit: Kit) -> DockingTable:
+        """The dockings of a kit's grammar."""
+        return cls(kit.types, kit.grammar.dockings, kit.pose_tolerance)
 
     def label(self, a: int, b: int, poses: FloatArray) -> IntArray:
         """Directed labels int32 (m,), seen from the part of type `a`, of a part of type `b` at `poses` (m, 4, 4)."""

@@ -32,17 +32,16 @@ class Pattern:
     owner: int
 
 
-def observed_patterns(kit: Kit, upright: bool) -> list[Pattern]:
+def observed_patterns(kit: Kit, dockings: DockingTable, upright: bool) -> list[Pattern]:
     """The patterns of all parts of the exemplars, each once, in the order of their types.
 
-    With `upright` patterns that differ only in which way is up are two.
+    dockings: those of the kit. With `upright` patterns that differ only in which way is up are two.
     """
-    table = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
     axis = {"y": 1, "z": 2}[kit.up]
     found: dict[tuple[int, ...], list[Pattern]] = {}
     for number, exemplar in enumerate(kit.exemplars):
         assembly = exemplar.assembly
-        labels = table.label_edges(assembly.types, assembly.poses, assembly.edges)
+        labels = dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
         tails = np.concatenate([assembly.edges[:, 0], assembly.edges[:, 1]])
         heads = np.concatenate([assembly.edges[:, 1], assembly.edges[:, 0]])
         seen_from = np.concatenate([labels[:, 0], labels[:, 1]])

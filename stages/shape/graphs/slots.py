@@ -22,6 +22,7 @@ from itertools import combinations, product
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert
 from stages.shape.graphs.patterns import SAME_UP, Pattern, observed_patterns
 from stages.shape.kit import Assembly, Kit, Strictness
@@ -85,14 +86,15 @@ class _Stance:
 class SlotGrammar:
     """What a kit's exemplars show of the slots around its types; the kit's grammar says how strict it is."""
 
-    def __init__(self, kit: Kit, upright: bool, level: Strictness | None = None) -> None:
+    def __init__(self, kit: Kit, dockings: DockingTable, upright: bool, level: Strictness | None = None) -> None:
+        """dockings: those of the kit."""
         self.kit = kit
         self.level = level or kit.grammar.strictness
         self.upright = upright
         self._axis = {"y": 1, "z": 2}[kit.up]
         self._limit = 2.0 * kit.pose_tolerance
         self._stances: dict[int, list[_Stance]] = {}
-        for pattern in observed_patterns(kit, upright):
+        for pattern in observed_patterns(kit, dockings, upright):
             self._stance(pattern).patterns.append(pattern)
         for stances in self._stances.values():
             for stance in stances:

@@ -7,10 +7,12 @@ import ctypes
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.graphs.patterns import observed_patterns
+from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 from stages.variations.growth.grow import grow, take_over
 from stages.variations.growth.layout import WORK, Contacts, Field, growing
-from stages.variations.growth.patterns import pattern_tables, patterns_of
+from stages.variations.growth.patterns import pattern_tables
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import PARTS, UNKNOWNS, KitTables, Outcome, Workspace
 
@@ -33,8 +35,10 @@ MEMORY = 0.9
 class Grower:
     """Grows shapes within limits of size.
 
-    parts, footprint: (least, most) parts, and sides of the area seen from above in the kit's units, the shorter first;
-    None where only `smallest` and `largest` parts, and what room so many parts take in the exemplars, set the limits.
+    slots: of a kit with a grammar of slots, whose patterns grow then, those that nobody has seen among them; else the
+    observed ones do. parts, footprint: (least, most) parts, and sides of the area seen from above in the kit's units,
+    the shorter first; None where only `smallest` and `largest` parts, and what room so many parts take in the
+    exemplars, set the limits.
     """
 
     def __init__(
@@ -43,6 +47,7 @@ class Grower:
         tables: KitTables,
         smallest: int,
         largest: int,
+        slots: SlotGrammar | None = None,
         parts: tuple[int, int] | None = None,
         footprint: tuple[float, float] | None = None,
     ) -> None:
@@ -50,7 +55,7 @@ class Grower:
         self.kit, self.answers, self.tables = kit, answers, tables
         self.smallest, self.largest = smallest, largest
         self.parts, self.footprint = parts, footprint
-        self.patterns = patterns_of(kit, tables.up >= 0)
+        self.patterns = slots.patterns() if slots else observed_patterns(kit, answers.dockings, tables.up >= 0)
         self._tables = pattern_tables(kit, self.patterns)
         self._g = growing(len(kit.types), largest)
         self._asker = answers.asker(self._g.spot_types, self._g.spot_rotations, self._g.spot_translations)

@@ -6,21 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
-from stages.shape.graphs.patterns import Pattern, observed_patterns
-from stages.shape.graphs.slots import SlotGrammar
+from stages.shape.graphs.patterns import Pattern
 from stages.shape.kit import Kit
 from stages.variations.growth.layout import PatternTables
 
-__all__ = ["pattern_tables", "patterns_of"]
-
-
-def patterns_of(kit: Kit, upright: bool) -> list[Pattern]:
-    """The patterns that growth may use: those observed, and where the kit's grammar is one of slots others that it
-    admits too."""
-    if kit.grammar.strictness in SLOT_LEVELS:
-        return SlotGrammar(kit, upright).patterns()
-    return observed_patterns(kit, upright)
+__all__ = ["pattern_tables"]
 
 
 def pattern_tables(kit: Kit, patterns: Sequence[Pattern]) -> PatternTables:

@@ -35,7 +35,7 @@ class ContactAnswers:
     def __init__(self, kit: Kit) -> None:
         self.kit = kit
         self.contact = ContactTest(kit.types, kit.contact_tolerance)
-        self.dockings = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
+        self.dockings = DockingTable.of(kit)
         self.table = Answers(np.zeros(1 << 16, dtype=np.uint64), np.zeros(1 << 16, dtype=np.int64))
         self.asked = 0
         self._broken: BaseException | None = None

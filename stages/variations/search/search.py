@@ -85,9 +85,12 @@ class Variant:
 
 
 class Search:
-    """One line of search: its parents, what it has seen, what it has learnt about contacts."""
+    """One line of search: its parents, what it has seen, what it has learnt about contacts.
 
-    def __init__(self, answers: ContactAnswers, config: SearchConfig) -> None:
+    slots: what the kit shows of slots, where its grammar is one of slots and somebody knows them already.
+    """
+
+    def __init__(self, answers: ContactAnswers, config: SearchConfig, slots: SlotGrammar | None = None) -> None:
         kit = answers.kit
         self.kit = kit
         self.answers = answers
@@ -99,7 +102,7 @@ class Search:
         self._histogram_weights = multiset_weights(len(kit.types))
         self._ws = workspace(max(self.largest, *sizes))
         slotted = kit.grammar.strictness in SLOT_LEVELS
-        self._slots = SlotGrammar(kit, config.upright) if slotted else None
+        self._slots = (slots or SlotGrammar(kit, answers.dockings, config.upright)) if slotted else None
         self._grower = self._made_grower() if config.method != "exchange" else None
         self.archive = Archive(config.novelty.quota)
         by_meaning = len(kit.labels) < len(kit.types)
@@ -245,7 +248,7 @@ class Search:
 
     def _made_grower(self) -> Grower:
         grown, limits = self.config.grown, (self.smallest, self.largest)
-        return Grower(self.answers, self.tables, *limits, grown.parts, grown.footprint)
+        return Grower(self.answers, self.tables, *limits, self._slots, grown.parts, grown.footprint)
 
     def _grow(self, rng: np.random.Generator) -> tuple[Variant | str, float]:
         """One shape grown from nothing: a new variant, or the reason why there is none; and what it cost."""

@@ -71,7 +71,7 @@ def test_a_fit_holds_within_its_slack_at_every_image_and_from_both_sides(
 ) -> None:
     kit = table_kit_of_both()
     fit = fits(kit)["top", "leg_2"]
-    table = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
+    table = DockingTable.of(kit)
     index = kit.grammar.dockings.index(fit)
     way = np.array(direction) / max(np.linalg.norm(direction), 1e-9)
     moved = pose(0, 0, 0, quarter_turns) @ fit.pose
@@ -95,7 +95,7 @@ def table_kit_of_both() -> Kit:
 
 
 def test_the_poses_of_a_pair_are_those_seen_and_those_that_fit(kit: Kit) -> None:
-    table = DockingTable(kit.types, kit.grammar.dockings, kit.pose_tolerance)
+    table = DockingTable.of(kit)
     corners = {(x, z) for x in (-0.8, 0.8) for z in (-0.8, 0.8)}
     for top in (0, 2):
         for leg in (1, 3):

@@ -70,7 +70,7 @@ def kit(*exemplars: Assembly) -> Kit:
 
 
 def copied(own: Kit, shape: Assembly) -> Copied:
-    table = DockingTable(own.types, own.grammar.dockings, own.pose_tolerance)
+    table = DockingTable.of(own)
     return CopyTest(own, table).copied(shape, table.label_edges(shape.types, shape.poses, shape.edges))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.patterns import Pattern, observed_patterns, seen_once
 from stages.shape.kit import Kit
 from tests.stages.variations.toy import CHAIN, box, chain, kit_of
@@ -19,7 +20,7 @@ def named(kit: Kit, patterns: list[Pattern]) -> list[tuple[str, str, float]]:
 
 def test_patterns_of_arrows_tell_their_two_ends_apart() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
-    patterns = observed_patterns(kit, upright=True)
+    patterns = observed_patterns(kit, DockingTable.of(kit), upright=True)
     ends = [("cap", "link", 2), ("link", "cap link", 2)]
     assert named(kit, patterns) == sorted([*ends, *ends, ("link", "link link", 4)])
     assert seen_once(patterns) == 0.0
@@ -27,13 +28,17 @@ def test_patterns_of_arrows_tell_their_two_ends_apart() -> None:
 
 def test_patterns_are_one_modulo_the_symmetries_of_the_part() -> None:
     kit = kit_of(PLAIN, [chain(3), chain(5)])
-    patterns = observed_patterns(kit, upright=True)
+    patterns = observed_patterns(kit, DockingTable.of(kit), upright=True)
     assert named(kit, patterns) == [("cap", "link", 4), ("link", "cap link", 4), ("link", "link link", 4)]
 
 
 def test_a_pattern_belongs_to_the_exemplar_that_showed_it_first() -> None:
     kit = kit_of(CHAIN, [chain(1), chain(5)])
-    owners = {(each.owner, *seen) for each in observed_patterns(kit, upright=True) for seen in named(kit, [each])}
+    owners = {
+        (each.owner, *seen)
+        for each in observed_patterns(kit, DockingTable.of(kit), upright=True)
+        for seen in named(kit, [each])
+    }
     assert owners == {
         (0, "cap", "link", 2),
         (0, "link", "cap cap", 1),
@@ -45,4 +50,4 @@ def test_a_pattern_belongs_to_the_exemplar_that_showed_it_first() -> None:
 @pytest.mark.parametrize(("lengths", "share"), [((1,), 1.0), ((4,), 4 / 6), ((1, 5), 3 / 10), ((3, 5), 0.0)])
 def test_share_of_parts_whose_pattern_no_other_shows(lengths: tuple[int, ...], share: float) -> None:
     kit = kit_of(CHAIN, [chain(length) for length in lengths])
-    assert seen_once(observed_patterns(kit, upright=True)) == pytest.approx(share)
+    assert seen_once(observed_patterns(kit, DockingTable.of(kit), upright=True)) == pytest.approx(share)

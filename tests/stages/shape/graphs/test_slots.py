@@ -10,6 +10,7 @@ import pytest
 import trimesh
 
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
@@ -38,7 +39,9 @@ def admitted(seen: list[tuple[str, str]], asked: tuple[str, str]) -> list[str]:
     """The levels that let the middle have `asked` to its left and right, where `seen` are all exemplars."""
     kit = kit_of(BLOCKS, [row(*each) for each in seen])
     shape = built(kit, row(*asked))
-    return [level for level in SLOT_LEVELS if 0 not in SlotGrammar(kit, True, level).misfits(shape)]
+    return [
+        level for level in SLOT_LEVELS if 0 not in SlotGrammar(kit, DockingTable.of(kit), True, level).misfits(shape)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -67,7 +70,7 @@ def test_symmetric_parts_are_seen_from_all_sides() -> None:
     kit = kit_of({**BLOCKS, "middle": box(1, 1, 1)}, [row("red", ""), row("red", "")])
     turned = [(name, pose(0, 0, 0, 1) @ at) for name, at in row("red", "")]
     for shape in (row("", "red"), turned):
-        assert SlotGrammar(kit, True, "slot_pairs").misfits(built(kit, shape)) == []
+        assert SlotGrammar(kit, DockingTable.of(kit), True, "slot_pairs").misfits(built(kit, shape)) == []
 
 
 def test_round_parts_with_too_many_images_are_seen_from_all_sides_all_the_same() -> None:
@@ -82,7 +85,7 @@ def test_round_parts_with_too_many_images_are_seen_from_all_sides_all_the_same()
     seen = [0, 40, 90, 131, 170, 215]
     kit = kit_of({**BLOCKS, "drum": drum}, [around(0.0, seen), around(quarter, seen)])
     assert len(kit.types[0].symmetries) >= 512
-    grammar = SlotGrammar(kit, True, "slot_fillings")
+    grammar = SlotGrammar(kit, DockingTable.of(kit), True, "slot_fillings")
     assert grammar.misfits(built(kit, around(5 * quarter, seen))) == []
     assert 0 in grammar.misfits(built(kit, around(0.0, [0, 40, 90, 131, 170, 200])))
 
@@ -90,7 +93,7 @@ def test_round_parts_with_too_many_images_are_seen_from_all_sides_all_the_same()
 @pytest.mark.parametrize("folder", SHIPPED[:2], ids=lambda folder: folder.name)
 def test_levels_grow_and_growth_keeps_to_each(folder: Path) -> None:
     observed = shipped_kit(folder)
-    grammars = [SlotGrammar(observed, True, level) for level in SLOT_LEVELS]
+    grammars = [SlotGrammar(observed, DockingTable.of(observed), True, level) for level in SLOT_LEVELS]
     for grammar in grammars:
         assert all(grammar.misfits(each.assembly) == [] for each in observed.exemplars)
         assert grammar.familiar(observed.exemplars[0].assembly) == 1.0
@@ -112,4 +115,4 @@ def test_exchange_keeps_to_slots_too() -> None:
     line = Search(ContactAnswers(kit), SearchConfig(method="exchange"))
     found, _ = line.run(np.random.default_rng(4), 1500, 20, "test", lambda count: None)
     assert found
-    assert all(SlotGrammar(kit, True).misfits(each.assembly) == [] for each in found)
+    assert all(SlotGrammar(kit, DockingTable.of(kit), True).misfits(each.assembly) == [] for each in found)

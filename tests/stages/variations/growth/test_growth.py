@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.patterns import observed_patterns
 from stages.shape.kit import Exemplar, Kit
 from stages.variations.kernels.answers import ContactAnswers
@@ -50,12 +51,12 @@ def test_every_rectangle_of_one_way_road_is_grown_and_nothing_but_closed_rings()
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
 def test_grown_shapes_have_observed_patterns_alone(folder: Path) -> None:
     kit = shipped_kit(folder)
-    known = len(observed_patterns(kit, upright=True))
+    known = len(observed_patterns(kit, DockingTable.of(kit), upright=True))
     _, found = grown(kit, wanted=12)
     assert len(found) >= 12
     for variant in found:
         both = (*kit.exemplars, Exemplar("variant", variant.assembly, ("",) * len(variant.assembly)))
-        assert len(observed_patterns(replace(kit, exemplars=both), upright=True)) == known
+        assert len(observed_patterns(replace(kit, exemplars=both), DockingTable.of(kit), upright=True)) == known
         assert variant.lineage["method"] == "growth"
         assert sum(variant.lineage["parts_from"]) == len(variant.assembly)
 
