@@ -14,7 +14,7 @@ from stages.exemplars.grammar import Contacts, observe_contacts, observe_neighbo
 from stages.exemplars.hubs import set_hubs_aside, with_touching
 from stages.exemplars.identify import Identified
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.kit import Assembly, ContactKind, Exemplar, Grammar, Kit, Strictness
+from stages.shape.kit import Assembly, ContactKind, Exemplar, Grammar, Kit, Strictness, labels_of
 
 __all__ = ["Setting", "Sight", "contact_tolerance"]
 
@@ -139,7 +139,9 @@ class Sight:
         seen = [with_touching(each, keep, setting.hubs) for each, keep in zip(counted, staying, strict=True)]
         everything = [each.select(parts) for each, parts in zip(counted, seen, strict=True)]
         dockings = tuple(each for each in self.contacts.dockings if each.kind in setting.kinds)
-        grammar = Grammar(observe_neighbourhoods(everything), dockings, self._nested, setting.grammar)
+        labels = labels_of(self.types)[1]
+        labelled = [replace(each, types=labels[each.types]) for each in everything]
+        grammar = Grammar(observe_neighbourhoods(labelled), dockings, self._nested, setting.grammar)
         edges = [each.edges for each in everything]
         face: ContactKind = "face"  # no kinds are asked for
         kinds = [(face,) * len(each) for each in edges]

@@ -54,8 +54,10 @@ def set_hubs_aside(
     The assemblies without hubs; their hubs alone, without contacts; the grammar, in which no neighbourhood counts
     hubs, those of hubs themselves being the parts around them that are none; and the `kinds` of those `contacts` that
     join two parts that are no hubs.
-    Dockings stay those of all parts.
+    Dockings stay those of all parts. Without hubs the grammar stays as it is, for neighbourhoods go by label.
     """
+    if not len(hub_types):
+        return list(assemblies), [each.select(np.empty(0, dtype=np.int64)) for each in assemblies], grammar, list(kinds)
     is_hub = [np.isin(each.types, hub_types) for each in assemblies]
     bare = [each.select(np.flatnonzero(~hub)) for each, hub in zip(assemblies, is_hub, strict=True)]
     alone = [each.select(np.flatnonzero(hub)) for each, hub in zip(assemblies, is_hub, strict=True)]

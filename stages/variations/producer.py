@@ -141,7 +141,7 @@ PRODUCER = Producer(
     limits=(
         "All parts are those of the exemplars, and they meet only as parts meet there. What is learnt of these kits "
         "need not hold for other castles, temples or tracks.",
-        "A variant is made of pieces of its parents and resembles them.",
+        "A variant is made of pieces of its parents, or grown of what stands around their parts, and resembles them.",
     ),
     card=_made,
     variety=_variety,

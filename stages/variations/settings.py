@@ -84,15 +84,22 @@ class SearchConfig(StrictModel):
     )
     method: Literal["both", "exchange", "growth"] = Field(
         "both",
-        description="How variants are made: pieces of two shapes are exchanged, shapes are grown part by part from "
-        "what was seen around parts, or both, each given its share by what it finds.",
+        description="How variants are made: pieces of two shapes are exchanged (with `types: meaning` also parts that "
+        "mean the same), shapes are grown part by part from what was seen around parts, or both, each given its share "
+        "by what it finds.",
     )
     grown: GrownConfig = Field(default_factory=GrownConfig, description="What grown shapes are to be like.")
     growth_share: float = Field(
-        0.3, ge=0, le=1, description="Share of pieces grown part by part; the rest are cut by half-space, slab or box."
+        0.3,
+        ge=0,
+        le=1,
+        description="Share of exchanged pieces that are grown part by part; others are cut by half-space, slab or box.",
     )
     exemplar_share: float = Field(
-        0.15, ge=0, le=1, description="Share of parents drawn from the exemplars; the rest are earlier variants."
+        0.15,
+        ge=0,
+        le=1,
+        description="Share of the exchange's parents drawn from the exemplars; the rest are earlier variants.",
     )
     parents: int = Field(2000, ge=1, description="Most earlier variants that one shard of the search holds as parents.")
     lanes: int = Field(2, ge=1, le=64, description="Shards of the search that run beside each other in a round.")

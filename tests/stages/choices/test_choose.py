@@ -12,13 +12,15 @@ import pytest
 
 from stages.choices.choose import Choices, choose
 from stages.choices.forecast import forecast
-from stages.choices.sight import contact_tolerance
+from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
 from stages.exemplars.build import build_kit
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.read import Model, read_model
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
+from stages.shape.kit import ContactKind
 from stages.variations.kernels.answers import ContactAnswers
+from tests.stages.variations.tables import ROUND, SQUARE, THICK, THIN, table
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, config_of, models_of, pose, ring
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -110,6 +112,18 @@ class TestLadder:
         made = chosen([shape], CHAIN)
         assert made.values["disconnected"] == "largest"
         assert made.reasons["disconnected"] == "1 part stands apart from the largest piece"
+
+    def test_what_is_told_by_meaning_is_probed_by_meaning(self) -> None:
+        models = [table(THIN, SQUARE), table(THICK, ROUND)]
+        config = left_open([[], []], types="meaning")
+        identified = identify_parts(models, config)
+        kinds: tuple[ContactKind, ...] = ("point", "line", "face")
+        probed = Sight(identified, 1e-3, config.pose_tolerance, "y").kit(Setting(kinds, "multiset"))
+        built, _ = build_kit(config.decide(STRICTEST), models)
+        assert probed.grammar.neighbourhoods == built.grammar.neighbourhoods
+        made = choose(config, models, identified, TRIES)
+        assert set(made.values) == set(config.left_open())
+        assert made.finds is not None
 
 
 class TestForecast:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from stages.shape.kit_files import describe_kit
 from stages.shape.sample import Sample
 from stages.shape.shape import kit_shape
 from tests.stages.variations.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
+from tests.stages.variations.toy import models_of, pose
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +40,15 @@ def test_neighbourhoods_are_those_of_labels_and_dockings_those_of_surfaces(kit: 
     assert kit.grammar.neighbourhoods == {0: {((1, 4),): 2}, 1: {((0, 1),): 8}}
     seen = [(each.a, each.b, each.count) for each in kit.grammar.dockings if each.count]
     assert seen == [(0, 1, 4), (2, 3, 4)]
+
+
+def test_neighbourhoods_are_those_of_labels_also_where_parts_stand_apart_and_are_left_out() -> None:
+    (shelf,) = models_of({"shelf": THIN}, [[("shelf", pose(9.0, 0.0, 0.0))]])
+    first, second = table(THIN, SQUARE), table(THICK, ROUND)
+    apart = replace(first, parts=(*shelf.parts, *first.parts))
+    kit = table_kit(apart, second, disconnected="largest")
+    assert kit.labels == ("top", "leg")
+    assert kit.grammar.neighbourhoods == {0: {((1, 4),): 2}, 1: {((0, 1),): 8}}
 
 
 def test_a_kit_by_congruence_or_labels_says_nothing_of_meanings() -> None:
