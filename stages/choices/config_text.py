@@ -15,6 +15,9 @@ __all__ = ["config_text", "dataset_name"]
 
 MOST = 200
 """Variants that the config asks for, if there are as many."""
+UNSEEN = 3
+"""So many times the layouts of the forecast are asked for: some are far rarer than others, and a short search counts
+those that come again and again."""
 
 
 def dataset_name(models: Sequence[Path]) -> str:
@@ -35,7 +38,7 @@ def config_text(
     made = config.decided()
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
     why = "; ".join(dict.fromkeys(model.why for model in models))
-    wanted = MOST if layouts is None else max(1, min(MOST, layouts))
+    wanted = MOST if layouts is None else max(1, min(MOST, UNSEEN * layouts))
     kit: list[tuple[int, str, Any, str]] = [
         (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else ""),
         (3, "types", config.types, "what makes a part type"),
@@ -66,7 +69,7 @@ def config_text(
         '        license: ""',
         *(_line(*each) for each in kit),
         "variations:",
-        _line(1, "per_kit", wanted, "as many as there may be" if wanted < MOST else "raise it for more"),
+        _line(1, "per_kit", wanted, "more than there may be" if wanted < MOST else "raise it for more"),
         "  search:",
         _line(2, "duplicates", "graph", "distinct shape graphs, not ways to turn a part in its place"),
     ]
