@@ -38,7 +38,7 @@ STAY = 0.6
 FITTED = 0.75
 """Share of finds on which hubs must fit again, of so many of the most different."""
 LOOKED_AT = 8
-WORK = 15_000_000
+WORK = 8_000_000
 """Tries times parts after which no more are tried but slots: a try takes the longer the more parts there are."""
 PEELED = 4
 """Most types of hubs that are peeled off."""

@@ -131,7 +131,11 @@ def _by_graph(task: Task, kits: list[str], pools: list[PoolIndex]) -> list[Chose
         taken.append(chosen)
     split_of = share_out(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
     ends = np.cumsum([len(each) for each in taken])[:-1]
-    return [Chosen(own, splits, 0) for own, splits in zip(taken, np.split(split_of, ends), strict=True)]
+    found = []
+    for name, pool, own, splits in zip(kits, pools, taken, np.split(split_of, ends), strict=True):
+        shapes = packed_shapes(task, input_kit(task, name), pool, own)
+        found.append(Chosen(own, splits, 0, nearness_of(shapes, np.arange(len(own)), splits)))
+    return found
 
 
 def _measures(task: Task, name: str, pool: PoolIndex, chosen: Chosen) -> dict[str, Any]:
@@ -140,9 +144,12 @@ def _measures(task: Task, name: str, pool: PoolIndex, chosen: Chosen) -> dict[st
     taken = pool.counts[variants], pool.features[variants], pool.digests[variants]
     sample = task.rng("edits", name).permutation(variants)[:SAMPLE].tolist()
     wanted = wanted_sizes(config.per_kit, config.splits)
-    nearness = nearness_of(packed_shapes(task, kit, pool, variants), chosen.split_of)
     splits = {
-        split: {"wanted": wanted[split], "samples": int((chosen.split_of == number).sum()), **nearness.get(split, {})}
+        split: {
+            "wanted": wanted[split],
+            "samples": int((chosen.split_of == number).sum()),
+            **chosen.nearness.get(split, {}),
+        }
         for number, split in enumerate(SPLITS)
     }
     pieces = [found.described(at)["copied"]["pieces"] for found, at in pool.variants(task, variants.tolist())]

@@ -30,11 +30,13 @@ Indices = npt.NDArray[np.int64]
 @dataclass(frozen=True)
 class Chosen:
     """The samples of a kit: variants int64 (k,), places in the pool, the most telling first; split_of int64 (k,),
-    counted as in SPLITS; let_go: variants of the pool that stand too near to others for any split."""
+    counted as in SPLITS; let_go: variants of the pool that stand too near to others for any split; nearness: how near
+    val and test are to train, as `nearness_of` tells."""
 
     variants: Indices
     split_of: Indices
     let_go: int
+    nearness: dict[str, dict[str, float]]
 
 
 def wanted_sizes(count: int, splits: SplitConfig) -> dict[str, int]:
@@ -78,7 +80,9 @@ def choose_by_family(
     variants = np.concatenate(taken)
     split_of = np.repeat(np.arange(len(SPLITS)), [len(each) for each in taken])
     order = select(kit, pool.counts[variants], pool.features[variants], len(variants), config.selection, rng)
-    return Chosen(variants[order], split_of[order], int((cut.split_of == LET_GO).sum()))
+    variants, split_of = variants[order], split_of[order]
+    nearness = nearness_of(shapes, np.searchsorted(held, variants), split_of)
+    return Chosen(variants, split_of, int((cut.split_of == LET_GO).sum()), nearness)
 
 
 def _near(pool: PoolIndex, ancestry: Ancestry, held: Indices, shapes: PackedShapes, least: float) -> Near:
@@ -97,15 +101,15 @@ def _near(pool: PoolIndex, ancestry: Ancestry, held: Indices, shapes: PackedShap
     return near
 
 
-def nearness_of(shapes: PackedShapes, split_of: Indices) -> dict[str, dict[str, float]]:
+def nearness_of(shapes: PackedShapes, places: Indices, split_of: Indices) -> dict[str, dict[str, float]]:
     """How much of their surface the shapes of val and of test share with the nearest of train: median and most, to
     three digits, over at most COMPARED of each, evenly spread; for splits that have any.
 
-    shapes: the samples of a kit; split_of: int64 (k,), theirs.
+    places: int64 (k,), where the samples of a kit stand among `shapes`; split_of: int64 (k,), theirs.
     """
-    train, nearness = np.flatnonzero(split_of == 0), {}
+    train, nearness = places[split_of == 0], {}
     for split in SPLITS[1:]:
-        own = np.flatnonzero(split_of == SPLITS.index(split))
+        own = places[split_of == SPLITS.index(split)]
         compared = own[:: max(1, -(-len(own) // COMPARED))]
         if len(train) and len(own):
             most = [shapes.most_shared(each, train) for each in compared.tolist()]

@@ -13,8 +13,8 @@ from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.kit import Kit
-from stages.variations.kernels.layout import FORBIDDEN, LABELS, NONE, Answers, Workspace
-from stages.variations.kernels.lookup import hash_key, quantise
+from stages.variations.kernels.layout import FORBIDDEN, LABELS, MISSING, NONE, Answers, Workspace
+from stages.variations.kernels.lookup import ask, hash_key, quantise
 from stages.variations.kernels.tables import QUANTUM
 
 __all__ = ["ContactAnswers"]
@@ -97,7 +97,12 @@ class ContactAnswers:
         rotation, translation = np.eye(3), np.zeros(3)
         reach = self.kit.types[b].diagonal / 2
         quantise(rotation, translation, np.ascontiguousarray(pose[:3, :3]), pose[:3, 3], reach, self._quantum, quanta)
-        return self._answer(a, b, quanta)
+        key = hash_key(a, b, quanta)
+        value = int(ask(self.table.keys, self.table.values, key))
+        if value == MISSING:
+            value = self._answer(a, b, quanta)
+            self._insert(int(key), value)
+        return value
 
     def _answer(self, a: int, b: int, quanta: np.ndarray) -> int:
         pose = self._pose(b, quanta)
