@@ -100,38 +100,36 @@ class Backdrop:
         look the same one."""
         from scipy.spatial import cKDTree
 
-        found = [
-            assembly.poses[part] @ poses[np.abs(ups - assembly.poses[part, :3, :3].T @ self._up).max(axis=1) < ASKEW]
-            for part_type, (poses, ups) in self._beside[hub].items()
-            for part in np.flatnonzero(assembly.types == part_type).tolist()
-        ]
-        places = np.concatenate([np.empty((0, 4, 4)), *found])
+        found = [np.empty((0, 4, 4))]
+        for part_type, (poses, ups) in self._beside[hub].items():
+            parts = assembly.poses[assembly.types == part_type]
+            gaps = np.abs(ups[None] - (self._up @ parts[:, :3, :3])[:, None])
+            part, pose = np.nonzero(gaps.max(axis=2) < ASKEW)
+            found.append(parts[part] @ poses[pose])
+        places = np.concatenate(found)
         if not len(places):
             return places
         fewest = min(sum(count for _, count in each) for each in self.kit.grammar.neighbourhoods[hub])
         tolerance = self.kit.pose_tolerance
-        agreeing = cKDTree(places[:, :3, 3]).query_ball_point(places[:, :3, 3], 2 * tolerance)
-        agreed = np.array([len(each) for each in agreeing])
+        tree = cKDTree(places[:, :3, 3])
+        agreed = tree.query_ball_point(places[:, :3, 3], 2 * tolerance, return_length=True)
         is_open = agreed >= FIT_SHARE * fewest
         chosen: list[int] = []
         for index in np.argsort(-agreed, kind="stable").tolist():
             if is_open[index]:
                 chosen.append(index)
-                beside = np.array(sorted(agreeing[index]))
+                beside = np.array(tree.query_ball_point(places[index, :3, 3], 2 * tolerance, return_sorted=True))
                 is_open[beside[_look_same(self.kit.types[hub], places[beside], places[index], tolerance)]] = False
         return places[chosen]
 
     def _touched(
-        self, hub: int, place: FloatArray, types: np.ndarray, poses: FloatArray, near: list[int]
+        self, hub: int, place: FloatArray, types: np.ndarray, poses: FloatArray, near: np.ndarray
     ) -> list[int] | None:
         """Which of the parts `near` a hub at `place` touches; None where it may not stand there."""
-        touched: list[int] = []
-        for part in near:
-            answer = self.answers.answer(int(types[part]), hub, invert(poses[part]) @ place)
-            if answer == FORBIDDEN:
-                return None
-            if answer != NONE:
-                touched.append(part)
+        answers = self.answers.around(types[near], poses[near], hub, place)
+        if (answers == FORBIDDEN).any():
+            return None
+        touched: list[int] = near[answers != NONE].tolist()
         return touched
 
 
@@ -165,8 +163,7 @@ def _look_same(part_type: PartType, poses: FloatArray, pose: FloatArray, toleran
     return same
 
 
-def _near(boxes: FloatArray, box: FloatArray, slack: float) -> list[int]:
-    """Which of the `boxes` (n, 2, 3) are at most `slack` from a box (2, 3) in every axis, ascending."""
+def _near(boxes: FloatArray, box: FloatArray, slack: float) -> np.ndarray:
+    """Which of the `boxes` (n, 2, 3) are at most `slack` from a box (2, 3) in every axis, int64, ascending."""
     apart = (boxes[:, 0] > box[1] + slack) | (boxes[:, 1] < box[0] - slack)
-    near: list[int] = np.flatnonzero(~apart.any(axis=1)).tolist()
-    return near
+    return np.flatnonzero(~apart.any(axis=1))

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.kit import Kit
 from stages.variations.kernels.layout import FORBIDDEN, LABELS, MISSING, NONE, Answers, Workspace
-from stages.variations.kernels.lookup import ask, hash_key, quantise
+from stages.variations.kernels.lookup import ask_around, hash_key, quantise
 from stages.variations.kernels.tables import QUANTUM
 
 __all__ = ["ContactAnswers"]
@@ -91,18 +91,23 @@ class ContactAnswers:
             error, self._broken = self._broken, None
             raise error
 
-    def answer(self, a: int, b: int, pose: FloatArray) -> int:
-        """The answer for a part of type `b` at `pose` (4, 4) in coordinates of a part of type `a`."""
-        quanta = np.empty(12, dtype=np.int64)
-        rotation, translation = np.eye(3), np.zeros(3)
-        reach = self.kit.types[b].diagonal / 2
-        quantise(rotation, translation, np.ascontiguousarray(pose[:3, :3]), pose[:3, 3], reach, self._quantum, quanta)
-        key = hash_key(a, b, quanta)
-        value = int(ask(self.table.keys, self.table.values, key))
-        if value == MISSING:
-            value = self._answer(a, b, quanta)
-            self._insert(int(key), value)
-        return value
+    def around(self, types: np.ndarray, poses: FloatArray, b: int, pose: FloatArray) -> IntArray:
+        """The answers, int64 (n,), for a part of type `b` at `pose` (4, 4) beside each of the parts of `types` (n,) at
+        `poses` (n, 4, 4). None is asked of geometry where one that is known already is FORBIDDEN."""
+        rotations, translations = np.ascontiguousarray(poses[:, :3, :3]), np.ascontiguousarray(poses[:, :3, 3])
+        rotation, translation = np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3])
+        reach, quantum = self.kit.types[b].diagonal / 2, self._quantum
+        values = ask_around(
+            self.table.keys, self.table.values, types, rotations, translations, b, rotation, translation, reach, quantum
+        )
+        if not (values == FORBIDDEN).any():
+            quanta = np.empty(12, dtype=np.int64)
+            for each in np.flatnonzero(values == MISSING).tolist():
+                quantise(rotations[each], translations[each], rotation, translation, reach, quantum, quanta)
+                values[each] = self._answer(int(types[each]), b, quanta)
+                self._insert(int(hash_key(types[each], b, quanta)), int(values[each]))
+        found: IntArray = values
+        return found
 
     def _answer(self, a: int, b: int, quanta: np.ndarray) -> int:
         pose = self._pose(b, quanta)

@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 
 from stages.variations.kernels.layout import MISSING
 
-__all__ = ["ask", "ask_python", "hash_key", "mix", "quantise", "random_below"]
+__all__ = ["ask", "ask_around", "ask_python", "hash_key", "mix", "quantise", "random_below"]
 
 
 @numba.njit(cache=True)
@@ -55,6 +55,17 @@ def ask(keys, values, key):
             return values[slot]
         slot = (slot + np.uint64(1)) & mask
     return MISSING
+
+
+@numba.njit(cache=True)
+def ask_around(keys, values, types, rotations, translations, b, rotation, translation, reach, quantum):
+    """What is known of a part of type b beside each of some others, int64 (n,)."""
+    known = np.empty(len(types), dtype=np.int64)
+    quanta = np.empty(12, dtype=np.int64)
+    for i in range(len(types)):
+        quantise(rotations[i], translations[i], rotation, translation, reach, quantum, quanta)
+        known[i] = ask(keys, values, hash_key(types[i], b, quanta))
+    return known
 
 
 @intrinsic  # type: ignore[untyped-decorator]
