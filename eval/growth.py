@@ -13,8 +13,9 @@ from pipeline.randomness import decision_rng
 from pipeline.records import read_record
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
-from stages.strings.alphabet import make_alphabet
-from stages.strings.encoder import NotConnectedError, canonical_string, random_strings
+from stages.strings.encoder import NotConnectedError
+from stages.strings.kit_strings import KitStrings
+from stages.strings.settings import StringsConfig
 from stages.variations.pool import FoundVariants
 
 __all__ = ["Find", "Grown", "Size", "generation_table", "grown", "growth_table", "read_finds", "sizes_by"]
@@ -106,23 +107,17 @@ def sizes_by(finds: Iterable[Find], step: Callable[[Find], int], strings: Mappin
     return sizes
 
 
-def count_strings(kit: Kit, assembly: Assembly, count: int, rng: np.random.Generator) -> int:
-    """How many strings stage `strings` writes of an assembly: its canonical one, and `count` random ones if it has so
-    many; none where its graph is not connected."""
-    labelled, alphabet = kit.labelled(assembly), make_alphabet(kit.labels)
-    try:
-        first = canonical_string(labelled.types, labelled.edges, alphabet).string
-        return 1 + len(random_strings(labelled.types, labelled.edges, alphabet, count, rng, {first}))
-    except NotConnectedError:
-        return 0
-
-
-def grown(kit: Kit, folder: Path, count: int, seed: int) -> Grown:
-    """How the search of `kit` has grown, read from the folder of stage `variations`; `count` random strings a shape."""
-    finds = read_finds(folder, kit.name)
+def grown(kit: Kit, folder: Path, config: StringsConfig, seed: int) -> Grown:
+    """How the search of `kit` has grown, read from the folder of stage `variations`; `config` says which strings shapes
+    get, and how many."""
+    finds, writer = read_finds(folder, kit.name), KitStrings(kit, config.edges)
 
     def strings(assembly: Assembly, name: str) -> int:
-        return count_strings(kit, assembly, count, decision_rng(seed, "growth", kit.name, name))
+        rng = decision_rng(seed, "growth", kit.name, name)
+        try:
+            return len(writer.strings(writer.graph(assembly), config.strings_per_shape, rng))
+        except NotConnectedError:
+            return 0
 
     written = {each.graph: strings(each.assembly, each.graph.hex()) for each in {f.graph: f for f in finds}.values()}
     wholes = [each.whole for each in kit.exemplars]

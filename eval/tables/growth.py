@@ -24,9 +24,9 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
     from stages.exemplars.language import made_kits
     from stages.strings.settings import StringsConfig
 
-    count, folder = subject.config.section(StringsConfig).strings_per_shape, subject.places.stage("variations").root
+    strings, folder = subject.config.section(StringsConfig), subject.places.stage("variations").root
     kits = made_kits(subject.places)
-    found = {name: grown(kit, folder, count, subject.config.seed) for name, kit in kits.items()}
+    found = {name: grown(kit, folder, strings, subject.config.seed) for name, kit in kits.items()}
     lines = {
         name: [(0.0, float(each.inputs.graphs)), *((float(n), float(s.graphs)) for n, s in each.generations.items())]
         for name, each in found.items()

@@ -15,6 +15,7 @@ from eval.registry import find_tables
 from eval.subject import Subject, load_subject
 from pipeline.records import read_record
 from stages.exemplars.language import made_kits
+from stages.strings.settings import StringsConfig
 from tests.mill import mill
 from tests.stated import stated
 
@@ -58,7 +59,7 @@ def test_a_collection_grows_by_what_is_new_in_each_step() -> None:
 def test_growth_agrees_with_the_records_of_the_search(subject: Subject) -> None:
     places = subject.places.stage("variations")
     for name, kit in made_kits(subject.places).items():
-        found = grown(kit, places.root, 8, 3)
+        found = grown(kit, places.root, StringsConfig(), 3)
         records = [read_record(path) for path in sorted(places.records.glob(f"{name}-r*-pool.json"))]
         summary = records[-1].summary
         last = found.rounds[len(records)]
