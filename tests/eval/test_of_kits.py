@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 import yaml
 
+from eval.corpora import COLUMNS, corpus_row
 from eval.growth import Find, Size, grown, growth_table, read_finds, sizes_by
 from eval.registry import find_tables
 from eval.subject import Subject, load_subject
 from pipeline.records import read_record
 from stages.exemplars.language import made_kits
+from stages.shape.kit import Assembly
 from stages.strings.settings import StringsConfig
 from tests.mill import mill
 from tests.stated import stated
@@ -102,3 +104,39 @@ def test_growth_is_a_table_of_what_has_been_searched(subject: Subject, tmp_path:
     assert [row[0] for row in answer.tables[0].rows[:2]] == ["castle, inputs", "castle, iteration 1"]
     assert [strip.pictures[0][0] for strip in answer.strips] == ["keep", "fort"]
     assert set(answer.curves[0].lines) == {"castle", "playground"}
+
+
+def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: Subject) -> None:
+    for kit in made_kits(subject.places).values():
+        for exemplar in kit.exemplars:
+            shapes = [exemplar.assembly]
+            rows = {
+                edges: dict(zip(COLUMNS, corpus_row("one", kit, shapes, edges, np.random.default_rng(1)), strict=True))
+                for edges in ("all", "tree")
+            }
+            rank = len(shapes[0].edges) - len(shapes[0]) + 1
+            assert rows["all"]["cycles"] == rows["all"]["cycle rank"] == rows["tree"]["cycle rank"] == rank
+            assert rows["tree"]["most cycles"] == 0
+            # the canonical walk is the same, and each cycle has two numbers of one token
+            assert rows["all"]["canonical"] - rows["tree"]["canonical"] == 2 * rank
+            assert rows["all"]["parts"] == len(shapes[0])
+
+
+def test_shapes_in_pieces_are_counted_as_without_strings(subject: Subject) -> None:
+    kit = made_kits(subject.places)["castle"]
+    whole = kit.exemplars[0].assembly
+    apart = Assembly(whole.types, whole.poses, whole.edges[:10])
+    row = dict(zip(COLUMNS, corpus_row("two", kit, [whole, apart], "tree", np.random.default_rng(1)), strict=True))
+    assert (row["shapes"], row["without"]) == (1, 1)
+    assert corpus_row("none", kit, [apart], "all", np.random.default_rng(1))[2:5] == (0, 1, "")
+
+
+def test_corpora_is_a_table_of_inputs_and_variants(subject: Subject) -> None:
+    table = find_tables()["corpora"].answer(subject, None).tables[0]  # type: ignore[arg-type]
+    assert [row[:2] for row in table.rows[:4]] == [
+        ("castle, inputs", "all"),
+        ("castle, inputs", "faces"),
+        ("castle, inputs", "tree"),
+        ("castle, variants", "all"),
+    ]
+    assert len(table.rows) == 2 * 2 * 3
