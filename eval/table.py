@@ -87,7 +87,7 @@ class Table:
 def cell_text(cell: Cell) -> str:
     """A cell as people read it: three digits that matter, thousands with commas."""
     if isinstance(cell, float):
-        return f"{cell:.1f}" if abs(cell) >= 10 else f"{cell:.3g}"
+        return f"{cell:,.0f}" if abs(cell) >= 1000 else f"{cell:.1f}" if abs(cell) >= 10 else f"{cell:.3g}"
     return f"{cell:,}" if isinstance(cell, int) else cell
 
 

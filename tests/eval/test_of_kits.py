@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from eval.compression import COLUMNS as SIZES
+from eval.compression import Stored, compression_row, round_trip
 from eval.corpora import COLUMNS, corpus_row
 from eval.growth import Find, Size, grown, growth_table, read_finds, sizes_by
 from eval.registry import find_tables
@@ -17,6 +20,7 @@ from eval.subject import Subject, load_subject
 from pipeline.records import read_record
 from stages.exemplars.language import made_kits
 from stages.shape.kit import Assembly
+from stages.strings.compression import Codebook
 from stages.strings.settings import StringsConfig
 from tests.mill import mill
 from tests.stated import stated
@@ -140,3 +144,30 @@ def test_corpora_is_a_table_of_inputs_and_variants(subject: Subject) -> None:
         ("castle, variants", "all"),
     ]
     assert len(table.rows) == 2 * 2 * 3
+
+
+def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: Subject) -> None:
+    for name, kit in made_kits(subject.places).items():
+        finds = [each.assembly for each in read_finds(subject.places.stage("variations").root, name)]
+        for edges in ("all", "tree"):
+            book = Codebook(kit, edges)
+            trips = [round_trip(book, each) for each in finds]
+            assert all(each.exact and each.own_poses == 0 for each in trips)
+            stored = [Stored(each, b'{"key": "a"}' * 50, b"glTF" * 1000) for each in finds]
+            row = dict(zip(SIZES, compression_row(name, kit, edges, stored, trips), strict=True))
+            assert row["exact %"] == 100
+            assert row["bytes"] == pytest.approx(np.mean([len(each.packed) for each in trips]))
+            assert row["GLB / bytes"] == pytest.approx(4000 / row["bytes"])
+            assert row["bytes"] < 200
+
+
+def test_a_shape_that_does_not_come_back_is_told(subject: Subject) -> None:
+    """A part that touches another in a way that the kit has not seen: a tree cannot find that contact again."""
+    kit = made_kits(subject.places)["castle"]
+    whole = kit.exemplars[0].assembly
+    touching = {tuple(each) for each in whole.edges.tolist()}
+    apart = next(pair for pair in combinations(range(len(whole)), 2) if pair not in touching)
+    more = Assembly(whole.types, whole.poses, np.concatenate([whole.edges, [apart]]).astype(np.int32))
+    assert round_trip(Codebook(kit, "all"), more).exact
+    trip = round_trip(Codebook(kit, "tree"), more)
+    assert (trip.exact, trip.gap <= 1.0) == (False, True)
