@@ -62,7 +62,7 @@ def ticks(low: float, high: float) -> Sequence[float]:
         low, high = low - 0.5, low + 0.5
     rough = (high - low) / 5
     power = 10.0 ** math.floor(math.log10(rough))
-    step = min((power * size for size in (1, 2, 2.5, 5, 10)), key=lambda each: abs(math.log(each / rough)))
+    step = min((power * size for size in (1, 2, 5, 10)), key=lambda each: abs(math.log(each / rough)))
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     return [round(step * number, 12) for number in range(first, last + 1)]
 

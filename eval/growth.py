@@ -146,13 +146,15 @@ def growth_table(kits: Mapping[str, Grown]) -> Table:
 
 
 def generation_table(kits: Mapping[str, Grown]) -> Table:
-    """For each kit a row for each generation: how large the collection is without later ones."""
-    rows = [
-        (f"{kit}, generation {number}", size.shapes, size.graphs, size.strings)
-        for kit, each in kits.items()
-        for number, size in each.generations.items()
-    ]
-    return Table("Growth by generation", ("collection up to", "shapes", "graphs", "strings"), tuple(rows))
+    """A row for each generation: graphs and strings of each kit's collection without later ones; no figures where a kit
+    has no such generation."""
+    columns = [f"{kit} {what}" for kit in kits for what in ("graphs", "strings")]
+    rows: list[tuple[Cell, ...]] = []
+    for number in sorted({number for each in kits.values() for number in each.generations}):
+        sizes = [each.generations.get(number) for each in kits.values()]
+        cells = [cell for size in sizes for cell in ((size.graphs, size.strings) if size else ("", ""))]
+        rows.append((f"generation {number}", *cells))
+    return Table("Growth by generation", ("collection up to", *columns), tuple(rows))
 
 
 def _cells(size: Size) -> tuple[Cell, ...]:

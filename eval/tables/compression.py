@@ -8,10 +8,11 @@ from argparse import Namespace
 from eval.evaluation import Answer, Evaluation, Strip
 from eval.needs import FINISHED, KITS
 from eval.subject import Subject
+from stages.strings.settings import Edges
 
 __all__ = ["TABLE"]
 
-EDGES = ("all", "tree")
+EDGES: tuple[Edges, ...] = ("all", "tree")
 
 
 def _answer(subject: Subject, _: Namespace) -> Answer:
@@ -22,7 +23,6 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
     from stages.shape.collection.pairs import CONTACTS, pairs_of
     from stages.shape.shape import Shape
     from stages.strings.compression import Codebook
-    from stages.strings.settings import Edges
 
     anew, samples = LANGUAGE.anew(subject.places), dict[str, list[Stored]]()
     for shard in sorted((subject.folder / "data").glob("*/*.tar")):
@@ -33,8 +33,7 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
     rows, pictures = [], []
     for name, kit in made_kits(subject.places).items():
         stored = samples.get(name, [])
-        chosen: tuple[Edges, ...] = EDGES if stored else ()
-        for edges in chosen:
+        for edges in EDGES if stored else ():
             book = Codebook(kit, edges)
             trips = [round_trip(book, each.assembly) for each in stored]
             rows.append(compression_row(name, kit, edges, stored, trips))

@@ -106,6 +106,11 @@ def test_growth_is_a_table_of_what_has_been_searched(subject: Subject, tmp_path:
     assert "make exemplars" in table.missing(load_subject(subject.config.path, tmp_path))
     answer = table.answer(subject, None)  # type: ignore[arg-type]
     assert [row[0] for row in answer.tables[0].rows[:2]] == ["castle, inputs", "castle, iteration 1"]
+    generations = answer.tables[1]
+    assert generations.columns[1:] == ("castle graphs", "castle strings", "playground graphs", "playground strings")
+    final = [[row[column] for row in generations.rows if row[column] != ""][-1] for column in (1, 3)]
+    last = {str(row[0]).partition(",")[0]: row for row in answer.tables[0].rows}
+    assert final == [last[kit][5] for kit in ("castle", "playground")], "graphs after the last iteration"
     assert [strip.pictures[0][0] for strip in answer.strips] == ["keep", "fort"]
     assert set(answer.curves[0].lines) == {"castle", "playground"}
 
