@@ -24,7 +24,7 @@ from eval.registry import find_tables
 from eval.subject import Subject, load_subject
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
-from pipeline.places import write_whole
+from pipeline.places import write_file
 
 __all__ = ["main"]
 
@@ -132,8 +132,7 @@ def _make_all(subject: Subject, tables: Mapping[str, Evaluation], asked: argpars
         made.append(Made(name, evaluation.question, answer, perf_counter() - start))
         _keep(subject, name, answer)
         print(f"{name}: made in {made[-1].seconds:.0f} s")
-    subject.results.mkdir(parents=True, exist_ok=True)
-    write_whole(subject.results / REPORT, report_html(subject, made, unmade, began).encode())
+    write_file(subject.results / REPORT, report_html(subject, made, unmade, began).encode())
     print(f"\n{subject.results / REPORT}: {len(made)} tables, {len(unmade)} not made")
     return 1 if failed else 0
 
@@ -144,12 +143,11 @@ def _markdown(answer: Answer) -> str:
 
 def _keep(subject: Subject, name: str, answer: Answer) -> None:
     """Write the tables of an answer: the first as `<name>`, others as `<name>_2` and so on, but all in one `.md`."""
-    subject.results.mkdir(parents=True, exist_ok=True)
-    write_whole(subject.results / f"{name}.md", _markdown(answer).encode())
+    write_file(subject.results / f"{name}.md", _markdown(answer).encode())
     for place, table in enumerate(answer.tables):
         stem = name if place == 0 else f"{name}_{place + 1}"
-        write_whole(subject.results / f"{stem}.csv", table.csv().encode())
-        write_whole(subject.results / f"{stem}.tex", table.latex().encode())
+        write_file(subject.results / f"{stem}.csv", table.csv().encode())
+        write_file(subject.results / f"{stem}.tex", table.latex().encode())
 
 
 if __name__ == "__main__":

@@ -13,13 +13,11 @@ contacts these are found again, as the pairs of parts that stand in a docking of
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray, TypeArray
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
-from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert, pose_vectors, relative_poses
 from stages.shape.kit import Assembly, Kit
 from stages.strings.decoder import decode
@@ -59,16 +57,11 @@ class Codebook:
         """The types of each label."""
         self._places: dict[tuple[int, int], tuple[TypeArray, FloatArray]] = {}
 
-    @cached_property
-    def table(self) -> DockingTable:
-        """The dockings of the kit."""
-        return DockingTable(self.kit.types, self.kit.grammar.dockings, self.kit.pose_tolerance)
-
     def places(self, parent: int, label: int) -> tuple[TypeArray, FloatArray]:
         """How parts of a label dock to a part of type `parent`: their types int16 (k,) and poses (k, 4, 4). A category
         below k is one of these; from k on it is a type of the label, at a pose of its own."""
         if (parent, label) not in self._places:
-            poses = [self.table.poses(parent, kind) for kind in self.kinds[label]]
+            poses = [self.writer.table.poses(parent, kind) for kind in self.kinds[label]]
             types = np.repeat(np.array(self.kinds[label], dtype=np.int16), [len(each) for each in poses])
             self._places[parent, label] = types, np.concatenate(poses)
         return self._places[parent, label]
@@ -238,12 +231,12 @@ def _docked(book: Codebook, assembly: Assembly) -> IntArray:
     """The pairs of parts that stand in a docking of the kit, int32 (m, 2)."""
     boxes = world_boxes(book.kit.types, assembly.types, assembly.poses)
     pairs = overlapping_boxes(boxes, book.kit.contact_tolerance + 2 * book.kit.pose_tolerance)
-    labels = book.table.label_edges(assembly.types, assembly.poses, pairs)[:, 0]
+    labels = book.writer.table.label_edges(assembly.types, assembly.poses, pairs)[:, 0]
     for row, pose in zip(
         np.flatnonzero(labels < 0).tolist(), relative_poses(assembly.poses, pairs[labels < 0]), strict=True
     ):
         a, b = (int(assembly.types[part]) for part in pairs[row])
-        labels[row] = 0 if book.table.fit(a, b, pose) is not None else -1
+        labels[row] = 0 if book.writer.table.fit(a, b, pose) is not None else -1
     found: IntArray = pairs[labels >= 0]
     return found
 

@@ -85,18 +85,19 @@ class KitStrings:
         """The kind of each contact: that of its docking; where the kit has not seen it, as with parts that were put
         back behind a shape, that of the contact itself."""
         dockings = self.kit.grammar.dockings
-        labels = self._table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0].tolist()
+        labels = self.table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0].tolist()
         poses = relative_poses(assembly.poses, assembly.edges)
         kinds: list[ContactKind | None] = []
         for (i, j), label, pose in zip(assembly.edges.tolist(), labels, poses, strict=True):
             a, b = int(assembly.types[i]), int(assembly.types[j])
-            fit = self._table.fit(a, b, pose) if label < 0 else (label, label)
+            fit = self.table.fit(a, b, pose) if label < 0 else (label, label)
             kinds.append(self._contact.kind(a, b, pose) if fit is None else dockings[fit[0] // 2].kind)
         return kinds
 
     @cached_property
-    def _table(self) -> DockingTable:
-        return DockingTable(self.kit.types, self.kit.grammar.dockings, self.kit.pose_tolerance)
+    def table(self) -> DockingTable:
+        """The dockings of the kit."""
+        return DockingTable.of(self.kit)
 
     @cached_property
     def _contact(self) -> ContactTest:
