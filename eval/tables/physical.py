@@ -96,7 +96,7 @@ def _at_least(least: int) -> Callable[[str], int]:
 TABLE = Evaluation(
     question="Does what the dataset holds stand, and how large a push does it bear?",
     needs=(FINISHED,),
-    seconds=lambda subject: 10 + 0.1 * min(subject.samples, MOST),
+    seconds=lambda subject: 10 + 0.2 * min(subject.samples, MOST),
     answer=_answer,
     of_files=_of_files,
     options=_options,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -108,3 +110,27 @@ def test_published_rows_stand_below_ours_with_their_source_in_every_format() -> 
 def test_published_figures_must_have_a_column() -> None:
     with pytest.raises(ValueError, match="strings Table 2 has depth, which is no column of T"):
         Table("T", ("kit", "size"), (), (), (Published("a", "strings Table 2", {"depth": 1}),))
+
+
+def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -> None:
+    """Tables of a house beside the project's, one of which fails, and the project's own, which lack their dataset."""
+    house = tmp_path / "house" / "eval" / "tables"
+    house.mkdir(parents=True)
+    text = (
+        "from eval.evaluation import Answer, Evaluation, Need\nfrom eval.table import Table\n"
+        "def answer(subject, asked):\n    {}\n"
+        "TABLE = Evaluation('Is it?', (Need('nothing', lambda _: ''),), lambda _: 1.0, answer)\n"
+    )
+    (house / "broken.py").write_text(text.format("raise ValueError('no such luck')"))
+    (house / "sound.py").write_text(text.format("return Answer([Table('T', ('a', 'b'), (('one', 2),))])"))
+    command = [sys.executable, "-m", "eval", "all", "--config", str(DEFAULT), "--out", str(tmp_path / "out")]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "house")}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    assert "ValueError: no such luck" in done.stderr
+    results = tmp_path / "out" / "shapemill-default-eval"
+    assert (results / "sound.csv").read_text() == "a,b\none,2\n"
+    report = (results / "report.html").read_text()
+    assert "it failed: ValueError: no such luck" in report
+    assert 'id="sound"' in report
+    assert all(f"<td>{name}</td>" in report for name in find_tables()), "what was not made is listed"
