@@ -6,6 +6,7 @@ markup. A Content-Security-Policy in the page forbids it to load anything.
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import sys
@@ -24,6 +25,7 @@ from eval.evaluation import Answer
 from eval.subject import Subject
 from eval.table import cell_text
 from stages.package.made_with import code_version, library_versions
+from stages.package.manifest import config_sections
 
 __all__ = ["Made", "report_html"]
 
@@ -91,6 +93,13 @@ def _subtitle(subject: Subject) -> str:
     return f"{described['name']} {described['version']}: {described['samples']:,} shapes, {kits}"
 
 
+def _changed_sections(subject: Subject) -> list[str]:
+    """The sections of the config that differ from those that the dataset was made with."""
+    said = json.loads(json.dumps(config_sections(subject.config)))
+    made = subject.manifest.get("config", {})
+    return [name for name, section in said.items() if name in made and made[name] != section]
+
+
 def _facts(subject: Subject, began: datetime) -> list[tuple[str, str]]:
     """What was run, when and on what."""
     described = subject.manifest
@@ -102,5 +111,9 @@ def _facts(subject: Subject, began: datetime) -> list[tuple[str, str]]:
         made_with = described["made_with"]["shapemill"]
         facts.append(("Dataset", f"{described['name']} {described['version']}, seed {described['seed']}"))
         facts.append(("Dataset made by", f"shapemill {made_with}"))
+        changed = _changed_sections(subject)
+        if changed:
+            told = f"sections of the config that say something else now: {', '.join(changed)}"
+            facts.append(("Not as it was made", told))
         facts.append(("Splits", ", ".join(f"{split} {count:,}" for split, count in described["splits"].items())))
     return facts

@@ -132,6 +132,7 @@ def test_every_table_about_kits_can_be_made_of_it_and_stands_in_the_report(
     assert all(row[header.index("exact %")] == "100.0" for row in rows)
     report = (results / "report.html").read_text()
     assert all(f'<section id="{name}">' in report for name in about_kits)
+    assert "say something else now" not in report, "the config is the one that the dataset was made with"
 
 
 def test_verify_finds_nothing_wrong_and_then_a_flipped_byte(made: tuple[Path, Path]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -16,6 +17,7 @@ from eval.evaluation import Answer, Curve, Strip
 from eval.report import Made, report_html
 from eval.subject import load_subject
 from eval.table import Published, Table
+from stages.package.manifest import config_sections
 from tests.eval.chromium import Browser, browser, find_chromium
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,6 +60,20 @@ def test_report_says_what_was_made_of_what_and_what_was_not(page: Path) -> None:
         assert said in text
     for said in ("cores", "UTC", "seed 1", "Python 3.11", "numpy", "name: shapemill-default"):
         assert said in text, "how it was made"
+
+
+def test_report_tells_of_a_config_that_was_edited_after_the_dataset_was_made(tmp_path: Path) -> None:
+    subject = load_subject(ROOT / "configs" / "default.yaml", tmp_path)
+    subject.folder.mkdir()
+    sections = json.loads(json.dumps(config_sections(subject.config)))
+    facts = {"name": "d", "version": "1.0.0", "seed": 1, "samples": 3, "kits": {"castle": 3}, "splits": {"train": 3}}
+    for edges, told in (("all", False), ("tree", True)):
+        sections["strings"]["edges"] = edges
+        manifest = {**facts, "made_with": {"shapemill": "0.1.0+abc"}, "config": sections}
+        (subject.folder / "manifest.json").write_text(json.dumps(manifest))
+        page = report_html(load_subject(subject.config.path, tmp_path), [], {}, datetime.now(UTC))
+        assert ("say something else now: strings" in page) == told
+        assert "3 shapes, 3 of castle" in page
 
 
 def test_whatever_is_told_stands_there_as_text(page: Path) -> None:
