@@ -30,8 +30,8 @@ SEED    ?=
 MESH    ?=
 ## PROGRAM  a shape program that `make inspect` looks at: a name, such as chair, or a module
 PROGRAM ?=
-## TABLE    the table that `make eval` prints
-TABLE   ?= physical
+## TABLE    the table that `make eval` prints, or all, for the report; without, it lists them
+TABLE   ?=
 ## SAMPLES  how many samples `make verify` looks at by all means: a number, or all
 SAMPLES ?= 100
 
@@ -90,7 +90,7 @@ inspect: setup  ## Show what MESH can become and write a config for it, or what 
 	@[ -n "$$MESH$$PROGRAM" ] || { echo 'make inspect needs MESH=my.glb or PROGRAM=chair' >&2; exit 2; }
 	@[ -z "$$PROGRAM" ] || $(PYTHON) -m stages.programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
 	@[ -z "$$MESH" ] || $(PYTHON) -m pipeline inspect --out "$$OUT/inspect" -- "$$MESH"
-eval: setup  ## Print TABLE (physical: does it stand? near_twins: are splits apart?) about the finished dataset, and keep it
+eval: setup  ## Print TABLE about the finished dataset and keep it; all: every table, and a report; without: list them
 	@$(PYTHON) -m eval $(ASKED) -- "$$TABLE"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	@$(PYTHON) -m pipeline doctor --out "$$OUT"

@@ -1,1 +1,8 @@
-"""Metrics as pure functions, and one table for each question."""
+"""Metrics as pure functions, tables that are found in `eval/tables`, and one report of them all."""
+
+from __future__ import annotations
+
+from pkgutil import extend_path
+
+__path__ = extend_path(__path__, __name__)
+"""A folder `eval` elsewhere on the PYTHONPATH adds its tables to these."""

@@ -1,10 +1,11 @@
-"""`make eval`: prints a table about a dataset or about files, and keeps it as Markdown, CSV and LaTeX.
+"""`make eval`: tables about a finished dataset, or about files, kept as Markdown, CSV and LaTeX; and the report.
 
-python -m eval physical [--config YAML] [--out FOLDER] [--most N] [--dry N] [--up y|z] [FILE...]
-python -m eval near_twins [--config YAML] [--out FOLDER]
+python -m eval [--config YAML] [--out FOLDER]                     lists the tables, and what each still needs
+python -m eval TABLE [--config YAML] [--out FOLDER] [OPTION...]   prints one and keeps it
+python -m eval TABLE [OPTION...] FILE...                          prints one about files, if it can be made of files
+python -m eval all [--config YAML] [--out FOLDER] [OPTION...]     makes every table that can be made, and the report
 
-FILE is a model (GLB, OBJ, ...) or an `.npz` of boxes; without any, the finished dataset of the config is measured. The
-table is written to `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`; of files it is only printed.
+A table is kept as `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`, the report as `OUT/<dataset>-eval/report.html`.
 """
 
 from __future__ import annotations
@@ -12,91 +13,141 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator
+import traceback
+from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
+from time import perf_counter
 
-from eval.table import Table
+from eval.evaluation import Answer, Evaluation
+from eval.registry import find_tables
+from eval.subject import Subject, load_subject
+from pipeline.config import nearest
+from pipeline.errors import ConfigError
+from pipeline.places import write_file
 
 __all__ = ["main"]
 
-TABLES = ("physical", "near_twins")
+ALL = "all"
+REPORT = "report.html"
 
 
 def main(arguments: list[str]) -> int:
-    """Print the table that the arguments ask for; 0, or 2 with a message where there is nothing to measure."""
-    parser = argparse.ArgumentParser(prog="python -m eval", description="Tables about datasets.")
-    parser.add_argument("table", choices=TABLES)
-    parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"), help="the dataset's YAML")
-    parser.add_argument("--out", type=Path, default=Path("datasets"), help="folder that datasets are made in")
-    parser.add_argument("--most", type=int, default=200, help="so many shapes of a dataset are measured at most")
-    parser.add_argument("--dry", type=int, default=10, help="so many of a kind at most are judged as dry blocks, too")
-    parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that points up in the files")
-    parser.add_argument("files", nargs="*", type=Path, help="models or boxes instead of the dataset")
-    asked = parser.parse_args(arguments)
-    if asked.most < 1:
-        parser.error("--most must be at least 1")
-    if asked.dry < 0:
-        parser.error("--dry must not be negative")
+    """Do what the arguments ask for; 0, or 2 with a message where that cannot be, or 1 where a table of all failed."""
     # Solvers of small systems on a busy machine: threads that wait for each other take a hundred times as long.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from pipeline.errors import ConfigError
-
+    tables = find_tables()
+    asked = _parser(tables).parse_args(arguments)
     try:
-        return _physical(asked) if asked.table == "physical" else _near_twins(asked)
+        if asked.files:
+            return _print_of_files(_known(tables, asked.table), asked)
+        subject = load_subject(asked.config, asked.out)
+        if not asked.table:
+            print(listing(subject, tables), end="")
+            return 0
+        if asked.table == ALL:
+            return _make_all(subject, tables, asked)
+        return _make_one(subject, _known(tables, asked.table), asked)
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
 
 
-def _physical(asked: argparse.Namespace) -> int:
-    from eval.physical import PUBLISHED, physical_table
-    from eval.shapes import box_shapes, dataset_shapes, model_shapes
-    from pipeline.config import load_config
-    from pipeline.errors import ConfigError
-    from pipeline.registry import find_stages
-    from stages.shape.physics.settings import PhysicsConfig
-    from stages.shape.shape import Shape
+def _parser(tables: Mapping[str, Evaluation]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m eval", description="Tables about datasets.")
+    parser.add_argument("table", nargs="?", default="", help=f"{', '.join(tables)} or {ALL}; without, they are listed")
+    parser.add_argument("files", nargs="*", type=Path, help="models or boxes instead of the dataset")
+    parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"), help="the dataset's YAML")
+    parser.add_argument("--out", type=Path, default=Path("datasets"), help="folder that datasets are made in")
+    for each in tables.values():
+        each.options(parser)
+    return parser
 
-    def of_files() -> Iterator[tuple[str, Shape]]:
-        for path in asked.files:
-            if not path.is_file():
-                raise ConfigError(f"there is no file {path}")
-            yield from (box_shapes if path.suffix == ".npz" else model_shapes)(path, asked.up)
 
-    if asked.files:
-        published = [
-            name for name in PUBLISHED if any(name in path.stem and path.suffix == ".npz" for path in asked.files)
-        ]
-        print(physical_table(of_files(), PhysicsConfig(), asked.dry, published).markdown(), end="")
-        return 0
-    config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
-    shapes = dataset_shapes(asked.out / config.name, asked.most)
-    _keep(
-        physical_table(shapes, config.section(PhysicsConfig), asked.dry), asked.out / f"{config.name}-eval", "physical"
-    )
+def _known(tables: Mapping[str, Evaluation], name: str) -> str:
+    if name not in tables:
+        close = nearest(name, tables)
+        raise ConfigError(f"there is no table {name}; " + (f"did you mean {close}?" if close else ", ".join(tables)))
+    return name
+
+
+def listing(subject: Subject, tables: Mapping[str, Evaluation]) -> str:
+    """Every table with its question, and what it needs that is not there, or how long it takes."""
+    where = f"{subject.folder}, {subject.samples:,} shapes" if subject.manifest else f"nothing in {subject.folder} yet"
+    lines = [f"Tables about {subject.config.name} ({where}):", ""]
+    for name, each in tables.items():
+        missing = each.missing(subject)
+        state = f"missing: {missing}" if missing else f"can be made, takes about {_duration(each.seconds(subject))}"
+        lines += [f"  {name:<13}{each.question}", f"  {'':<13}{state}"]
+        lines += [f"  {'':<13}needs {', '.join(need.what for need in each.needs)}", ""]
+    lines.append(f"make eval TABLE=<name> prints one; TABLE={ALL} makes all that can be made, and {REPORT}")
+    return "\n".join(lines) + "\n"
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
+
+
+def _print_of_files(name: str, asked: argparse.Namespace) -> int:
+    of_files = find_tables()[name].of_files
+    if of_files is None:
+        raise ConfigError(f"{name} is a table about datasets, not about files; leave out {asked.files[0]}")
+    print(_markdown(of_files(asked.files, asked)), end="")
     return 0
 
 
-def _near_twins(asked: argparse.Namespace) -> int:
-    from eval.near_twins import dataset_clouds, near_twins_table
-    from pipeline.config import load_config
-    from pipeline.registry import find_stages
-
-    config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
-    clouds = dataset_clouds(asked.out / config.name, config.seed)
-    _keep(near_twins_table(clouds), asked.out / f"{config.name}-eval", "near_twins")
+def _make_one(subject: Subject, name: str, asked: argparse.Namespace) -> int:
+    evaluation = find_tables()[name]
+    missing = evaluation.missing(subject)
+    if missing:
+        raise ConfigError(f"{name}: {missing}")
+    answer = evaluation.answer(subject, asked)
+    _keep(subject, name, answer)
+    print(_markdown(answer), end="")
+    print(f"\nAlso in {subject.results}: {name}.md, {name}.csv, {name}.tex")
     return 0
 
 
-def _keep(table: Table, folder: Path, name: str) -> None:
-    """Print a table and write it to a folder."""
-    from pipeline.places import write_whole
+def _make_all(subject: Subject, tables: Mapping[str, Evaluation], asked: argparse.Namespace) -> int:
+    """Make every table that has what it needs, one after another; a failure is told and takes no other with it."""
+    from eval.report import Made, report_html
 
-    folder.mkdir(parents=True, exist_ok=True)
-    for suffix, text in (("md", table.markdown()), ("csv", table.csv()), ("tex", table.latex())):
-        write_whole(folder / f"{name}.{suffix}", text.encode())
-    print(table.markdown(), end="")
-    print(f"\nAlso in {folder}: {name}.md, {name}.csv, {name}.tex")
+    made: list[Made] = []
+    unmade: dict[str, str] = {}
+    failed, began = 0, datetime.now(UTC)
+    for name, evaluation in tables.items():
+        missing = evaluation.missing(subject)
+        if missing:
+            unmade[name] = missing
+            print(f"{name}: missing: {missing}")
+            continue
+        start = perf_counter()
+        try:
+            answer = evaluation.answer(subject, asked)
+        except Exception as error:
+            failed += 1
+            unmade[name] = f"it failed: {type(error).__name__}: {error}"
+            traceback.print_exc()
+            continue
+        made.append(Made(name, evaluation.question, answer, perf_counter() - start))
+        _keep(subject, name, answer)
+        print(f"{name}: made in {made[-1].seconds:.0f} s")
+    write_file(subject.results / REPORT, report_html(subject, made, unmade, began).encode())
+    print(f"\n{subject.results / REPORT}: {len(made)} tables, {len(unmade)} not made")
+    return 1 if failed else 0
+
+
+def _markdown(answer: Answer) -> str:
+    return "\n".join(table.markdown() for table in answer.tables)
+
+
+def _keep(subject: Subject, name: str, answer: Answer) -> None:
+    """Write the tables of an answer: the first as `<name>`, others as `<name>_2` and so on, but all in one `.md`."""
+    write_file(subject.results / f"{name}.md", _markdown(answer).encode())
+    for place, table in enumerate(answer.tables):
+        stem = name if place == 0 else f"{name}_{place + 1}"
+        write_file(subject.results / f"{stem}.csv", table.csv().encode())
+        write_file(subject.results / f"{stem}.tex", table.latex().encode())
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ __all__ = [
     "dataset_clouds",
     "near_twins",
     "near_twins_table",
+    "nearest_by_split",
     "nearest_in_train",
 ]
 
@@ -84,27 +85,25 @@ def dataset_clouds(folder: Path, seed: int) -> Clouds:
     return clouds
 
 
-def near_twins_table(clouds: Clouds) -> Table:
-    """One row for each kit and each of its splits but train."""
-    rows = []
+def nearest_by_split(clouds: Clouds) -> dict[tuple[str, str], list[Nearest]]:
+    """By kit and split the nearest shape of train of each shape; for the splits but train of kits that have shapes
+    there."""
+    found = {}
     for (kit, split), asked in clouds.items():
         train = [first for first, _ in clouds.get((kit, "train"), ())]
-        if split == "train" or not train or not asked:
-            continue
-        found = nearest_in_train(asked, train)
-        distances = [each.distance for each in found]
-        twins = int(near_twins(found).sum())
-        rows.append(
-            (
-                kit,
-                split,
-                len(asked),
-                twins,
-                100 * twins / len(asked),
-                min(distances),
-                median(distances),
-            )
-        )
+        if split != "train" and train and asked:
+            found[kit, split] = nearest_in_train(asked, train)
+    return found
+
+
+def near_twins_table(found: Mapping[tuple[str, str], Sequence[Nearest]]) -> Table:
+    """One row for each kit and split."""
+    rows = []
+    for (kit, split), nearest in found.items():
+        distances = [each.distance for each in nearest]
+        twins = int(near_twins(nearest).sum())
+        share = 100 * twins / len(nearest)
+        rows.append((kit, split, len(nearest), twins, share, min(distances), median(distances)))
     return Table("Near-twins of train", COLUMNS, tuple(rows), NOTES)
 
 

@@ -1,32 +1,66 @@
-"""A table of figures as Markdown, CSV and LaTeX."""
+"""A table of figures, with published ones beside ours, as Markdown, CSV and LaTeX."""
 
 from __future__ import annotations
 
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Table"]
+__all__ = ["Cell", "Published", "Table", "cell_text"]
 
 Cell = str | int | float
 
 
 @dataclass(frozen=True)
+class Published:
+    """A row that others have published. source: paper and table; figures: by column."""
+
+    name: str
+    source: str
+    figures: Mapping[str, Cell]
+
+
+@dataclass(frozen=True)
 class Table:
     """columns: names, in the order of the cells; rows: cells, the first of which names the row; notes: what a reader
-    must know. A string cell that says nothing is empty."""
+    must know; published: rows to stand below ours. A string cell that says nothing is empty.
+
+    Raises ValueError for published figures in a column that is not there.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     notes: Sequence[str] = ()
+    published: Sequence[Published] = ()
+
+    def __post_init__(self) -> None:
+        for each in self.published:
+            unknown = set(each.figures) - set(self.columns[1:])
+            if unknown:
+                raise ValueError(f"{each.source} has {', '.join(sorted(unknown))}, which is no column of {self.title}")
+
+    def published_by_source(self) -> dict[str, list[tuple[Cell, ...]]]:
+        """The published rows, cells in the order of the columns, by their sources."""
+        found: dict[str, list[tuple[Cell, ...]]] = {}
+        for each in self.published:
+            cells = (each.name, *(each.figures.get(column, "") for column in self.columns[1:]))
+            found.setdefault(each.source, []).append(cells)
+        return found
+
+    def _all_rows(self) -> Iterator[tuple[Cell, ...]]:
+        """Our rows, then the published ones, named with their source."""
+        yield from self.rows
+        for source, rows in self.published_by_source().items():
+            yield from ((f"{name} ({source})", *figures) for name, *figures in rows)
 
     def markdown(self) -> str:
         """GitHub Markdown, numbers to the right."""
         marks = ["---", *("---:" for _ in self.columns[1:])]
-        lines = [self.columns, marks, *([_text(cell) for cell in row] for row in self.rows)]
+        rows = [[cell_text(cell) for cell in row] for row in self._all_rows()]
+        lines = [self.columns, marks, *rows]
         body = "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
         return "\n\n".join([f"**{self.title}**", body, *self.notes]) + "\n"
 
@@ -35,7 +69,7 @@ class Table:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(self.columns)
-        writer.writerows(self.rows)
+        writer.writerows(self._all_rows())
         return text.getvalue()
 
     def latex(self) -> str:
@@ -43,14 +77,17 @@ class Table:
         lines = [rf"\begin{{tabular}}{{l{'r' * (len(self.columns) - 1)}}}", r"\toprule"]
         lines.append(" & ".join(_escaped(name) for name in self.columns) + r" \\")
         lines.append(r"\midrule")
-        lines += [" & ".join(_escaped(_text(cell)) for cell in row) + r" \\" for row in self.rows]
+        rows = [" & ".join(_escaped(cell_text(cell)) for cell in row) + r" \\" for row in self._all_rows()]
+        lines += rows[: len(self.rows)]
+        lines += [r"\midrule", *rows[len(self.rows) :]] if self.published else []
         lines += [r"\bottomrule", r"\end{tabular}"]
         return "\n".join(lines) + "\n"
 
 
-def _text(cell: Cell) -> str:
+def cell_text(cell: Cell) -> str:
+    """A cell as people read it: three digits that matter, thousands with commas."""
     if isinstance(cell, float):
-        return f"{cell:.1f}" if abs(cell) >= 10 else f"{cell:.3g}"
+        return f"{cell:,.0f}" if abs(cell) >= 1000 else f"{cell:.1f}" if abs(cell) >= 10 else f"{cell:.3g}"
     return f"{cell:,}" if isinstance(cell, int) else cell
 
 

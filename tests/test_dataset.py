@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 import os
@@ -14,6 +15,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from eval.__main__ import main as evaluate
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
@@ -112,6 +114,25 @@ def test_a_kill_in_each_stage_and_another_go_make_the_same_folder(made: tuple[Pa
         assert code == 0, printed
     assert sum(alive) >= 4, "too many stages were over before the kill"
     assert digests(killed) == digests(one)
+
+
+def test_every_table_about_kits_can_be_made_of_it_and_stands_in_the_report(
+    made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, one = made
+    for name in ("small", ".work"):
+        (tmp_path / name).symlink_to(one / name)
+    asked = ["--config", str(config), "--out", str(tmp_path)]
+    assert evaluate(["all", *asked, "--most", "6", "--dry", "0"]) == 0, capsys.readouterr()
+    about_kits = {"compression", "corpora", "growth", "near_twins", "physical"}
+    results = tmp_path / "small-eval"
+    assert about_kits <= {path.stem for path in results.glob("*.csv")}
+    header, *rows = csv.reader((results / "compression.csv").open())
+    assert [row[:2] for row in rows] == [[kit, edges] for kit in ("castle", "playground") for edges in ("all", "tree")]
+    assert all(row[header.index("exact %")] == "100.0" for row in rows)
+    report = (results / "report.html").read_text()
+    assert all(f'<section id="{name}">' in report for name in about_kits)
+    assert "say something else now" not in report, "the config is the one that the dataset was made with"
 
 
 def test_verify_finds_nothing_wrong_and_then_a_flipped_byte(made: tuple[Path, Path]) -> None:

@@ -97,6 +97,27 @@ def test_what_they_say_of_themselves_stands_in_card_croissant_index_and_manifest
     assert "mass.npy" in {each["name"] for each in json.loads((folder / "manifest.json").read_text())["members"]}
 
 
+def test_a_table_of_theirs_is_found_and_stands_in_the_report(made: tuple[Path, str]) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests" / "house")}
+    command = [
+        sys.executable,
+        "-m",
+        "eval",
+        "all",
+        "--config",
+        str(made[0].parent / "heaps.yaml"),
+        "--out",
+        str(made[0]),
+    ]
+    done = subprocess.run([*command, "--dry", "0"], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    results = made[0] / "heaps-eval"
+    assert "highest" in (results / "heights.csv").read_text()
+    report = (results / "report.html").read_text()
+    for said in ("How high are they?", "near-twins %", "How large a push they bear", "data:image/png;base64"):
+        assert said in report
+
+
 def test_a_dataset_of_theirs_is_verified(made: tuple[Path, str]) -> None:
     assert "geometry" in made[1]
     assert "faults" not in made[1]

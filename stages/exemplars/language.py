@@ -106,7 +106,7 @@ LANGUAGE = Language(
     reads=_reads,
     speaker=lambda task: Kits(input_kits(task)),
     graphs=True,
-    text="Its shape graph as strings, SMILES-like, one a line, the first canonical.",
+    text="",
     anew=_anew,
     coordinates="The unit is that of the model files. The origin of a mesh is the middle of the box around the part as "
     "its model file has it; the origin of a shape is that of the exemplar that most of it stands in, and may lie "

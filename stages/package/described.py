@@ -7,6 +7,7 @@ from typing import Any
 
 from pipeline.config import Config
 from stages.shape.collection.declared import members
+from stages.shape.collection.language import Language
 from stages.shape.collection.members import TEXT, Member
 
 __all__ = ["described_members"]
@@ -25,13 +26,15 @@ OWN = (
 )
 
 
-def described_members(config: Config, names: Sequence[str], text: str) -> list[dict[str, Any]]:
-    """Name, sentence, dtype and shape of each member that samples have, as JSON. `text` says what `txt` is.
+def described_members(config: Config, names: Sequence[str], language: Language) -> list[dict[str, Any]]:
+    """Name, sentence, dtype and shape of each member that samples in `language` have, as JSON.
 
     Raises ValueError for a member that nobody declares.
     """
     declared = {each.name: each for stage in members().values() for each in stage.of(config)}
-    declared |= {each.name: each for each in (*OWN, Member(TEXT, text))}
+    declared |= {each.name: each for each in OWN}
+    if not language.graphs:
+        declared[TEXT] = Member(TEXT, language.text)
     unknown = [name for name in names if name not in declared]
     if unknown:
         raise ValueError(f"samples have {', '.join(unknown)}, which no stage declares in its members.py")

@@ -21,13 +21,13 @@ PROJECT = Path(pipeline.__file__).parent.parent / "pyproject.toml"
 
 
 @cache
-def code_version() -> str:
-    """The project's version and a digest of its code, `0.1.0+3f2a9c01d4e7`.
+def code_version(*besides: ModuleType) -> str:
+    """The project's version and a digest of its code, of the packages `besides` as well, `0.1.0+3f2a9c01d4e7`.
 
     It is a function of what the code says alone, comments and docstrings aside, so that the same code says the same in
     a checkout, in a fresh clone and in a copy without history, and an edited file says so by itself.
     """
-    digest = code_digest(reached(name for package in (pipeline, stages) for name in _modules(package)))
+    digest = code_digest(reached(name for package in (pipeline, stages, *besides) for name in _modules(package)))
     return f"{_project()['version']}+{digest[:12]}"
 
 

@@ -71,7 +71,7 @@ def plan(plan: Plan) -> list[Shard]:
         "producer": producer,
         "sections": config_sections(plan.config),
         "shards": filled,
-        "members": described_members(plan.config, filled[0]["members"], language.text),
+        "members": described_members(plan.config, filled[0]["members"], language),
         "schema": record_schema(plan.config, producer, merged[0].params["stages"]),
         "apart": declared.apart,
         "story": {
@@ -79,7 +79,7 @@ def plan(plan: Plan) -> list[Shard]:
             "splits": [declared.splits, *declared.nearness(plan)],
             "coordinates": language.coordinates,
             "limits": list(declared.limits),
-            "paragraphs": list(declared.card(plan)),
+            "paragraphs": [*declared.card(plan), *(said for each in members().values() for said in each.card(plan))],
             "variety": list(declared.variety(plan)),
             "rejects": _rejects(plan, producer),
             "unstated": unstated(origins),

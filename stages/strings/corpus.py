@@ -3,33 +3,38 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from hashlib import blake2b
 from typing import Any, BinaryIO
 
 from pipeline.errors import ShardFailed
 from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Task
 from stages.shape.kit_input import input_kits
+from stages.shape.splits import SPLITS
 from stages.strings.alphabet import make_alphabet
-from stages.strings.statistics import StringStatistics
+from stages.strings.members import CORPUS
+from stages.strings.settings import MEANINGS, Edges, StringsConfig
+from stages.strings.statistics import StringStatistics, whole
 from stages.strings.tokens import number_value
 
 __all__ = ["CORPUS", "compose_corpus"]
 
-CORPUS = "corpus"
-"""Name of the shard, and stem of its files."""
-
 
 def compose_corpus(task: Task) -> Outcome:
     """Files of the shard: `<kit>-<split>.txt`, one string a line; `vocabulary.json`, for each kit the name of the type
-    behind each token and all tokens of its strings; `statistics.json`, for each kit and split what its file holds.
+    behind each token, all tokens of its strings, and what a string stands for; `statistics.json`, for each kit and
+    split what its file holds.
 
-    Only a digest of each shape's graph is kept in memory, and the strings of graphs that several shapes share: equal
-    strings stand for equal graphs, so duplicates are among these. Raises ShardFailed where shapes of one graph stand
-    in different splits.
+    Where strings tell of all contacts, only a digest of each shape's graph is kept in memory, and the strings of graphs
+    that several shapes share: equal strings stand for equal graphs, so duplicates are among these. Where they tell of
+    less, shapes of different graphs may share strings, and a digest of every string is kept: one that train has is not
+    written in val, nor what val has in test. Raises ShardFailed where shapes of one graph stand in different splits.
     """
-    splits: dict[str, str] = dict(task.shard.params["splits"])
+    splits = dict(sorted(task.shard.params["splits"].items(), key=lambda each: SPLITS.index(each[1])))
+    edges = task.config.section(StringsConfig).edges
     shared = _shared_graphs(task, splits)
+    known: dict[tuple[str, str], set[bytes]] = {}
     statistics: dict[str, dict[str, StringStatistics]] = {}
     files: dict[str, BinaryIO] = {}
     for place, (shard, split) in enumerate(splits.items()):
@@ -39,13 +44,15 @@ def compose_corpus(task: Task) -> Outcome:
             if name not in files:
                 files[name] = task.output(f"{CORPUS}.{name}")
             counted = statistics.setdefault(kit, {}).setdefault(split, StringStatistics())
-            counted.shapes += 1
+            counted.add_shape(row["cycle_rank"])
             counted.graphs += not shared.get(graph)
             kept = strings
             if graph in shared:
                 kept = [each for each in strings if each not in shared[graph]]
                 shared[graph].update(kept)
             counted.duplicates += len(strings) - len(kept)
+            if edges != "all":
+                kept = _new(kept, kit, split, known, counted)
             for each in kept:
                 counted.add(each)
             files[name].write("".join(f"{each}\n" for each in kept).encode())
@@ -54,7 +61,7 @@ def compose_corpus(task: Task) -> Outcome:
         kit: {split: counted.describe() for split, counted in sorted(of_splits.items())}
         for kit, of_splits in sorted(statistics.items())
     }
-    for name, value in (("vocabulary.json", _vocabulary(task, statistics)), ("statistics.json", described)):
+    for name, value in (("vocabulary.json", _vocabulary(task, statistics, edges)), ("statistics.json", described)):
         files[name] = task.output(f"{CORPUS}.{name}")
         files[name].write(_readable(value))
     counts = [counted for of_splits in statistics.values() for counted in of_splits.values()]
@@ -62,9 +69,31 @@ def compose_corpus(task: Task) -> Outcome:
         "files": sorted(files),
         "strings": sum(each.strings for each in counts),
         "duplicates": sum(each.duplicates for each in counts),
+        "elsewhere": sum(each.elsewhere for each in counts),
         "graphs": sum(each.graphs for each in counts),
+        "edges": edges,
+        "kits": {kit: whole(of_splits.values()) for kit, of_splits in sorted(statistics.items())},
     }
     return Outcome(samples=0, summary=summary)
+
+
+def _new(
+    strings: Sequence[str], kit: str, split: str, known: dict[tuple[str, str], set[bytes]], counted: StringStatistics
+) -> list[str]:
+    """Those of `strings` that no file of the kit has yet; `known` holds digests of the strings of each file."""
+    own = known.setdefault((kit, split), set())
+    others = [digests for (other, where), digests in known.items() if other == kit and where != split]
+    kept = []
+    for each in strings:
+        digest = blake2b(each.encode(), digest_size=16).digest()
+        if digest in own:
+            counted.duplicates += 1
+        elif any(digest in digests for digests in others):
+            counted.elsewhere += 1
+        else:
+            own.add(digest)
+            kept.append(each)
+    return kept
 
 
 def _shared_graphs(task: Task, splits: dict[str, str]) -> dict[bytes, set[str]]:
@@ -102,15 +131,17 @@ def _rows_and_strings(task: Task, shard: str) -> Iterator[tuple[dict[str, Any], 
         yield row, members["txt"].decode().splitlines()
 
 
-def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]]) -> dict[str, Any]:
-    """For each kit with strings: `types`, type name by token; `tokens`, types first, then parentheses and numbers."""
+def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]], edges: Edges) -> dict[str, Any]:
+    """For each kit with strings: `types`, type name by token; `tokens`, types first, then parentheses and numbers;
+    `edges`, what strings tell of, and `meaning`, what that is in words."""
     described = {}
     for name, kit in sorted(input_kits(task).items()):
         if name in statistics:
             types = make_alphabet(kit.labels).vocabulary()
             seen = {token for counted in statistics[name].values() for token in counted.seen}
             numbers = sorted(seen - set(types) - {"(", ")"}, key=_number)
-            described[name] = {"types": types, "tokens": [*types, "(", ")", *numbers]}
+            tokens = [*types, "(", ")", *numbers]
+            described[name] = {"types": types, "tokens": tokens, "edges": edges, "meaning": MEANINGS[edges]}
     return described
 
 

@@ -35,11 +35,14 @@ class Encoded:
     nodes: npt.NDArray[np.int64]
 
 
-def encode(types: TypeArray, edges: IntArray, alphabet: Alphabet, rng: np.random.Generator) -> Encoded:
+def encode(
+    types: TypeArray, edges: IntArray, alphabet: Alphabet, rng: np.random.Generator, cycles: bool = True
+) -> Encoded:
     """A random string of a graph: random spanning tree, random root, random order of the children.
 
     All cycles are broken at random edges; the tree that is left is written depth first, each subtree of a node in
-    parentheses except the last; the broken edges come back as numbers behind both of their nodes.
+    parentheses except the last; the broken edges come back as numbers behind both of their nodes. Without `cycles` they
+    do not come back: the string is that of a random spanning tree (strings §7, brick buildings).
 
     types: int16 (n,), at least one node; edges: int32 (m, 2), a simple graph. Raises NotConnectedError, and ValueError
     if the graph is empty or an edge or a type names what is not there.
@@ -49,6 +52,8 @@ def encode(types: TypeArray, edges: IntArray, alphabet: Alphabet, rng: np.random
     letters, pairs = _checked(types, edges, alphabet)
     root = int(rng.integers(len(letters)))
     tree = first_edges_tree(len(letters), pairs, rng.permutation(len(pairs)))
+    if not cycles:
+        pairs, tree = pairs[tree], tree[tree]
     return _write(letters, pairs, tree, rng.permutation(len(pairs)), root, alphabet)
 
 
@@ -59,6 +64,7 @@ def random_strings(
     count: int,
     rng: np.random.Generator,
     besides: Collection[str] = (),
+    cycles: bool = True,
 ) -> list[Encoded]:
     """`count` distinct random strings of a graph, none of them in `besides`.
 
@@ -68,7 +74,7 @@ def random_strings(
     found: list[Encoded] = []
     in_vain = 0
     while len(found) < count and in_vain < PATIENCE * (4 + len(seen)):
-        encoded = encode(types, edges, alphabet, rng)
+        encoded = encode(types, edges, alphabet, rng, cycles)
         if encoded.string in seen:
             in_vain += 1
         else:
@@ -78,8 +84,9 @@ def random_strings(
     return found
 
 
-def canonical_string(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> Encoded:
-    """The canonical string of a graph, the same for all isomorphic graphs: depth first in canonical order.
+def canonical_string(types: TypeArray, edges: IntArray, alphabet: Alphabet, cycles: bool = True) -> Encoded:
+    """The canonical string of a graph, the same for all isomorphic graphs: depth first in canonical order. Without
+    `cycles`, that of the spanning tree which such a walk goes along.
 
     Arguments and errors as for `encode`, and ValueError if the graph is not simple.
     """
@@ -92,6 +99,9 @@ def canonical_string(types: TypeArray, edges: IntArray, alphabet: Alphabet) -> E
     pairs = np.sort(rank[np.asarray(edges).reshape(-1, 2)], axis=1)
     edge_order = np.argsort(pairs[:, 0] * len(order) + pairs[:, 1])
     tree = depth_first_tree(len(order), pairs, edge_order, 0)
+    if not cycles:
+        pairs, tree = pairs[edge_order][tree[edge_order]], tree[tree]
+        edge_order = np.arange(len(pairs))
     encoded = _write(letters[order], pairs, tree, edge_order, 0, alphabet)
     return Encoded(encoded.string, order[encoded.nodes])
 

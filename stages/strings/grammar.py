@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 
-from stages.shape.graphs.neighbourhoods import admits
+from stages.shape.graphs.neighbourhoods import admits, admits_more
 from stages.shape.kit import Grammar
 from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
+from stages.strings.settings import Edges
 from stages.strings.tokens import StringError
 
 __all__ = ["check"]
 
 
-def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
-    """The graph of `string`, if the grammar admits the neighbours of every node.
+def check(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges = "all") -> Decoded:
+    """The graph of `string`, if the grammar admits the neighbours of every node: just these, or, where strings do not
+    tell of all contacts (`edges`), these and others besides.
 
     Raises StringError where the string cannot be decoded; at the first edge whose two types were never neighbours;
     else at the first node whose neighbours the grammar does not admit.
@@ -29,14 +31,14 @@ def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
         if docking.a in grammar.hubs or docking.b in grammar.hubs:
             around.setdefault(docking.a, set()).add(docking.b)
             around.setdefault(docking.b, set()).add(docking.a)
-    edges = decoded.edges.tolist()
+    pairs = decoded.edges.tolist()
     neighbours: list[list[int]] = [[] for _ in types]
-    for i, j in edges:
+    for i, j in pairs:
         neighbours[i].append(types[j])
         neighbours[j].append(types[i])
     for token in decoded.tokens:
         if token.edge >= 0:
-            i, j = edges[token.edge]
+            i, j = pairs[token.edge]
             if types[j] not in around.get(types[i], ()):
                 pair = f"{alphabet.tokens[types[i]]} ({alphabet.names[types[i]]}) and {alphabet.tokens[types[j]]} "
                 raise StringError(string, token.index, f"{pair}({alphabet.names[types[j]]}) are never neighbours")
@@ -44,7 +46,7 @@ def check(string: str, alphabet: Alphabet, grammar: Grammar) -> Decoded:
         if token.kind == "node":
             counts = Counter(neighbours[token.node])
             multiset = tuple(sorted(counts.items()))
-            if not admits(grammar, types[token.node], multiset):
+            if not (admits if edges == "all" else admits_more)(grammar, types[token.node], multiset):
                 seen = ", ".join(f"{count} {alphabet.tokens[kind]}" for kind, count in multiset) or "no neighbour"
                 raise StringError(string, token.index, f"{token.text} {_verdict(grammar)} with {seen} around it")
     return decoded

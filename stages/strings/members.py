@@ -1,9 +1,42 @@
-"""What stage `strings` adds to every sample that is a shape graph: its text."""
+"""What stage `strings` adds to every sample that is a shape graph, its text, and what the card says of the corpus."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from pipeline.config import Config
+from pipeline.stage import Plan
 from stages.shape.collection.members import TEXT, Member, Members
+from stages.strings.settings import MEANINGS, StringsConfig
 
-__all__ = ["MEMBERS"]
+__all__ = ["CORPUS", "MEMBERS"]
 
-MEMBERS = Members(of=lambda _: (Member(TEXT, "The shape as text."),))
+CORPUS = "corpus"
+"""Name of the shard that makes the corpus, and stem of its files."""
+
+COLUMNS = (
+    ("tokens", "tokens a string"),
+    ("cycles", "cycle numbers a string"),
+    ("cycle_rank", "cycle rank of a shape"),
+)
+
+
+def _text(config: Config) -> tuple[Member, ...]:
+    edges = config.section(StringsConfig).edges
+    told = {"all": "", "faces": " by its face contacts", "tree": " without the contacts that close cycles"}[edges]
+    return (Member(TEXT, f"Its shape graph{told} as strings, SMILES-like, one a line, the first canonical."),)
+
+
+def _card(plan: Plan) -> Sequence[str]:
+    """What a string stands for, and how long strings are."""
+    summary = plan.summary("strings", CORPUS)
+    if summary is None:
+        return []
+    rows = ["| strings of | " + " | ".join(title for _, title in COLUMNS) + " |", "|---|" + "---:|" * len(COLUMNS)]
+    for kit, figures in summary["kits"].items():
+        cells = [f"{figures[name]['median']:,}, at most {figures[name]['most']:,}" for name, _ in COLUMNS]
+        rows.append(f"| {kit} | " + " | ".join(cells) + " |")
+    return [f"{MEANINGS[summary['edges']]} Medians of the corpus:", "\n".join(rows)]
+
+
+MEMBERS = Members(of=_text, card=_card)

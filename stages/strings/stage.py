@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,13 +13,12 @@ from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.declared import language_of
 from stages.shape.collection.shards import PRODUCERS, collection_shards
 from stages.shape.graphs.canonical import graph_digest
-from stages.shape.kit import Assembly
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
-from stages.strings.alphabet import Alphabet, make_alphabet
-from stages.strings.corpus import CORPUS, compose_corpus
-from stages.strings.decoder import decode
-from stages.strings.encoder import Encoded, NotConnectedError, canonical_string, random_strings
+from stages.strings.corpus import compose_corpus
+from stages.strings.encoder import NotConnectedError
+from stages.strings.kit_strings import KitStrings
+from stages.strings.members import CORPUS
 from stages.strings.settings import StringsConfig
 
 __all__ = ["STAGE"]
@@ -48,25 +46,24 @@ def run_shard(task: Task) -> Outcome:
 
 def write_strings(task: Task) -> Outcome:
     """Files of the shard: `.tar` with the member `txt` of each sample, one string a line, the canonical one first;
-    and `.jsonl` with the sample's key, kit and graph for the corpus, in the same order.
+    and `.jsonl` with the sample's key, kit, graph and cycle rank for the corpus, in the same order.
 
     Every string is decoded again before it is written. A sample whose graph is not connected has no string and is
     refused. Raises ShardFailed where a string does not stand for its graph, or a sample is filed under a wrong graph.
     """
     config = task.config.section(StringsConfig)
-    kits = input_kits(task)
-    alphabets = {name: make_alphabet(kit.labels) for name, kit in kits.items()}
+    kits = {name: KitStrings(kit, config.edges) for name, kit in input_kits(task).items()}
     written, rows = 0, []
 
     def strings_of(_: Collection, sample: Sample) -> Mapping[str, bytes]:
         nonlocal written
         try:
-            labelled = replace(sample, assembly=kits[sample.kit].labelled(sample.assembly))
-            strings = _strings(labelled, alphabets[sample.kit], config.strings_per_shape, task.rng(sample.key))
+            strings = _strings(sample, kits[sample.kit], config.strings_per_shape, task.rng(sample.key))
         except NotConnectedError as error:
             raise Rejected("shape graph is not connected", str(error)) from error
         written += len(strings)
-        rows.append({"key": sample.key, "kit": sample.kit, "graph": sample.graph})
+        cycle_rank = len(sample.assembly.edges) - len(sample.assembly) + 1
+        rows.append({"key": sample.key, "kit": sample.kit, "graph": sample.graph, "cycle_rank": cycle_rank})
         return {"txt": ("\n".join(strings) + "\n").encode()}
 
     samples = add_members(task, strings_of)
@@ -84,12 +81,18 @@ def publish(plan: Plan) -> Mapping[str, str]:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """One line about the corpus, once it is there."""
+    """What the corpus holds, once it is there, and how long its strings are."""
     summary = plan.summary("strings", CORPUS)
     if summary is None:
         return ()
     counts = f"{summary['strings']} strings of {summary['graphs']} graphs"
-    return (f"corpus: {counts}, {summary['duplicates']} duplicates dropped",)
+    elsewhere = f" and {summary['elsewhere']} that stand in another split" if summary["elsewhere"] else ""
+    lengths = [
+        f"{kit}: {each['tokens']['median']:,} tokens a string in the median, {each['tokens']['most']:,} at most; cycle "
+        f"rank of the shapes {each['cycle_rank']['median']:,} in the median, {each['cycle_rank']['most']:,} at most"
+        for kit, each in summary["kits"].items()
+    ]
+    return (f"corpus: {counts}, {summary['duplicates']} duplicates{elsewhere} dropped", *lengths)
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -103,30 +106,17 @@ def _graph_shards(plan: Plan) -> list[Shard]:
     return [each for each in collection_shards(plan) if language_of(each.params["producer"]).graphs]
 
 
-def _strings(sample: Sample, alphabet: Alphabet, count: int, rng: np.random.Generator) -> list[str]:
-    """The canonical string of a sample, its types being those of `alphabet`, and `count` random ones, proved to stand
-    for its graph."""
-    types, edges = sample.assembly.types, sample.assembly.edges
-    if graph_digest(types, edges) != sample.graph:
+def _strings(sample: Sample, kit: KitStrings, count: int, rng: np.random.Generator) -> list[str]:
+    """The canonical string of a sample and `count` random ones, proved to stand for its graph."""
+    labelled = kit.kit.labelled(sample.assembly)
+    if graph_digest(labelled.types, labelled.edges) != sample.graph:
         raise ShardFailed(f"sample {sample.key} is filed under graph {sample.graph}, which is not its own")
-    canonical = canonical_string(types, edges, alphabet)
-    encoded = [canonical, *random_strings(types, edges, alphabet, count, rng, {canonical.string})]
+    graph = kit.graph(sample.assembly)
+    encoded = kit.strings(graph, count, rng)
     for each in encoded:
-        if not _stands_for(each, sample.assembly, alphabet):
+        if not kit.stands_for(each, graph):
             raise ShardFailed(f"a string of sample {sample.key} does not stand for its graph: {each.string}")
     return [each.string for each in encoded]
-
-
-def _stands_for(encoded: Encoded, assembly: Assembly, alphabet: Alphabet) -> bool:
-    """Whether the string, decoded, is the graph of `assembly` under the encoder's own matching of their nodes."""
-    decoded = decode(encoded.string, alphabet)
-    if sorted(encoded.nodes.tolist()) != list(range(len(assembly))):
-        return False
-    if not np.array_equal(decoded.types, assembly.types[encoded.nodes]):
-        return False
-    found = np.sort(encoded.nodes[decoded.edges], axis=1)
-    keys, expected = found @ (len(assembly), 1), np.sort(assembly.edges, axis=1) @ (len(assembly), 1)
-    return np.array_equal(np.sort(keys), np.sort(expected))
 
 
 STAGE = Stage(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eval.near_twins import cloud_distance, near_twins, near_twins_table, nearest_in_train
+from eval.near_twins import cloud_distance, near_twins, near_twins_table, nearest_by_split, nearest_in_train
 
 
 def boxes(rng: np.random.Generator, *boxes: tuple[float, ...]) -> np.ndarray:
@@ -56,5 +56,5 @@ def test_the_table_counts_twins_of_each_split_but_train() -> None:
         ("huts", "val"): pairs(SHED),
         ("huts", "test"): pairs(HOUSE, SHED),
     }
-    table = near_twins_table(clouds)
+    table = near_twins_table(nearest_by_split(clouds))
     assert [row[:5] for row in table.rows] == [("huts", "val", 1, 0, 0.0), ("huts", "test", 2, 1, 50.0)]

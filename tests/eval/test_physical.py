@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eval.__main__ import main
-from eval.physical import physical_table
+from eval.physical import PUBLISHED, judged_by_name, physical_table
 from eval.shapes import box_shape, shared_meshes
 from eval.table import Table
 from stages.shape.arrays import FloatArray
@@ -33,7 +33,7 @@ def corners(*heights: float) -> FloatArray:
 def test_so_many_shapes_are_judged_dry_as_are_asked_for() -> None:
     shapes = [("towers", STANDS), ("towers", FLOATS), ("towers", FLOATS)]
     for most, share in ((9, pytest.approx(100 / 3)), (1, 100), (2, 50), (0, "")):
-        table = physical_table(shapes, PhysicsConfig(), most)
+        table = physical_table(judged_by_name(shapes, PhysicsConfig()), PhysicsConfig(), most)
         found = dict(zip(table.columns, table.rows[0], strict=True))
         assert found["stable %"] == pytest.approx(100 / 3)
         assert found["dry stable %"] == share
@@ -41,14 +41,18 @@ def test_so_many_shapes_are_judged_dry_as_are_asked_for() -> None:
 
 def test_table_has_a_row_for_each_name_with_its_shares() -> None:
     post = solid(box(0.1, 0.1, 2, at=(0, 0, 1)))  # tips at a push of a twentieth of its weight
-    table = physical_table([("b", STANDS), ("a", FLOATS), ("b", FLOATS), ("c", post)], PhysicsConfig(), 9, ["chair"])
+    judged = judged_by_name([("b", STANDS), ("a", FLOATS), ("b", FLOATS), ("c", post)], PhysicsConfig())
+    table = physical_table(judged, PhysicsConfig(), 9, PUBLISHED[:1])
     rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
-    assert list(rows) == ["b", "a", "c", "chair, published"]
+    assert list(rows) == ["b", "a", "c"]
     assert (rows["b"]["shapes"], rows["b"]["parts"]) == (2, 2)
     assert (rows["b"]["rooted %"], rows["b"]["stable %"], rows["b"]["dry stable %"]) == (50, 50, 50)
     assert [(rows[name]["stable %"], rows[name]["firm %"]) for name in "bc"] == [(50, 50), (100, 0)]
     assert (rows["a"]["floating"], rows["a"]["pieces"]) == (1, 2)
-    assert (rows["chair, published"]["rooted %"], rows["chair, published"]["stable %"]) == (100.0, 88.0)
+    ((_, ours),) = table.published_by_source().items()
+    published = dict(zip(table.columns, ours[0], strict=True))
+    assert published["shapes of"] == "chair, ground truth"
+    assert (published["rooted %"], published["stable %"]) == (100.0, 88.0)
 
 
 def test_table_reads_the_same_in_every_format() -> None:
@@ -86,7 +90,8 @@ def test_files_are_measured_from_the_command_line(tmp_path: Path, capsys: pytest
     assert main(["physical", str(tmp_path / "chair_boxes.npz")]) == 0
     printed = capsys.readouterr().out
     assert "| chair_boxes | 2 | 2 | 50.0 | 50.0 | 50.0 |" in printed
-    assert "chair, published" in printed
+    assert "chair, ground truth (shapeassembly Table 2, by simulation)" in printed
+    assert "storage" not in printed
 
 
 def test_missing_dataset_and_wrong_file_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -69,7 +69,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-",
-        "TABLE": "physical", "SAMPLES": "100",
+        "TABLE": "-", "SAMPLES": "100",
     }  # fmt: skip
 
 

@@ -55,7 +55,8 @@ class Language:
     speaker: the language inside a task whose shard has those among its inputs.
     graphs: whether its samples are shape graphs, with contacts of their own and strings; else they have a text, and
     contacts are found by whoever asks.
-    text: what the member `txt` of its samples is; coordinates: their unit, and where their origin is; for the card.
+    text: what the member `txt` of its samples is, unless they are shape graphs; coordinates: their unit, and where
+    their origin is; for the card.
     anew: the shape that the record of a packaged sample says, made anew and upright, given the mill's folders of its
     dataset; raises LookupError where what it is made from is not there, ValueError where the record cannot be meant.
     """

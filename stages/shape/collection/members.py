@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from pipeline.config import Config
+from pipeline.stage import Plan
 from stages.shape.arrays import ByteArray
 from stages.shape.views.camera import Camera
 
@@ -62,6 +63,10 @@ def _no_fields(_: Config) -> Mapping[str, Field]:
     return {}
 
 
+def _nothing_to_say(_: Plan) -> Sequence[str]:
+    return ()
+
+
 @dataclass(frozen=True)
 class Members:
     """What a stage adds. `MEMBERS = Members(...)` stands in `stages/<stage>/members.py`.
@@ -70,10 +75,12 @@ class Members:
     with the declared fields, which package merges into the record.
 
     of: the members, given the config; fields: of the record, by name; columns: of the index, by name.
-    row: how the preview shows it, or None.
+    row: how the preview shows it, or None; card: paragraphs and tables for the card's section on how the dataset was
+    made, from finished records.
     """
 
     of: Callable[[Config], tuple[Member, ...]]
     fields: Callable[[Config], Mapping[str, Field]] = _no_fields
     columns: Mapping[str, Column] = field(default_factory=dict)
     row: Row | None = None
+    card: Callable[[Plan], Sequence[str]] = _nothing_to_say

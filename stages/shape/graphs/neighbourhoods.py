@@ -22,7 +22,7 @@ from itertools import combinations
 
 from stages.shape.kit import Grammar, Multiset, Strictness
 
-__all__ = ["SLOT_LEVELS", "STRICTNESS", "admits"]
+__all__ = ["SLOT_LEVELS", "STRICTNESS", "admits", "admits_more"]
 
 STRICTNESS: tuple[Strictness, ...] = ("multiset", "count_and_set", "count_and_pairs", "count_and_types")
 """The levels, the strictest first."""
@@ -51,6 +51,34 @@ def admits(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
         return True
     together = {pair for each in observed for pair in combinations([other for other, _ in each], 2)}
     return all(pair in together for pair in combinations(sorted(types), 2))
+
+
+def admits_more(grammar: Grammar, part_type: int, neighbours: Multiset) -> bool:
+    """Whether a part of type `part_type` may have these `neighbours` and, it may be, others: what a graph that leaves
+    out contacts can show of it."""
+    if part_type in grammar.hubs:
+        return True
+    counts = {other: count for other, count in neighbours if other not in grammar.hubs}
+    total = sum(counts.values())
+    observed = grammar.neighbourhoods.get(part_type, {})
+    if grammar.strictness == "multiset":
+        return any(all(dict(each).get(other, 0) >= count for other, count in counts.items()) for each in observed)
+    if grammar.strictness == "count_and_set":
+        # each observed type stands there at least once, so that many places are left
+        return any(
+            counts.keys() <= dict(each).keys() and sum(max(counts.get(other, 0), 1) for other, _ in each) <= _size(each)
+            for each in observed
+        )
+    if not counts.keys() <= {other for each in observed for other, _ in each}:
+        return False
+    if grammar.strictness in SLOT_LEVELS:
+        return True
+    if not any(total <= _size(each) for each in observed):
+        return False
+    if grammar.strictness == "count_and_types":
+        return True
+    together = {pair for each in observed for pair in combinations([other for other, _ in each], 2)}
+    return all(pair in together for pair in combinations(sorted(counts), 2))
 
 
 def _size(multiset: Multiset) -> int:

@@ -30,6 +30,7 @@ from stages.shape.sample import Sample, read_samples, write_sample
 from stages.shape.views.scene import scene_of
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.sketches.stage import drawings
+from stages.strings.settings import StringsConfig
 from stages.validity.stage import STAGE as VALIDITY
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
 
@@ -117,10 +118,6 @@ class ToyConfig(StrictModel):
     shards: int = 8
 
 
-class NoConfig(StrictModel):
-    """Nothing to set."""
-
-
 def _make_kit(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.json") as text, task.output(f"{task.shard.name}.tar") as arrays:
         write_kit(toy_kit(task.shard.name), text, arrays)
@@ -173,7 +170,7 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
             "exemplars", __name__, ExemplarsConfig, (), lambda _: [Shard(name) for name in KITS], _make_kit, _no_bytes
         ),
         Stage("variations", __name__, ToyConfig, ("exemplars",), _plan_collection, _make_collection, _no_bytes),
-        Stage("strings", __name__, NoConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
+        Stage("strings", __name__, StringsConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
         POINTS,
         VALIDITY,
         Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
@@ -188,7 +185,7 @@ def toy_config(shards: int = 8) -> Config:
         **ABSENT_SECTIONS,
         "exemplars": ExemplarsConfig(),
         "variations": ToyConfig(shards=shards),
-        "strings": NoConfig(),
+        "strings": StringsConfig(),
         "validity": PhysicsConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(

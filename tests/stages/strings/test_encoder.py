@@ -190,3 +190,43 @@ def test_what_is_no_connected_graph_of_the_kit_is_refused(
         encode(*graph, ALPHABET, np.random.default_rng(0))
     with pytest.raises(ValueError, match=reason):
         canonical_string(*graph, ALPHABET)
+
+
+def assert_spans(encoded: Encoded, graph: Graph) -> None:
+    """The decoded string is a spanning tree of the graph."""
+    types, edges = graph
+    decoded = decode(encoded.string, ALPHABET)
+    assert decoded.types.tolist() == types[encoded.nodes].tolist()
+    found = nx.Graph(encoded.nodes[decoded.edges].tolist())
+    found.add_nodes_from(range(len(types)))
+    assert nx.is_tree(found)
+    assert {frozenset(each) for each in found.edges} <= {frozenset(each) for each in edges.tolist()}
+    assert not set("0123456789%") & set(encoded.string)
+
+
+@settings(max_examples=100, deadline=None)
+@given(connected_graphs(), st.integers(0, 2**32 - 1))
+def test_without_cycles_strings_are_spanning_trees(graph: Graph, seed: int) -> None:
+    assert_spans(encode(*graph, ALPHABET, np.random.default_rng(seed), cycles=False), graph)
+    canonical = canonical_string(*graph, ALPHABET, cycles=False)
+    assert_spans(canonical, graph)
+    again = canonical_string(*renamed(graph, np.random.default_rng(seed)), ALPHABET, cycles=False)
+    assert again.string == canonical.string
+
+
+@settings(max_examples=50, deadline=None)
+@given(connected_graphs(), st.integers(0, 2**32 - 1))
+def test_a_tree_has_the_same_strings_with_and_without_cycles(graph: Graph, seed: int) -> None:
+    decoded = decode(encode(*graph, ALPHABET, np.random.default_rng(seed), cycles=False).string, ALPHABET)
+    tree = decoded.types, decoded.edges
+    for cycles in (True, False):
+        one, other = (encode(*tree, ALPHABET, np.random.default_rng(seed), each) for each in (True, cycles))
+        assert one.string == other.string
+        assert canonical_string(*tree, ALPHABET, cycles).string == canonical_string(*tree, ALPHABET).string
+
+
+def test_all_trees_of_a_triangle_are_written() -> None:
+    graph = (np.array([0, 1, 2], dtype=np.int16), np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32))
+    found = {each.string for each in random_strings(*graph, ALPHABET, 50, np.random.default_rng(0), (), cycles=False)}
+    chains = {"ABC", "ACB", "BAC", "BCA", "CAB", "CBA"}
+    assert found == chains | {"A(B)C", "A(C)B", "B(A)C", "B(C)A", "C(A)B", "C(B)A"}

@@ -5,6 +5,7 @@ import pytest
 from stages.shape.kit import Grammar
 from stages.strings.alphabet import make_alphabet
 from stages.strings.grammar import check
+from stages.strings.settings import Edges
 from stages.strings.tokens import StringError
 
 ALPHABET = make_alphabet(["tower", "gate", "flag", "wall"])
@@ -55,3 +56,15 @@ def test_a_forbidden_cycle_edge_is_named_at_its_number() -> None:
 def test_a_string_that_cannot_be_read_is_refused_as_such() -> None:
     with pytest.raises(StringError, match="not closed"):
         check("A(D", ALPHABET, CASTLE)
+
+
+@pytest.mark.parametrize("edges", ["faces", "tree"])
+def test_where_strings_leave_out_contacts_a_part_may_have_fewer_neighbours_than_were_seen(edges: Edges) -> None:
+    for string in ("ADADAD", "CADADBDAD", "D(AD)AC"):
+        with pytest.raises(StringError):
+            check(string, ALPHABET, CASTLE)
+        check(string, ALPHABET, CASTLE, edges)
+    for string, index in (("ADADCD", 4), ("A(C)(C)DAD", 0), ("AD(A)AD", 1)):
+        with pytest.raises(StringError) as caught:
+            check(string, ALPHABET, CASTLE, edges)
+        assert caught.value.index == index

@@ -23,7 +23,8 @@ from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
-from stages.strings.settings import StringsConfig
+from stages.strings.members import MEMBERS
+from stages.strings.settings import MEANINGS, Edges, StringsConfig
 from stages.strings.stage import STAGE
 from stages.strings.statistics import measure_string
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
@@ -72,6 +73,8 @@ def make_shapes(task: Task) -> Outcome:
     rng = np.random.default_rng(place)
     shapes = [("castle", nx.grid_2d_graph(3, 4 + place)), ("castle", nx.grid_2d_graph(4, 6 + place))]
     shapes += [("chain", nx.path_graph(3 + place)), ("chain", nx.cycle_graph(5 + place))]
+    if flaw == "rings in val" and place == 2:
+        shapes[2] = ("chain", nx.cycle_graph(4))
     if place == 1 or (place == 2 and flaw == "one graph in two splits"):
         shapes[0] = ("castle", nx.grid_2d_graph(3, 4))
     with task.output(f"{name}.tar") as stream, ShardWriter(stream) as writer:
@@ -103,12 +106,12 @@ STAGES: Mapping[str, Stage] = named_inputs(
 )
 
 
-def config(flaw: str = "", count: int = 8) -> Config:
+def config(flaw: str = "", count: int = 8, edges: Edges = "all") -> Config:
     sections = {
         **ABSENT_SECTIONS,
         "exemplars": KitsConfig(),
         "variations": ShapesConfig(flaw=flaw),
-        "strings": StringsConfig(strings_per_shape=count),
+        "strings": StringsConfig(strings_per_shape=count, edges=edges),
     }
     return Config(name="toys", version="1.0.0", seed=3, sections=sections, path=Path("toys.yaml"))
 
@@ -219,7 +222,9 @@ def test_the_report_counts_the_corpus(made: Path) -> None:
     survey = Survey(config(), STAGES, Places(made, "toys"))
     total = sum(len(lines(made, f"{kit}-{split}.txt")) for kit in KITS for split in ("train", "val"))
     report = STAGE.report(survey.stage("strings").view)
-    assert len(report) == 1
+    assert len(report) == 1 + len(KITS)
+    assert report[1].startswith("castle: ")
+    assert report[1].endswith("cycle rank of the shapes 10 in the median, 21 at most"), "of grids of 3 x 4 to 4 x 8"
     assert report[0].startswith(f"corpus: {total} strings of 11 graphs")
 
 
@@ -258,3 +263,56 @@ def test_a_shape_that_is_not_connected_is_refused_and_counted(tmp_path: Path) ->
     for shard in SPLITS:
         assert records[shard].rejects == {"shape graph is not connected": 1}
         assert records[shard].samples == 3
+
+
+def corpus_file(out: Path, name: str) -> str:
+    """A file of the corpus that is not published yet."""
+    return (Places(out, "toys").work / "strings" / f"corpus.{name}").read_text()
+
+
+@pytest.fixture(scope="module")
+def trees(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output folder of the stage for spanning trees."""
+    out = tmp_path_factory.mktemp("trees")
+    assert make_here(config(edges="tree"), out) == {}
+    return out
+
+
+def test_strings_of_trees_have_no_cycles_and_say_so(trees: Path) -> None:
+    work = Places(trees, "toys").work
+    for shard in SPLITS:
+        samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
+        for key, members in read_shard(work / "strings" / f"{shard}.tar"):
+            for each in members["txt"].decode().splitlines():
+                decoded = decode(each, make_alphabet(KITS[samples[key].kit]))
+                assert sorted(decoded.types) == sorted(samples[key].assembly.types)
+                assert len(decoded.edges) == len(decoded.types) - 1
+    vocabulary = json.loads(corpus_file(trees, "vocabulary.json"))
+    assert vocabulary["castle"]["tokens"] == ["A", "B", "C", "(", ")"]
+    assert (vocabulary["castle"]["edges"], vocabulary["castle"]["meaning"]) == ("tree", MEANINGS["tree"])
+    statistics = json.loads(corpus_file(trees, "statistics.json"))
+    assert statistics["castle"]["train"]["cycles"]["most"] == 0
+    assert statistics["castle"]["train"]["cycle_rank"]["histogram"] == {"6": 2, "15": 1, "18": 1}
+
+
+def test_a_string_that_several_graphs_share_stands_once_in_a_corpus_of_trees(tmp_path: Path) -> None:
+    """A ring of links and the chain of the same links have strings in common; here they stand in different splits."""
+    assert make_here(config("rings in val", edges="tree", count=40), tmp_path) == {}
+    statistics = json.loads(corpus_file(tmp_path, "statistics.json"))
+    train, val = (corpus_file(tmp_path, f"chain-{split}.txt").splitlines() for split in ("train", "val"))
+    assert not set(train) & set(val)
+    assert len(set(train)) == len(train)
+    assert statistics["chain"]["val"]["elsewhere_dropped"] > 0
+    assert statistics["chain"]["train"]["elsewhere_dropped"] == 0
+    survey = Survey(config("rings in val", edges="tree", count=40), STAGES, Places(tmp_path, "toys"))
+    assert "that stand in another split dropped" in STAGE.report(survey.stage("strings").view)[0]
+
+
+def test_the_card_says_what_strings_stand_for_and_how_long_they_are(trees: Path) -> None:
+    survey = Survey(config(edges="tree"), STAGES, Places(trees, "toys"))
+    meaning, table = MEMBERS.card(survey.stage("strings").view)
+    assert meaning.startswith(MEANINGS["tree"])
+    castle = next(line for line in table.splitlines() if line.startswith("| castle |"))
+    assert "| 0, at most 0 | 10, at most 21 |" in castle
+    (member,) = MEMBERS.of(config(edges="tree"))
+    assert "without the contacts that close cycles" in member.sentence

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from stages.strings.statistics import StringFigures, StringStatistics, measure_string
+from stages.strings.statistics import StringFigures, StringStatistics, measure_string, whole
 
 
 @pytest.mark.parametrize(
@@ -27,5 +27,19 @@ def test_statistics_count_values_and_tokens() -> None:
     assert statistics.seen == Counter({"A": 5, "B": 2, "0": 2})
     described = statistics.describe()
     assert described["strings"] == 3
-    assert described["tokens"] == {"least": 2, "mean": 3.0, "most": 5, "histogram": {"2": 2, "5": 1}}
-    assert described["cycles"] == {"least": 0, "mean": 0.333, "most": 1, "histogram": {"0": 2, "1": 1}}
+    assert described["tokens"] == {"least": 2, "median": 2, "mean": 3.0, "most": 5, "histogram": {"2": 2, "5": 1}}
+    assert described["cycles"] == {"least": 0, "median": 0, "mean": 0.333, "most": 1, "histogram": {"0": 2, "1": 1}}
+    assert "cycle_rank" not in described
+
+
+def test_figures_of_several_files_are_joined() -> None:
+    first, second = StringStatistics(), StringStatistics()
+    for statistics, strings, ranks in ((first, ["AB", "AAAAA"], [3]), (second, ["A0AA0"], [1, 7])):
+        for string in strings:
+            statistics.add(string)
+        for rank in ranks:
+            statistics.add_shape(rank)
+    joined = whole([first, second])
+    assert (joined["tokens"], joined["cycles"]) == ({"median": 5, "most": 5}, {"median": 0, "most": 1})
+    assert joined["cycle_rank"] == {"median": 3, "most": 7}
+    assert second.describe()["cycle_rank"]["histogram"] == {"1": 1, "7": 1}

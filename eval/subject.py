@@ -1,0 +1,62 @@
+"""What tables are about: a config, and whatever has been made of it so far."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pipeline.config import Config, load_config
+from pipeline.places import Places
+from pipeline.registry import find_stages
+from stages.package.layout import MANIFEST
+
+__all__ = ["Subject", "load_subject"]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """config: the dataset's; out: the folder that datasets are made in."""
+
+    config: Config
+    out: Path
+
+    @property
+    def folder(self) -> Path:
+        """The finished dataset."""
+        return self.out / self.config.name
+
+    @property
+    def models(self) -> Path:
+        """The folder of what was trained on the dataset, a folder a model."""
+        return self.out / f"{self.config.name}-models"
+
+    @property
+    def results(self) -> Path:
+        """Where tables about the dataset are kept."""
+        return self.out / f"{self.config.name}-eval"
+
+    @property
+    def places(self) -> Places:
+        """The mill's folders of the dataset."""
+        return Places(self.out, self.config.name)
+
+    @cached_property
+    def manifest(self) -> Mapping[str, Any]:
+        """What the finished dataset says of itself, empty where none stands."""
+        path = self.folder / MANIFEST
+        described: dict[str, Any] = json.loads(path.read_bytes()) if path.is_file() else {}
+        return described
+
+    @property
+    def samples(self) -> int:
+        """Samples of the finished dataset."""
+        return int(self.manifest.get("samples", 0))
+
+
+def load_subject(config: Path, out: Path) -> Subject:
+    """The subject of a config file. Raises ConfigError for a config that is not valid."""
+    return Subject(load_config(config, {name: stage.config for name, stage in find_stages().items()}), out)

@@ -1,0 +1,56 @@
+"""`make eval TABLE=compression`: how few bytes does a shape take as string and categories? (strings §7)"""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+
+from eval.evaluation import Answer, Evaluation, Strip
+from eval.needs import FINISHED, KITS
+from eval.subject import Subject
+from stages.strings.settings import Edges
+
+__all__ = ["TABLE"]
+
+EDGES: tuple[Edges, ...] = ("all", "tree")
+
+
+def _answer(subject: Subject, _: Namespace) -> Answer:
+    from eval.compression import Stored, compression_row, compression_table, round_trip
+    from eval.pictures import shape_picture
+    from pipeline.shards import read_shard
+    from stages.exemplars.language import LANGUAGE, made_kits
+    from stages.shape.collection.pairs import CONTACTS, pairs_of
+    from stages.shape.shape import Shape
+    from stages.strings.compression import Codebook
+
+    anew, samples = LANGUAGE.anew(subject.places), dict[str, list[Stored]]()
+    for shard in sorted((subject.folder / "data").glob("*/*.tar")):
+        for _key, members in read_shard(shard):
+            record = json.loads(members["json"])
+            assembly = anew(record, pairs_of(members[CONTACTS])).assembly
+            samples.setdefault(record["kit"], []).append(Stored(assembly, members["json"], members["glb"]))
+    rows, pictures = [], []
+    for name, kit in made_kits(subject.places).items():
+        stored = samples.get(name, [])
+        for edges in EDGES if stored else ():
+            book = Codebook(kit, edges)
+            trips = [round_trip(book, each.assembly) for each in stored]
+            rows.append(compression_row(name, kit, edges, stored, trips))
+        if stored:
+            ranked = sorted(trips, key=lambda trip: (len(trip.packed), trip.text))
+            for trip in (ranked[0], ranked[len(ranked) // 2], ranked[-1]):
+                shape = Shape(kit.types, trip.restored, "y", kit.labels)
+                pictures.append(
+                    (f"{name}, {len(trip.restored)} parts of {len(trip.packed)} bytes", shape_picture(shape))
+                )
+    strip = Strip("The smallest, the median and the largest of each kit, restored from their bytes", pictures)
+    return Answer([compression_table(rows)], strips=[strip])
+
+
+TABLE = Evaluation(
+    question="How few bytes does a shape take as string and categories, and does it come back exactly?",
+    needs=(FINISHED, KITS),
+    seconds=lambda subject: 10 + 0.025 * subject.samples,
+    answer=_answer,
+)

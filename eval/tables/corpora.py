@@ -1,0 +1,45 @@
+"""`make eval TABLE=corpora`: how long are the strings that a model would have to learn? (strings §7)"""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import get_args
+
+from eval.evaluation import Answer, Evaluation
+from eval.needs import KITS
+from eval.subject import Subject
+
+__all__ = ["TABLE"]
+
+MOST = 100
+"""So many variants of a kit are measured at most."""
+
+
+def _answer(subject: Subject, _: Namespace) -> Answer:
+    from eval.corpora import corpora_table, corpus_row
+    from eval.growth import read_finds
+    from pipeline.randomness import decision_rng
+    from stages.exemplars.language import made_kits
+    from stages.strings.settings import Edges
+
+    folder = subject.places.stage("variations").root
+    rows = []
+    for name, kit in made_kits(subject.places).items():
+        finds = read_finds(folder, name)
+        groups = {
+            f"{name}, inputs": [each.assembly for each in kit.exemplars],
+            f"{name}, variants": [each.assembly for each in finds[:: -(-len(finds) // MOST) or 1]],
+        }
+        for group, shapes in groups.items():
+            for edges in get_args(Edges) if shapes else ():
+                rng = decision_rng(subject.config.seed, "corpora", group, edges)
+                rows.append(corpus_row(group, kit, shapes, edges, rng))
+    return Answer([corpora_table(rows)])
+
+
+TABLE = Evaluation(
+    question="How many tokens and cycles do strings have, if they tell of all contacts, of faces, or of a tree?",
+    needs=(KITS,),
+    seconds=lambda subject: 20,
+    answer=_answer,
+)

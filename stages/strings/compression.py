@@ -1,0 +1,293 @@
+"""A shape as a string and the category of each of its edges, and back, exactly (strings §6, §7).
+
+Walking a string, each part after the first stands at one of the poses in which parts of its label were seen to dock to
+its parent: that pose is the edge's category. A category is chosen beside the parent as it has been put back, so that
+errors do not add up, and a part that none places within the kit's tolerance brings a pose of its own: whatever the
+shape, each part is put back where it stood. Geometry is borrowed from the kit. The paper's categories are clusters over
+many variations; ours are the kit's dockings with all their images under the symmetries of parts, which are exact.
+
+Brackets and cycle numbers have the dummy category: the tree says where all parts stand. Of strings that leave out
+contacts these are found again, as the pairs of parts that stand in a docking of the kit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import Float32Array, FloatArray, IntArray, TypeArray
+from stages.shape.geometry.contact import overlapping_boxes, world_boxes
+from stages.shape.geometry.pose import invert, pose_vectors, relative_poses
+from stages.shape.kit import Assembly, Kit
+from stages.strings.decoder import decode
+from stages.strings.encoder import Encoded
+from stages.strings.kit_strings import KitStrings
+from stages.strings.settings import Edges
+from stages.strings.tokens import number_text, number_value, split_tokens
+
+__all__ = ["DUMMY", "Codebook", "Described", "describe", "pack", "restore", "unpack"]
+
+DUMMY = -1
+"""The category of what is no part."""
+MOST_TOKENS = 1_000_000
+"""No shape has more: bytes that say so are not of one."""
+
+
+@dataclass(frozen=True)
+class Described:
+    """One shape. categories: one for each token of the string; poses: float32 (s, 6), rotation vector and translation
+    of the first part and of those that no category places, in order."""
+
+    string: str
+    categories: tuple[int, ...]
+    poses: Float32Array
+
+
+class Codebook:
+    """What both sides of the way know: a kit, and which contacts its strings tell of."""
+
+    def __init__(self, kit: Kit, edges: Edges) -> None:
+        self.kit, self.edges = kit, edges
+        self.writer = KitStrings(kit, edges)
+        self.alphabet = self.writer.alphabet
+        self.kinds: list[list[int]] = [
+            np.flatnonzero(kit.label_of == label).tolist() for label in range(len(kit.labels))
+        ]
+        """The types of each label."""
+        self._places: dict[tuple[int, int], tuple[TypeArray, FloatArray]] = {}
+
+    def places(self, parent: int, label: int) -> tuple[TypeArray, FloatArray]:
+        """How parts of a label dock to a part of type `parent`: their types int16 (k,) and poses (k, 4, 4). A category
+        below k is one of these; from k on it is a type of the label, at a pose of its own."""
+        if (parent, label) not in self._places:
+            poses = [self.writer.table.poses(parent, kind) for kind in self.kinds[label]]
+            types = np.repeat(np.array(self.kinds[label], dtype=np.int16), [len(each) for each in poses])
+            self._places[parent, label] = types, np.concatenate(poses)
+        return self._places[parent, label]
+
+    def radix(self, parent: int | None, label: int) -> int:
+        """How many categories a part of a label may have beside a part of type `parent`, or as the first."""
+        return len(self.kinds[label]) + (0 if parent is None else len(self.places(parent, label)[0]))
+
+
+def describe(book: Codebook, assembly: Assembly, encoded: Encoded) -> Described:
+    """The description of an assembly along one of its strings. Raises ValueError for a part that is mirrored."""
+    decoded = decode(encoded.string, book.alphabet)
+    types, poses = assembly.types[encoded.nodes], assembly.poses[encoded.nodes]
+    back = np.empty_like(poses)
+    categories: list[int] = []
+    stored: list[Float32Array] = []
+    for token in decoded.tokens:
+        if token.kind != "node":
+            categories.append(DUMMY)
+            continue
+        node, kind = token.node, int(types[token.node])
+        label = int(decoded.types[node])
+        category, first = None, 0
+        if token.edge >= 0:
+            parent = int(decoded.edges[token.edge][0])  # a parent stands before its child
+            kinds, places = book.places(int(types[parent]), label)
+            first = len(kinds)
+            category = _nearest(book.kit, kinds, places, kind, invert(back[parent]) @ poses[node])
+        if category is None:
+            stored.append(_stored(poses[node]))
+            back[node] = _pose(stored[-1])
+            category = first + book.kinds[label].index(kind)
+        else:
+            back[node] = back[parent] @ places[category]
+        categories.append(category)
+    return Described(encoded.string, tuple(categories), np.array(stored, dtype=np.float32))
+
+
+def restore(book: Codebook, described: Described) -> Assembly:
+    """The assembly of a description, its parts in the order of the string.
+
+    Raises ValueError (StringError) for what is no description of a shape of the kit.
+    """
+    decoded = decode(described.string, book.alphabet)
+    if len(described.categories) != len(decoded.tokens):
+        raise ValueError(f"{len(decoded.tokens)} tokens have {len(described.categories)} categories")
+    types = np.empty(len(decoded.types), dtype=np.int16)
+    poses = np.empty((len(types), 4, 4))
+    stored = iter(described.poses)
+    for token, category in zip(decoded.tokens, described.categories, strict=True):
+        if token.kind != "node":
+            continue
+        node, label = token.node, int(decoded.types[token.node])
+        parent = int(decoded.edges[token.edge][0]) if token.edge >= 0 else None
+        if not 0 <= category < book.radix(None if parent is None else int(types[parent]), label):
+            raise ValueError(f"part {node} has category {category}, which is none of the kit")
+        kinds, places = book.places(int(types[parent]), label) if parent is not None else ((), ())
+        if category < len(kinds):
+            types[node], poses[node] = kinds[category], poses[parent] @ places[category]
+            continue
+        own = next(stored, None)
+        if own is None:
+            raise ValueError(f"part {node} has no pose")
+        types[node], poses[node] = book.kinds[label][category - len(kinds)], _pose(own)
+    if next(stored, None) is not None:
+        raise ValueError("there are more poses than parts that have one of their own")
+    placed = Assembly(types, poses, decoded.edges)
+    return placed if book.edges == "all" else Assembly(types, poses, _docked(book, placed))
+
+
+def pack(book: Codebook, described: Described) -> bytes:
+    """A description as few bytes: its tokens and categories as digits of one number, each in the base of what may stand
+    there, then its poses."""
+    texts = split_tokens(described.string)
+    numbers = 1 + max((number_value(text) or 0 for text in texts if number_value(text) is not None), default=-1)
+    labels = len(book.kit.labels)
+    bases = labels + 2 + numbers
+    code = {**book.alphabet.types, "(": labels, ")": labels + 1}
+    digits: list[tuple[int, int]] = []
+    walk = _Walk(book)
+    for text, category in zip(texts, described.categories, strict=True):
+        value = code[text] if text in code else labels + 2 + _number(text)
+        digits.append((value, bases))
+        radix = walk.step(value)
+        if radix is not None:
+            digits.append((category, radix))
+            walk.put(category)
+    whole = 0
+    for digit, base in reversed(digits):
+        whole = whole * base + digit
+    content = whole.to_bytes((whole.bit_length() + 7) // 8, "little")
+    header = b"".join(map(_varint, (len(texts), numbers, len(content))))
+    return header + content + described.poses.astype("<f4").tobytes()
+
+
+def unpack(book: Codebook, content: bytes) -> Described:
+    """The description that `pack` has written. Raises ValueError for bytes that it has not."""
+    place, header = 0, []
+    for _ in range(3):
+        value, place = _read_varint(content, place)
+        header.append(value)
+    count, numbers, size = header
+    body, rest = content[place : place + size], content[place + size :]
+    if len(body) < size or len(rest) % 24:
+        raise ValueError("the bytes of a shape end early")
+    whole, labels = int.from_bytes(body, "little"), len(book.kit.labels)
+    if max(count, numbers) > MOST_TOKENS:
+        raise ValueError(f"the bytes of a shape ask for {max(count, numbers):,} tokens")
+    texts: list[str] = []
+    categories: list[int] = []
+    walk = _Walk(book)
+    for _ in range(count):
+        whole, value = divmod(whole, labels + 2 + numbers)
+        texts.append(_text(book, value))
+        radix = walk.step(value)
+        if radix is None:
+            categories.append(DUMMY)
+            continue
+        whole, category = divmod(whole, radix)
+        categories.append(category)
+        walk.put(category)
+    if whole:
+        raise ValueError("the bytes of a shape hold more than its tokens")
+    return Described("".join(texts), tuple(categories), np.frombuffer(rest, "<f4").reshape(-1, 6).astype(np.float32))
+
+
+class _Walk:
+    """Which part a token hangs on, token by token, for those who know types only as they come."""
+
+    def __init__(self, book: Codebook) -> None:
+        self._book = book
+        self._here: int | None = None
+        self._branches: list[int] = []
+        self._label = 0
+
+    def step(self, value: int) -> int | None:
+        """Take one token; of a part the number of its categories, which `put` then gives."""
+        labels = len(self._book.kit.labels)
+        if value < labels:
+            self._label = value
+            return self._book.radix(self._here, value)
+        if value == labels and self._here is not None:
+            self._branches.append(self._here)
+        elif value == labels + 1 and self._branches:
+            self._here = self._branches.pop()
+        elif value <= labels + 1:
+            raise ValueError("the brackets of a string do not match")
+        return None
+
+    def put(self, category: int) -> None:
+        """The category of the part that was taken: its type is known by it."""
+        kinds = self._book.places(self._here, self._label)[0].tolist() if self._here is not None else []
+        self._here = [*kinds, *self._book.kinds[self._label]][category]
+
+
+def _nearest(kit: Kit, kinds: TypeArray, places: FloatArray, kind: int, pose: FloatArray) -> int | None:
+    """The category that puts a part of type `kind` nearest to `pose` (4, 4), if that is within tolerance."""
+    own = np.flatnonzero(kinds == kind)
+    if not len(own):
+        return None
+    length = kit.types[kind].diagonal / 2
+    gaps = np.linalg.norm(pose_vectors(places[own], length) - pose_vectors(pose[None], length), axis=1)
+    return int(own[gaps.argmin()]) if gaps.min() <= kit.pose_tolerance else None
+
+
+def _docked(book: Codebook, assembly: Assembly) -> IntArray:
+    """The pairs of parts that stand in a docking of the kit, int32 (m, 2)."""
+    boxes = world_boxes(book.kit.types, assembly.types, assembly.poses)
+    pairs = overlapping_boxes(boxes, book.kit.contact_tolerance + 2 * book.kit.pose_tolerance)
+    labels = book.writer.table.label_edges(assembly.types, assembly.poses, pairs)[:, 0]
+    for row, pose in zip(
+        np.flatnonzero(labels < 0).tolist(), relative_poses(assembly.poses, pairs[labels < 0]), strict=True
+    ):
+        a, b = (int(assembly.types[part]) for part in pairs[row])
+        labels[row] = 0 if book.writer.table.fit(a, b, pose) is not None else -1
+    found: IntArray = pairs[labels >= 0]
+    return found
+
+
+def _stored(pose: FloatArray) -> Float32Array:
+    """A pose (4, 4) as six numbers."""
+    from scipy.spatial.transform import Rotation
+
+    if np.linalg.det(pose[:3, :3]) < 0:
+        raise ValueError("a mirrored part has no rotation")
+    turn = Rotation.from_matrix(pose[:3, :3]).as_rotvec()
+    return np.concatenate([turn, pose[:3, 3]]).astype(np.float32)
+
+
+def _pose(stored: Float32Array) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_rotvec(stored[:3].astype(np.float64)).as_matrix()
+    pose[:3, 3] = stored[3:]
+    return pose
+
+
+def _text(book: Codebook, value: int) -> str:
+    tokens = (*book.alphabet.tokens, "(", ")")
+    return tokens[value] if value < len(tokens) else number_text(value - len(tokens))
+
+
+def _number(text: str) -> int:
+    number = number_value(text)
+    if number is None:
+        raise ValueError(f"{text!r} is no token of the kit")
+    return number
+
+
+def _varint(value: int) -> bytes:
+    """Seven bits a byte, the low ones first; the top bit says that more follow."""
+    written = bytearray()
+    while value > 127:
+        written.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*written, value])
+
+
+def _read_varint(content: bytes, place: int) -> tuple[int, int]:
+    """The number at `place`, and where it ends."""
+    value = shift = 0
+    while True:
+        if place >= len(content) or shift > 28:
+            raise ValueError("the bytes of a shape end early")
+        value |= (content[place] & 127) << shift
+        place, shift = place + 1, shift + 7
+        if content[place - 1] < 128:
+            return value, place

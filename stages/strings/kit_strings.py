@@ -1,0 +1,104 @@
+"""The strings of a kit's shapes: which of their contacts are edges of the strings, and the strings themselves.
+
+All contacts, as published; or less, where strings with hundreds of cycles cannot be learnt: face contacts alone, or a
+spanning tree (strings §7, brick buildings).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from stages.shape.arrays import IntArray
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.docking import DockingTable
+from stages.shape.geometry.pose import relative_poses
+from stages.shape.graphs.canonical import canonical_order
+from stages.shape.kit import Assembly, ContactKind, Kit
+from stages.strings.alphabet import Alphabet, make_alphabet
+from stages.strings.decoder import decode
+from stages.strings.encoder import Encoded, canonical_string, random_strings
+from stages.strings.settings import Edges
+
+__all__ = ["KitStrings"]
+
+_STRENGTH: dict[ContactKind | None, int] = {"face": 0, "line": 1, "point": 2, None: 2}
+
+
+class KitStrings:
+    """Strings of shapes of one kit, their graphs being made of `edges`."""
+
+    def __init__(self, kit: Kit, edges: Edges) -> None:
+        self.kit, self.edges = kit, edges
+        self.alphabet: Alphabet = make_alphabet(kit.labels)
+
+    def graph(self, assembly: Assembly) -> Assembly:
+        """The labels of an assembly's parts, with those of its contacts that its strings tell of; for `tree`, which of
+        them are told is drawn anew for each string, and all stay."""
+        labelled = self.kit.labelled(assembly)
+        if self.edges != "faces":
+            return labelled
+        return Assembly(labelled.types, labelled.poses, self._held_by_faces(assembly))
+
+    def strings(self, graph: Assembly, count: int, rng: np.random.Generator) -> list[Encoded]:
+        """The canonical string of what `graph` has answered, and at most `count` random ones, all distinct.
+
+        Raises NotConnectedError where its edges do not hold it in one piece.
+        """
+        cycles = self.edges != "tree"
+        first = canonical_string(graph.types, graph.edges, self.alphabet, cycles)
+        others = random_strings(graph.types, graph.edges, self.alphabet, count, rng, {first.string}, cycles)
+        return [first, *others]
+
+    def stands_for(self, encoded: Encoded, graph: Assembly) -> bool:
+        """Whether a string, decoded, is what `graph` answered, under the encoder's own matching of their nodes; for
+        `tree`, a spanning tree of it."""
+        decoded, size = decode(encoded.string, self.alphabet), len(graph)
+        if sorted(encoded.nodes.tolist()) != list(range(size)):
+            return False
+        if not np.array_equal(decoded.types, graph.types[encoded.nodes]):
+            return False
+        found = np.sort(encoded.nodes[decoded.edges], axis=1) @ (size, 1)
+        expected = np.sort(graph.edges, axis=1) @ (size, 1)
+        if self.edges == "tree":
+            # a string is in one piece, so that as many edges as a tree has are a tree
+            return len(found) == size - 1 and bool(np.isin(found, expected).all())
+        return np.array_equal(np.sort(found), np.sort(expected))
+
+    def _held_by_faces(self, assembly: Assembly) -> IntArray:
+        """The face contacts of an assembly, and of its lines, then its points, those that first join what is apart, in
+        the order of the canonical graph."""
+        from stages.strings.traversal import first_edges_tree
+
+        edges = assembly.edges
+        strength = np.array([_STRENGTH[kind] for kind in self._kinds(assembly)], dtype=np.int64)
+        labels = np.stack([strength, strength], axis=1).astype(np.int32)
+        rank = np.argsort(canonical_order(self.kit.label_of[assembly.types], edges, labels))
+        ends = np.sort(rank[edges], axis=1)
+        order = np.lexsort((ends[:, 1], ends[:, 0], strength))
+        tree = first_edges_tree(len(assembly), edges.astype(np.int64), order)
+        kept: IntArray = edges[(strength == 0) | tree]
+        return kept
+
+    def _kinds(self, assembly: Assembly) -> list[ContactKind | None]:
+        """The kind of each contact: that of its docking; where the kit has not seen it, as with parts that were put
+        back behind a shape, that of the contact itself."""
+        dockings = self.kit.grammar.dockings
+        labels = self.table.label_edges(assembly.types, assembly.poses, assembly.edges)[:, 0].tolist()
+        poses = relative_poses(assembly.poses, assembly.edges)
+        kinds: list[ContactKind | None] = []
+        for (i, j), label, pose in zip(assembly.edges.tolist(), labels, poses, strict=True):
+            a, b = int(assembly.types[i]), int(assembly.types[j])
+            fit = self.table.fit(a, b, pose) if label < 0 else (label, label)
+            kinds.append(self._contact.kind(a, b, pose) if fit is None else dockings[fit[0] // 2].kind)
+        return kinds
+
+    @cached_property
+    def table(self) -> DockingTable:
+        """The dockings of the kit."""
+        return DockingTable.of(self.kit)
+
+    @cached_property
+    def _contact(self) -> ContactTest:
+        return ContactTest(self.kit.types, self.kit.contact_tolerance)

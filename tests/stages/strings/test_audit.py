@@ -1,0 +1,84 @@
+"""What `make verify` finds in the strings of a sample, whichever contacts they are to tell of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.places import Places
+from stages.shape.collection.packaged import Packaged
+from stages.shape.collection.pairs import CONTACTS, pair_bytes
+from stages.shape.graphs.canonical import graph_digest
+from stages.shape.kit_files import write_kit
+from stages.shape.shape import kit_shape
+from stages.strings.audit import AUDIT, string_faults
+from stages.strings.kit_strings import KitStrings
+from stages.strings.settings import Edges
+from tests.stages.strings.test_kit_strings import kit_of
+
+KIT = kit_of("cubes")
+ASSEMBLY = KIT.exemplars[0].assembly
+
+
+def written(edges: Edges) -> list[str]:
+    writer = KitStrings(KIT, edges)
+    return [each.string for each in writer.strings(writer.graph(ASSEMBLY), 3, np.random.default_rng(2))]
+
+
+def sample(strings: list[str], said: Edges | None) -> Packaged:
+    """A sample with these strings, of a dataset that says what they tell of, or is older than that."""
+    labelled = KIT.labelled(ASSEMBLY)
+    record = {"language": "kit", "kit": "cubes", "graph": graph_digest(labelled.types, labelled.edges)}
+    members = {"txt": "".join(f"{each}\n" for each in strings).encode(), CONTACTS: pair_bytes(ASSEMBLY.edges)}
+    sections = {"strings": {"strings_per_shape": 3, **({"edges": said} if said else {})}}
+    return Packaged("cubes-0", record, members, {}, kit_shape(KIT, ASSEMBLY), sections)
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory: pytest.TempPathFactory) -> Places:
+    """The mill's folders with the kit in them."""
+    found = Places(tmp_path_factory.mktemp("made"), "blocks")
+    folder = found.stage("exemplars").root
+    folder.mkdir(parents=True)
+    with open(folder / "cubes.json", "wb") as text, open(folder / "cubes.tar", "wb") as tar:
+        write_kit(KIT, text, tar)
+    return found
+
+
+@pytest.mark.parametrize(("edges", "said"), [("all", None), ("all", "all"), ("faces", "faces"), ("tree", "tree")])
+def test_strings_of_each_kind_are_good_where_the_config_says_so(
+    edges: Edges, said: Edges | None, places: Places
+) -> None:
+    found = sample(written(edges), said)
+    assert list(string_faults(found)) == []
+    assert list(AUDIT.anew(found, places)) == []
+
+
+@pytest.mark.parametrize(("edges", "said"), [("all", "tree"), ("tree", "all"), ("faces", "all"), ("faces", "tree")])
+def test_strings_of_another_kind_are_found(edges: Edges, said: Edges) -> None:
+    assert list(string_faults(sample(written(edges), said))) == ["line 1 of its txt stands for another graph"]
+
+
+def test_strings_that_tell_of_all_contacts_are_no_strings_of_faces(places: Places) -> None:
+    found = sample(written("all"), "faces")
+    assert list(AUDIT.anew(found, places)) == ["its txt does not tell of its face contacts"]
+    faces = written("faces")
+    mixed = sample([faces[0], written("all")[1]], "faces")
+    assert list(string_faults(mixed)) == ["the lines of its txt stand for different graphs"]
+
+
+def test_a_tree_that_is_not_in_the_graph_is_found() -> None:
+    first, *others = written("tree")
+    letters = [place for place, each in enumerate(first) if each.isalpha()]
+    for place in letters[1:]:
+        other = next(each for each in letters if first[each] != first[place])
+        swapped = list(first)
+        swapped[place], swapped[other] = first[other], first[place]
+        faults = list(string_faults(sample(["".join(swapped), *others], "tree")))
+        assert faults[0] in {
+            "line 1 of its txt stands for another graph",
+            "the first line of its txt is not the canonical spanning tree",
+        }
+    assert list(string_faults(sample([others[0], first], "tree"))) == [
+        "the first line of its txt is not the canonical spanning tree"
+    ]

@@ -1,0 +1,190 @@
+"""Shapes as strings and categories, packed to bytes and restored."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from stages.exemplars.build import read_kit
+from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.shape.geometry.pose import pose_vectors
+from stages.shape.kit import Assembly, Kit
+from stages.strings.compression import DUMMY, Codebook, Described, describe, pack, restore, unpack
+from stages.strings.encoder import Encoded
+from stages.strings.settings import Edges
+from stages.strings.tokens import split_tokens
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search
+from stages.variations.settings import SearchConfig
+from tests.stages.strings.test_kit_strings import kit_of, pairs
+from tests.stages.variations.chairs import write_chairs
+
+EDGES: tuple[Edges, ...] = ("all", "faces", "tree")
+
+
+@cache
+def book_of(name: str, edges: Edges) -> Codebook:
+    return Codebook(kit_of(name), edges)
+
+
+def strings_of(book: Codebook, assembly: Assembly, count: int, seed: int) -> list[Encoded]:
+    return book.writer.strings(book.writer.graph(assembly), count, np.random.default_rng(seed))
+
+
+def gaps(kit: Kit, assembly: Assembly, other: Assembly) -> list[float]:
+    """How far each part stands from where it should, in tolerances."""
+    found = []
+    for kind, one, two in zip(assembly.types, assembly.poses, other.poses, strict=True):
+        first, second = (pose_vectors(each[None], kit.types[kind].diagonal / 2) for each in (one, two))
+        found.append(float(np.linalg.norm(first - second)) / kit.pose_tolerance)
+    return found
+
+
+def assert_comes_back(book: Codebook, assembly: Assembly, encoded: Encoded) -> Described:
+    """Through bytes, with its parts in the order of the string: types, poses, contacts."""
+    described = unpack(book, pack(book, describe(book, assembly, encoded)))
+    found = restore(book, described)
+    assert found.types.tolist() == assembly.types[encoded.nodes].tolist()
+    wanted = replace(assembly, types=found.types, poses=assembly.poses[encoded.nodes])
+    assert max(gaps(book.kit, wanted, found)) <= 1.0
+    back = np.sort(encoded.nodes[found.edges], axis=1)
+    assert pairs(back) == pairs(np.sort(assembly.edges, axis=1))
+    return described
+
+
+@pytest.mark.parametrize("edges", EDGES)
+@pytest.mark.parametrize("name", ["castle", "playground", "space-base", "temple", "cubes"])
+def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -> None:
+    book = book_of(name, edges)
+    for seed, exemplar in enumerate(book.kit.exemplars):
+        for encoded in strings_of(book, exemplar.assembly, 2, seed):
+            described = assert_comes_back(book, exemplar.assembly, encoded)
+            assert len(described.poses) == 1, "every part but the first stands at a docking of the kit"
+            tokens = split_tokens(encoded.string)
+            parts = [each in book.alphabet.types for each in tokens]
+            assert [each != DUMMY for each in described.categories] == parts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edges", EDGES)
+def test_parts_of_one_label_keep_the_surface_that_they_have(edges: Edges, tmp_path: Path) -> None:
+    """Also where they dock as parts of their labels do, though these two were never seen to."""
+    shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
+    kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").decide(STRICTEST))
+    book = Codebook(kit, edges)
+    assert len(kit.labels) < len(kit.types)
+    search = Search(ContactAnswers(kit), SearchConfig())
+    found, _ = search.run(np.random.default_rng(0), 1000, 12, "test", lambda count: None)
+    assert any(set(each.assembly.types.tolist()) - set(kit.exemplars[0].assembly.types.tolist()) for each in found)
+    for assembly in (*(each.assembly for each in kit.exemplars), *(each.assembly for each in found)):
+        for encoded in strings_of(book, assembly, 1, 0):
+            assert_comes_back(book, assembly, encoded)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(EDGES))
+def test_a_shape_comes_back_wherever_it_stands_and_whatever_part_of_it_was_moved(seed: int, edges: Edges) -> None:
+    book, rng = book_of("cubes", edges), np.random.default_rng(seed)
+    assembly = book.kit.exemplars[seed % 2].assembly
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.random(rng=rng).as_matrix()
+    motion[:3, 3] = rng.normal(0, 100 * book.kit.pose_tolerance, 3)
+    poses = motion @ assembly.poses
+    moved = rng.integers(len(assembly))
+    slip = np.eye(4)
+    slip[:3, 3] = rng.normal(0, 3 * book.kit.pose_tolerance, 3)
+    poses[moved] = poses[moved] @ slip
+    (encoded, *_) = strings_of(book, assembly, 0, seed)
+    described = describe(book, Assembly(assembly.types, poses, assembly.edges), encoded)
+    found = restore(book, unpack(book, pack(book, described)))
+    assert max(gaps(book.kit, Assembly(found.types, poses[encoded.nodes], found.edges), found)) <= 1.0
+    assert 1 <= len(described.poses) <= 1 + 1 + len(assembly.neighbours()[moved])
+
+
+def test_errors_of_a_long_chain_do_not_add_up() -> None:
+    """Each cube stands a little further from the one before than it should: in the end by ten tolerances and more."""
+    book = book_of("cubes", "tree")
+    stairs = book.kit.exemplars[1].assembly
+    step = next(row for row, (i, j) in enumerate(stairs.edges.tolist()) if stairs.types[i] == stairs.types[j])
+    i, j = stairs.edges[step]
+    apart = stairs.poses[j][:3, 3] - stairs.poses[i][:3, 3]
+    count = 40
+    poses = np.tile(stairs.poses[i], (count, 1, 1))
+    poses[:, :3, 3] += np.arange(count)[:, None] * apart * (1 + 0.5 * book.kit.pose_tolerance / np.linalg.norm(apart))
+    row = Assembly(
+        np.full(count, stairs.types[i], np.int16), poses, np.stack([np.arange(count - 1), np.arange(1, count)], axis=1)
+    )
+    (encoded, *_) = strings_of(book, row, 0, 0)
+    described = describe(book, row, encoded)
+    found = restore(book, described)
+    wanted = replace(row, poses=row.poses[encoded.nodes])
+    assert max(gaps(book.kit, wanted, found)) <= 1.0
+    assert 2 <= len(described.poses) <= count // 2, "now and then a part brings a pose of its own, and most do not"
+
+
+def test_one_part_takes_three_bytes_of_header_and_its_pose() -> None:
+    book = book_of("cubes", "all")
+    exemplar = book.kit.exemplars[0].assembly
+    alone = exemplar.select(np.array([0]))
+    (encoded, *_) = strings_of(book, alone, 0, 0)
+    packed = pack(book, describe(book, alone, encoded))
+    assert len(packed) in (27, 28)
+    assert_comes_back(book, alone, encoded)
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_spoiled_bytes_are_another_shape_or_refused(seed: int) -> None:
+    book, rng = book_of("cubes", "all"), np.random.default_rng(seed)
+    (encoded, *_) = strings_of(book, book.kit.exemplars[0].assembly, 0, 0)
+    packed = bytearray(pack(book, describe(book, book.kit.exemplars[0].assembly, encoded)))
+    for place in rng.integers(0, len(packed), 2):
+        packed[place] = rng.integers(256)
+    spoiled = bytes(packed[: rng.integers(1, len(packed) + 1)] if seed % 2 else packed)
+    try:
+        found = restore(book, unpack(book, spoiled))
+    except ValueError:
+        return
+    assert len(found) == len(found.poses)
+
+
+@pytest.mark.parametrize("cut", [0, 1, 2, 5, -1, -24])
+def test_bytes_that_end_early_are_refused(cut: int) -> None:
+    book = book_of("cubes", "all")
+    assembly = book.kit.exemplars[0].assembly
+    packed = pack(book, describe(book, assembly, strings_of(book, assembly, 0, 0)[0]))
+    with pytest.raises(ValueError, match=r"end early|no pose|more than"):
+        restore(book, unpack(book, packed[:cut]))
+
+
+def test_categories_that_the_kit_does_not_have_are_refused() -> None:
+    book = book_of("cubes", "all")
+    assembly = book.kit.exemplars[0].assembly
+    described = describe(book, assembly, strings_of(book, assembly, 0, 0)[0])
+    for changed, said in (
+        (replace(described, categories=(99, *described.categories[1:])), "category 99"),
+        (replace(described, categories=described.categories[:-1]), "categories"),
+        (replace(described, poses=np.tile(described.poses, (2, 1))), "more poses"),
+        (replace(described, poses=described.poses[:0]), "no pose"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            restore(book, changed)
+
+
+@pytest.mark.skipif(not (Path(__file__).resolve().parents[4] / "shared").is_dir(), reason="no public models here")
+def test_shapes_with_hundreds_of_cycles_come_back() -> None:
+    shared = Path(__file__).resolve().parents[4] / "shared" / "exemplars"
+    paths = tuple(shared / name / "model.glb" for name in ("a12_dungeon_room_large", "a13_dungeon_junction"))
+    kit = read_kit(KitConfig(name="dungeon", shapes=paths).decide(STRICTEST))
+    for edges in EDGES:
+        book = Codebook(kit, edges)
+        for exemplar in kit.exemplars:
+            for encoded in strings_of(book, exemplar.assembly, 1, 0):
+                assert_comes_back(book, exemplar.assembly, encoded)
