@@ -26,6 +26,9 @@ TRIES, NEARLY = 6, 0.9
 RIVALS, MIDDLES = 4, 16
 """Variants drawn at random for each place, and for the middle of a region, that with least around it is taken; a middle
 with little enough at once."""
+ENOUGH = 0.5
+"""Share of what is wanted that train gets before val and test are thought of: of a pool of near-twins there is only
+train, rather than a handful of each."""
 SOUNDED = 128
 """Variants of the pool on which is estimated how much is around a rival."""
 REHEARSED = 256
@@ -54,7 +57,8 @@ def cut_families(near: Near, count: int, wanted: Mapping[str, int], rng: np.rand
 
     Val and test have as many as wanted and train at least as many, if any number of regions leaves so many; else val
     and test are halved until train has its share; and where the pool does not allow that either, the cut that gives
-    most of its share to the split that gets least. How many regions a large pool allows is tried on a few of it first.
+    most of its share to the split that gets least, if train has ENOUGH. How many regions a large pool allows is tried
+    on a few of it first.
     """
     most = max(REGIONS)
     if count > 2 * REHEARSED:
@@ -73,13 +77,14 @@ def _places(near: Near, some: Indices, place: int, among: Indices) -> Indices:
 def _cut(near: Near, count: int, wanted: Mapping[str, int], most: int, rng: np.random.Generator) -> tuple[Cut, int]:
     """The best of several cuts, and the number of regions asked of it; no more than `most` are."""
     ground = _Ground(near, count, np.sort(rng.permutation(count)[:SOUNDED]))
-    best, best_worth, asked = Cut(np.zeros(count, dtype=np.int8), 0), (-1.0, -1), 1
+    best, best_worth, asked = Cut(np.zeros(count, dtype=np.int8), 0), (-1.0, -1.0, -1), 1
     for sizes, regions in _attempts(wanted, most):
         for _ in range(TRIES):
             cut = _grow(ground, sizes, wanted, regions, rng)
             got = cut.sizes(wanted)
             shares = [got[split] / wanted[split] for split in SPLITS if wanted[split]]
-            worth = min(shares, default=1.0), sum(got.values())
+            enough = min(got["train"] / max(wanted["train"], 1), ENOUGH)
+            worth = enough, min(shares, default=1.0), sum(got.values())
             if worth > best_worth:
                 best, best_worth, asked = cut, worth, regions
             if got["train"] == wanted["train"]:

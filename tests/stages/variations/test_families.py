@@ -78,6 +78,15 @@ def test_where_all_are_twins_there_is_only_train_and_that_is_said() -> None:
     )
 
 
+def test_where_hardly_two_stand_apart_train_has_its_samples_and_val_and_test_go_without() -> None:
+    matrix = np.ones((200, 200), dtype=bool)
+    matrix[0, 1:15] = matrix[1:15, 0] = matrix[1, 2:15] = matrix[2:15, 1] = False  # 13 are apart from these two
+    wanted = {"train": 80, "val": 10, "test": 10}
+    cut = cut_families(near_by(matrix), 200, wanted, np.random.default_rng(0))
+    assert cut.sizes(wanted) == {"train": 80, "val": 0, "test": 0}
+    assert crossings(matrix, cut) == 0
+
+
 def test_a_pool_too_dense_for_its_sizes_gives_each_split_a_part() -> None:
     cluster = np.arange(40) // 20
     matrix = cluster[:, None] == cluster[None]
