@@ -57,6 +57,7 @@ def run(
     seed: SeedOption = None,
     shards: Annotated[str, typer.Option(help="make part i of n, from 1, as one job of a job array: i/n")] = "1/1",
     retries: Annotated[int, typer.Option(min=0, help="how often a shard that failed is tried again")] = 2,
+    only: Annotated[str, typer.Option(help="make the shards called so, or so-..., and what they read")] = "",
 ) -> None:
     """Make what is missing of one stage."""
     from pipeline.run import run_stage
@@ -68,7 +69,7 @@ def run(
         close = nearest(stage, stages)
         hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
         raise ConfigError(f"there is no stage {stage}; {hint}")
-    result = run_stage(stage, stages, *_load(stages, config, out, seed), workers, part, retries)
+    result = run_stage(stage, stages, *_load(stages, config, out, seed), workers, part, retries, only=only)
     if result.failed:
         print(f"{stage}: set aside: {', '.join(result.failed)}; run again to try them again", file=sys.stderr)
         raise typer.Exit(1)

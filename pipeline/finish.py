@@ -12,7 +12,7 @@ from pipeline.places import Places, file_digest, sync_folder, temporary, write_w
 from pipeline.shards import json_bytes
 from pipeline.survey import StageSurvey, Survey
 
-__all__ = ["finish_stage"]
+__all__ = ["finish_stage", "publish"]
 
 
 def finish_stage(survey: Survey, name: str, places: Places) -> None:
@@ -25,7 +25,7 @@ def finish_stage(survey: Survey, name: str, places: Places) -> None:
     rejects: Counter[str] = Counter()
     for record in surveyed.records.values():
         rejects.update(record.rejects)
-    _publish(surveyed, places)
+    publish(surveyed, places)
     manifest = json_bytes(
         {
             "stage": name,
@@ -42,8 +42,11 @@ def finish_stage(survey: Survey, name: str, places: Places) -> None:
         write_whole(surveyed.places.manifest, manifest)
 
 
-def _publish(surveyed: StageSurvey, places: Places) -> None:
-    """Bring the output folder to what the stage publishes, and take away what it published before and no more."""
+def publish(surveyed: StageSurvey, places: Places) -> None:
+    """Bring the output folder to what the stage publishes, and take away what it published before and no more.
+
+    Raises ValueError when that is a path outside the output folder or a file that no finished shard has.
+    """
     wanted = {_inside(target): file for target, file in sorted(surveyed.stage.publish(surveyed.view).items())}
     listing = surveyed.places.published
     before = [Path(each) for each in json.loads(listing.read_bytes())] if listing.is_file() else []

@@ -13,7 +13,7 @@ from typing import BinaryIO
 from pipeline.check import withdraw_damaged
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal
-from pipeline.finish import finish_stage
+from pipeline.finish import finish_stage, publish
 from pipeline.journal import Journal, Standing, span
 from pipeline.places import Places, StagePlaces, stops_everything, write_whole
 from pipeline.reasons import reasons
@@ -52,8 +52,11 @@ def run_stage(
     part: Slice = WHOLE,
     retries: int = 2,
     waits: bool = False,
+    only: str = "",
 ) -> RunResult:
     """Make all shards of stage `name` that have no matching record; the stages that it reads must be finished.
+
+    `only`: make no more than the shards called so, or `<only>-<anything>`, and those of the stage that they read.
 
     A shard that raises is tried again `retries` times, then set aside; one that has killed its worker three times
     is run once more with nothing beside it, then set aside. The rest goes on. An input that is found damaged is made
@@ -68,7 +71,7 @@ def run_stage(
     journal = Journal(name, places.log)
     try:
         with locked(own, part, waits) as lock:
-            return _Run(name, stages, config, places, workers, part, retries, journal).through(lock)
+            return _Run(name, stages, config, places, workers, part, retries, journal, only).through(lock)
     except OSError as error:
         if stops_everything(error) is None:
             raise
@@ -88,6 +91,7 @@ class _Run:
         part: Slice,
         retries: int,
         journal: Journal,
+        only: str,
     ) -> None:
         self._name = name
         self._stages = stages
@@ -96,6 +100,7 @@ class _Run:
         self._part = part
         self._retries = retries
         self._journal = journal
+        self._only = only
         self._survey = Survey(config, stages, places)
         self._result = RunResult()
         self._made: set[str] = set()
@@ -116,12 +121,16 @@ class _Run:
             for line in reasons(surveyed):
                 self._journal.say(line)
             surveyed.places.manifest.unlink(missing_ok=True)
-            self._journal.say(f"{_shards(len(surveyed.missing))} to make, {check_space(surveyed, self._places.out)}")
+            missing = len(self._mine(surveyed))
+            self._journal.say(f"{_shards(missing)} to make, {check_space(surveyed, self._places.out)}")
             self._make_missing()
             surveyed = self._survey.stage(self._name)
         if not surveyed.missing:
             fcntl.flock(lock, fcntl.LOCK_EX)
             finish_stage(self._survey, self._name, self._places)
+        elif surveyed.stage.publishes_parts:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            publish(surveyed, self._places)
         self._close(surveyed)
         return self._result
 
@@ -155,12 +164,25 @@ class _Run:
                 path.unlink(missing_ok=True)
 
     def _mine(self, surveyed: StageSurvey) -> list[Shard]:
-        done, failed = surveyed.records, self._result.failed
+        done, failed, chosen = surveyed.records, self._result.failed, self._chosen(surveyed)
         return [
             shard
             for index, shard in enumerate(surveyed.shards)
-            if index in self._part and shard.name not in done and shard.name not in failed
+            if index in self._part and shard.name in chosen and shard.name not in done and shard.name not in failed
         ]
+
+    def _chosen(self, surveyed: StageSurvey) -> set[str]:
+        """The shards that were asked for and those that they read. Raises ConfigError where there is none."""
+        chosen = {
+            each.name for each in surveyed.shards if not self._only or f"{each.name}-".startswith(f"{self._only}-")
+        }
+        if not chosen and surveyed.shards:
+            planned = ", ".join(each.name for each in surveyed.shards)
+            raise ConfigError(f"{self._name} has no shards {self._only} or {self._only}-...; there are {planned}")
+        for shard in reversed(surveyed.shards):  # what a shard reads is planned before it
+            if shard.name in chosen:
+                chosen |= {each.partition("/")[2] for each in shard.inputs if each.startswith(f"{self._name}/")}
+        return chosen
 
     def _make_missing(self) -> None:
         workers = Workers(self._workers, self._places.worker_output)
@@ -227,7 +249,7 @@ class _Run:
         """Make the `ready` shards, each until it is done or set aside."""
         alone: deque[Job] = deque()
         while ready or alone or workers.jobs:
-            while ready and workers.idle:
+            while ready and workers.has_room(ready[0]):
                 workers.submit(ready.popleft())
             if alone and not workers.jobs:
                 workers.submit(alone.popleft())

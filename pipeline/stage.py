@@ -48,12 +48,14 @@ class Shard:
     `name` is the stem of its files and of its record (letters, digits, `-`, `_`). `params` is JSON and says what
     the shard holds. `inputs` names the records it reads, as `stage/shard`, of earlier stages or of earlier
     shards of its own stage. `code` names the modules that it finds at run time, and no import of the stage reaches.
+    `threads` is how many threads it works with: the mill puts that many workers aside for it, or all that it has.
     """
 
     name: str
     params: Mapping[str, Any] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()
     code: tuple[str, ...] = ()
+    threads: int = 1
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,11 @@ class Stage:
 
     For `make plan`, a stage that makes samples says in `asked` how many the config wants, shard by shard of those that
     later stages read, and in `trial` its section for a short run: some thirty samples in shards of at most ten.
+
+    `whole_section`: whether the bytes of each shard may depend on all of the stage's section. Where its entries are
+    apart, and an edit of one must not make the shards of another anew, say False: tasks then do not see the section,
+    and each shard has in its `params` what it needs of it. `publishes_parts`: `publish` is asked while shards are
+    missing, too, and names what is there of whole results.
     """
 
     name: str
@@ -155,3 +162,5 @@ class Stage:
     asked: Callable[[Config], Sequence[int]] = _nothing_asked
     sections: tuple[str, ...] = ()
     trial: Callable[[Config], StrictModel] | None = None
+    whole_section: bool = True
+    publishes_parts: bool = False

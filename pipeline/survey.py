@@ -73,7 +73,7 @@ class Survey:
         Raises ValueError for a plan that breaks its contract.
         """
         surveyed = self._surveyed[name]
-        section = surveyed.config.sections[name].model_dump(mode="json")
+        section = surveyed.config.sections[name].model_dump(mode="json") if surveyed.stage.whole_section else {}
         dataset = (self.config.name, self.config.version, self.config.seed)
         while True:
             surveyed.shards = surveyed.stage.plan(surveyed.view)
@@ -115,7 +115,7 @@ class Survey:
             stage=name,
             run_shard=surveyed.stage.run_shard,
             shard=shard,
-            config=surveyed.config,
+            config=surveyed.config if surveyed.stage.whole_section else _without(surveyed.config, name),
             places=self._places,
             recipe=surveyed.recipes[shard.name],
             inputs=inputs,
@@ -171,6 +171,10 @@ class Survey:
             if source is None or source.files.get(file, {}).get("sha256") != digest:
                 return False
         return True
+
+
+def _without(config: Config, stage: str) -> Config:
+    return config.only(each for each in config.sections if each != stage)
 
 
 class _View:

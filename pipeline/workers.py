@@ -102,28 +102,34 @@ class Workers:
     """A fixed number of workers that stay alive between the waves of a plan."""
 
     def __init__(self, count: int, output: Path) -> None:
+        self._count = count
         self._idle = [_Worker(output) for _ in range(count)]
-        self._busy: dict[Future[Report], tuple[_Worker, Job]] = {}
-
-    @property
-    def idle(self) -> int:
-        """How many workers wait for a job."""
-        return len(self._idle)
+        self._busy: dict[Future[Report], tuple[list[_Worker], Job]] = {}
 
     @property
     def jobs(self) -> list[Job]:
         """The jobs that run now."""
         return [job for _, job in self._busy.values()]
 
+    def has_room(self, job: Job) -> bool:
+        """Whether as many workers are idle as the job has threads; or all, where it has more than there are workers."""
+        return len(self._idle) >= self._places(job)
+
     def submit(self, job: Job) -> None:
-        """Start a job on an idle worker. Raises IndexError when none is idle."""
-        worker = self._idle.pop()
-        self._busy[worker.submit(job)] = (worker, job)
+        """Start a job on an idle worker; for each further thread of it another stays idle meanwhile.
+
+        Raises IndexError when there is no room.
+        """
+        taken = [self._idle.pop() for _ in range(self._places(job))]
+        self._busy[taken[0].submit(job)] = (taken, job)
+
+    def _places(self, job: Job) -> int:
+        return min(job.shard.threads, self._count)
 
     def finished(self, timeout: float | None) -> Iterator[tuple[Job, Report | None]]:
         """Jobs that end within `timeout` seconds (None: the next), with None for one that has killed its worker."""
         for future in wait(self._busy, timeout=timeout, return_when=FIRST_COMPLETED).done:
-            worker, job = self._busy.pop(future)
+            (worker, *others), job = self._busy.pop(future)
             try:
                 report: Report | None = future.result()
             except TerminatedWorkerError:
@@ -132,11 +138,11 @@ class Workers:
             except BrokenProcessPool as error:
                 worker.stop(kill=True)
                 report = Report(job.shard.name, "failed", f"the job did not reach its worker: {error}", repr(error))
-            self._idle.append(worker)
+            self._idle += [worker, *others]
             yield job, report
 
     def stop(self, kill: bool) -> None:
         """End all workers: at once, or after what they do now."""
-        for worker in [*self._idle, *(worker for worker, _ in self._busy.values())]:
+        for worker in [*self._idle, *(worker for taken, _ in self._busy.values() for worker in taken)]:
             worker.stop(kill)
         self._busy.clear()

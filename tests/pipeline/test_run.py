@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import json
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +15,7 @@ from pipeline.errors import ConfigError
 from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.slices import Slice
-from pipeline.stage import Outcome, Shard, Stage, Task
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from tests.pipeline.conftest import WriteConfig, made, record_times
 from tests.pipeline.turn import turn
 
@@ -195,3 +197,67 @@ def test_published_file_that_went_missing_is_put_back(tmp_path: Path, write_conf
     (tmp_path / "out/mill/loaves/0.bin").unlink()
     turn(config, tmp_path / "out", "bread")
     assert made(tmp_path / "out") == whole
+
+
+def write_span(task: Task) -> Outcome:
+    """Writes when it began and when it ended."""
+    began = time.monotonic()
+    time.sleep(0.2)
+    with task.output(f"{task.shard.name}.json") as stream:
+        stream.write(json.dumps([began, time.monotonic()]).encode())
+    return Outcome(0)
+
+
+def stage_of(shards: list[Shard], **more: Any) -> dict[str, Stage]:
+    return {"looms": Stage("looms", __name__, LoomsConfig, (), lambda _: shards, write_span, lambda _: 0, **more)}
+
+
+def weave(folder: Path, stages: dict[str, Stage], workers: int = 1, only: str = "", **section: str) -> int:
+    config = Config("mill", "1.0.0", 0, {"looms": LoomsConfig(**section)}, folder / "mill.yaml")
+    return run_stage("looms", stages, config, Places(folder, "mill"), workers, only=only).made
+
+
+class LoomsConfig(StrictModel):
+    """Which colour is woven."""
+
+    colour: str = "red"
+
+
+def test_nothing_runs_beside_a_shard_that_takes_all_threads(tmp_path: Path) -> None:
+    threads = {"a": 1, "b": 2, "c": 1, "d": 1, "e": 9}
+    weave(tmp_path, stage_of([Shard(name, threads=count) for name, count in threads.items()]), workers=2)
+    spans = {name: json.loads((tmp_path / WORK / f"looms/{name}.json").read_text()) for name in threads}
+    for wide in ("b", "e"):
+        began, ended = spans[wide]
+        assert all(each[1] <= began or ended <= each[0] for name, each in spans.items() if name != wide)
+
+
+def test_only_what_was_asked_for_is_made_with_what_it_reads(tmp_path: Path) -> None:
+    shards = [Shard("wool"), Shard("sock-0", inputs=("looms/wool",)), Shard("sock-1", inputs=("looms/sock-0",))]
+    stages = stage_of([*shards, Shard("sock2"), Shard("hat")])
+    assert weave(tmp_path, stages, only="sock") == 3
+    assert not (tmp_path / WORK / "looms/mill/manifest.json").exists()
+    with pytest.raises(ConfigError, match=r"looms has no shards so or so-\.\.\.; there are wool, sock-0"):
+        weave(tmp_path, stages, only="so")
+    assert weave(tmp_path, stages) == 2
+
+
+def test_stage_may_publish_what_is_whole_before_all_is_made(tmp_path: Path) -> None:
+    def whole(plan: Plan) -> dict[str, str]:
+        return {f"woven/{name}": f"{name}.json" for name in ("a", "b") if plan.summary("looms", name) is not None}
+
+    stages = stage_of([Shard("a"), Shard("b")], publish=whole, publishes_parts=True)
+    weave(tmp_path, stages, only="a")
+    assert [path.name for path in (tmp_path / "woven").iterdir()] == ["a"]
+    weave(tmp_path, stages)
+    assert sorted(path.name for path in (tmp_path / "woven").iterdir()) == ["a", "b"]
+
+
+def test_shards_that_do_not_see_their_section_are_not_made_anew_for_it(tmp_path: Path) -> None:
+    stages = stage_of([Shard("a", {"dye": "red"})], whole_section=False)
+    assert weave(tmp_path, stages) == 1
+    assert weave(tmp_path, stages, colour="blue") == 0
+    assert weave(tmp_path, stage_of([Shard("a", {"dye": "blue"})], whole_section=False), colour="blue") == 1
+    # A stage whose shards see its section, as is the rule, makes them anew.
+    assert weave(tmp_path / "seen", stage_of([Shard("a")])) == 1
+    assert weave(tmp_path / "seen", stage_of([Shard("a")]), colour="blue") == 1
