@@ -30,6 +30,8 @@ SEED    ?=
 MESH    ?=
 ## PROGRAM  a shape program that `make inspect` looks at: a name, such as chair, or a module
 PROGRAM ?=
+## MODEL    the model that `make train` trains, by its name, or <name>-<kit>; unless you say, all of CONFIG
+MODEL   ?=
 ## TABLE    the table that `make eval` prints, or all, for the report; without, it lists them
 TABLE   ?=
 ## SAMPLES  how many samples `make verify` looks at by all means: a number, or all
@@ -37,7 +39,7 @@ SAMPLES ?= 100
 
 # Their values are text, whatever stands in it: make expands none of it, and recipes read it from the environment, as
 # "$$CONFIG", so that no shell does. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM TABLE SAMPLES
+VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM MODEL TABLE SAMPLES
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -76,6 +78,10 @@ sketches: variations programs shapeassembly  ## Draw each shape as lines
 	$(RUN)
 package: validity strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)
+
+.PHONY: train
+train: exemplars strings  ## Train the models of CONFIG on the dataset's samples, from where they stand
+	@$(PYTHON) -m pipeline run training $(HOW) $${MODEL:+--only "$$MODEL"}
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-VARIABLES = ("CONFIG", "OUT", "WORKERS", "SEED", "MESH", "PROGRAM", "TABLE", "SAMPLES")
+VARIABLES = ("CONFIG", "OUT", "WORKERS", "SEED", "MESH", "PROGRAM", "MODEL", "TABLE", "SAMPLES")
 SAY_ARGUMENTS = "import json, sys; print(json.dumps(sys.argv[1:]))"
 
 
@@ -55,6 +55,15 @@ def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
     assert all(run == ["-m", "pipeline", "run", run[3], *asked] for run in runs)
 
 
+def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for() -> None:
+    runs = calls("train", "MODEL=masked-castle")
+    assert [run[3] for run in runs] == [
+        "choices", "exemplars", "variations", "programs", "shapeassembly", "strings", "training",
+    ]  # fmt: skip
+    assert runs[-1][-2:] == ["--only", "masked-castle"]
+    assert "--only" not in calls("train")[-1]
+
+
 def test_without_a_seed_the_config_has_its_own() -> None:
     assert "--seed" not in calls("points")[0]
 
@@ -69,7 +78,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-",
-        "TABLE": "-", "SAMPLES": "100",
+        "MODEL": "-", "TABLE": "-", "SAMPLES": "100",
     }  # fmt: skip
 
 

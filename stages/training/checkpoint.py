@@ -1,0 +1,74 @@
+"""Weights on disk: safetensors whose header says what they are. Nothing else is read, and pickles least of all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+__all__ = ["VERSION", "CheckpointError", "checkpoint_bytes", "load_checkpoint", "tensors_of"]
+
+VERSION = 1
+"""Of what stands in the header. A file of another version is refused."""
+
+_KEY = "shapemill"
+_PICKLES = (b"PK\x03\x04", b"\x80")
+"""How what `torch.save` and `pickle` write begins."""
+
+
+class CheckpointError(ValueError):
+    """A file that holds no weights, or not those that were asked for."""
+
+
+def checkpoint_bytes(tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> bytes:
+    """A safetensors file: equal tensors and an equal header make equal bytes."""
+    from safetensors.torch import save
+
+    text = json.dumps({**header, "version": VERSION}, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    content: bytes = save({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, {_KEY: text})
+    return content
+
+
+def load_checkpoint(path: Path, expected: Mapping[str, Any]) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """The tensors and the header of a file, on the CPU.
+
+    Raises CheckpointError, which names the file and the reason: a pickle; a file that is cut off or damaged, or that
+    Shapemill did not write; another version; a header that says something else than `expected`, such as
+    `{"kit": "castle"}`.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    with open(path, "rb") as stream:
+        beginning = stream.read(8)
+    if beginning.startswith(_PICKLES):
+        raise CheckpointError(f"{path} is a pickle, which may run any code when it is read: refused; only safetensors")
+    try:
+        with safe_open(path, framework="pt", device="cpu") as stored:
+            metadata = stored.metadata() or {}
+            tensors: dict[str, Tensor] = {name: stored.get_tensor(name) for name in sorted(stored.keys())}
+    except (SafetensorError, OSError, ValueError) as error:
+        raise CheckpointError(f"{path} is cut off or damaged: {error}") from error
+    if _KEY not in metadata:
+        raise CheckpointError(f"{path} holds tensors, but Shapemill did not write it: its header does not say what of")
+    header: dict[str, Any] = json.loads(metadata[_KEY])
+    for key, wanted in {"version": VERSION, **expected}.items():
+        if header.get(key) != wanted:
+            raise CheckpointError(f"{path} is of another {key}: {_difference(header.get(key), wanted)}")
+    return tensors, header
+
+
+def _difference(found: Any, wanted: Any) -> str:
+    if isinstance(found, list) and isinstance(wanted, list):
+        for place, (one, other) in enumerate(zip(found, wanted, strict=False)):
+            if one != other:
+                return f"entry {place} is {one!r}, and {other!r} is asked for"
+        return f"it has {len(found)} entries, and {len(wanted)} are asked for"
+    return f"{found!r}, and {wanted!r} is asked for"
+
+
+def tensors_of(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    """Those of `tensors` whose name begins with `prefix` and a dot, by the rest of their name."""
+    return {name[len(prefix) + 1 :]: each for name, each in tensors.items() if name.startswith(f"{prefix}.")}

@@ -1,0 +1,45 @@
+"""What the config says of every model, whatever its kind: its name, its data, and how long and on what it trains."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from pipeline.config import StrictModel
+
+__all__ = ["ModelEntry"]
+
+
+class ModelEntry(StrictModel):
+    """One entry of `training.models`: a model for each of its kits and each of its seeds."""
+
+    name: str = Field(
+        pattern=r"^[a-z][a-z0-9]*(_[a-z0-9]+)*$",
+        max_length=32,
+        description="what the model is called; its weights stand in `OUT/<dataset>-models/<name>-<kit>-<seed>`; "
+        "lower-case letters, digits and single underscores",
+    )
+    kits: tuple[str, ...] = Field((), description="the kits that it is trained on, each by itself; all if empty")
+    seeds: int = Field(1, ge=1, le=100, description="how often it is trained, from other weights; unit: models")
+    learning_rate: float = Field(1e-3, gt=0, le=1, description="of Adam at the start; it falls to a twentieth")
+    batch: int = Field(64, ge=1, le=65_536, description="samples that a step of the optimiser sees; unit: samples")
+    steps: int = Field(
+        300, ge=1, le=1_000_000, description="steps of a round, a minute or two of work; unit: optimiser steps"
+    )
+    rounds: int = Field(16, ge=1, le=10_000, description="rounds at most; unit: rounds")
+    patience: int = Field(
+        4, ge=1, le=10_000, description="so many rounds in a row that are no better than the best end it; unit: rounds"
+    )
+    threads: int = Field(
+        1,
+        ge=1,
+        le=256,
+        description="threads of a training, and workers that are put aside for it; another number sums in another "
+        "order: other weights; unit: threads",
+    )
+    device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where it trains; `auto`: a GPU if there is one")
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32", description="numbers of the forward pass; `bfloat16` is faster where the processor knows it"
+    )
+    compile: bool = Field(False, description="whether torch compiles the model first: a minute, then faster on a GPU")

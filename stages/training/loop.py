@@ -1,0 +1,101 @@
+"""The training loop: so many steps of Adam."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stages.training.checkpoint import tensors_of
+from stages.training.entry import ModelEntry
+from stages.training.learner import Learner
+
+__all__ = ["Trainee", "device_of", "same_arithmetic", "train"]
+
+LAST_RATE = 0.05
+"""Share of the learning rate that is left at the last step."""
+LARGEST_GRADIENT = 1.0
+"""Longer gradients are shortened to this norm: recurrent nets have rare ones that undo hours."""
+
+_MOMENTS = ("exp_avg", "exp_avg_sq")
+
+
+def same_arithmetic(threads: int) -> None:
+    """Let torch sum in one order, with so many threads: equal seeds give equal weights."""
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+
+
+def device_of(asked: str) -> torch.device:
+    """The device that a config asks for."""
+    return torch.device("cuda" if asked == "cuda" or (asked == "auto" and torch.cuda.is_available()) else "cpu")
+
+
+@dataclass
+class Trainee:
+    """A learner on its way: with its optimiser, after so many steps."""
+
+    learner: Learner
+    optimizer: torch.optim.Adam
+    step: int = 0
+
+    @classmethod
+    def of(cls, learner: Learner, entry: ModelEntry) -> Trainee:
+        return cls(learner, torch.optim.Adam(learner.module.parameters(), lr=entry.learning_rate))
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Weights as `weights.<name>` and the optimiser's moments as `exp_avg.<name>` and `exp_avg_sq.<name>`."""
+        module = self.learner.module
+        tensors = {f"weights.{name}": tensor for name, tensor in module.state_dict().items()}
+        for name, parameter in module.named_parameters():
+            for moment in _MOMENTS:
+                tensors[f"{moment}.{name}"] = self.optimizer.state[parameter][moment]
+        return tensors
+
+    def restore(self, tensors: dict[str, Tensor], step: int) -> None:
+        """Go on from `tensors()` as they were after `step` steps."""
+        module = self.learner.module
+        module.load_state_dict(tensors_of(tensors, "weights"))
+        moments = {moment: tensors_of(tensors, moment) for moment in _MOMENTS}
+        state = {
+            number: {"step": torch.tensor(float(step)), **{moment: moments[moment][name] for moment in _MOMENTS}}
+            for number, (name, _) in enumerate(module.named_parameters())
+        }
+        self.optimizer.load_state_dict({"state": state, "param_groups": self.optimizer.state_dict()["param_groups"]})
+        self.step = step
+
+
+def train(
+    trainee: Trainee, entry: ModelEntry, rng: np.random.Generator, progress: Callable[[int, int], None]
+) -> dict[str, float]:
+    """One round: `entry.steps` steps. Answers the mean of each figure of the learner."""
+    learner, optimizer = trainee.learner, trainee.optimizer
+    device = next(learner.module.parameters()).device
+    if entry.compile:
+        learner.module.compile()
+    noise = torch.Generator(device).manual_seed(int(rng.integers(2**63)))
+    stream = learner.batches(rng)
+    sums: dict[str, Tensor] = {}
+    learner.module.train()
+    for done in range(entry.steps):
+        for group in optimizer.param_groups:
+            group["lr"] = entry.learning_rate * _rate(trainee.step, entry.steps * entry.rounds)
+        with torch.autocast(device.type, torch.bfloat16, enabled=entry.precision == "bfloat16"):
+            losses = learner.losses(next(stream), trainee.step, noise)
+        optimizer.zero_grad()
+        losses["loss"].backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(learner.module.parameters(), LARGEST_GRADIENT)
+        optimizer.step()
+        trainee.step += 1
+        for name, value in losses.items():
+            sums[name] = sums.get(name, torch.zeros((), device=device)) + value.detach()
+        progress(done + 1, entry.steps)
+    return {name: float(total) / entry.steps for name, total in sums.items()}
+
+
+def _rate(step: int, steps: int) -> float:
+    """The share of the learning rate at a step: it falls in a straight line."""
+    return 1.0 - (1.0 - LAST_RATE) * step / steps

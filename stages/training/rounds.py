@@ -1,0 +1,133 @@
+"""The rounds of a training: a chain of shards, each of which reads the one before it."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, cast
+
+from pipeline.code import code_digest, reached
+from pipeline.errors import ShardFailed
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Task
+from stages.training.entry import ModelEntry
+
+__all__ = ["Chain", "Kind", "kind_of", "rounds", "run_round"]
+
+
+class Kind(Protocol):
+    """What the `training.py` of a kind holds; its folder is found by the kind's name."""
+
+    def prepare(self, task: Task) -> Outcome:
+        """Make the samples of a kit ready, as files `<shard>.<anything>`."""
+
+    def entry(self, settings: Mapping[str, Any]) -> ModelEntry:
+        """The entry whose JSON is `settings`."""
+
+    def learner(self, task: Task, entry: Any, seed: int) -> Any:
+        """A `Learner` with fresh weights, of `task.shard.params`: `kit`, and `data`, the shard that `prepare` made."""
+
+
+def module_of(kind: str) -> str:
+    """The module of a kind."""
+    return f"{__name__.rpartition('.')[0]}.{kind}.training"
+
+
+def kind_of(kind: str) -> Kind:
+    """The kind of models of that name."""
+    return cast(Kind, importlib.import_module(module_of(kind)))
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The rounds of one model as far as they are known.
+
+    best: the number of the round with the best weights; ended: whether another round is none of the plan.
+    """
+
+    shards: tuple[Shard, ...]
+    summaries: tuple[Mapping[str, Any], ...]
+    best: int
+    ended: bool
+
+
+def rounds(plan: Plan, entry: ModelEntry, kind: str, kit: str, seed: int, data: str) -> Chain:
+    """The chain of one model: a round follows the one before it, until there are `rounds`, or `patience` of them in a
+    row were no better than the best.
+
+    So a training that ends early has made nothing that says nothing. What decides about the end, and which kits and
+    seeds there are besides, is no setting of a round.
+    """
+    settings = entry.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"})
+    shards: list[Shard] = []
+    summaries: list[Mapping[str, Any]] = []
+    best = 0
+    for number in range(entry.rounds):
+        name = f"{entry.name}-{kit}-{seed}-r{number:04}"
+        before = [shards[-1].name] if shards else []
+        params = {
+            "job": "round", "kind": kind, "kit": kit, "seed": seed, "round": number, "data": data, "before": before,
+            "settings": settings,
+        }  # fmt: skip
+        inputs = tuple(f"training/{each}" for each in (data, *before))
+        shards.append(Shard(name, params, inputs, (module_of(kind),), entry.threads))
+        summary = plan.summary("training", name)
+        if summary is None:
+            return Chain(tuple(shards), tuple(summaries), best, ended=False)
+        summaries.append(summary)
+        if summary["loss"] < summaries[best]["loss"]:
+            best = number
+        if number - best >= entry.patience:
+            break
+    return Chain(tuple(shards), tuple(summaries), best, ended=True)
+
+
+def run_round(task: Task) -> Outcome:
+    """Files of the shard: `.safetensors`, weights and moments of the optimiser; `.json`, the figures of the round."""
+    from stages.training.checkpoint import checkpoint_bytes, load_checkpoint
+    from stages.training.loop import Trainee, same_arithmetic, train
+
+    params, name = task.shard.params, task.shard.name
+    kind = kind_of(params["kind"])
+    entry = kind.entry({"name": "round", **params["settings"]})
+    same_arithmetic(entry.threads)
+    learner = kind.learner(task, entry, _seed(task, "weights"))
+    trainee = Trainee.of(learner, entry)
+    described = {"kind": params["kind"], "kit": params["kit"], "settings": params["settings"], **learner.header}
+    for before in params["before"]:
+        tensors, header = load_checkpoint(task.input("training", f"{before}.safetensors"), described)
+        trainee.restore(tensors, header["step"])
+    learnt = train(trainee, entry, task.rng("batches"), task.progress)
+    import torch
+
+    device = next(learner.module.parameters()).device
+    learner.module.eval()
+    with torch.no_grad():
+        found = learner.validate(torch.Generator(device).manual_seed(_seed(task, "validation")))
+    figures = {"round": params["round"], "step": trainee.step}
+    figures |= {f"train_{key}": value for key, value in learnt.items()}
+    figures |= {f"val_{key}": value for key, value in found.items()}
+    if not _finite(figures.values()):
+        raise ShardFailed(f"the training has run away: {json.dumps(figures)}; try a smaller learning_rate")
+    header = {
+        **described,
+        "step": trainee.step,
+        "code": code_digest(reached((module_of(params["kind"]),))),
+        "device": device.type,
+        "figures": figures,
+    }
+    with task.output(f"{name}.safetensors") as stream:
+        stream.write(checkpoint_bytes(trainee.tensors(), header))
+    with task.output(f"{name}.json") as stream:
+        stream.write(json_bytes(figures))
+    return Outcome(samples=0, summary={"loss": found["loss"], "step": trainee.step, "device": device.type})
+
+
+def _seed(task: Task, decision: str) -> int:
+    return int(task.rng(decision).integers(2**63))
+
+
+def _finite(values: Sequence[float] | Any) -> bool:
+    return all(abs(value) < float("inf") for value in values)

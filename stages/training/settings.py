@@ -1,0 +1,27 @@
+"""The config of stage `training`."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from pipeline.config import StrictModel
+from stages.training.string_vae.settings import StringVaeEntry
+
+__all__ = ["TrainingConfig"]
+
+
+class TrainingConfig(StrictModel):
+    """Which models are trained. None belongs to the dataset: `make train` trains them."""
+
+    longest: int = Field(
+        256, ge=2, le=100_000, description="longer strings are left out of the training of models; unit: tokens"
+    )
+    models: tuple[StringVaeEntry, ...] = Field((), description="the models; each is trained by itself")
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> TrainingConfig:
+        names = [each.name for each in self.models]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"models of one name: {', '.join(twice)}")
+        return self

@@ -1,0 +1,150 @@
+"""Stage `training`: models learn from the samples of a dataset, round by round.
+
+Its shards are the samples of each kit made ready, the rounds of each model, and the finished models. It is no part of
+a dataset: `make train`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+from pipeline.config import Config
+from pipeline.errors import ConfigError
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.exemplars.settings import ExemplarsConfig
+from stages.training.entry import ModelEntry
+from stages.training.rounds import Chain, kind_of, module_of, rounds, run_round
+from stages.training.settings import TrainingConfig
+from stages.training.trained import FILES, run_trained
+
+__all__ = ["STAGE"]
+
+BYTES_A_ROUND = 16_000_000
+"""Weights and two moments of a model of about a million parameters."""
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """The samples of each kit that a model learns from; then the rounds of every model as far as they are known, and
+    each model whose rounds have ended."""
+    shards: dict[str, Shard] = {}
+    for entry, kit, seed in _models(plan):
+        data = _data_shard(plan, entry.kind, kit)
+        shards.setdefault(data.name, data)
+        chain = rounds(plan, entry, entry.kind, kit, seed, data.name)
+        shards.update((shard.name, shard) for shard in chain.shards)
+        if chain.ended:
+            trained = _trained_shard(plan, entry, kit, seed, chain)
+            shards[trained.name] = trained
+    return list(shards.values())
+
+
+def run_shard(task: Task) -> Outcome:
+    """Samples made ready, one round, or a finished model."""
+    if task.shard.params["job"] == "data":
+        return kind_of(task.shard.params["kind"]).prepare(task)
+    return run_round(task) if task.shard.params["job"] == "round" else run_trained(task)
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """How far each model is."""
+    lines = []
+    for entry, kit, seed in _models(plan):
+        chain = rounds(plan, entry, entry.kind, kit, seed, "")
+        if chain.summaries:
+            state = "ended" if chain.ended else f"of {entry.rounds} at most"
+            lines.append(
+                f"{_name(entry, kit, seed)}: {len(chain.summaries)} rounds {state}, "
+                f"{chain.summaries[-1]['step']:,} steps; best loss {chain.summaries[chain.best]['loss']:.4g} "
+                f"after {chain.summaries[chain.best]['step']:,}"
+            )
+    return lines
+
+
+def publish(plan: Plan) -> Mapping[str, str]:
+    """The folder of each finished model."""
+    folder = f"{plan.config.name}-models"
+    names = (_name(*model) for model in _models(plan))
+    finished = (name for name in names if plan.summary("training", f"{name}-trained") is not None)
+    return {f"{folder}/{name}/{file}": f"{name}-trained.{file}" for name, file in product(finished, sorted(FILES))}
+
+
+def check(config: Config) -> None:
+    """Raises ConfigError for models of kits that the config has not."""
+    kits = [kit.name for kit in config.section(ExemplarsConfig).kits]
+    for entry in config.section(TrainingConfig).models:
+        unknown = [kit for kit in entry.kits if kit not in kits]
+        if unknown or not kits:
+            which = f"there is no kit {unknown[0]}" if unknown else "it learns from kits, and there are none"
+            raise ConfigError(f"{config.path}: training.models: {entry.name}: {which}; kits are {', '.join(kits)}")
+
+
+def estimate_bytes(plan: Plan) -> int:
+    """All rounds of all models."""
+    return sum(entry.rounds * BYTES_A_ROUND for entry, _, _ in _models(plan))
+
+
+def trial(config: Config) -> TrainingConfig:
+    """No models: a dataset is planned without what learns from it."""
+    return config.section(TrainingConfig).model_copy(update={"models": ()})
+
+
+def _models(plan: Plan) -> Iterator[tuple[ModelEntry, str, int]]:
+    """Each model of the config: its entry, its kit, its seed."""
+    for entry in plan.config.section(TrainingConfig).models:
+        for kit, seed in product(entry.kits or plan.shards("exemplars"), range(entry.seeds)):
+            yield entry, kit, seed
+
+
+def _name(entry: ModelEntry, kit: str, seed: int) -> str:
+    return f"{entry.name}-{kit}-{seed}"
+
+
+def _data_shard(plan: Plan, kind: str, kit: str) -> Shard:
+    splits = {}
+    for name in plan.shards("strings"):
+        summary = plan.summary("strings", name)
+        if summary is not None and summary.get("split") in ("train", "val"):
+            splits[name] = summary["split"]
+    params = {
+        "job": "data",
+        "kind": kind,
+        "kit": kit,
+        "splits": splits,
+        "longest": plan.config.section(TrainingConfig).longest,
+    }
+    inputs = (f"exemplars/{kit}", *(f"strings/{name}" for name in splits))
+    return Shard(f"{kit}-{kind}", params, inputs, (module_of(kind),))
+
+
+def _trained_shard(plan: Plan, entry: ModelEntry, kit: str, seed: int, chain: Chain) -> Shard:
+    name = _name(entry, kit, seed)
+    names = [shard.name for shard in chain.shards]
+    params = {
+        "job": "trained",
+        "name": name,
+        "kind": entry.kind,
+        "kit": kit,
+        "dataset": f"{plan.config.name} {plan.config.version}",
+        "license": plan.config.license,
+        "rounds": names,
+        "best": chain.best,
+    }
+    return Shard(f"{name}-trained", params, tuple(f"training/{each}" for each in names))
+
+
+STAGE = Stage(
+    name="training",
+    module=__name__,
+    config=TrainingConfig,
+    inputs=("exemplars", "strings"),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=estimate_bytes,
+    report=report,
+    publish=publish,
+    check=check,
+    trial=trial,
+    whole_section=False,
+    publishes_parts=True,
+)

@@ -1,0 +1,1 @@
+"""A variational autoencoder of a kit's strings (strings §5)."""

@@ -1,0 +1,42 @@
+"""What the config says of a string VAE."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from stages.training.entry import ModelEntry
+
+__all__ = ["StringVaeEntry"]
+
+
+class StringVaeEntry(ModelEntry):
+    """A string VAE (strings §5). Sizes are not published: these train in minutes on one core."""
+
+    kind: Literal["string_vae"] = Field("string_vae", description="a variational autoencoder of strings")
+    decoder: Literal["plain", "masked", "transformer"] = Field(
+        "masked",
+        description="`plain`: a GRU, as published; `masked`: the same, which never takes a token that can no longer "
+        "lead to a string of the grammar; `transformer`: a small transformer, masked too",
+    )
+    latent: int = Field(64, ge=1, le=4096, description="dimensions of the latent space")
+    embedding: int = Field(32, ge=1, le=4096, description="numbers that stand for a token")
+    hidden: int = Field(256, ge=2, le=8192, description="size of the GRUs, or width of the transformer; even")
+    layers: int = Field(1, ge=1, le=24, description="layers of the decoder")
+    kl_weight: float = Field(
+        0.1, ge=0, le=10, description="weight of the divergence from the prior, in nats, beside that of a whole string"
+    )
+    anneal: int = Field(
+        900,
+        ge=0,
+        le=1_000_000,
+        description="the weight of the divergence rises to this in an S over so many steps; unit: optimiser steps",
+    )
+    word_dropout: float = Field(
+        0.2, ge=0, lt=1, description="share of the tokens that the decoder does not see while it learns"
+    )
+    triplet_weight: float = Field(
+        0.0, ge=0, le=1000, description="weight of the triplet loss, which brings similar shapes together; 0: without"
+    )
+    triplet_margin: float = Field(1.0, gt=0, le=1000, description="by how much the similar one shall be nearer")

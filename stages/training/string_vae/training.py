@@ -1,0 +1,165 @@
+"""How a string VAE learns: its samples, its losses, its validation (strings §5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Generator, Tensor
+from torch.nn.functional import relu
+
+from pipeline.places import file_digest
+from pipeline.stage import Outcome, Task
+from stages.training.loop import device_of
+from stages.training.string_vae.batches import Batch, Strings, batches
+from stages.training.string_vae.corpus import prepare_corpus, read_corpus
+from stages.training.string_vae.model import StringVae, shifted
+from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.vocabulary import END, Vocabulary
+
+__all__ = ["StringVaeLearner", "entry", "learner", "new_model", "prepare"]
+
+ANNEAL_STEEPNESS = 12.0
+"""The weight of the divergence goes from 0.25 % to 99.75 % of its value along its S."""
+
+
+def prepare(task: Task) -> Outcome:
+    """The strings of a kit, as numbers."""
+    return prepare_corpus(task)
+
+
+def entry(settings: Mapping[str, Any]) -> StringVaeEntry:
+    """The entry whose JSON is `settings`."""
+    return StringVaeEntry.model_validate(settings)
+
+
+def learner(task: Task, entry: StringVaeEntry, seed: int) -> StringVaeLearner:
+    """A string VAE with fresh weights beside the strings of its kit."""
+    data = task.shard.params["data"]
+    described, vocabulary, strings = read_corpus(task, data)
+    device = device_of(entry.device)
+    sources: dict[str, Path] = {
+        split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
+    }
+    header = {
+        "names": described["names"],
+        "cycles": described["cycles"],
+        "longest": described["longest"],
+        "tokens": list(vocabulary.texts),
+        "data": {split: file_digest(path) for split, path in sources.items()},
+        "counts": described["counts"],
+    }
+    module = new_model(entry, vocabulary, described["longest"], seed).to(device)
+    return StringVaeLearner(module, header, entry, vocabulary, strings["train"], strings["val"])
+
+
+def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, longest: int, seed: int) -> StringVae:
+    """A model with random weights, by its seed alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return StringVae(entry, len(vocabulary), longest + 1)
+
+
+@dataclass(frozen=True)
+class StringVaeLearner:
+    """The `Learner` of a string VAE."""
+
+    module: StringVae
+    header: Mapping[str, Any]
+    entry: StringVaeEntry
+    vocabulary: Vocabulary
+    train: Strings
+    val: Strings
+
+    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+        """Random batches of train, one pass after another."""
+        device = next(self.module.parameters()).device
+        while True:
+            for batch in batches(self.train, self.entry.batch, len(self.vocabulary), rng):
+                yield batch.to(device)
+
+    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+        """Nats of a string, the divergence from the prior, and the triplet loss where it is asked for."""
+        mean, log_variance = self.module.encode(batch.codes, batch.lengths)
+        points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
+        shown = shifted(batch.codes)
+        hidden = torch.rand(shown.shape, generator=noise, device=shown.device) < self.entry.word_dropout
+        logits = self.module.decode(shown.masked_fill(hidden, END), points)
+        nats, _ = self._reconstruction(logits, batch)
+        divergence = _divergence(mean, log_variance)
+        losses = {"nats": nats, "divergence": divergence}
+        loss = nats + self.entry.kl_weight * annealed(step, self.entry.anneal) * divergence
+        if self.entry.triplet_weight:
+            losses["triplet"] = triplet_loss(mean, batch.histograms, self.entry.triplet_margin, noise)
+            loss = loss + self.entry.triplet_weight * losses["triplet"]
+        return {"loss": loss, **losses}
+
+    def validate(self, noise: Generator) -> dict[str, float]:
+        """On val, with the weight that the divergence has at the end; `accuracy`: share of the tokens that are the
+        likeliest where all before them are right."""
+        sums = {"loss": 0.0, "nats": 0.0, "divergence": 0.0, "accuracy": 0.0}
+        device = next(self.module.parameters()).device
+        for batch in (each.to(device) for each in batches(self.val, self.entry.batch, len(self.vocabulary), None)):
+            mean, log_variance = self.module.encode(batch.codes, batch.lengths)
+            points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
+            logits = self.module.decode(shifted(batch.codes), points)
+            nats, accuracy = self._reconstruction(logits, batch)
+            divergence = _divergence(mean, log_variance)
+            loss = nats + self.entry.kl_weight * divergence
+            found = {"loss": loss, "nats": nats, "divergence": divergence, "accuracy": accuracy}
+            for name, value in found.items():
+                sums[name] += float(value) * len(batch.codes) / len(self.val)
+        return sums
+
+    def _reconstruction(self, logits: Tensor, batch: Batch) -> tuple[Tensor, Tensor]:
+        """Nats of a string, mean over the batch, and the share of the tokens that are the likeliest."""
+        if self.entry.decoder != "plain":
+            logits = logits.masked_fill(~batch.allowed, -torch.inf)
+        there = torch.arange(batch.codes.shape[1]) < batch.lengths[:, None]
+        there = there.to(logits.device)
+        nats = -torch.log_softmax(logits.float(), dim=-1).gather(-1, batch.codes[..., None])[..., 0]
+        right = (logits.argmax(dim=-1) == batch.codes) & there
+        return torch.where(there, nats, 0.0).sum() / len(batch.codes), right.sum() / there.sum()
+
+
+def annealed(step: int, over: int) -> float:
+    """The share of its weight that the divergence has at a step: an S from 0 to 1."""
+    if not over:
+        return 1.0
+    return float(1.0 / (1.0 + np.exp(-ANNEAL_STEEPNESS * (step / over - 0.5))))
+
+
+def triplet_loss(points: Tensor, histograms: Tensor, margin: float, noise: Generator) -> Tensor:
+    """The triplet loss (strings §5.3) of points float (n, latent), mean over the batch.
+
+    Each is compared with two others at random; the one that is more similar, by the types of the parts, shall be
+    nearer by `margin`, in squared distance. Two that are as similar say nothing.
+    """
+    first, second = (
+        torch.randperm(len(points), generator=noise, device=noise.device).to(points.device) for _ in range(2)
+    )
+    unlikeness = [histogram_distance(histograms, histograms[other]) for other in (first, second)]
+    gaps = [((points - points[other]) ** 2).sum(dim=-1) for other in (first, second)]
+    nearer, farther = (
+        torch.where(unlikeness[0] < unlikeness[1], gaps[0], gaps[1]),
+        torch.where(unlikeness[0] < unlikeness[1], gaps[1], gaps[0]),
+    )
+    return (relu(nearer - farther + margin) * (unlikeness[0] != unlikeness[1])).mean()
+
+
+def histogram_distance(first: Tensor, second: Tensor) -> Tensor:
+    """E (strings §5.3) of the histograms of types float (n, types) of shapes, pair by pair, float (n,)."""
+    return (first - second).abs().sum(dim=-1) / (first.sum(dim=-1) + second.sum(dim=-1))
+
+
+def _divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
+    """Of normal distributions from the standard one, in nats of a string, mean over the batch."""
+    return 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum(dim=-1).mean()
+
+
+def _normal(like: Tensor, noise: Generator) -> Tensor:
+    return torch.randn(like.shape, generator=noise, device=like.device)

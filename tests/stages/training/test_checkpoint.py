@@ -1,0 +1,68 @@
+"""Weights are read only from a whole safetensors file that says it is what was asked for."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save
+
+from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
+
+TENSORS = {"b": torch.arange(6.0).reshape(2, 3), "a": torch.ones(4, dtype=torch.int64)}
+HEADER = {"kit": "castle", "tokens": ["", "A", "B", "(", ")"]}
+
+
+def written(folder: Path, content: bytes) -> Path:
+    path = folder / "weights.safetensors"
+    path.write_bytes(content)
+    return path
+
+
+def test_tensors_and_header_come_back(tmp_path: Path) -> None:
+    tensors, header = load_checkpoint(written(tmp_path, checkpoint_bytes(TENSORS, HEADER)), HEADER)
+    assert header["kit"] == "castle"
+    assert all(torch.equal(tensors[name], tensor) for name, tensor in TENSORS.items())
+
+
+def test_bytes_do_not_depend_on_the_order_of_names() -> None:
+    turned = dict(reversed(TENSORS.items())), dict(reversed(HEADER.items()))
+    assert checkpoint_bytes(*turned) == checkpoint_bytes(TENSORS, HEADER)
+
+
+@pytest.mark.parametrize("zipped", [True, False])
+def test_pickle_is_refused_before_it_is_read(tmp_path: Path, zipped: bool) -> None:
+    stream = io.BytesIO()
+    torch.save(TENSORS, stream, _use_new_zipfile_serialization=zipped)
+    with pytest.raises(CheckpointError, match=r"weights.safetensors is a pickle, which may run any code"):
+        load_checkpoint(written(tmp_path, stream.getvalue()), {})
+
+
+@pytest.mark.parametrize("kept", [0, 5, 100, -1])
+def test_truncated_file_is_refused(tmp_path: Path, kept: int) -> None:
+    with pytest.raises(CheckpointError, match="is cut off or damaged"):
+        load_checkpoint(written(tmp_path, checkpoint_bytes(TENSORS, HEADER)[:kept]), {})
+
+
+def test_weights_of_somebody_else_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(CheckpointError, match="Shapemill did not write it"):
+        load_checkpoint(written(tmp_path, save(TENSORS)), {})
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"kit": "playground"}, "of another kit: 'castle', and 'playground' is asked for"),
+        ({"tokens": ["", "A", "C", "(", ")"]}, "of another tokens: entry 2 is 'B', and 'C' is asked for"),
+        ({"tokens": ["", "A", "B", "(", ")", "0"]}, "of another tokens: it has 5 entries, and 6 are asked for"),
+        ({"version": 2}, "of another version: 1, and 2 is asked for"),
+    ],
+)
+def test_weights_of_something_else_are_refused_by_name(
+    tmp_path: Path, changed: dict[str, object], message: str
+) -> None:
+    path = written(tmp_path, checkpoint_bytes(TENSORS, HEADER))
+    with pytest.raises(CheckpointError, match=message):
+        load_checkpoint(path, HEADER | changed)
