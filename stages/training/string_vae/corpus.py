@@ -8,30 +8,37 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes, read_shard
 from pipeline.stage import Outcome, Task
+from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.strings.alphabet import make_alphabet
+from stages.strings.rules import Rules, make_rules, patterns_of
 from stages.strings.tokens import number_value, split_tokens
 from stages.training.string_vae.batches import Strings
 from stages.training.string_vae.vocabulary import END, Vocabulary
 
 __all__ = ["prepare_corpus", "read_corpus"]
 
+Masks = npt.NDArray[np.bool_]
+
 
 def prepare_corpus(task: Task) -> Outcome:
     """Files of the shard: `.<split>.safetensors`, the `Strings` of each split; `.json`, what the tokens stand for.
 
     The strings of train say which cycle numbers there are; strings of other splits with more, and strings of more than
-    `longest` tokens, are refused. Raises Rejected where train or val keeps none.
+    `longest` tokens, are refused. Where the grammar does not admit them all, because edges were left out of them, the
+    rules for partial graphs hold. Raises Rejected where train or val keeps no string.
     """
-    kit, splits, longest = task.shard.params["kit"], task.shard.params["splits"], task.shard.params["longest"]
-    alphabet = make_alphabet(input_kit(task, kit).labels)
+    name, splits, longest = task.shard.params["kit"], task.shard.params["splits"], task.shard.params["longest"]
+    kit = input_kit(task, name)
+    alphabet = make_alphabet(kit.labels)
     shapes: dict[str, list[list[str]]] = {}
     for done, (shard, split) in enumerate(splits.items()):
-        for key, strings in _strings_of(task, kit, shard):
+        for key, strings in _strings_of(task, name, shard):
             kept = [each for each in strings if len(split_tokens(each)) <= longest]
             refused = len(strings) - len(kept)
             if refused:
@@ -39,19 +46,23 @@ def prepare_corpus(task: Task) -> Outcome:
             shapes.setdefault(split, []).append(kept)
         task.progress(done + 1, len(splits))
     vocabulary = Vocabulary(alphabet, _cycles(shapes.get("train", [])))
-    counts = {}
+    rules, partial = _rules_for(kit, vocabulary, shapes.get("train", []))
+    counts, most = {}, 0
     for split, of_split in sorted(shapes.items()):
-        strings = _numbered(task, vocabulary, of_split)
+        strings, needed = _numbered(task, vocabulary, rules, of_split)
+        most = max(most, needed, int(strings.lengths.max(initial=1)) - 1)
         counts[split] = {"strings": len(strings), "graphs": len(strings.histograms), "tokens": len(strings.tokens)}
         _write(task, f"{task.shard.name}.{split}.safetensors", strings)
     for split in ("train", "val"):
         if not counts.get(split, {}).get("strings"):
-            raise Rejected(f"kit {kit} has no strings of at most {longest} tokens in split {split}")
+            raise Rejected(f"kit {name} has no strings of at most {longest} tokens in split {split}")
     described = {
-        "kit": kit,
+        "kit": name,
         "names": list(alphabet.names),
         "cycles": vocabulary.cycles,
-        "longest": max(len(split_tokens(each)) for of in shapes.values() for strings in of for each in strings),
+        "most": most,
+        "partial": partial,
+        "patterns": patterns_of(rules),
         "counts": counts,
     }
     with task.output(f"{task.shard.name}.json") as stream:
@@ -86,25 +97,55 @@ def _cycles(shapes: list[list[str]]) -> int:
     return 1 + max((number for number in numbers if number is not None), default=-1)
 
 
-def _numbered(task: Task, vocabulary: Vocabulary, shapes: list[list[str]]) -> Strings:
-    codes, graph, histograms = [], [], []
+def _rules_for(kit: Kit, vocabulary: Vocabulary, shapes: list[list[str]]) -> tuple[Rules, bool]:
+    """The rules of the kit that its strings fit, and whether they are those for partial graphs."""
+    whole = make_rules(kit.grammar, len(kit.labels), vocabulary.cycles)
+    fit = all(_followed(whole, vocabulary, vocabulary.codes(strings[0])) is not None for strings in shapes if strings)
+    return (whole, False) if fit else (make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, partial=True), True)
+
+
+def _followed(rules: Rules, vocabulary: Vocabulary, codes: npt.NDArray[np.int16]) -> tuple[Masks, int] | None:
+    """`follow` for a string without its end; None where the rules do not admit it."""
+    from stages.strings.acceptor import follow
+
+    try:
+        return follow(rules, vocabulary.cycles, np.append(codes, END).astype(np.int64))
+    except ValueError:
+        return None
+
+
+def _numbered(task: Task, vocabulary: Vocabulary, rules: Rules, shapes: list[list[str]]) -> tuple[Strings, int]:
+    """The strings as numbers, with their masks, and the most tokens that any beginning of them needs."""
     types = len(vocabulary.alphabet.tokens)
+    codes: list[npt.NDArray[np.int16]] = [np.empty(0, np.int16)]
+    masks: list[npt.NDArray[np.uint8]] = [np.empty((0, -(-len(vocabulary) // 8)), np.uint8)]
+    graph: list[int] = []
+    histograms: list[npt.NDArray[np.int64]] = []
+    most = 0
     for strings in shapes:
-        known = [vocabulary.codes(each) for each in strings if _knows(vocabulary, each)]
-        if len(known) < len(strings):
-            task.reject(strings[0], "cycle numbers that train has not", count=len(strings) - len(known))
-        if known:
-            graph += [len(histograms)] * len(known)
-            histograms.append(np.bincount(known[0], minlength=types + 1)[1 : types + 1])
-            codes += [np.append(each, END) for each in known]
-    lengths = np.array([len(each) for each in codes], dtype=np.int64)
+        before = len(graph)
+        for string in strings:
+            if not _knows(vocabulary, string):
+                task.reject(string, "cycle numbers that train has not")
+                continue
+            each = vocabulary.codes(string)
+            followed = _followed(rules, vocabulary, each)
+            if followed is None:
+                task.reject(string, "not admitted by the grammar")
+                continue
+            masks.append(np.packbits(followed[0], axis=-1, bitorder="little"))
+            codes.append(np.append(each, np.int16(END)))
+            graph.append(len(histograms))
+            most = max(most, followed[1])
+        if len(graph) > before:
+            histograms.append(np.bincount(codes[-1], minlength=types + 1)[1 : types + 1])
     return Strings(
-        tokens=np.concatenate([np.empty(0, np.int16), *codes]).astype(np.int16),
-        first=np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
-        masks=np.full((int(lengths.sum()), -(-len(vocabulary) // 8)), 255, dtype=np.uint8),
+        tokens=np.concatenate(codes),
+        first=np.cumsum([len(each) for each in codes], dtype=np.int64),
+        masks=np.concatenate(masks),
         graph=np.array(graph, dtype=np.int32),
         histograms=np.array(histograms, dtype=np.int32).reshape(-1, types),
-    )
+    ), most
 
 
 def _knows(vocabulary: Vocabulary, string: str) -> bool:

@@ -46,22 +46,19 @@ def learner(task: Task, entry: StringVaeEntry, seed: int) -> StringVaeLearner:
         split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
     }
     header = {
-        "names": described["names"],
-        "cycles": described["cycles"],
-        "longest": described["longest"],
+        **{key: described[key] for key in ("names", "cycles", "most", "partial", "patterns", "counts")},
         "tokens": list(vocabulary.texts),
         "data": {split: file_digest(path) for split, path in sources.items()},
-        "counts": described["counts"],
     }
-    module = new_model(entry, vocabulary, described["longest"], seed).to(device)
+    module = new_model(entry, vocabulary, described["most"], seed).to(device)
     return StringVaeLearner(module, header, entry, vocabulary, strings["train"], strings["val"])
 
 
-def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, longest: int, seed: int) -> StringVae:
-    """A model with random weights, by its seed alone."""
+def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, most: int, seed: int) -> StringVae:
+    """A model of strings of at most `most` tokens with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return StringVae(entry, len(vocabulary), longest + 1)
+        return StringVae(entry, len(vocabulary), most + 1)
 
 
 @dataclass(frozen=True)

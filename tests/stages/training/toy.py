@@ -118,7 +118,7 @@ STAGES: Mapping[str, Stage] = {
 }
 
 TINY: Mapping[str, Any] = {
-    "name": "tiny", "decoder": "plain", "latent": 4, "embedding": 4, "hidden": 8, "batch": 16, "steps": 4, "rounds": 4,
+    "name": "tiny", "decoder": "masked", "latent": 4, "embedding": 4, "hidden": 8, "batch": 16, "steps": 4, "rounds": 4,
     "anneal": 8,
 }  # fmt: skip
 

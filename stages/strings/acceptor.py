@@ -1,0 +1,480 @@
+"""Which tokens may follow the beginning of a string, so that a string of the tiling grammar can still come of it.
+
+Tokens are numbers: 0 ends a string; then come the types, `(`, `)`, and the cycle numbers from 0. A token is left out if
+no string that begins so is well-formed (`stages.strings.decoder`) and admitted (`stages.strings.grammar`), as far as
+can be told from each node alone: its neighbours so far fit into a pattern of its type; and a subtree of it can hold the
+other end of each cycle that is open. So no token is left out that an admitted string has, but for want of room: what is
+open must be closed in the tokens that are left, each cycle by a number and each node by subtrees without cycles.
+
+Where no cycle is open the converse is true as well: the string can be ended from there. With several open cycles, each
+may be closed alone but not all of them: rarely there is then no token left, and whoever writes the string must go back.
+
+Numba compiles this module when it is imported: import it inside functions.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from stages.strings.rules import NEVER, Rules
+
+__all__ = ["END", "Acceptor", "follow", "tokens_to_complete"]
+
+END = 0
+_START, _NODE, _OPEN, _CLOSE, _ENDED = range(5)
+"""What the last token was; a number counts as its node."""
+
+_State = namedtuple(
+    "_State",
+    "kind parent counts pending need left stack depth current previous nodes length opened partners closed",
+)
+"""Of strings by row. Of each node: kind, its type; parent; counts, neighbours by type; pending, cycles that began at it
+and are open; need, the fewest tokens that complete it; left, whether only the ends of its cycles can come to it.
+stack, depth: the nodes of the open branches; current: the node that the next token hangs on; opened: the node of each
+open number, or -1; partners, closed: the nodes that cycles join the current node to, and how many they are."""
+
+
+@numba.njit(cache=True)
+def tokens_to_complete(rules, kind, counts, pending, left):
+    """The fewest tokens of the children that a node still needs, with their parentheses, or NEVER.
+
+    counts: int64 (types,), its neighbours; pending: edges of open cycles to come; left: it gets no more children.
+    """
+    best = NEVER
+    types = len(counts)
+    for p in range(rules.first[kind], rules.first[kind + 1]):
+        total, missing = 0, 0
+        fits = True
+        for t in range(types):
+            if counts[t] > rules.high[p, t]:
+                fits = False
+                break
+            if rules.counted[t]:
+                total += counts[t]
+            if counts[t] < rules.low[p, t]:
+                missing += rules.low[p, t] - counts[t]
+        if not fits:
+            continue
+        limited = rules.size[p] >= 0
+        room = rules.size[p] - total if limited else missing + pending
+        if missing > room:
+            continue
+        if left:
+            if missing <= pending and (not limited or room == pending or (room < pending and rules.loose[p])):
+                return 0
+            continue
+        if room < pending and not rules.loose[p]:
+            continue
+        best = min(best, _cheapest(rules, p, kind, counts, missing, room if limited else missing, pending))
+    return best
+
+
+@numba.njit(cache=True)
+def _cheapest(rules, p, kind, counts, missing, room, pending):
+    """Tokens of the children that fill `room` places of pattern p, where `pending` of them, those that cost most, are
+    filled by cycles."""
+    children = max(room - pending, 0)
+    if children == 0:
+        return 0
+    fill = NEVER
+    for t in range(len(counts)):
+        if counts[t] < rules.high[p, t] and rules.counted[t]:
+            fill = min(fill, rules.cost[kind, t])
+    total = fill * (room - missing) if room > missing else 0
+    dearest_total = 0
+    for t in range(len(counts)):
+        if counts[t] < rules.low[p, t]:
+            total += rules.cost[kind, t] * (rules.low[p, t] - counts[t])
+    if pending > 0:
+        spare = pending
+        last = NEVER + 1
+        while spare > 0:  # the dearest first
+            dearest, number = -1, 0
+            if room > missing and fill < last:
+                dearest, number = fill, room - missing
+            for t in range(len(counts)):
+                if counts[t] < rules.low[p, t]:
+                    cost = rules.cost[kind, t]
+                    if cost < last:
+                        if cost > dearest:
+                            dearest, number = cost, rules.low[p, t] - counts[t]
+                        elif cost == dearest:
+                            number += rules.low[p, t] - counts[t]
+            if dearest < 0:
+                break
+            taken = min(spare, number)
+            dearest_total += taken * dearest
+            spare -= taken
+            last = dearest
+    return min(total - dearest_total + 2 * (children - 1), NEVER)
+
+
+@numba.njit(cache=True)
+def _update(rules, state, i, node):
+    need = tokens_to_complete(
+        rules, state.kind[i, node], state.counts[i, node], state.pending[i, node], state.left[i, node]
+    )
+    state.need[i, node] = need
+    return need < NEVER
+
+
+@numba.njit(cache=True)
+def _add_node(rules, state, i, kind):
+    """Append a node; whether it and its parent can be completed."""
+    new, parent = state.nodes[i], state.current[i]
+    state.kind[i, new], state.parent[i, new] = kind, parent
+    state.counts[i, new, :] = 0
+    state.pending[i, new] = 0
+    state.left[i, new] = False
+    fits = True
+    if new > 0:
+        if state.previous[i] != _OPEN:
+            state.left[i, parent] = True
+        state.counts[i, parent, kind] += 1
+        state.counts[i, new, state.kind[i, parent]] = 1
+        fits = _update(rules, state, i, parent)
+    state.nodes[i] += 1
+    state.current[i] = new
+    state.previous[i] = _NODE
+    state.closed[i] = 0
+    return _update(rules, state, i, new) and fits
+
+
+@numba.njit(cache=True)
+def _remove_node(state, i, previous, need, closed):
+    """Undo `_add_node`."""
+    new = state.nodes[i] - 1
+    parent = state.parent[i, new]
+    if new > 0:
+        state.counts[i, parent, state.kind[i, new]] -= 1
+        state.left[i, parent] = False
+        state.need[i, parent] = need
+    state.nodes[i] = new
+    state.current[i] = parent
+    state.previous[i] = previous
+    state.closed[i] = closed
+
+
+@numba.njit(cache=True)
+def _viable_node(rules, state, i, kind, tokens):
+    """Whether a node may come next, with so many tokens left after it."""
+    parent, previous, closed = state.current[i], state.previous[i], state.closed[i]
+    if previous != _START and rules.arc[state.kind[i, parent], kind] < 0:
+        return False
+    need = state.need[i, parent] if previous != _START else 0
+    viable = _add_node(rules, state, i, kind) and _viable(rules, state, i, tokens)
+    _remove_node(state, i, previous, need, closed)
+    return viable
+
+
+@numba.njit(cache=True)
+def _viable(rules, state, i, tokens):
+    """Whether all that is open can be closed with so many tokens, each by itself."""
+    total = state.need[i, state.current[i]]
+    for d in range(state.depth[i]):
+        total += state.need[i, state.stack[i, d]] + 1
+    for k in range(state.opened.shape[1]):
+        total += state.opened[i, k] >= 0
+    if total > tokens:
+        return False
+    for k in range(state.opened.shape[1]):
+        if state.opened[i, k] >= 0 and not _can_close(rules, state, i, k):
+            return False
+    return True
+
+
+@numba.njit(cache=True)
+def _can_close(rules, state, i, k):
+    """Whether some node to come, or the current one, can be the other end of open cycle number k."""
+    origin = state.opened[i, k]
+    kind = state.kind[i, origin]
+    counts = state.counts[i, origin]
+    types = len(counts)
+    for other in range(types):
+        goal = rules.arc[kind, other]
+        if goal < 0:
+            continue
+        counts[other] += 1
+        state.pending[i, origin] -= 1
+        closable = (
+            tokens_to_complete(rules, kind, counts, state.pending[i, origin], state.left[i, origin]) < NEVER
+        ) and _leads_to(rules, state, i, origin, other, goal)
+        counts[other] -= 1
+        state.pending[i, origin] += 1
+        if closable:
+            return True
+    return False
+
+
+@numba.njit(cache=True)
+def _leads_to(rules, state, i, origin, other, goal):
+    current = state.current[i]
+    if state.previous[i] == _NODE and state.kind[i, current] == other and _not_joined(state, i, origin):
+        state.counts[i, current, state.kind[i, origin]] += 1
+        fits = tokens_to_complete(rules, other, state.counts[i, current], state.pending[i, current], False) < NEVER
+        state.counts[i, current, state.kind[i, origin]] -= 1
+        if fits:
+            return True
+    for d in range(state.depth[i] + 1):
+        node = state.stack[i, d] if d < state.depth[i] else current
+        if state.left[i, node]:
+            continue
+        kind = state.kind[i, node]
+        counts = state.counts[i, node]
+        for child in range(len(counts)):
+            arc = rules.arc[kind, child]
+            if arc < 0 or not (rules.closes_below[arc, goal] if node == origin else rules.closes[arc, goal]):
+                continue
+            counts[child] += 1
+            fits = tokens_to_complete(rules, kind, counts, state.pending[i, node], False) < NEVER
+            counts[child] -= 1
+            if fits:
+                return True
+    return False
+
+
+@numba.njit(cache=True)
+def _not_joined(state, i, origin):
+    """Whether the current node is another than `origin`, and no neighbour of it."""
+    current = state.current[i]
+    if origin == current or state.parent[i, current] == origin:
+        return False
+    joined = False
+    for place in range(state.closed[i]):
+        joined |= state.partners[i, place] == origin
+    return not joined
+
+
+@numba.njit(cache=True)
+def _close_cycle(rules, state, i, k):
+    origin, current = state.opened[i, k], state.current[i]
+    state.counts[i, origin, state.kind[i, current]] += 1
+    state.counts[i, current, state.kind[i, origin]] += 1
+    state.pending[i, origin] -= 1
+    state.opened[i, k] = -1
+    state.partners[i, state.closed[i]] = origin
+    state.closed[i] += 1
+    fits = _update(rules, state, i, origin)
+    return _update(rules, state, i, current) and fits
+
+
+@numba.njit(cache=True)
+def _viable_number(rules, state, i, k, tokens):
+    """Whether cycle number k may come next, with so many tokens left after it."""
+    current, origin = state.current[i], state.opened[i, k]
+    need = state.need[i, current]
+    if origin < 0:
+        state.pending[i, current] += 1
+        state.opened[i, k] = current
+        viable = _update(rules, state, i, current) and _viable(rules, state, i, tokens)
+        state.pending[i, current] -= 1
+        state.opened[i, k] = -1
+        state.need[i, current] = need
+        return viable
+    if rules.arc[state.kind[i, origin], state.kind[i, current]] < 0 or not _not_joined(state, i, origin):
+        return False
+    needed = state.need[i, origin]
+    viable = _close_cycle(rules, state, i, k) and _viable(rules, state, i, tokens)
+    state.closed[i] -= 1
+    state.counts[i, origin, state.kind[i, current]] -= 1
+    state.counts[i, current, state.kind[i, origin]] -= 1
+    state.pending[i, origin] += 1
+    state.opened[i, k] = origin
+    state.need[i, origin], state.need[i, current] = needed, need
+    return viable
+
+
+@numba.njit(cache=True)
+def _can_leave(rules, state, i):
+    """Whether the current node is complete but for its open cycles."""
+    node = state.current[i]
+    kind, counts, pending = state.kind[i, node], state.counts[i, node], state.pending[i, node]
+    return tokens_to_complete(rules, kind, counts, pending, True) < NEVER
+
+
+@numba.njit(cache=True)
+def _viable_branch(rules, state, i, tokens):
+    """Whether a branch may begin: whether some node may come in it."""
+    types = len(rules.counted)
+    previous, current = state.previous[i], state.current[i]
+    state.stack[i, state.depth[i]] = current
+    state.depth[i] += 1
+    state.previous[i] = _OPEN
+    viable = False
+    for kind in range(types):
+        if _viable_node(rules, state, i, kind, tokens - 1):
+            viable = True
+            break
+    state.depth[i] -= 1
+    state.previous[i] = previous
+    return viable
+
+
+@numba.njit(cache=True)
+def _viable_end_of_branch(rules, state, i, tokens):
+    node = state.current[i]
+    previous = state.previous[i]
+    state.depth[i] -= 1
+    state.current[i] = state.stack[i, state.depth[i]]
+    state.previous[i] = _CLOSE
+    viable = _viable(rules, state, i, tokens)
+    state.depth[i] += 1
+    state.current[i] = node
+    state.previous[i] = previous
+    return viable
+
+
+@numba.njit(cache=True)
+def _allow(rules, state, i, most, allowed):
+    """Fill `allowed`, bool (tokens,), for a string of at most `most` tokens."""
+    types = len(rules.counted)
+    previous = state.previous[i]
+    allowed[:] = False
+    if previous == _ENDED:
+        allowed[END] = True
+        return
+    tokens = most - state.length[i] - 1
+    if tokens >= 0:
+        for kind in range(types):
+            allowed[1 + kind] = _viable_node(rules, state, i, kind, tokens)
+    if previous in (_START, _OPEN):
+        return
+    can_leave = _can_leave(rules, state, i)
+    if tokens >= 0:
+        allowed[types + 1] = _viable_branch(rules, state, i, tokens)
+        if state.depth[i] > 0:
+            allowed[types + 2] = can_leave and _viable_end_of_branch(rules, state, i, tokens)
+        if previous == _NODE:
+            free = -1
+            for k in range(state.opened.shape[1]):
+                if state.opened[i, k] < 0 and free >= 0:
+                    allowed[types + 3 + k] = allowed[types + 3 + free]  # one free number is as good as another
+                    continue
+                allowed[types + 3 + k] = _viable_number(rules, state, i, k, tokens)
+                if state.opened[i, k] < 0:
+                    free = k
+    if state.depth[i] == 0 and can_leave:
+        allowed[END] = True
+        for k in range(state.opened.shape[1]):
+            if state.opened[i, k] >= 0:
+                allowed[END] = False
+
+
+@numba.njit(cache=True)
+def _take(rules, state, i, token):
+    """Append an allowed token."""
+    types = len(rules.counted)
+    if token == END:
+        state.previous[i] = _ENDED
+        return
+    state.length[i] += 1
+    if token <= types:
+        _add_node(rules, state, i, token - 1)
+    elif token == types + 1:
+        state.stack[i, state.depth[i]] = state.current[i]
+        state.depth[i] += 1
+        state.previous[i] = _OPEN
+    elif token == types + 2:
+        state.left[i, state.current[i]] = True
+        _update(rules, state, i, state.current[i])
+        state.depth[i] -= 1
+        state.current[i] = state.stack[i, state.depth[i]]
+        state.previous[i] = _CLOSE
+    else:
+        k = token - types - 3
+        if state.opened[i, k] >= 0:
+            _close_cycle(rules, state, i, k)
+        else:
+            state.pending[i, state.current[i]] += 1
+            state.opened[i, k] = state.current[i]
+            _update(rules, state, i, state.current[i])
+
+
+@numba.njit(cache=True)
+def _allow_all(rules, state, most, allowed):
+    for i in range(len(allowed)):
+        _allow(rules, state, i, most, allowed[i])
+
+
+@numba.njit(cache=True)
+def _take_all(rules, state, tokens):
+    for i in range(len(tokens)):
+        if state.previous[i] != _ENDED:
+            _take(rules, state, i, tokens[i])
+
+
+@numba.njit(cache=True)
+def _follow(rules, state, tokens, allowed):
+    """The masks along one string, and the most tokens that any beginning of it needs to end without more cycles: -1
+    where the string has a token that is not allowed."""
+    most = 0
+    for place in range(len(tokens)):
+        _allow(rules, state, 0, NEVER, allowed[place])
+        if not allowed[place, tokens[place]]:
+            return -1
+        _take(rules, state, 0, tokens[place])
+        if state.previous[0] != _OPEN and state.previous[0] != _ENDED:
+            total = state.length[0] + state.need[0, state.current[0]]
+            for d in range(state.depth[0]):
+                total += state.need[0, state.stack[0, d]] + 1
+            for k in range(state.opened.shape[1]):
+                total += state.opened[0, k] >= 0
+            most = max(most, total)
+    return most
+
+
+class Acceptor:
+    """The beginnings of some strings, all of which grow by one token at a time."""
+
+    def __init__(self, rules: Rules, cycles: int, strings: int, most: int) -> None:
+        """`strings` empty beginnings of strings with the cycle numbers below `cycles` and at most `most` tokens."""
+        types = len(rules.counted)
+        shape = (strings, most + 1)
+        self._rules, self._most = rules, most
+        self.tokens = types + 3 + cycles
+        self._state = _State(
+            kind=np.zeros(shape, np.int16),
+            parent=np.full(shape, -1, np.int32),
+            counts=np.zeros((*shape, types), np.int16),
+            pending=np.zeros(shape, np.int16),
+            need=np.zeros(shape, np.int64),
+            left=np.zeros(shape, np.bool_),
+            stack=np.zeros(shape, np.int32),
+            depth=np.zeros(strings, np.int32),
+            current=np.full(strings, -1, np.int32),
+            previous=np.full(strings, _START, np.int8),
+            nodes=np.zeros(strings, np.int32),
+            length=np.zeros(strings, np.int32),
+            opened=np.full((strings, cycles), -1, np.int32),
+            partners=np.zeros(shape, np.int32),
+            closed=np.zeros(strings, np.int32),
+        )
+
+    def allowed(self) -> npt.NDArray[np.bool_]:
+        """Which tokens may come next, bool (strings, tokens); of a string that has ended, its end."""
+        allowed = np.empty((len(self._state.depth), self.tokens), np.bool_)
+        _allow_all(self._rules, self._state, self._most, allowed)
+        return allowed
+
+    def take(self, tokens: npt.NDArray[np.int64]) -> None:
+        """Append an allowed token, int64 (strings,), to each string that has not ended."""
+        _take_all(self._rules, self._state, tokens)
+
+
+def follow(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.bool_], int]:
+    """What was allowed at each token of a whole string, END among them, bool (n, tokens); and how many tokens a string
+    that begins as this one does at any place may need, if it takes the shortest way to its end from there.
+
+    Raises ValueError for a string with a token that is not allowed.
+    """
+    beginning = Acceptor(rules, cycles, 1, len(tokens))
+    allowed = np.zeros((len(tokens), beginning.tokens), np.bool_)
+    most = int(_follow(rules, beginning._state, tokens, allowed))
+    if most < 0:
+        place = int(np.argmax(~allowed.any(axis=1) | ~allowed[np.arange(len(tokens)), tokens]))
+        raise ValueError(f"token {place} is not allowed there by the grammar")
+    return allowed, most

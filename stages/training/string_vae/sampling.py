@@ -1,0 +1,146 @@
+"""Ways to new strings through the latent space (strings §5.2).
+
+Each starts searches at points of its own and asks the decoder around them, with offsets that grow, until it finds a
+valid string that is not known, or the offsets are as large as they may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from stages.training.string_vae.trained import Points, TrainedStringVae
+
+__all__ = ["WAYS", "Found", "linear_points", "path_points", "perturb", "sample"]
+
+LARGEST = 0.25
+"""Largest offset of a perturbation in each dimension (strings §5.2)."""
+LARGEST_BETWEEN = 0.1
+"""The same around points between training samples: smaller, as the paper has it, which does not say by how much."""
+GROWTH = 10
+"""Offsets grow in so many equal steps to the largest; not published."""
+PATH_SEGMENTS = 32
+"""Length of a path, in segments (strings §5.2)."""
+STOPS = 4
+"""Points on a line, and on each segment of a path, at equal distances; not published."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search has found: a valid string, not known where it started, or None; `asked`: strings that were decoded,
+    `valid`: how many of them were valid."""
+
+    string: str | None
+    asked: int
+    valid: int
+
+
+def perturb(
+    model: TrainedStringVae,
+    points: Points,
+    known: Sequence[frozenset[str]],
+    largest: float,
+    rng: np.random.Generator,
+) -> list[Found]:
+    """A search around each point, float32 (n, latent), for a valid string other than those `known` there.
+
+    Each offset is larger than the one before in every dimension, of random sign. Strings are the likeliest of a point.
+    """
+    found: list[Found] = [Found(None, 0, 0)] * len(points)
+    searching = list(range(len(points)))
+    bounds = np.linspace(0, largest, GROWTH + 1)
+    for low, high in pairwise(bounds.tolist()):
+        shape = (len(searching), points.shape[1])
+        offsets = rng.uniform(low, high, shape) * rng.choice([-1.0, 1.0], shape)
+        strings = model.decode((points[searching] + offsets).astype(np.float32), None)
+        still = []
+        for place, string in zip(searching, strings, strict=True):
+            valid = model.is_valid(string)
+            is_new = valid and string not in known[place]
+            found[place] = Found(string if is_new else None, found[place].asked + 1, found[place].valid + valid)
+            if not is_new:
+                still.append(place)
+        searching = still
+        if not searching:
+            break
+    return found
+
+
+def linear_points(first: Points, second: Points, stops: int) -> Points:
+    """Points on the line between two others, float32 (latent,), at equal distances: (stops, latent)."""
+    shares = np.arange(1, stops + 1)[:, None] / (stops + 1)
+    return (first + shares * (second - first)).astype(np.float32)
+
+
+def path_points(first: Points, second: Points, samples: Points, segments: int) -> Points:
+    """A path between two points along `samples`, float32 (n, latent): its corners, (segments + 1, latent).
+
+    Each segment is split at the sample that is nearest to both of its ends together, and that the path has not passed,
+    again and again until there are as many segments; `segments` is a power of two. With too few samples the path ends
+    with fewer.
+    """
+    path = [first, second]
+    free = np.ones(len(samples), np.bool_)
+    for end in (first, second):
+        free &= (samples != end).any(axis=1)
+    while len(path) - 1 < segments:
+        grown = [path[0]]
+        for begin, end in pairwise(path):
+            if free.any():
+                gaps = np.linalg.norm(samples - begin, axis=1) + np.linalg.norm(samples - end, axis=1)
+                nearest = int(np.where(free, gaps, np.inf).argmin())
+                free[nearest] = False
+                grown.append(samples[nearest])
+            grown.append(end)
+        if len(grown) == len(path):
+            break
+        path = grown
+    return np.stack(path).astype(np.float32)
+
+
+def sample(
+    model: TrainedStringVae, way: str, strings: Sequence[str], count: int, rng: np.random.Generator
+) -> list[Found]:
+    """`count` searches of one of WAYS among training strings."""
+    return WAYS[way](model, strings, count, rng)
+
+
+def _prior(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> list[Found]:
+    """Points of the prior, decoded once: no search."""
+    points = rng.standard_normal((count, model.latent)).astype(np.float32)
+    decoded = model.decode(points, rng)
+    return [Found(each if model.is_valid(each) else None, 1, int(model.is_valid(each))) for each in decoded]
+
+
+def _perturbation(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> list[Found]:
+    chosen = [strings[int(place)] for place in rng.choice(len(strings), count)]
+    return perturb(model, model.encode(chosen), [frozenset({each}) for each in chosen], LARGEST, rng)
+
+
+def _linear(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> list[Found]:
+    lines = -(-count // STOPS)
+    pairs = [rng.choice(len(strings), 2, replace=False).tolist() for _ in range(lines)]
+    ends = model.encode([strings[place] for pair in pairs for place in pair]).reshape(lines, 2, -1)
+    points = np.concatenate([linear_points(first, second, STOPS) for first, second in ends])
+    known = [frozenset(strings[place] for place in pair) for pair in pairs for _ in range(STOPS)]
+    return perturb(model, points[:count], known[:count], LARGEST_BETWEEN, rng)
+
+
+def _path(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> list[Found]:
+    samples = model.encode(strings)
+    everything = frozenset(strings)
+    points: list[Points] = []
+    while sum(map(len, points)) < count:
+        first, second = rng.choice(len(strings), 2, replace=False)
+        corners = path_points(samples[first], samples[second], samples, PATH_SEGMENTS)
+        points += [linear_points(begin, end, STOPS) for begin, end in pairwise(corners)]
+    return perturb(model, np.concatenate(points)[:count], [everything] * count, LARGEST_BETWEEN, rng)
+
+
+Way = Callable[[TrainedStringVae, Sequence[str], int, np.random.Generator], list[Found]]
+
+WAYS: dict[str, Way] = {"perturbation": _perturbation, "linear": _linear, "path": _path, "prior": _prior}
+"""The ways by name: the published three in their published order, the best last, and beside them the prior."""

@@ -1,0 +1,143 @@
+"""The latent space as a graph of strings, on which interpolation is a shortest path (strings §5.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+__all__ = [
+    "PathFigures",
+    "histogram_distances",
+    "interpolation",
+    "naive_graph",
+    "nearest_points",
+    "nearest_strings",
+    "path_figures",
+    "search_graph",
+]
+
+NEAREST_POINTS = 4
+"""Neighbours of a node in the search graph besides its equals: "between 3 and 5" (strings §5.3)."""
+NEAREST_STRINGS = 3
+"""The same in the naive graph (strings Table 2)."""
+
+Links = npt.NDArray[np.int64]
+"""Pairs of nodes, int64 (m, 2)."""
+Histograms = npt.NDArray[np.int64]
+"""How many parts of each type each shape has, int64 (n, types)."""
+Codes = npt.NDArray[np.int16]
+
+
+@dataclass(frozen=True)
+class PathFigures:
+    """Of all shortest paths of a graph (strings Table 2): connected components of the graph; mean and greatest weight
+    of the paths between two nodes that are connected."""
+
+    components: int
+    mean: float
+    greatest: float
+
+
+def search_graph(points: npt.NDArray[np.float32], graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
+    """The search graph of strings: each is joined to those nearest in latent space, and to all of the same graph.
+
+    points: float32 (n, latent); graphs: what names the shape graph of each; histograms: int64 (n, types), its parts.
+    The weights are E: 0 between equals. float64 (n, n), symmetric; a zero that is stored is an edge.
+    """
+    return _weighted(nearest_points(points, NEAREST_POINTS), graphs, histograms)
+
+
+def naive_graph(codes: Sequence[Codes], graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
+    """The same, but joined to the nearest strings by edit distance of their tokens (strings Table 2)."""
+    return _weighted(nearest_strings(codes, NEAREST_STRINGS), graphs, histograms)
+
+
+def path_figures(graph: csr_matrix) -> PathFigures:
+    """The figures of Table 2 of a graph of at least one node."""
+    components, _ = connected_components(graph, directed=False)
+    lengths = dijkstra(graph, directed=False)
+    paths = lengths[np.isfinite(lengths) & ~np.eye(len(lengths), dtype=np.bool_)]
+    return PathFigures(int(components), float(paths.mean()) if len(paths) else 0.0, float(paths.max(initial=0.0)))
+
+
+def interpolation(graph: csr_matrix, first: int, second: int) -> list[int]:
+    """The nodes of a shortest path, both ends among them; empty where there is none."""
+    lengths, before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
+    if not np.isfinite(lengths[second]):
+        return []
+    path = [second]
+    while path[-1] != first:
+        path.append(int(before[path[-1]]))
+    return path[::-1]
+
+
+def histogram_distances(histograms: Histograms, links: Links) -> npt.NDArray[np.float64]:
+    """E of pairs of shapes, by the histograms of their types, int64 (n, types): float64 (m,), from 0 to 1."""
+    first, second = histograms[links[:, 0]], histograms[links[:, 1]]
+    distances: npt.NDArray[np.float64] = np.abs(first - second).sum(axis=1) / (first + second).sum(axis=1)
+    return distances
+
+
+def nearest_points(points: npt.NDArray[np.float32], count: int) -> Links:
+    """Each point with the `count` nearest others."""
+    from scipy.spatial import cKDTree
+
+    count = min(count, len(points) - 1)
+    _, near = cKDTree(points.astype(np.float64)).query(points, k=count + 1)
+    near = near.reshape(len(points), -1)
+    others = [[other for other in row if other != node][:count] for node, row in enumerate(near.tolist())]
+    return np.array([(node, other) for node, row in enumerate(others) for other in row], np.int64).reshape(-1, 2)
+
+
+def nearest_strings(codes: Sequence[Codes], count: int) -> Links:
+    """Each string with the `count` nearest others by edit distance of their tokens; of those as near the first."""
+    first = np.concatenate([[0], np.cumsum([len(each) for each in codes])]).astype(np.int64)
+    distances = _edit_distances(np.concatenate(codes), first)
+    np.fill_diagonal(distances, np.iinfo(np.int32).max)
+    near = np.argsort(distances, axis=1, kind="stable")[:, : min(count, len(codes) - 1)]
+    return np.stack([np.repeat(np.arange(len(codes)), near.shape[1]), near.ravel()], axis=1).astype(np.int64)
+
+
+def _weighted(links: Links, graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
+    """The links and chains of equals, which make them as near as all their pairs would."""
+    equals: dict[str, list[int]] = {}
+    for node, graph in enumerate(graphs):
+        equals.setdefault(graph, []).append(node)
+    chains = [pair for nodes in equals.values() for pair in pairwise(nodes)]
+    joined = np.concatenate([links, np.array(chains, np.int64).reshape(-1, 2)])
+    joined = np.unique(np.sort(joined, axis=1), axis=0)  # a pair that stood twice would weigh twice as much
+    weights = histogram_distances(histograms, joined)
+    both = np.concatenate([joined, joined[:, ::-1]])
+    return csr_matrix((np.tile(weights, 2), (both[:, 0], both[:, 1])), shape=(len(graphs), len(graphs)))
+
+
+@numba.njit(cache=True)
+def _edit_distances(codes, first):
+    """Edit distances of all pairs of strings, int32 (n, n); string i is `codes[first[i]:first[i + 1]]`."""
+    n = len(first) - 1
+    distances = np.zeros((n, n), np.int32)
+    row = np.empty(int((first[1:] - first[:-1]).max()) + 1, np.int32)
+    for i in range(n):
+        a = codes[first[i] : first[i + 1]]
+        for j in range(i):
+            b = codes[first[j] : first[j + 1]]
+            for y in range(len(b) + 1):
+                row[y] = y
+            for x in range(len(a)):
+                corner = row[0]
+                row[0] = x + 1
+                for y in range(len(b)):
+                    above = row[y + 1]
+                    best = corner if a[x] == b[y] else corner + 1
+                    best = min(best, above + 1, row[y] + 1)
+                    corner = above
+                    row[y + 1] = best
+            distances[i, j] = distances[j, i] = row[len(b)]
+    return distances

@@ -1,0 +1,100 @@
+"""A trained string VAE, read from its published weights alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from stages.strings.alphabet import make_alphabet
+from stages.strings.rules import Rules, rules_of
+from stages.training.checkpoint import load_checkpoint
+from stages.training.string_vae.model import StringVae
+from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.vocabulary import END, Vocabulary
+from stages.training.string_vae.writing import write_codes
+
+__all__ = ["Points", "TrainedStringVae", "load_string_vae"]
+
+Points = npt.NDArray[np.float32]
+"""Points of a latent space, float32 (n, latent)."""
+
+AT_ONCE = 256
+
+
+@dataclass(frozen=True)
+class TrainedStringVae:
+    """header: what the weights say of themselves."""
+
+    module: StringVae
+    vocabulary: Vocabulary
+    rules: Rules
+    header: Mapping[str, Any]
+
+    @property
+    def latent(self) -> int:
+        """Dimensions of the latent space."""
+        return int(self.header["settings"]["latent"])
+
+    @property
+    def is_masked(self) -> bool:
+        """Whether its decoder takes only tokens that can lead to a string of the grammar."""
+        return bool(self.header["settings"]["decoder"] != "plain")
+
+    @torch.no_grad()
+    def encode(self, strings: Sequence[str]) -> Points:
+        """The mean of each string in the latent space. Raises StringError for a token that is not known, and ValueError
+        for an empty string."""
+        means: list[Points] = [np.empty((0, self.latent), np.float32)]
+        device = next(self.module.parameters()).device
+        for start in range(0, len(strings), AT_ONCE):
+            codes = [
+                np.append(self.vocabulary.codes(each), END).astype(np.int64)
+                for each in strings[start : start + AT_ONCE]
+            ]
+            lengths = torch.tensor([len(each) for each in codes])
+            padded = np.zeros((len(codes), int(lengths.max())), np.int64)
+            for row, each in enumerate(codes):
+                padded[row, : len(each)] = each
+            mean, _ = self.module.encode(torch.from_numpy(padded).to(device), lengths)
+            means.append(mean.cpu().numpy())
+        return np.concatenate(means)
+
+    def decode(self, points: Points, rng: np.random.Generator | None) -> list[str]:
+        """A string for each point: each token drawn by its probability, or, without `rng`, the likeliest.
+
+        A plain decoder may answer what is no string; a masked one does so only where it is lost in many cycles.
+        """
+        rules = self.rules if self.is_masked else None
+        written = write_codes(self.module, points, self.header["most"], rules, self.vocabulary.cycles, rng)
+        return [self.vocabulary.string(each) for each in written]
+
+    def is_valid(self, string: str) -> bool:
+        """Whether it is a string of the grammar that the model has learnt from (strings §5.1)."""
+        from stages.strings.acceptor import follow
+
+        try:
+            codes = np.append(self.vocabulary.codes(string), END).astype(np.int64)
+            follow(self.rules, self.vocabulary.cycles, codes)
+        except ValueError:  # which a StringError is
+            return False
+        return True
+
+
+def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedStringVae:
+    """The string VAE in a file of weights, on the CPU.
+
+    Raises CheckpointError for whatever is not one, or says something else of itself than `expected`, such as
+    `{"kit": "castle"}`.
+    """
+    tensors, header = load_checkpoint(path, {"kind": "string_vae", **(expected or {})})
+    vocabulary = Vocabulary(make_alphabet(header["names"]), header["cycles"])
+    entry = StringVaeEntry.model_validate({"name": "trained", **header["settings"]})
+    module = StringVae(entry, len(vocabulary), header["most"] + 1)
+    module.load_state_dict(tensors)
+    return TrainedStringVae(module.eval(), vocabulary, rules_of(header["patterns"], header["cycles"]), header)

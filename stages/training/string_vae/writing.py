@@ -1,0 +1,125 @@
+"""Points of the latent space to strings, token by token; where a mask says what may come, with ways back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from stages.strings.rules import Rules
+from stages.training.string_vae.model import StringVae
+from stages.training.string_vae.vocabulary import END
+
+__all__ = ["write_codes"]
+
+AT_ONCE = 256
+"""Strings that are written side by side."""
+TRIES = 40
+"""A string that has come to a dead end so often is left as it is: unfinished."""
+MOST_DOUBLINGS = 8
+"""After so many doublings a string goes back by one token again."""
+
+
+@dataclass
+class _Draft:
+    """One string on its way. kept: its tokens up to where it was cut; banned: tokens that must not come next there;
+    ends: dead ends so far."""
+
+    kept: list[int] = field(default_factory=list)
+    banned: set[int] = field(default_factory=set)
+    ends: int = 0
+    codes: list[int] = field(default_factory=list)
+
+    def cut(self) -> None:
+        """Go back from a dead end: one token the first time, twice as far each time after, then one again. What stood
+        there is banned there. So a choice that was wrong far before is reached soon."""
+        place = max(len(self.codes) - 2 ** (self.ends % MOST_DOUBLINGS), 0)
+        self.ends += 1
+        if not self.codes:  # all was banned
+            self.kept, self.banned = [], set()
+            return
+        self.banned = {self.codes[place]} | (self.banned if place == len(self.kept) else set())
+        self.kept = self.codes[:place]
+
+
+@torch.no_grad()
+def write_codes(
+    module: StringVae,
+    points: npt.NDArray[np.float32],
+    most: int,
+    rules: Rules | None,
+    cycles: int,
+    rng: np.random.Generator | None,
+) -> list[list[int]]:
+    """The tokens of a string for each point, float32 (n, latent), at most `most`, without an end.
+
+    Each token is drawn by its probability, or, without an `rng`, is the likeliest. With `rules`, only tokens that can
+    still lead to a string of the grammar are taken; where none is left, the string goes back and on by another way.
+    """
+    module.eval()
+    found: list[list[int]] = []
+    for start in range(0, len(points), AT_ONCE):
+        here = torch.from_numpy(points[start : start + AT_ONCE])
+        drafts = [_Draft() for _ in range(len(here))]
+        waiting = list(range(len(drafts)))
+        for _ in range(TRIES if rules is not None else 1):
+            ended = _write(module, here[waiting], [drafts[row] for row in waiting], most, rules, cycles, rng)
+            waiting = [row for row, has_ended in zip(waiting, ended, strict=True) if not has_ended]
+            if not waiting:
+                break
+            for row in waiting if rules is not None else ():
+                drafts[row].cut()
+        found += [draft.codes for draft in drafts]
+    return found
+
+
+def _write(
+    module: StringVae,
+    points: Tensor,
+    drafts: list[_Draft],
+    most: int,
+    rules: Rules | None,
+    cycles: int,
+    rng: np.random.Generator | None,
+) -> list[bool]:
+    """Write each draft on from where it was cut; which have come to an end."""
+    from stages.strings.acceptor import Acceptor
+
+    device = next(module.parameters()).device
+    points = points.to(device)
+    acceptor = None if rules is None else Acceptor(rules, cycles, len(drafts), most)
+    state = module.decoder.start(points)
+    shown = torch.full((len(drafts),), END, device=device)
+    ended, dead = np.zeros(len(drafts), np.bool_), np.zeros(len(drafts), np.bool_)
+    for draft in drafts:
+        draft.codes = []
+    for place in range(most + 1):
+        logits, state = module.decoder.step(shown, points, state)
+        scores = logits.double().cpu().numpy()
+        if acceptor is not None:
+            allowed = acceptor.allowed()
+            for row, draft in enumerate(drafts):
+                if place == len(draft.kept):
+                    allowed[row, list(draft.banned)] = False
+                elif place < len(draft.kept):
+                    allowed[row] = False
+                    allowed[row, draft.kept[place]] = True
+            scores[~allowed] = -np.inf
+            dead |= ~allowed.any(axis=1) & ~ended
+        if rng is not None:
+            scores += rng.gumbel(size=scores.shape)
+        tokens = scores.argmax(axis=1)
+        tokens[dead | ended] = END
+        for row in np.flatnonzero(~dead & ~ended):
+            if tokens[row] != END:
+                drafts[row].codes.append(int(tokens[row]))
+        ended |= (tokens == END) & ~dead
+        if (ended | dead).all():
+            break
+        if acceptor is not None:
+            acceptor.take(tokens)
+        shown = torch.from_numpy(tokens).to(device)
+    return list(ended)

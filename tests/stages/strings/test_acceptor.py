@@ -1,0 +1,160 @@
+"""What may follow the beginning of a string, against all strings there are and against the grammar itself."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
+from stages.shape.kit import Docking, Grammar, Strictness
+from stages.strings.acceptor import END, Acceptor, follow
+from stages.strings.alphabet import make_alphabet
+from stages.strings.decoder import decode
+from stages.strings.encoder import encode
+from stages.strings.grammar import check
+from stages.strings.rules import make_rules, patterns_of, rules_of
+from stages.strings.tokens import StringError
+from stages.training.string_vae.vocabulary import Vocabulary
+from tests.stages.training import toy
+
+ALL_LEVELS: tuple[Strictness, ...] = (*STRICTNESS, *SLOT_LEVELS)
+
+
+def grammar_of(*strings: str, strictness: Strictness = "multiset", hubs: tuple[int, ...] = ()) -> Grammar:
+    """What is seen in some strings; hubs stand outside the neighbourhoods."""
+    around: dict[int, dict[tuple[tuple[int, int], ...], int]] = {}
+    dockings = []
+    for string in strings:
+        decoded = decode(string, AB)
+        for node, kind in enumerate(decoded.types.tolist()):
+            others = [int(decoded.types[i + j - node]) for i, j in decoded.edges.tolist() if node in (i, j)]
+            dockings += [Docking(min(kind, each), max(kind, each), np.eye(4), "face", 1, 0.0) for each in others]
+            kept = [each for each in others if each not in hubs]
+            if kind not in hubs:
+                around.setdefault(kind, {})[tuple((each, kept.count(each)) for each in sorted(set(kept)))] = 1
+    return Grammar(around, tuple(dockings), {}, strictness, hubs)
+
+
+AB = make_alphabet(["a", "b", "c"])
+GRAMMARS = {
+    "a chain": grammar_of("ABA", "ABBA"),
+    "a star": grammar_of("A(B)(B)B", "AB"),
+    "only rings end it": grammar_of("A0BAB0"),
+    "a ring with a tail": grammar_of("A0B(C)B0"),
+    "a free count": grammar_of("A(B)C", "A(B)(B)B", "BB", strictness="count_and_types"),
+    "a hub": grammar_of("AB(CA)C", "BB", hubs=(2,)),
+}
+
+
+def every_string(vocabulary: Vocabulary, grammar: Grammar, most: int) -> set[tuple[int, ...]]:
+    """All admitted strings of at most `most` tokens, each with its end."""
+    found = set()
+    for length in range(1, most + 1):
+        for codes in product(range(1, len(vocabulary)), repeat=length):
+            try:
+                check(vocabulary.string(codes), vocabulary.alphabet, grammar)
+            except StringError:
+                continue
+            found.add((*codes, END))
+    return found
+
+
+@pytest.mark.parametrize("name", GRAMMARS)
+@pytest.mark.parametrize(("cycles", "most"), [(0, 6), (1, 5)])
+def test_allowed_is_what_some_admitted_string_goes_on_with(name: str, cycles: int, most: int) -> None:
+    vocabulary, grammar = Vocabulary(AB, cycles), GRAMMARS[name]
+    strings = every_string(vocabulary, grammar, most)
+    follows: dict[tuple[int, ...], set[int]] = {(): set()}
+    for string in strings:
+        for place, code in enumerate(string):
+            follows.setdefault(string[:place], set()).add(code)
+    rules = make_rules(grammar, 3, cycles)
+    for beginning, wanted in follows.items():
+        # Cycles make a string shorter than its subtrees would be, so that it needs more room.
+        acceptor = Acceptor(rules, cycles, 1, most if cycles == 0 else 3 * most)
+        for code in beginning:
+            acceptor.take(np.array([code]))
+        allowed = set(np.flatnonzero(acceptor.allowed()[0]).tolist())
+        assert wanted <= allowed, vocabulary.string(beginning)
+        if cycles == 0:
+            assert allowed == wanted, vocabulary.string(beginning)
+
+
+def walk(grammar: Grammar, cycles: int, most: int, rng: np.random.Generator) -> tuple[list[int], bool]:
+    """A string of random allowed tokens, and whether it came to its end, not to a dead one."""
+    acceptor = Acceptor(make_rules(grammar, 3, cycles), cycles, 1, most)
+    codes: list[int] = []
+    while True:
+        allowed = np.flatnonzero(acceptor.allowed()[0])
+        if not len(allowed):
+            return codes, False
+        code = int(rng.choice(allowed))
+        if code == END:
+            return codes, True
+        codes.append(code)
+        acceptor.take(np.array([code]))
+
+
+@given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.integers(0, 3), st.sampled_from(ALL_LEVELS))
+def test_string_of_allowed_tokens_is_admitted_and_no_longer_than_it_may_be(
+    seed: int, name: str, cycles: int, strictness: Strictness
+) -> None:
+    known = GRAMMARS[name]
+    grammar = Grammar(known.neighbourhoods, known.dockings, {}, strictness, known.hubs)
+    codes, has_ended = walk(grammar, cycles, 30, np.random.default_rng(seed))
+    if not has_ended:
+        assert cycles or not codes, "without cycles there is always a way to the end"
+        return
+    assert len(codes) <= 30
+    check(Vocabulary(AB, cycles).string(codes), AB, grammar)
+
+
+@given(st.integers(0, 2**32), st.integers(0, len(toy.graphs()) - 1), st.sampled_from(ALL_LEVELS))
+def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, strictness: Strictness) -> None:
+    types, edges = toy.graphs()[number]
+    grammar = Grammar(toy.grammar().neighbourhoods, (), {}, strictness)
+    string = encode(types, edges, toy.ALPHABET, np.random.default_rng(seed)).string
+    check(string, toy.ALPHABET, grammar)
+    vocabulary = Vocabulary(toy.ALPHABET, 4)
+    codes = np.append(vocabulary.codes(string), END).astype(np.int64)
+    masks, most = follow(make_rules(grammar, 3, 4), 4, codes)
+    assert masks[np.arange(len(codes)), codes].all()
+    # With as many tokens as its beginnings need, no token of it is left out for want of room.
+    acceptor = Acceptor(make_rules(grammar, 3, 4), 4, 1, max(most, len(codes) - 1))
+    for code in codes:
+        assert acceptor.allowed()[0, code]
+        acceptor.take(np.array([code]))
+
+
+@pytest.mark.parametrize(
+    ("string", "place"),
+    [("BCD", 2), ("A", 1), ("B(A)", 3), ("A0B0", 3), ("A00", 2)],
+    ids=["no such neighbours", "ends too soon", "branch ends too soon", "edge twice", "edge to itself"],
+)
+def test_what_is_not_admitted_is_refused_at_its_first_wrong_token(string: str, place: int) -> None:
+    alphabet = make_alphabet(["a", "b", "c", "d"])
+    around = {0: {((1, 2),): 1}, 1: {((0, 2),): 1, ((2, 1),): 1}, 2: {((1, 1),): 1}, 3: {((3, 1),): 1}}
+    rules, vocabulary = make_rules(Grammar(around, (), {}), 4, 1), Vocabulary(alphabet, 1)
+    codes = np.append(vocabulary.codes(string), END).astype(np.int64)
+    with pytest.raises(ValueError, match=f"token {place} is not allowed"):
+        follow(rules, 1, codes)
+
+
+def test_partial_rules_admit_a_spanning_tree() -> None:
+    grammar = grammar_of("A0BAB0")
+    vocabulary = Vocabulary(AB, 1)
+    tree = np.append(vocabulary.codes("ABAB"), END).astype(np.int64)
+    with pytest.raises(ValueError, match="is not allowed"):
+        follow(make_rules(grammar, 3, 1), 1, tree)
+    follow(make_rules(grammar, 3, 1, partial=True), 1, tree)
+
+
+@pytest.mark.parametrize("name", GRAMMARS)
+def test_rules_come_back_from_their_patterns(name: str) -> None:
+    rules = make_rules(GRAMMARS[name], 3, 1)
+    again = rules_of(patterns_of(rules), 1)
+    assert all(np.array_equal(one, other) for one, other in zip(rules, again, strict=True))

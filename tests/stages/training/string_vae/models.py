@@ -1,0 +1,81 @@
+"""Small string VAEs of the toy kit, with random weights and trained ones."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import torch
+
+from stages.strings.acceptor import follow
+from stages.strings.rules import make_rules, patterns_of
+from stages.training.loop import Trainee, train
+from stages.training.string_vae.batches import Strings
+from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.trained import TrainedStringVae
+from stages.training.string_vae.training import StringVaeLearner, new_model
+from stages.training.string_vae.vocabulary import END, Vocabulary
+from tests.stages.training import toy
+
+__all__ = ["MOST", "VOCABULARY", "entry", "random_vae", "toy_strings", "trained_vae"]
+
+VOCABULARY = Vocabulary(toy.ALPHABET, 2)
+RULES = make_rules(toy.grammar(), 3, 2)
+MOST = 60
+
+
+def entry(**changes: Any) -> StringVaeEntry:
+    """Settings of a model that learns in seconds."""
+    settings = {"name": "tiny", "latent": 8, "embedding": 8, "hidden": 64, "batch": 20, "steps": 400, "rounds": 1}
+    return StringVaeEntry.model_validate({**settings, "anneal": 50, "kl_weight": 0.01, "word_dropout": 0.1, **changes})
+
+
+@cache
+def toy_strings() -> tuple[str, ...]:
+    """The strings of all shards of the toy."""
+    return tuple(each for shard in toy.SPLITS for _, strings in toy.strings(shard) for each in strings)
+
+
+def numbered() -> Strings:
+    """The strings as a learner takes them, each a graph of its own."""
+    codes = [np.append(VOCABULARY.codes(each), np.int16(END)) for each in toy_strings()]
+    masks = [follow(RULES, 2, each.astype(np.int64))[0] for each in codes]
+    return Strings(
+        tokens=np.concatenate(codes),
+        first=np.cumsum([0, *map(len, codes)]),
+        masks=np.packbits(np.concatenate(masks), axis=-1, bitorder="little"),
+        graph=np.arange(len(codes), dtype=np.int32),
+        histograms=np.array([np.bincount(each, minlength=4)[1:4] for each in codes], dtype=np.int32),
+    )
+
+
+def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringVae:
+    header = {
+        "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
+        "most": MOST,
+        "patterns": patterns_of(RULES),
+        "names": list(toy.LABELS),
+        "cycles": 2,
+    }
+    return TrainedStringVae(module.eval(), VOCABULARY, RULES, header)
+
+
+def random_vae(decoder: str, seed: int = 0) -> TrainedStringVae:
+    """A model with random weights, which are larger than fresh ones, so that it has preferences."""
+    settings = entry(decoder=decoder)
+    module = new_model(settings, VOCABULARY, MOST, seed)
+    with torch.no_grad():
+        for parameter in module.parameters():
+            parameter.mul_(3.0)
+    return wrapped(module, settings)
+
+
+@cache
+def trained_vae(decoder: str = "masked", **changes: Any) -> TrainedStringVae:
+    """A model that has learnt the strings of the toy, some hundred steps."""
+    settings = entry(decoder=decoder, learning_rate=0.01, **changes)
+    strings = numbered()
+    learner = StringVaeLearner(new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, strings, strings)
+    train(Trainee.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
+    return wrapped(learner.module, settings)

@@ -1,0 +1,150 @@
+"""The string VAE: what it sees, what it learns, and what it writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from stages.strings.grammar import check
+from stages.training.checkpoint import CheckpointError, checkpoint_bytes
+from stages.training.string_vae.batches import batches
+from stages.training.string_vae.model import shifted
+from stages.training.string_vae.trained import load_string_vae
+from stages.training.string_vae.training import annealed, triplet_loss
+from stages.training.string_vae.vocabulary import END
+from tests.stages.training import toy
+from tests.stages.training.string_vae.models import (
+    MOST,
+    VOCABULARY,
+    numbered,
+    random_vae,
+    toy_strings,
+    trained_vae,
+)
+
+DECODERS = ("plain", "masked", "transformer")
+
+
+@pytest.mark.parametrize("decoder", DECODERS)
+def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str) -> None:
+    module = random_vae(decoder).module
+    rng = np.random.default_rng(1)
+    codes = torch.from_numpy(rng.integers(0, len(VOCABULARY), (3, 11)))
+    points = torch.from_numpy(rng.standard_normal((3, 8)).astype(np.float32))
+    whole = module.decode(shifted(codes), points)
+    state = module.decoder.start(points)
+    for place in range(11):
+        logits, state = module.decoder.step(shifted(codes)[:, place], points, state)
+        torch.testing.assert_close(logits, whole[:, place], rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("decoder", DECODERS)
+def test_a_token_is_told_by_those_before_it_alone(decoder: str) -> None:
+    module = random_vae(decoder).module
+    codes = torch.ones((1, 9), dtype=torch.int64)
+    changed = codes.clone()
+    changed[0, 5] = 2
+    points = torch.zeros((1, 8))
+    before, after = (module.decode(shifted(each), points)[0] for each in (codes, changed))
+    torch.testing.assert_close(before[:6], after[:6])
+    assert not torch.allclose(before[6], after[6])
+
+
+def test_a_string_is_encoded_alike_whatever_stands_beside_it() -> None:
+    model, strings = random_vae("masked"), sorted(toy_strings(), key=len)
+    alone, beside = model.encode(strings[:1]), model.encode([strings[0], strings[-1]])[:1]
+    np.testing.assert_allclose(alone, beside, rtol=1e-4, atol=1e-5)
+    assert not np.allclose(beside, model.encode(strings[-1:]))
+
+
+@pytest.mark.parametrize("decoder", ["masked", "transformer"])
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("drawn", [True, False])
+def test_every_string_of_a_masked_decoder_is_one_of_the_grammar(decoder: str, seed: int, drawn: bool) -> None:
+    model, rng = random_vae(decoder, seed), np.random.default_rng(seed)
+    points = (3 * rng.standard_normal((64, 8))).astype(np.float32)
+    strings = model.decode(points, rng if drawn else None)
+    for each in strings:
+        check(each, toy.ALPHABET, toy.grammar())
+        assert model.is_valid(each)
+        assert len(VOCABULARY.codes(each)) <= MOST
+    assert len(set(strings)) > 1
+
+
+def test_plain_decoder_writes_what_is_no_string() -> None:
+    model, rng = random_vae("plain"), np.random.default_rng(0)
+    strings = model.decode(rng.standard_normal((64, 8)).astype(np.float32), rng)
+    assert sum(map(model.is_valid, strings)) < 32
+
+
+def test_equal_draws_write_equal_strings() -> None:
+    model = random_vae("masked")
+    points = np.random.default_rng(3).standard_normal((20, 8)).astype(np.float32)
+    first, again, other = (model.decode(points, np.random.default_rng(seed)) for seed in (5, 5, 6))
+    assert first == again
+    assert first != other
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("decoder", DECODERS)
+def test_it_learns_to_write_what_it_has_read(decoder: str) -> None:
+    model = trained_vae(decoder)
+    strings = toy_strings()
+    again = model.decode(model.encode(strings), None)
+    right = np.mean([one == other for one, other in zip(strings, again, strict=True)])
+    random = random_vae(decoder)
+    by_chance = np.mean(
+        [one == other for one, other in zip(strings, random.decode(random.encode(strings), None), strict=True)]
+    )
+    assert by_chance < 0.05
+    assert right > 0.3
+
+
+def test_batches_hold_every_string_once_with_its_mask() -> None:
+    strings = numbered()
+    seen: dict[str, int] = {}
+    for batch in batches(strings, 16, len(VOCABULARY), np.random.default_rng(0)):
+        for codes, length, allowed in zip(batch.codes, batch.lengths, batch.allowed, strict=True):
+            text = VOCABULARY.string(codes.tolist())
+            seen[text] = seen.get(text, 0) + 1
+            assert codes[length - 1] == END
+            assert len(VOCABULARY.codes(text)) == length - 1
+            assert allowed.gather(-1, codes[:, None]).all()
+            assert not allowed[:length].all(dim=-1).any()
+    assert seen == dict.fromkeys(toy_strings(), 1)
+
+
+def test_divergence_weighs_nothing_first_and_all_at_the_end() -> None:
+    weights = [annealed(step, 100) for step in range(0, 201, 10)]
+    assert weights == sorted(weights)
+    assert weights[0] < 0.005
+    assert weights[5] == 0.5
+    assert weights[10] > 0.995
+    assert annealed(0, 0) == 1.0
+
+
+def test_triplet_loss_asks_that_the_more_similar_is_nearer() -> None:
+    histograms = torch.tensor([[4.0, 0.0], [3.0, 1.0], [0.0, 4.0]])
+    near = torch.tensor([[0.0], [0.1], [9.0]])
+    far = torch.tensor([[0.0], [9.0], [0.1]])
+    losses = [
+        sum(float(triplet_loss(points, histograms, 1.0, torch.Generator().manual_seed(seed))) for seed in range(40))
+        for points in (near, far)
+    ]
+    assert losses[0] < 0.1 * losses[1]
+
+
+def test_published_weights_are_read_alone_and_others_refused(tmp_path: Path) -> None:
+    model = random_vae("masked")
+    header = {**model.header, "kind": "string_vae", "kit": "toy"}
+    path = tmp_path / "weights.safetensors"
+    path.write_bytes(checkpoint_bytes(model.module.state_dict(), header))
+    read = load_string_vae(path, {"kit": "toy"})
+    points = np.random.default_rng(3).standard_normal((9, 8)).astype(np.float32)
+    assert read.decode(points, None) == model.decode(points, None)
+    np.testing.assert_array_equal(read.encode(toy_strings()[:3]), model.encode(toy_strings()[:3]))
+    with pytest.raises(CheckpointError, match="of another kit: 'toy', and 'castle' is asked for"):
+        load_string_vae(path, {"kit": "castle"})
