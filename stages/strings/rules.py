@@ -108,10 +108,10 @@ def _patterns(grammar: Grammar, kind: int, beside_hub: set[tuple[int, int]]) -> 
     elif grammar.strictness in SLOT_LEVELS:
         yield {}, {**hubs, **dict.fromkeys(around, MANY)}, ANY
     else:
-        sets = [around] if grammar.strictness == "count_and_types" else _seen_together(observed, around)
+        together = [around] if grammar.strictness == "count_and_types" else _seen_together(observed, around)
         for size in sizes:
-            for each in sets:
-                yield {}, {**hubs, **dict.fromkeys(each, size)}, size
+            for types in together:
+                yield {}, {**hubs, **dict.fromkeys(types, size)}, size
 
 
 def _seen_together(observed: list[Multiset], around: list[int]) -> list[list[int]]:

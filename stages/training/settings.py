@@ -7,7 +7,10 @@ from pydantic import Field, model_validator
 from pipeline.config import StrictModel
 from stages.training.string_vae.settings import StringVaeEntry
 
-__all__ = ["TrainingConfig"]
+__all__ = ["AnyEntry", "TrainingConfig"]
+
+AnyEntry = StringVaeEntry
+"""An entry of any kind."""
 
 
 class TrainingConfig(StrictModel):
@@ -16,7 +19,7 @@ class TrainingConfig(StrictModel):
     longest: int = Field(
         256, ge=2, le=100_000, description="longer strings are left out of the training of models; unit: tokens"
     )
-    models: tuple[StringVaeEntry, ...] = Field((), description="the models; each is trained by itself")
+    models: tuple[AnyEntry, ...] = Field((), description="the models; each is trained by itself")
 
     @model_validator(mode="after")
     def _names_differ(self) -> TrainingConfig:

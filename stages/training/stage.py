@@ -13,9 +13,8 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.training.entry import ModelEntry
 from stages.training.rounds import Chain, kind_of, module_of, rounds, run_round
-from stages.training.settings import TrainingConfig
+from stages.training.settings import AnyEntry, TrainingConfig
 from stages.training.trained import FILES, run_trained
 
 __all__ = ["STAGE"]
@@ -89,14 +88,14 @@ def trial(config: Config) -> TrainingConfig:
     return config.section(TrainingConfig).model_copy(update={"models": ()})
 
 
-def _models(plan: Plan) -> Iterator[tuple[ModelEntry, str, int]]:
+def _models(plan: Plan) -> Iterator[tuple[AnyEntry, str, int]]:
     """Each model of the config: its entry, its kit, its seed."""
     for entry in plan.config.section(TrainingConfig).models:
         for kit, seed in product(entry.kits or plan.shards("exemplars"), range(entry.seeds)):
             yield entry, kit, seed
 
 
-def _name(entry: ModelEntry, kit: str, seed: int) -> str:
+def _name(entry: AnyEntry, kit: str, seed: int) -> str:
     return f"{entry.name}-{kit}-{seed}"
 
 
@@ -117,7 +116,7 @@ def _data_shard(plan: Plan, kind: str, kit: str) -> Shard:
     return Shard(f"{kit}-{kind}", params, inputs, (module_of(kind),))
 
 
-def _trained_shard(plan: Plan, entry: ModelEntry, kit: str, seed: int, chain: Chain) -> Shard:
+def _trained_shard(plan: Plan, entry: AnyEntry, kit: str, seed: int, chain: Chain) -> Shard:
     name = _name(entry, kit, seed)
     names = [shard.name for shard in chain.shards]
     params = {

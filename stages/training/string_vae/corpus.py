@@ -49,10 +49,10 @@ def prepare_corpus(task: Task) -> Outcome:
     rules, partial = _rules_for(kit, vocabulary, shapes.get("train", []))
     counts, most = {}, 0
     for split, of_split in sorted(shapes.items()):
-        strings, needed = _numbered(task, vocabulary, rules, of_split)
-        most = max(most, needed, int(strings.lengths.max(initial=1)) - 1)
-        counts[split] = {"strings": len(strings), "graphs": len(strings.histograms), "tokens": len(strings.tokens)}
-        _write(task, f"{task.shard.name}.{split}.safetensors", strings)
+        made, needed = _numbered(task, vocabulary, rules, of_split)
+        most = max(most, needed, int(made.lengths.max(initial=1)) - 1)
+        counts[split] = {"strings": len(made), "graphs": len(made.histograms), "tokens": len(made.tokens)}
+        _write(task, f"{task.shard.name}.{split}.safetensors", made)
     for split in ("train", "val"):
         if not counts.get(split, {}).get("strings"):
             raise Rejected(f"kit {name} has no strings of at most {longest} tokens in split {split}")

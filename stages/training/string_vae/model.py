@@ -9,7 +9,7 @@ from torch.nn.functional import scaled_dot_product_attention
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import END
 
-__all__ = ["Decoder", "DecoderState", "StringVae"]
+__all__ = ["Decoder", "DecoderState", "StringVae", "shifted"]
 
 DecoderState = list[Tensor]
 
@@ -114,7 +114,7 @@ class TransformerDecoder(Decoder):
         return logits
 
     def start(self, points: Tensor) -> DecoderState:
-        return [points.new_zeros(len(points), 0, block.width) for block in self.blocks for _ in range(2)]
+        return [points.new_zeros(len(points), 0, self.embedding.embedding_dim) for _ in range(2 * len(self.blocks))]
 
     def step(self, shown: Tensor, points: Tensor, state: DecoderState) -> tuple[Tensor, DecoderState]:
         place = torch.full_like(shown, state[0].shape[1])
@@ -133,7 +133,6 @@ class _Block(nn.Module):
 
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.width = width
         self.heads = max(width // self.HEAD, 1)
         self.attention_norm, self.feed_norm = nn.LayerNorm(width), nn.LayerNorm(width)
         self.projections, self.joined = nn.Linear(width, 3 * width), nn.Linear(width, width)

@@ -113,7 +113,7 @@ def _write(
             scores += rng.gumbel(size=scores.shape)
         tokens = scores.argmax(axis=1)
         tokens[dead | ended] = END
-        for row in np.flatnonzero(~dead & ~ended):
+        for row in np.flatnonzero(~dead & ~ended).tolist():
             if tokens[row] != END:
                 drafts[row].codes.append(int(tokens[row]))
         ended |= (tokens == END) & ~dead
