@@ -63,6 +63,10 @@ def tokens_to_complete(rules, kind, counts, pending, left):
         room = rules.size[p] - total if limited else missing + pending
         if missing > room:
             continue
+        if rules.partial:
+            if pending <= room or rules.loose[p]:
+                return 0
+            continue
         if left:
             if missing <= pending and (not limited or room == pending or (room < pending and rules.loose[p])):
                 return 0

@@ -25,12 +25,13 @@ MANY = 1 << 14
 NEVER = 1 << 28
 """Tokens to the end of what has no end."""
 
-Rules = namedtuple("Rules", "first low high size loose counted cost arc closes closes_below")
+Rules = namedtuple("Rules", "first low high size loose counted partial cost arc closes closes_below")
 """Arrays, for compiled code.
 
 first: int64 (types + 1,), the patterns of type t are rows first[t] to first[t + 1]; low, high: int64 (patterns, types);
 size: int64 (patterns,), or ANY; loose: bool (patterns,), whether uncounted neighbours fit it besides; counted: bool
-(types,), whether neighbours of a type count, which hubs do not.
+(types,), whether neighbours of a type count, which hubs do not; partial: whether a node is complete with less, as long
+as the rest may be there besides.
 cost: int64 (types, types), the fewest tokens of a subtree whose root is a `column` that hangs on a `row`; where none
 ends without a cycle 1, or NEVER for strings without cycles.
 arc: int64 (types, types), number of the pair of neighbour types (row, column), or -1.
@@ -44,18 +45,19 @@ Pattern = tuple[dict[int, int], dict[int, int], int]
 def make_rules(grammar: Grammar, types: int, cycles: int, partial: bool = False) -> Rules:
     """The rules of a grammar of so many types, for strings with so many cycle numbers.
 
-    `partial`: strings that leave out edges are to fit it, too: a node may have fewer neighbours than a pattern says.
+    `partial`: strings do not tell of all contacts, so that a node may have neighbours besides (`admits_more`).
     """
     beside_hub = _beside_hubs(grammar)
     first, low, high, size = [0], [], [], []
     for kind in range(types):
         for lows, highs, total in _patterns(grammar, kind, beside_hub):
-            low.append([0 if partial else lows.get(other, 0) for other in range(types)])
+            low.append([lows.get(other, 0) for other in range(types)])
             high.append([highs.get(other, 0) for other in range(types)])
-            size.append(ANY if partial else total)
+            size.append(total)
         first.append(len(low))
     counted = [kind not in grammar.hubs for kind in range(types)]
-    return rules_of({"first": first, "low": low, "high": high, "size": size, "counted": counted}, cycles)
+    patterns = {"first": first, "low": low, "high": high, "size": size, "counted": counted, "partial": partial}
+    return rules_of(patterns, cycles)
 
 
 def rules_of(patterns: Mapping[str, Any], cycles: int) -> Rules:
@@ -71,6 +73,7 @@ def rules_of(patterns: Mapping[str, Any], cycles: int) -> Rules:
         size=np.array(patterns["size"], dtype=np.int64),
         loose=(high[:, ~counted] > 0).any(axis=1),
         counted=counted,
+        partial=bool(patterns["partial"]),
         cost=np.full((types, types), NEVER, dtype=np.int64),
         arc=np.full((types, types), -1, dtype=np.int64),
         closes=empty,
@@ -81,7 +84,8 @@ def rules_of(patterns: Mapping[str, Any], cycles: int) -> Rules:
 
 def patterns_of(rules: Rules) -> dict[str, Any]:
     """What rules are made of, as JSON."""
-    return {name: getattr(rules, name).tolist() for name in ("first", "low", "high", "size", "counted")}
+    arrays = {name: getattr(rules, name).tolist() for name in ("first", "low", "high", "size", "counted")}
+    return {**arrays, "partial": rules.partial}
 
 
 def _beside_hubs(grammar: Grammar) -> set[tuple[int, int]]:

@@ -29,9 +29,10 @@ Masks = npt.NDArray[np.bool_]
 def prepare_corpus(task: Task) -> Outcome:
     """Files of the shard: `.<split>.safetensors`, the `Strings` of each split; `.json`, what the tokens stand for.
 
-    The strings of train say which cycle numbers there are; strings of other splits with more, and strings of more than
-    `longest` tokens, are refused. Where the grammar does not admit them all, because edges were left out of them, the
-    rules for partial graphs hold. Raises Rejected where train or val keeps no string.
+    The strings of train say which cycle numbers there are; strings of other splits with more are refused, and so are
+    those of more than `longest` tokens, and those that train has as well. Where the grammar does not admit the strings,
+    because contacts were left out of them, the rules for such strings hold. Raises Rejected where train or val keeps no
+    string.
     """
     name, splits, longest = task.shard.params["kit"], task.shard.params["splits"], task.shard.params["longest"]
     kit = input_kit(task, name)
@@ -46,10 +47,11 @@ def prepare_corpus(task: Task) -> Outcome:
             shapes.setdefault(split, []).append(kept)
         task.progress(done + 1, len(splits))
     vocabulary = Vocabulary(alphabet, _cycles(shapes.get("train", [])))
-    rules, partial = _rules_for(kit, vocabulary, shapes.get("train", []))
+    rules = _rules_for(kit, vocabulary, shapes.get("train", []))
+    learnt = {each for strings in shapes.get("train", []) for each in strings}
     counts, most = {}, 0
     for split, of_split in sorted(shapes.items()):
-        made, needed = _numbered(task, vocabulary, rules, of_split)
+        made, needed = _numbered(task, vocabulary, rules, of_split, set() if split == "train" else learnt)
         most = max(most, needed, int(made.lengths.max(initial=1)) - 1)
         counts[split] = {"strings": len(made), "graphs": len(made.histograms), "tokens": len(made.tokens)}
         _write(task, f"{task.shard.name}.{split}.safetensors", made)
@@ -61,7 +63,6 @@ def prepare_corpus(task: Task) -> Outcome:
         "names": list(alphabet.names),
         "cycles": vocabulary.cycles,
         "most": most,
-        "partial": partial,
         "patterns": patterns_of(rules),
         "counts": counts,
     }
@@ -97,11 +98,11 @@ def _cycles(shapes: list[list[str]]) -> int:
     return 1 + max((number for number in numbers if number is not None), default=-1)
 
 
-def _rules_for(kit: Kit, vocabulary: Vocabulary, shapes: list[list[str]]) -> tuple[Rules, bool]:
-    """The rules of the kit that its strings fit, and whether they are those for partial graphs."""
+def _rules_for(kit: Kit, vocabulary: Vocabulary, shapes: list[list[str]]) -> Rules:
+    """The rules of the kit that its strings fit: those for strings that tell of all contacts, or those for others."""
     whole = make_rules(kit.grammar, len(kit.labels), vocabulary.cycles)
     fit = all(_followed(whole, vocabulary, vocabulary.codes(strings[0])) is not None for strings in shapes if strings)
-    return (whole, False) if fit else (make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, partial=True), True)
+    return whole if fit else make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, partial=True)
 
 
 def _followed(rules: Rules, vocabulary: Vocabulary, codes: npt.NDArray[np.int16]) -> tuple[Masks, int] | None:
@@ -114,8 +115,10 @@ def _followed(rules: Rules, vocabulary: Vocabulary, codes: npt.NDArray[np.int16]
         return None
 
 
-def _numbered(task: Task, vocabulary: Vocabulary, rules: Rules, shapes: list[list[str]]) -> tuple[Strings, int]:
-    """The strings as numbers, with their masks, and the most tokens that any beginning of them needs."""
+def _numbered(
+    task: Task, vocabulary: Vocabulary, rules: Rules, shapes: list[list[str]], elsewhere: set[str]
+) -> tuple[Strings, int]:
+    """The strings that are not `elsewhere`, with their masks, and the most tokens that any beginning of them needs."""
     types = len(vocabulary.alphabet.tokens)
     codes: list[npt.NDArray[np.int16]] = [np.empty(0, np.int16)]
     masks: list[npt.NDArray[np.uint8]] = [np.empty((0, -(-len(vocabulary) // 8)), np.uint8)]
@@ -125,6 +128,9 @@ def _numbered(task: Task, vocabulary: Vocabulary, rules: Rules, shapes: list[lis
     for strings in shapes:
         before = len(graph)
         for string in strings:
+            if string in elsewhere:
+                task.reject(string, "stands in train as well")
+                continue
             if not _knows(vocabulary, string):
                 task.reject(string, "cycle numbers that train has not")
                 continue

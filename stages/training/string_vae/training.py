@@ -46,7 +46,7 @@ def learner(task: Task, entry: StringVaeEntry, seed: int) -> StringVaeLearner:
         split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
     }
     header = {
-        **{key: described[key] for key in ("names", "cycles", "most", "partial", "patterns", "counts")},
+        **{key: described[key] for key in ("names", "cycles", "most", "patterns", "counts")},
         "tokens": list(vocabulary.texts),
         "data": {split: file_digest(path) for split, path in sources.items()},
     }

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS, admits
 from stages.shape.kit import Docking, Grammar, Strictness
-from stages.strings.acceptor import END, Acceptor, follow
+from stages.strings.acceptor import END, Acceptor, follow, tokens_to_complete
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.encoder import encode
 from stages.strings.grammar import check
-from stages.strings.rules import make_rules, patterns_of, rules_of
+from stages.strings.rules import NEVER, make_rules, patterns_of, rules_of
 from stages.strings.tokens import StringError
 from stages.training.string_vae.vocabulary import Vocabulary
 from tests.stages.training import toy
@@ -142,6 +142,20 @@ def test_what_is_not_admitted_is_refused_at_its_first_wrong_token(string: str, p
     codes = np.append(vocabulary.codes(string), END).astype(np.int64)
     with pytest.raises(ValueError, match=f"token {place} is not allowed"):
         follow(rules, 1, codes)
+
+
+@given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.sampled_from(ALL_LEVELS))
+def test_partial_rules_admit_what_may_have_more_neighbours(seed: int, name: str, strictness: Strictness) -> None:
+    known = GRAMMARS[name]
+    grammar = Grammar(known.neighbourhoods, known.dockings, {}, strictness, known.hubs)
+    rules = make_rules(grammar, 3, 1, partial=True)
+    counts = np.random.default_rng(seed).integers(0, 3, 3)
+    kind = int(np.random.default_rng(seed).integers(3))
+    wider = [counts + more for more in np.ndindex(4, 4, 4)]
+    whole = [tuple((other, int(count)) for other, count in enumerate(each) if count) for each in wider]
+    docked = all(rules.high[rules.first[kind] : rules.first[kind + 1], other].any() for other in np.flatnonzero(counts))
+    wanted = docked and any(admits(grammar, kind, each) for each in whole)
+    assert (tokens_to_complete(rules, kind, counts, 0, True) < NEVER) == wanted
 
 
 def test_partial_rules_admit_a_spanning_tree() -> None:
