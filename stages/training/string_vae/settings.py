@@ -28,7 +28,7 @@ class StringVaeEntry(ModelEntry):
         0.1, ge=0, le=10, description="weight of the divergence from the prior, in nats, beside that of a whole string"
     )
     anneal: int = Field(
-        900,
+        750,
         ge=0,
         le=1_000_000,
         description="the weight of the divergence rises to this in an S over so many steps; unit: optimiser steps",
