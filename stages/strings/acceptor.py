@@ -7,7 +7,7 @@ other end of each cycle that is open. So no token is left out that an admitted s
 open must be closed in the tokens that are left, each cycle by a number and each node by subtrees without cycles.
 
 Where no cycle is open the converse is true as well: the string can be ended from there. With several open cycles, each
-may be closed alone but not all of them: rarely there is then no token left, and whoever writes the string must go back.
+may be closed alone but not all of them: then there may be no token left, and whoever writes the string must go back.
 
 Numba compiles this module when it is imported: import it inside functions.
 """

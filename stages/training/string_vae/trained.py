@@ -68,7 +68,7 @@ class TrainedStringVae:
     def decode(self, points: Points, rng: np.random.Generator | None) -> list[str]:
         """A string for each point: each token drawn by its probability, or, without `rng`, the likeliest.
 
-        A plain decoder may answer what is no string; a masked one does so only where it is lost in many cycles.
+        A plain decoder may answer what is no string; a masked one does so only if no string of the grammar is a tree.
         """
         rules = self.rules if self.is_masked else None
         written = write_codes(self.module, points, self.header["most"], rules, self.vocabulary.cycles, rng)

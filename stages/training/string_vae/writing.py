@@ -17,32 +17,47 @@ __all__ = ["write_codes"]
 
 AT_ONCE = 256
 """Strings that are written side by side."""
-TRIES = 40
-"""A string that has come to a dead end so often is left as it is: unfinished."""
-MOST_DOUBLINGS = 8
-"""After so many doublings a string goes back by one token again."""
+TRIES = 8
+"""After so many dead ends a string is ended without further cycles."""
 
 
 @dataclass
 class _Draft:
     """One string on its way. kept: its tokens up to where it was cut; banned: tokens that must not come next there;
-    ends: dead ends so far."""
+    acyclic: whether no cycle may begin any more; ends: dead ends so far."""
 
     kept: list[int] = field(default_factory=list)
     banned: set[int] = field(default_factory=set)
+    acyclic: bool = False
     ends: int = 0
     codes: list[int] = field(default_factory=list)
 
-    def cut(self) -> None:
-        """Go back from a dead end: one token the first time, twice as far each time after, then one again. What stood
-        there is banned there. So a choice that was wrong far before is reached soon."""
-        place = max(len(self.codes) - 2 ** (self.ends % MOST_DOUBLINGS), 0)
+    def cut(self, numbers: int) -> None:
+        """Go back from a dead end; tokens from `numbers` on are cycle numbers.
+
+        One token the first time, twice as far each time after, and what stood there is banned there: so a choice that
+        was wrong far before is reached soon. In the end to where no cycle was open: from there the grammar has a way to
+        the end that opens none, unless none of its strings is a tree.
+        """
         self.ends += 1
-        if not self.codes:  # all was banned
-            self.kept, self.banned = [], set()
+        if self.ends == TRIES:
+            self.kept, self.banned, self.acyclic = self.codes[: self._last_acyclic(numbers)], set(), True
             return
-        self.banned = {self.codes[place]} | (self.banned if place == len(self.kept) else set())
+        place = max(len(self.codes) - 2 ** (self.ends - 1), 0)
+        stood = set(self.codes[place : place + 1])
+        self.banned = stood | (self.banned if place == len(self.kept) else set())
         self.kept = self.codes[:place]
+
+    def _last_acyclic(self, numbers: int) -> int:
+        """How many of the tokens can be kept so that no cycle is open."""
+        opened: set[int] = set()
+        last = 0
+        for place, code in enumerate(self.codes):
+            if code >= numbers:
+                opened ^= {code}
+            if not opened:
+                last = place + 1
+        return last
 
 
 @torch.no_grad()
@@ -57,7 +72,8 @@ def write_codes(
     """The tokens of a string for each point, float32 (n, latent), at most `most`, without an end.
 
     Each token is drawn by its probability, or, without an `rng`, is the likeliest. With `rules`, only tokens that can
-    still lead to a string of the grammar are taken; where none is left, the string goes back and on by another way.
+    still lead to a string of the grammar are taken; where none is left, the string goes back and on by another way, so
+    that all are strings of the grammar, if some of its strings are trees.
     """
     module.eval()
     found: list[list[int]] = []
@@ -65,13 +81,13 @@ def write_codes(
         here = torch.from_numpy(points[start : start + AT_ONCE])
         drafts = [_Draft() for _ in range(len(here))]
         waiting = list(range(len(drafts)))
-        for _ in range(TRIES if rules is not None else 1):
+        for _ in range(TRIES + 1 if rules is not None else 1):
             ended = _write(module, here[waiting], [drafts[row] for row in waiting], most, rules, cycles, rng)
             waiting = [row for row, has_ended in zip(waiting, ended, strict=True) if not has_ended]
             if not waiting:
                 break
             for row in waiting if rules is not None else ():
-                drafts[row].cut()
+                drafts[row].cut(len(rules.counted) + 3)
         found += [draft.codes for draft in drafts]
     return found
 
@@ -102,6 +118,8 @@ def _write(
         if acceptor is not None:
             allowed = acceptor.allowed()
             for row, draft in enumerate(drafts):
+                if draft.acyclic and place >= len(draft.kept):
+                    allowed[row, allowed.shape[1] - cycles :] = False
                 if place == len(draft.kept):
                     allowed[row, list(draft.banned)] = False
                 elif place < len(draft.kept):

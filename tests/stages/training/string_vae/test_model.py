@@ -74,6 +74,16 @@ def test_every_string_of_a_masked_decoder_is_one_of_the_grammar(decoder: str, se
     assert len(set(strings)) > 1
 
 
+def test_string_that_is_lost_in_cycles_is_ended_without_more() -> None:
+    model = random_vae("masked")
+    with torch.no_grad():  # cycle numbers wherever they may stand
+        model.module.decoder.logits.bias[-2:] += 50.0
+    strings = model.decode(np.random.default_rng(0).standard_normal((64, 8)).astype(np.float32), None)
+    for each in strings:
+        check(each, toy.ALPHABET, toy.grammar())
+    assert any(each.count("0") or each.count("1") for each in strings)
+
+
 def test_plain_decoder_writes_what_is_no_string() -> None:
     model, rng = random_vae("plain"), np.random.default_rng(0)
     strings = model.decode(rng.standard_normal((64, 8)).astype(np.float32), rng)
