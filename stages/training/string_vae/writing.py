@@ -86,8 +86,9 @@ def write_codes(
             waiting = [row for row, has_ended in zip(waiting, ended, strict=True) if not has_ended]
             if not waiting:
                 break
-            for row in waiting if rules is not None else ():
-                drafts[row].cut(len(rules.counted) + 3)
+            if rules is not None:
+                for row in waiting:
+                    drafts[row].cut(len(rules.counted) + 3)
         found += [draft.codes for draft in drafts]
     return found
 
