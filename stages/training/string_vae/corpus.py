@@ -13,10 +13,10 @@ import numpy.typing as npt
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes, read_shard
 from pipeline.stage import Outcome, Task
-from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.strings.alphabet import make_alphabet
 from stages.strings.rules import Rules, make_rules, patterns_of
+from stages.strings.settings import StringsConfig
 from stages.strings.tokens import number_value, split_tokens
 from stages.training.string_vae.batches import Strings
 from stages.training.string_vae.vocabulary import END, Vocabulary
@@ -30,8 +30,7 @@ def prepare_corpus(task: Task) -> Outcome:
     """Files of the shard: `.<split>.safetensors`, the `Strings` of each split; `.json`, what the tokens stand for.
 
     The strings of train say which cycle numbers there are; strings of other splits with more are refused, and so are
-    those of more than `longest` tokens, and those that train has as well. Where the grammar does not admit the strings,
-    because contacts were left out of them, the rules for such strings hold. Raises Rejected where train or val keeps no
+    those of more than `longest` tokens, and those that train has as well. Raises Rejected where train or val keeps no
     string.
     """
     name, splits, longest = task.shard.params["kit"], task.shard.params["splits"], task.shard.params["longest"]
@@ -47,7 +46,8 @@ def prepare_corpus(task: Task) -> Outcome:
             shapes.setdefault(split, []).append(kept)
         task.progress(done + 1, len(splits))
     vocabulary = Vocabulary(alphabet, _cycles(shapes.get("train", [])))
-    rules = _rules_for(kit, vocabulary, shapes.get("train", []))
+    partial = task.config.section(StringsConfig).edges != "all"
+    rules = make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, partial)
     learnt = {each for strings in shapes.get("train", []) for each in strings}
     counts, most = {}, 0
     for split, of_split in sorted(shapes.items()):
@@ -96,13 +96,6 @@ def _cycles(shapes: list[list[str]]) -> int:
     """One more than the greatest cycle number."""
     numbers = {number_value(text) for strings in shapes for each in strings for text in split_tokens(each)}
     return 1 + max((number for number in numbers if number is not None), default=-1)
-
-
-def _rules_for(kit: Kit, vocabulary: Vocabulary, shapes: list[list[str]]) -> Rules:
-    """The rules of the kit that its strings fit: those for strings that tell of all contacts, or those for others."""
-    whole = make_rules(kit.grammar, len(kit.labels), vocabulary.cycles)
-    fit = all(_followed(whole, vocabulary, vocabulary.codes(strings[0])) is not None for strings in shapes if strings)
-    return whole if fit else make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, partial=True)
 
 
 def _followed(rules: Rules, vocabulary: Vocabulary, codes: npt.NDArray[np.int16]) -> tuple[Masks, int] | None:

@@ -21,6 +21,7 @@ from stages.shape.kit import Grammar, Kit, Multiset, PartType
 from stages.shape.kit_files import write_kit
 from stages.strings.alphabet import Alphabet, make_alphabet
 from stages.strings.encoder import canonical_string, random_strings
+from stages.strings.settings import StringsConfig
 from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
 from tests.stages.strings.graphs import arrays
@@ -113,7 +114,7 @@ def plan_strings(plan: Plan) -> list[Shard]:
 
 STAGES: Mapping[str, Stage] = {
     "exemplars": Stage("exemplars", __name__, NothingConfig, (), lambda _: [Shard("toy")], make_kit, lambda _: 0),
-    "strings": Stage("strings", __name__, NothingConfig, ("exemplars",), plan_strings, make_strings, lambda _: 0),
+    "strings": Stage("strings", __name__, StringsConfig, ("exemplars",), plan_strings, make_strings, lambda _: 0),
     "training": STAGE,
 }
 
@@ -127,7 +128,7 @@ def config(*models: Mapping[str, Any]) -> Config:
     """A config with models like TINY, each with its own changes; one without any."""
     entries = [{**TINY, **changes} for changes in models or ({},)]
     training = TrainingConfig.model_validate_json(json_bytes({"models": entries}))
-    sections = {"exemplars": NothingConfig(), "strings": NothingConfig(), "training": training}
+    sections = {"exemplars": NothingConfig(), "strings": StringsConfig(), "training": training}
     return Config("toys", "1.0.0", 3, sections, Path("toys.yaml"), license="CC0-1.0")
 
 
