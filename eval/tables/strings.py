@@ -1,0 +1,68 @@
+"""`make eval TABLE=strings`: what string VAEs have learnt (strings §5 and Table 2)."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from eval.evaluation import Answer, Curve, Evaluation, Need
+from eval.subject import Subject
+
+__all__ = ["TABLE"]
+
+
+def _no_models(subject: Subject) -> str:
+    there = any(subject.models.glob("*/weights.safetensors"))
+    return "" if there else f"no trained model in {subject.models}; make train"
+
+
+def _no_corpus(subject: Subject) -> str:
+    return "" if _corpus(subject).is_dir() else f"no corpus in {_corpus(subject)}; make strings"
+
+
+def _corpus(subject: Subject) -> Path:
+    return subject.out / f"{subject.config.name}-corpus"
+
+
+def _answer(subject: Subject, asked: Namespace) -> Answer:
+    from eval.strings import (
+        corpus_strings,
+        model_rng,
+        reconstruction,
+        reconstruction_table,
+        sampling,
+        sampling_table,
+        structure,
+        structure_table,
+        trained_models,
+        training_curve,
+    )
+    from stages.training.string_vae.sampling import WAYS
+
+    rebuilt, sampled, joined, lines, seed = [], [], [], {}, subject.config.seed
+    for each in trained_models(subject.models):
+        train, test = (corpus_strings(_corpus(subject), each.kit, split, each.model) for split in ("train", "test"))
+        if test:
+            rebuilt.append((each, reconstruction(each.model, test)))
+        for way in WAYS:
+            rng = model_rng(seed, each, way)
+            sampled.append((each, way, sampling(each.model, way, train, asked.searches, rng)))
+        joined.append((each, *structure(each.model, train, model_rng(seed, each, "structure"))))
+        lines[each.folder] = training_curve(subject.models / each.folder)
+    return Answer(
+        [reconstruction_table(rebuilt), sampling_table(sampled), structure_table(joined)],
+        [Curve("What a string that was not learnt takes", "steps of training", "nats a string", lines)],
+    )
+
+
+def _options(parser: ArgumentParser) -> None:
+    parser.add_argument("--searches", type=int, default=1000, help="searches of each way of sampling")
+
+
+TABLE = Evaluation(
+    question="Do strings come back from a string VAE, and how many new shapes does each way of sampling find?",
+    needs=(Need("a trained string VAE", _no_models), Need("the corpus of its dataset", _no_corpus)),
+    seconds=lambda subject: 150.0 * len(list(subject.models.glob("*/weights.safetensors"))),
+    answer=_answer,
+    options=_options,
+)
