@@ -42,4 +42,3 @@ class ModelEntry(StrictModel):
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="numbers of the forward pass; `bfloat16` is faster where the processor knows it"
     )
-    compile: bool = Field(False, description="whether torch compiles the model first: a minute, then faster on a GPU")

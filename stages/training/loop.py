@@ -74,8 +74,6 @@ def train(
     """One round: `entry.steps` steps. Answers the mean of each figure of the learner."""
     learner, optimizer = trainee.learner, trainee.optimizer
     device = next(learner.module.parameters()).device
-    if entry.compile:
-        learner.module.compile()
     noise = torch.Generator(device).manual_seed(int(rng.integers(2**63)))
     stream = learner.batches(rng)
     sums: dict[str, Tensor] = {}

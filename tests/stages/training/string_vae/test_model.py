@@ -10,15 +10,17 @@ import torch
 
 from stages.strings.grammar import check
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
+from stages.training.loop import Trainee, train
 from stages.training.string_vae.batches import batches
 from stages.training.string_vae.model import shifted
 from stages.training.string_vae.trained import load_string_vae
-from stages.training.string_vae.training import annealed, triplet_loss
+from stages.training.string_vae.training import StringVaeLearner, annealed, new_model, triplet_loss
 from stages.training.string_vae.vocabulary import END
 from tests.stages.training import toy
 from tests.stages.training.string_vae.models import (
     MOST,
     VOCABULARY,
+    entry,
     numbered,
     random_vae,
     toy_strings,
@@ -111,6 +113,17 @@ def test_it_learns_to_write_what_it_has_read(decoder: str) -> None:
     )
     assert by_chance < 0.05
     assert right > 0.3
+
+
+def test_half_precision_learns_nearly_the_same() -> None:
+    losses = []
+    for precision in ("float32", "bfloat16"):
+        settings, strings = entry(precision=precision, steps=4), numbered()
+        learner = StringVaeLearner(new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, strings, strings)
+        learnt = train(Trainee.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
+        losses.append(learnt["loss"])
+    assert losses[0] != losses[1]
+    assert losses[1] == pytest.approx(losses[0], rel=0.02)
 
 
 def test_batches_hold_every_string_once_with_its_mask() -> None:
