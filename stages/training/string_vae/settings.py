@@ -25,7 +25,7 @@ class StringVaeEntry(ModelEntry):
     hidden: int = Field(256, ge=2, le=8192, description="size of the GRUs, or width of the transformer; even")
     layers: int = Field(1, ge=1, le=24, description="layers of the decoder")
     kl_weight: float = Field(
-        0.1, ge=0, le=10, description="weight of the divergence from the prior, in nats, beside that of a whole string"
+        0.01, ge=0, le=10, description="weight of the divergence from the prior, in nats, beside that of a whole string"
     )
     anneal: int = Field(
         750,
