@@ -6,7 +6,7 @@ from eval.evaluation import Need
 from eval.subject import Subject
 from stages.shape.collection.declared import language_of, producers
 
-__all__ = ["FINISHED", "KITS", "SEARCH", "trained_model"]
+__all__ = ["FINISHED", "KITS", "SEARCH", "STRING_VAE"]
 
 
 def _finished(subject: Subject) -> str:
@@ -39,11 +39,10 @@ SEARCH = Need("the records of a search", _search)
 """The mill's folder holds what the search of stage `variations` has found, round by round."""
 
 
-def trained_model(name: str) -> Need:
-    """A model of this name, trained on the dataset and published in `Subject.models`."""
+def _string_vae(subject: Subject) -> str:
+    there = any(subject.models.glob("*/weights.safetensors"))
+    return "" if there else f"no trained model in {subject.models}; make train"
 
-    def missing(subject: Subject) -> str:
-        folder = subject.models / name
-        return "" if folder.is_dir() and any(folder.iterdir()) else f"no trained model in {folder}; make train"
 
-    return Need(f"a trained model {name}", missing)
+STRING_VAE = Need("a trained string VAE", _string_vae)
+"""`Subject.models` holds weights."""

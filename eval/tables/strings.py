@@ -6,14 +6,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from eval.evaluation import Answer, Curve, Evaluation, Need
+from eval.needs import STRING_VAE
 from eval.subject import Subject
 
 __all__ = ["TABLE"]
-
-
-def _no_models(subject: Subject) -> str:
-    there = any(subject.models.glob("*/weights.safetensors"))
-    return "" if there else f"no trained model in {subject.models}; make train"
 
 
 def _no_corpus(subject: Subject) -> str:
@@ -61,7 +57,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="Do strings come back from a string VAE, and how many new shapes does each way of sampling find?",
-    needs=(Need("a trained string VAE", _no_models), Need("the corpus of its dataset", _no_corpus)),
+    needs=(STRING_VAE, Need("the corpus of its dataset", _no_corpus)),
     seconds=lambda subject: 150.0 * len(list(subject.models.glob("*/weights.safetensors"))),
     answer=_answer,
     options=_options,

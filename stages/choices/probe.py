@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
@@ -111,8 +112,8 @@ class Probe:
             return Finds(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
         taken = farthest_first(counts, exemplars, min(SHOWN, len(counts)))
         chosen = counts[taken]
-        near = _metric(chosen, exemplars).min(axis=1)
-        apart = _metric(chosen, chosen)[np.triu_indices(len(chosen), 1)]
+        near = histogram_metric(chosen[:, None], exemplars[None]).min(axis=1)
+        apart = histogram_metric(chosen[:, None], chosen[None])[np.triu_indices(len(chosen), 1)]
         return Finds(
             tries=self._tries,
             graphs=len(self.variants),
@@ -134,10 +135,3 @@ class Probe:
 def _counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:
     """Parts by type, float64 (k, types)."""
     return np.array([np.bincount(each, minlength=len(kit.types)) for each in shapes], dtype=np.float64)
-
-
-def _metric(some: FloatArray, others: FloatArray) -> FloatArray:
-    """The histogram metric E of each two, (k, m)."""
-    gaps = np.abs(some[:, None] - others[None]).sum(axis=2)
-    metric: FloatArray = gaps / (some.sum(axis=1)[:, None] + others.sum(axis=1)[None])
-    return metric

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Kit, Strictness
 
@@ -28,7 +29,7 @@ def mutual_distance(counts: np.ndarray) -> float:
     i, j = np.triu_indices(len(chosen), 1)
     if not len(i):
         return 0.0
-    return float((np.abs(chosen[i] - chosen[j]).sum(axis=1) / (chosen[i] + chosen[j]).sum(axis=1)).mean())
+    return float(histogram_metric(chosen[i], chosen[j]).mean())
 
 
 def dullness(kit: Kit, measures: Mapping[str, Any]) -> str:

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from stages.shape.arrays import Float32Array, FloatArray
+from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.kit import Assembly, Kit
 
 __all__ = ["AXES", "MIXED", "Axis", "FeatureTest", "material_shares"]
@@ -55,7 +56,7 @@ class FeatureTest:
         spans = (middles + reach).max(axis=0) - (middles - reach).min(axis=0)
         sides = np.delete(spans, self._up)
         counts = np.bincount(assembly.types, minlength=self._types)
-        distance = min(np.abs(counts - each).sum() / (len(assembly) + each.sum()) for each in self._exemplars)
+        distance = min(histogram_metric(counts, each) for each in self._exemplars)
         return np.array(
             [
                 len(assembly),

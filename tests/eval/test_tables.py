@@ -14,7 +14,7 @@ import pytest
 
 from eval.__main__ import main
 from eval.evaluation import Evaluation
-from eval.needs import FINISHED, KITS, trained_model
+from eval.needs import FINISHED, KITS, STRING_VAE
 from eval.registry import find_tables
 from eval.subject import Subject, load_subject
 from eval.table import Published, Table
@@ -57,12 +57,11 @@ def test_what_is_missing_is_named_with_what_makes_it(tmp_path: Path) -> None:
     assert "make exemplars" in KITS.missing(nothing)
     assert "no shape graphs" in KITS.missing(load_subject(CHAIRS, tmp_path))
     assert FINISHED.missing(finished(tmp_path, DEFAULT)) == ""
-    model = trained_model("strings")
-    assert "make train" in model.missing(nothing)
-    (nothing.models / "strings").mkdir(parents=True)
-    assert "make train" in model.missing(nothing), "an empty folder is no model"
-    (nothing.models / "strings" / "weights.safetensors").touch()
-    assert model.missing(nothing) == ""
+    assert "make train" in STRING_VAE.missing(nothing)
+    (nothing.models / "masked-castle-0").mkdir(parents=True)
+    assert "make train" in STRING_VAE.missing(nothing), "an empty folder is no model"
+    (nothing.models / "masked-castle-0" / "weights.safetensors").touch()
+    assert STRING_VAE.missing(nothing) == ""
 
 
 def test_without_a_table_all_are_listed_with_what_they_lack(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

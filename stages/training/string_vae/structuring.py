@@ -12,9 +12,10 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from stages.shape.graphs.histograms import histogram_metric
+
 __all__ = [
     "PathFigures",
-    "histogram_distances",
     "interpolation",
     "naive_graph",
     "nearest_points",
@@ -78,13 +79,6 @@ def interpolation(graph: csr_matrix, first: int, second: int) -> list[int]:
     return path[::-1]
 
 
-def histogram_distances(histograms: Histograms, links: Links) -> npt.NDArray[np.float64]:
-    """E of pairs of shapes, by the histograms of their types, int64 (n, types): float64 (m,), from 0 to 1."""
-    first, second = histograms[links[:, 0]], histograms[links[:, 1]]
-    distances: npt.NDArray[np.float64] = np.abs(first - second).sum(axis=1) / (first + second).sum(axis=1)
-    return distances
-
-
 def nearest_points(points: npt.NDArray[np.float32], count: int) -> Links:
     """Each point with the `count` nearest others."""
     from scipy.spatial import cKDTree
@@ -113,7 +107,7 @@ def _weighted(links: Links, graphs: Sequence[str], histograms: Histograms) -> cs
     chains = [pair for nodes in equals.values() for pair in pairwise(nodes)]
     joined = np.concatenate([links, np.array(chains, np.int64).reshape(-1, 2)])
     joined = np.unique(np.sort(joined, axis=1), axis=0)  # a pair that stood twice would weigh twice as much
-    weights = histogram_distances(histograms, joined)
+    weights = histogram_metric(histograms[joined[:, 0]], histograms[joined[:, 1]])
     both = np.concatenate([joined, joined[:, ::-1]])
     return csr_matrix((np.tile(weights, 2), (both[:, 0], both[:, 1])), shape=(len(graphs), len(graphs)))
 

@@ -14,6 +14,7 @@ from torch.nn.functional import relu
 
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
+from stages.shape.graphs.histograms import histogram_metric
 from stages.training.loop import device_of
 from stages.training.string_vae.batches import Batch, Strings, batches
 from stages.training.string_vae.corpus import prepare_corpus, read_corpus
@@ -139,18 +140,14 @@ def triplet_loss(points: Tensor, histograms: Tensor, margin: float, noise: Gener
     first, second = (
         torch.randperm(len(points), generator=noise, device=noise.device).to(points.device) for _ in range(2)
     )
-    unlikeness = [histogram_distance(histograms, histograms[other]) for other in (first, second)]
+    unlikeness = [histogram_metric(histograms, histograms[other]) for other in (first, second)]
     gaps = [((points - points[other]) ** 2).sum(dim=-1) for other in (first, second)]
     nearer, farther = (
         torch.where(unlikeness[0] < unlikeness[1], gaps[0], gaps[1]),
         torch.where(unlikeness[0] < unlikeness[1], gaps[1], gaps[0]),
     )
-    return (relu(nearer - farther + margin) * (unlikeness[0] != unlikeness[1])).mean()
-
-
-def histogram_distance(first: Tensor, second: Tensor) -> Tensor:
-    """E (strings §5.3) of the histograms of types float (n, types) of shapes, pair by pair, float (n,)."""
-    return (first - second).abs().sum(dim=-1) / (first.sum(dim=-1) + second.sum(dim=-1))
+    loss: Tensor = (relu(nearer - farther + margin) * (unlikeness[0] != unlikeness[1])).mean()
+    return loss
 
 
 def _divergence(mean: Tensor, log_variance: Tensor) -> Tensor:

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stages.training.string_vae.structuring import (
-    histogram_distances,
     interpolation,
     naive_graph,
     nearest_points,
@@ -16,12 +15,6 @@ from stages.training.string_vae.structuring import (
     path_figures,
     search_graph,
 )
-
-
-def test_histogram_distance_is_the_share_of_parts_that_differ() -> None:
-    histograms = np.array([[2, 2, 0], [2, 0, 4], [2, 2, 0]])
-    # strings §5.3: (0 + 2 + 4) / (4 + 6)
-    np.testing.assert_allclose(histogram_distances(histograms, np.array([[0, 1], [0, 2]])), [0.6, 0.0])
 
 
 def test_equals_are_joined_at_no_cost_however_far_apart_they_lie() -> None:
