@@ -22,9 +22,11 @@ import numpy.typing as npt
 
 from stages.strings.rules import NEVER, Rules
 
-__all__ = ["END", "Acceptor", "follow", "tokens_to_complete"]
+__all__ = ["END", "NONE", "Acceptor", "follow", "is_followed", "tokens_to_complete"]
 
 END = 0
+NONE = -1
+"""No token."""
 _START, _NODE, _OPEN, _CLOSE, _ENDED = range(5)
 """What the last token was; a number counts as its node."""
 
@@ -178,11 +180,9 @@ def _viable_node(rules, state, i, kind, tokens):
 @numba.njit(cache=True)
 def _viable(rules, state, i, tokens):
     """Whether all that is open can be closed with so many tokens, each by itself."""
-    total = state.need[i, state.current[i]]
+    total = state.need[i, state.current[i]] + _open_cycles(state, i)
     for d in range(state.depth[i]):
         total += state.need[i, state.stack[i, d]] + 1
-    for k in range(state.opened.shape[1]):
-        total += state.opened[i, k] >= 0
     if total > tokens:
         return False
     for k in range(state.opened.shape[1]):
@@ -333,39 +333,61 @@ def _viable_end_of_branch(rules, state, i, tokens):
 
 
 @numba.njit(cache=True)
-def _allow(rules, state, i, most, allowed):
-    """Fill `allowed`, bool (tokens,), for a string of at most `most` tokens."""
+def _may_come(rules, state, i, most, token):
+    """Whether a token may come next in a string of at most `most` tokens."""
     types = len(rules.counted)
     previous = state.previous[i]
-    allowed[:] = False
     if previous == _ENDED:
-        allowed[END] = True
-        return
+        return token == END
     tokens = most - state.length[i] - 1
-    if tokens >= 0:
-        for kind in range(types):
-            allowed[1 + kind] = _viable_node(rules, state, i, kind, tokens)
+    if 1 <= token <= types:
+        return tokens >= 0 and _viable_node(rules, state, i, token - 1, tokens)
     if previous in (_START, _OPEN):
-        return
-    can_leave = _can_leave(rules, state, i)
-    if tokens >= 0:
-        allowed[types + 1] = _viable_branch(rules, state, i, tokens)
-        if state.depth[i] > 0:
-            allowed[types + 2] = can_leave and _viable_end_of_branch(rules, state, i, tokens)
-        if previous == _NODE:
-            free = -1
-            for k in range(state.opened.shape[1]):
-                if state.opened[i, k] < 0 and free >= 0:
-                    allowed[types + 3 + k] = allowed[types + 3 + free]  # one free number is as good as another
-                    continue
-                allowed[types + 3 + k] = _viable_number(rules, state, i, k, tokens)
-                if state.opened[i, k] < 0:
-                    free = k
-    if state.depth[i] == 0 and can_leave:
-        allowed[END] = True
-        for k in range(state.opened.shape[1]):
-            if state.opened[i, k] >= 0:
-                allowed[END] = False
+        return False
+    if token == END:
+        return state.depth[i] == 0 and _open_cycles(state, i) == 0 and _can_leave(rules, state, i)
+    if tokens < 0:
+        return False
+    if token == types + 1:
+        return _viable_branch(rules, state, i, tokens)
+    if token == types + 2:
+        return state.depth[i] > 0 and _can_leave(rules, state, i) and _viable_end_of_branch(rules, state, i, tokens)
+    return previous == _NODE and _viable_number(rules, state, i, token - types - 3, tokens)
+
+
+@numba.njit(cache=True)
+def _open_cycles(state, i):
+    opened = 0
+    for k in range(state.opened.shape[1]):
+        opened += state.opened[i, k] >= 0
+    return opened
+
+
+@numba.njit(cache=True)
+def _allow(rules, state, i, most, allowed):
+    """Fill `allowed`, bool (tokens,), for a string of at most `most` tokens."""
+    first = len(rules.counted) + 3
+    free = -1
+    for token in range(len(allowed)):
+        is_free = token >= first and state.opened[i, token - first] < 0
+        if is_free and free >= 0:
+            allowed[token] = allowed[free]  # one free number is as good as another
+            continue
+        allowed[token] = _may_come(rules, state, i, most, token)
+        if is_free:
+            free = token
+
+
+@numba.njit(cache=True)
+def _choose(rules, state, i, most, scores):
+    """The token of the highest score that may come next, or NONE; scores of those before it become -inf."""
+    while True:
+        token = int(scores.argmax())
+        if scores[token] == -np.inf:
+            return NONE
+        if _may_come(rules, state, i, most, token):
+            return token
+        scores[token] = -np.inf
 
 
 @numba.njit(cache=True)
@@ -405,10 +427,25 @@ def _allow_all(rules, state, most, allowed):
 
 
 @numba.njit(cache=True)
+def _choose_all(rules, state, most, scores, kept, tokens):
+    for i in range(len(tokens)):
+        tokens[i] = kept[i] if kept[i] != NONE else _choose(rules, state, i, most, scores[i])
+
+
+@numba.njit(cache=True)
 def _take_all(rules, state, tokens):
     for i in range(len(tokens)):
         if state.previous[i] != _ENDED:
             _take(rules, state, i, tokens[i])
+
+
+@numba.njit(cache=True)
+def _is_followed(rules, state, tokens):
+    for place in range(len(tokens)):
+        if not _may_come(rules, state, 0, NEVER, tokens[place]):
+            return False
+        _take(rules, state, 0, tokens[place])
+    return True
 
 
 @numba.njit(cache=True)
@@ -422,11 +459,9 @@ def _follow(rules, state, tokens, allowed):
             return -1
         _take(rules, state, 0, tokens[place])
         if state.previous[0] != _OPEN and state.previous[0] != _ENDED:
-            total = state.length[0] + state.need[0, state.current[0]]
+            total = state.length[0] + state.need[0, state.current[0]] + _open_cycles(state, 0)
             for d in range(state.depth[0]):
                 total += state.need[0, state.stack[0, d]] + 1
-            for k in range(state.opened.shape[1]):
-                total += state.opened[0, k] >= 0
             most = max(most, total)
     return most
 
@@ -464,9 +499,22 @@ class Acceptor:
         _allow_all(self._rules, self._state, self._most, allowed)
         return allowed
 
+    def choose(self, scores: npt.NDArray[np.float64], kept: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """The token of the highest score, float64 (strings, tokens), that may come next in each string, or NONE where
+        none may that has a score above -inf; the scores are used up. Where `kept`, int64 (strings,), is a token and
+        not NONE, it is that one, unasked. Far fewer tokens are looked at than for `allowed`."""
+        tokens = np.empty(len(scores), np.int64)
+        _choose_all(self._rules, self._state, self._most, scores, kept, tokens)
+        return tokens
+
     def take(self, tokens: npt.NDArray[np.int64]) -> None:
         """Append an allowed token, int64 (strings,), to each string that has not ended."""
         _take_all(self._rules, self._state, tokens)
+
+
+def is_followed(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> bool:
+    """Whether each token of a whole string, int64 (n,), END among them, is allowed after those before it."""
+    return bool(_is_followed(rules, Acceptor(rules, cycles, 1, len(tokens))._state, tokens))
 
 
 def follow(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.bool_], int]:

@@ -13,6 +13,7 @@ import torch
 
 from stages.strings.alphabet import make_alphabet
 from stages.strings.rules import Rules, rules_of
+from stages.strings.tokens import StringError
 from stages.training.checkpoint import load_checkpoint
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.settings import StringVaeEntry
@@ -76,14 +77,13 @@ class TrainedStringVae:
 
     def is_valid(self, string: str) -> bool:
         """Whether it is a string of the grammar that the model has learnt from (strings §5.1)."""
-        from stages.strings.acceptor import follow
+        from stages.strings.acceptor import is_followed
 
         try:
             codes = np.append(self.vocabulary.codes(string), END).astype(np.int64)
-            follow(self.rules, self.vocabulary.cycles, codes)
-        except ValueError:  # which a StringError is
+        except StringError:
             return False
-        return True
+        return is_followed(self.rules, self.vocabulary.cycles, codes)
 
 
 def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedStringVae:

@@ -103,7 +103,7 @@ def _write(
     rng: np.random.Generator | None,
 ) -> list[bool]:
     """Write each draft on from where it was cut; which have come to an end."""
-    from stages.strings.acceptor import Acceptor
+    from stages.strings.acceptor import NONE, Acceptor
 
     device = next(module.parameters()).device
     points = points.to(device)
@@ -116,21 +116,22 @@ def _write(
     for place in range(most + 1):
         logits, state = module.decoder.step(shown, points, state)
         scores = logits.double().cpu().numpy()
-        if acceptor is not None:
-            allowed = acceptor.allowed()
-            for row, draft in enumerate(drafts):
-                if draft.acyclic and place >= len(draft.kept):
-                    allowed[row, allowed.shape[1] - cycles :] = False
-                if place == len(draft.kept):
-                    allowed[row, list(draft.banned)] = False
-                elif place < len(draft.kept):
-                    allowed[row] = False
-                    allowed[row, draft.kept[place]] = True
-            scores[~allowed] = -np.inf
-            dead |= ~allowed.any(axis=1) & ~ended
         if rng is not None:
             scores += rng.gumbel(size=scores.shape)
-        tokens = scores.argmax(axis=1)
+        if acceptor is None:
+            tokens = scores.argmax(axis=1)
+        else:
+            kept = np.full(len(drafts), NONE)
+            for row, draft in enumerate(drafts):
+                if place < len(draft.kept):
+                    kept[row] = draft.kept[place]
+                    continue
+                if place == len(draft.kept):
+                    scores[row, list(draft.banned)] = -np.inf
+                if draft.acyclic:
+                    scores[row, scores.shape[1] - cycles :] = -np.inf
+            tokens = acceptor.choose(scores, kept)
+            dead |= (tokens == NONE) & ~ended
         tokens[dead | ended] = END
         for row in np.flatnonzero(~dead & ~ended).tolist():
             if tokens[row] != END:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS, admits
 from stages.shape.kit import Docking, Grammar, Strictness
-from stages.strings.acceptor import END, Acceptor, follow, tokens_to_complete
+from stages.strings.acceptor import END, NONE, Acceptor, follow, is_followed, tokens_to_complete
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.encoder import encode
@@ -113,6 +113,21 @@ def test_string_of_allowed_tokens_is_admitted_and_no_longer_than_it_may_be(
     check(Vocabulary(AB, cycles).string(codes), AB, grammar)
 
 
+@given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.integers(0, 3))
+def test_chosen_is_the_best_of_what_is_allowed(seed: int, name: str, cycles: int) -> None:
+    rng = np.random.default_rng(seed)
+    acceptor = Acceptor(make_rules(GRAMMARS[name], 3, cycles), cycles, 4, 12)
+    for _ in range(12):
+        allowed = acceptor.allowed()
+        scores = np.where(rng.random(allowed.shape) < 0.2, -np.inf, rng.normal(size=allowed.shape))
+        kept = np.array([NONE, NONE, NONE, int(allowed[3].argmax())])
+        masked = np.where(allowed, scores, -np.inf)
+        wanted = np.where(np.isinf(masked).all(axis=1), NONE, masked.argmax(axis=1))
+        wanted[3] = kept[3]
+        assert acceptor.choose(scores, kept).tolist() == wanted.tolist()
+        acceptor.take(np.where(wanted == NONE, END, wanted))
+
+
 @given(st.integers(0, 2**32), st.integers(0, len(toy.graphs()) - 1), st.sampled_from(ALL_LEVELS))
 def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, strictness: Strictness) -> None:
     types, edges = toy.graphs()[number]
@@ -123,6 +138,7 @@ def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, st
     codes = np.append(vocabulary.codes(string), END).astype(np.int64)
     masks, most = follow(make_rules(grammar, 3, 4), 4, codes)
     assert masks[np.arange(len(codes)), codes].all()
+    assert is_followed(make_rules(grammar, 3, 4), 4, codes)
     # With as many tokens as its beginnings need, no token of it is left out for want of room.
     acceptor = Acceptor(make_rules(grammar, 3, 4), 4, 1, max(most, len(codes) - 1))
     for code in codes:
@@ -142,6 +158,7 @@ def test_what_is_not_admitted_is_refused_at_its_first_wrong_token(string: str, p
     codes = np.append(vocabulary.codes(string), END).astype(np.int64)
     with pytest.raises(ValueError, match=f"token {place} is not allowed"):
         follow(rules, 1, codes)
+    assert not is_followed(rules, 1, codes)
 
 
 @given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.sampled_from(ALL_LEVELS))
