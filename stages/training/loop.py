@@ -27,6 +27,7 @@ def same_arithmetic(threads: int) -> None:
     """Let torch sum in one order, with so many threads: equal seeds give equal weights."""
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # it only costs time
 
 
 def device_of(asked: str) -> torch.device:
