@@ -1,0 +1,142 @@
+"""Strings that a VAE learns from a second and core, beside one trained as in MOSES.
+
+The peer has the same sizes and sees the same strings. As in MOSES it draws its batches at random, whatever the lengths,
+sorts each by length, reads it as a packed sequence and writes it as a packed sequence, without a mask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import cross_entropy
+from torch.nn.utils.rnn import pack_sequence, pad_packed_sequence
+
+from stages.exemplars.build import read_kit
+from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.strings.acceptor import follow
+from stages.strings.kit_strings import KitStrings
+from stages.strings.rules import make_rules
+from stages.training.loop import LARGEST_GRADIENT, same_arithmetic
+from stages.training.string_vae.batches import Strings
+from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.training import StringVaeLearner, new_model
+from stages.training.string_vae.vocabulary import END, Vocabulary
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search
+from stages.variations.settings import SearchConfig
+from tests.bench.measure import Measure, rate
+
+SHAPES = 60
+
+
+def bench() -> Iterator[Measure]:
+    """Strings of the castle that comes with Shapemill, forward, backward and one step of Adam."""
+    same_arithmetic(1)
+    strings, vocabulary, most = castle_strings()
+    note = f"{int(np.median(strings.lengths))} tokens in the median"
+    entry = StringVaeEntry(name="bench")
+    peer = rate(moses_steps(strings, len(vocabulary), entry), 4.0, 2)
+    arms: dict[str, dict[str, Any]] = {
+        "plain": {"decoder": "plain"},
+        "masked": {},
+        "masked, bfloat16": {"precision": "bfloat16"},
+        "transformer": {"decoder": "transformer", "hidden": 128, "layers": 3},
+    }
+    for name, settings in arms.items():
+        arm = StringVaeEntry.model_validate({"name": "bench", **settings})
+        learner = StringVaeLearner(new_model(arm, vocabulary, most, 0), {}, arm, vocabulary, strings, strings)
+        ours = rate(our_steps(learner), 4.0, 2)
+        yield Measure(f"string VAE learns, {name}", "strings", ours, "as in MOSES", peer, note)
+
+
+def castle_strings() -> tuple[Strings, Vocabulary, int]:
+    """Nine strings of each of SHAPES variants."""
+    shapes = tuple(ShapeFile(path=path) for path in sorted(Path("datasets/exemplars/castle").glob("*.glb")))
+    kit = read_kit(KitConfig(name="castle", shapes=shapes).decide(STRICTEST))
+    rng = np.random.default_rng(0)
+    found, _ = Search(ContactAnswers(kit), SearchConfig()).run(rng, SHAPES, 10**9, "bench", lambda count: None)
+    writer = KitStrings(kit, "all")
+    written = [[each.string for each in writer.strings(writer.graph(new.assembly), 8, rng)] for new in found]
+    cycles = 12
+    vocabulary, rules = Vocabulary(writer.alphabet, cycles), make_rules(kit.grammar, len(kit.labels), cycles)
+    codes = [np.append(vocabulary.codes(each), END).astype(np.int64) for of_shape in written for each in of_shape]
+    masks = [np.packbits(follow(rules, cycles, each)[0], axis=-1, bitorder="little") for each in codes]
+    types = len(kit.labels)
+    strings = Strings(
+        tokens=np.concatenate(codes).astype(np.int16),
+        first=np.cumsum([0, *map(len, codes)]),
+        masks=np.concatenate(masks),
+        graph=np.arange(len(codes), dtype=np.int32),
+        histograms=np.stack([np.bincount(each, minlength=types + 1)[1 : types + 1] for each in codes]).astype(np.int32),
+    )
+    return strings, vocabulary, max(map(len, codes))
+
+
+def our_steps(learner: StringVaeLearner) -> Any:
+    """A function that trains one step and says how many strings it saw."""
+    optimizer = torch.optim.Adam(learner.module.parameters())
+    stream, noise, steps = learner.batches(np.random.default_rng(0)), torch.Generator().manual_seed(0), count()
+
+    def step() -> int:
+        batch = next(stream)
+        with torch.autocast("cpu", torch.bfloat16, enabled=learner.entry.precision == "bfloat16"):
+            loss = learner.losses(batch, next(steps), noise)["loss"]
+        _descend(learner.module, optimizer, loss)
+        return len(batch.codes)
+
+    return step
+
+
+def moses_steps(strings: Strings, tokens: int, entry: StringVaeEntry) -> Any:
+    """The same for the peer."""
+    model = _Moses(entry, tokens)
+    optimizer = torch.optim.Adam(model.parameters())
+    rng = np.random.default_rng(0)
+    each = [torch.from_numpy(part.astype(np.int64)) for part in np.split(strings.tokens, strings.first[1:-1])]
+
+    def step() -> int:
+        chosen = sorted((each[row] for row in rng.choice(len(each), entry.batch)), key=len, reverse=True)
+        _descend(model, optimizer, model(chosen, entry.kl_weight))
+        return len(chosen)
+
+    return step
+
+
+def _descend(module: nn.Module, optimizer: torch.optim.Adam, loss: Tensor) -> None:
+    optimizer.zero_grad()
+    loss.backward()  # type: ignore[no-untyped-call]
+    torch.nn.utils.clip_grad_norm_(module.parameters(), LARGEST_GRADIENT)
+    optimizer.step()
+
+
+class _Moses(nn.Module):
+    def __init__(self, entry: StringVaeEntry, tokens: int) -> None:
+        super().__init__()
+        self.embedding = nn.Embedding(tokens, entry.embedding)
+        self.encoder = nn.GRU(entry.embedding, entry.hidden // 2, batch_first=True, bidirectional=True)
+        self.mean, self.log_variance = nn.Linear(entry.hidden, entry.latent), nn.Linear(entry.hidden, entry.latent)
+        self.first = nn.Linear(entry.latent, entry.hidden)
+        self.decoder = nn.GRU(entry.embedding + entry.latent, entry.hidden, batch_first=True)
+        self.logits = nn.Linear(entry.hidden, tokens)
+
+    def forward(self, strings: list[Tensor], weight: float) -> Tensor:
+        _, last = self.encoder(pack_sequence([self.embedding(each) for each in strings]))
+        summary = torch.cat([last[0], last[1]], dim=-1)
+        mean, log_variance = self.mean(summary), self.log_variance(summary)
+        points = mean + torch.exp(0.5 * log_variance) * torch.randn_like(mean)
+        shown = [torch.cat([each.new_full((1,), END), each[:-1]]) for each in strings]
+        seen = [
+            torch.cat([self.embedding(each), point.expand(len(each), -1)], dim=-1)
+            for each, point in zip(shown, points, strict=True)
+        ]
+        written, _ = pad_packed_sequence(self.decoder(pack_sequence(seen), self.first(points)[None])[0], True)
+        wanted = nn.utils.rnn.pad_sequence(strings, batch_first=True, padding_value=-1)
+        nats = cross_entropy(self.logits(written).flatten(0, 1), wanted.flatten(), ignore_index=-1, reduction="sum")
+        divergence = 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum(dim=-1).mean()
+        return nats / len(strings) + weight * divergence
