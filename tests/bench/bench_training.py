@@ -139,4 +139,5 @@ class _Moses(nn.Module):
         wanted = nn.utils.rnn.pad_sequence(strings, batch_first=True, padding_value=-1)
         nats = cross_entropy(self.logits(written).flatten(0, 1), wanted.flatten(), ignore_index=-1, reduction="sum")
         divergence = 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum(dim=-1).mean()
-        return nats / len(strings) + weight * divergence
+        loss: Tensor = nats / len(strings) + weight * divergence
+        return loss
