@@ -1,4 +1,4 @@
-"""Programs from the command line: `python -m stages.programs inspect|sheet|make|mix|interpolate PROGRAM ...`.
+"""Programs from the command line: `python -m stages.programs inspect|movement|sheet|make|mix|interpolate PROGRAM ...`.
 
 A SHAPE is a JSON file of parameters, a whole number (the random shape of that seed), or `base`.
 """
@@ -15,6 +15,7 @@ from pipeline.errors import ConfigError, ShardFailed
 from pipeline.places import write_file
 from stages.programs.editing import interpolate, mix
 from stages.programs.files import named_values, random_shapes, shape_glb
+from stages.programs.movement import movement_table, movements
 from stages.programs.parameters import ParameterError
 from stages.programs.program import Program, find_program
 from stages.programs.recipe import recipe_markdown
@@ -46,6 +47,11 @@ def _inspect(program: Program, asked: argparse.Namespace) -> list[Path]:
     sys.stdout.flush()
     picture = asked.picture or asked.out / f"{program.name}.png"
     return [write_file(picture, picture_png(parameter_sheet(program)))]
+
+
+def _movement(program: Program, asked: argparse.Namespace) -> list[Path]:
+    print(movement_table(list(movements(program, asked.count, asked.seed))), end="")
+    return []
 
 
 def _sheet(program: Program, asked: argparse.Namespace) -> list[Path]:
@@ -100,6 +106,9 @@ def _parser() -> argparse.ArgumentParser:
 
     inspect = command("inspect", _inspect, "Print the table of parameters, and draw one row a parameter.")
     inspect.add_argument("--picture", type=Path, metavar="FILE", help="where the PNG goes")
+    movement = command("movement", _movement, "Print how far each parameter moves the surface of random shapes.")
+    movement.add_argument("--count", type=_count, default=40, help="so many shapes in which a parameter is visible")
+    movement.add_argument("--seed", type=int, default=0, help="which")
     sheet = command("sheet", _sheet, "Draw random shapes.")
     sheet.add_argument("--count", type=_count, default=64, help="how many")
     sheet.add_argument("--seed", type=int, default=0, help="which")
