@@ -37,7 +37,16 @@ PARAMETERS = (
     continuous(
         "scale z", 0.5, 2.0, 10, 1.0, "size", "Height of the posts of the back above the ground, in 0.95 metres."
     ),
-    continuous("bevel_rails", 0.0, 1.0, 3, 0.0, "back", "Section of the rails, from square to round.", OPEN),
+    continuous(
+        "bevel_rails",
+        0.0,
+        1.0,
+        3,
+        0.0,
+        "back",
+        "Section of the rails, from square to round and turned.",
+        OPEN,
+    ),
     discrete("pillow_state", 0, 2, 1, "seat", "No cushion, a flat one or a puffed one."),
     discrete(
         "pillow_fill_edge", 0, 1, 1, "seat", "Whether the cushion reaches to the edge of the seat.", "pillow_state > 0"
@@ -47,8 +56,8 @@ PARAMETERS = (
     discrete("cr_count", 3, 8, 5, "back", "Number of cross rails.", CROSS),
     continuous("cr_scale_y", 0.5, 1.2, 4, 0.7333, "back", "Thickness of the cross rails.", CROSS),
     continuous("cr_scale_z", 0.3, 2.0, 6, 0.98, "back", "Height of each cross rail.", CROSS),
-    continuous("cr_offset_bottom", 0.15, 0.75, 8, 0.4071, "back", "Height of the lowest cross rail.", CROSS),
-    continuous("cr_offset_top", 0.35, 0.95, 8, 0.7786, "back", "Height of the highest cross rail.", CROSS),
+    continuous("cr_offset_bottom", 0.15, 0.75, 8, 0.4071, "back", "Where the lowest cross rail begins.", CROSS),
+    continuous("cr_offset_top", 0.35, 0.95, 8, 0.7786, "back", "Where the highest cross rail ends.", CROSS),
     continuous(
         "cr_shape_1", 0.0, 2.0, 7, 0.0, "back", "How far cross rails are arched, and narrow at their ends.", CROSS
     ),
@@ -68,7 +77,16 @@ PARAMETERS = (
     discrete("vr_count", 3, 8, 4, "back", "Number of vertical rails.", VERTICAL),
     continuous("vr_scale_x", 0.3, 2.0, 6, 0.7799999713897705, "back", "Width of each vertical rail.", VERTICAL),
     continuous("vr_scale_y", 0.2, 1.0, 4, 0.3499999940395355, "back", "Thickness of the vertical rails.", VERTICAL),
-    continuous("vr_shape_1", 0.0, 0.4, 5, 0.0, "back", "How much vertical rails thin towards their ends.", VERTICAL),
+    continuous(
+        "vr_shape_1",
+        0.0,
+        0.4,
+        5,
+        0.0,
+        "back",
+        "How far vertical rails bow to the front, and thin at their ends.",
+        VERTICAL,
+    ),
     binary("is_back_rest", False, "back", "Whether an upholstered panel fills the back, instead of rails."),
     continuous("legs_shape_1", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at the ground.", LEGS),
     continuous("legs_shape_2", 0.0, 1.0, 3, 1.0, "legs", "Thickness of the legs at half their height.", LEGS),

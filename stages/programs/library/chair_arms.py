@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.programs.curves import Curve, Part, bezier, square_circle, sweep, symmetric
+from stages.programs.curves import Curve, Part, bezier, polyline, square_circle, sweep, symmetric
 from stages.programs.library.chair_dimensions import LEATHER, WOOD, ChairDimensions
+from stages.programs.library.rails import cubic, eased
 from stages.shape.arrays import FloatArray
 
 __all__ = ["arm_parts"]
@@ -19,9 +20,9 @@ def arm_parts(chair: ChairDimensions) -> list[Part]:
     state = int(values["handles_state"])
     if not state:
         return []
-    width = 1.4 * chair.unit * float(values["handles_profile_width"])
-    height = 1.05 * chair.unit * float(values["handles_profile_height"])
-    arm = _arm(chair, state, width)
+    width = chair.unit * (2.0 * float(values["handles_profile_width"]) - 0.35)
+    height = chair.unit * (2.1 * float(values["handles_profile_height"]) - 0.6)
+    arm = _arm(chair, state, width, height)
     profile = square_circle(0.4, width, height, 12)
     parts = [Part("arm", sweep(arm, profile, up=UP, caps=("flat", "round" if state == 1 else "flat")), WOOD)]
     if state == 1 and values["is_handles_support"]:
@@ -31,11 +32,11 @@ def arm_parts(chair: ChairDimensions) -> list[Part]:
     return symmetric(parts, "x")
 
 
-def _arm(chair: ChairDimensions, state: int, width: float) -> Curve:
-    """The right arm from the post forwards."""
+def _arm(chair: ChairDimensions, state: int, width: float, height: float) -> Curve:
+    """The right arm from the post forwards, for a section of this width and height."""
     values = chair.values
     # Arms leave room for a cushion.
-    above = 2.2 * chair.unit
+    above = 2.4 * chair.unit
     rest = chair.back_height - above
     share = float(values["handles_base_pos_z_pct"])
     start = chair.back(chair.x, (above + rest * share) / chair.back_height)
@@ -49,10 +50,12 @@ def _arm(chair: ChairDimensions, state: int, width: float) -> Curve:
     forward = start[2] + (front - start[2]) * (0.1 + 0.8 * float(values["handles_mid_pos_y_pct"]))
     middle = np.array([side, start[1] + lift, forward])
     if state == 2:
-        return bezier([start, middle, middle, _foot(chair, width)], count=16)
+        points = cubic([start, middle, middle, _foot(chair, width)], 16)
+        return polyline(eased(points, np.full(17, 0.5 * np.hypot(width, height))))
     end = np.array([chair.x + bow * float(values["handles_edge_pos_x_pct"]), start[1], front])
     # Gently towards the middle, or the free end would be a hook where both are near each other.
-    return bezier([start, start + (middle - start) / 1.5, end + (middle - end) / 1.5, end], count=12)
+    points = cubic([start, start + (middle - start) / 1.5, end + (middle - end) / 1.5, end], 12)
+    return polyline(eased(points, np.full(13, 0.5 * np.hypot(width, height))))
 
 
 def _foot(chair: ChairDimensions, width: float) -> FloatArray:
@@ -64,7 +67,7 @@ def _foot(chair: ChairDimensions, width: float) -> FloatArray:
 def _support(chair: ChairDimensions, arm: Curve) -> Part:
     """The post below the right arm."""
     values = chair.values
-    size = chair.unit * float(values["handles_support_thickness"])
+    size = chair.unit * (2.1 * float(values["handles_support_thickness"]) - 0.49)
     foot, top = _foot(chair, size), arm.at(float(values["handles_support_top_pos"]))
     bow = np.array(
         [
@@ -83,6 +86,9 @@ def _pad(chair: ChairDimensions, arm: Curve, state: int, width: float, height: f
     cover = float(chair.values["handles_cusion_cover_pct"])
     middle, half = (0.53, 0.11 + 0.31 * cover) if state == 1 else (0.36, 0.08 + 0.19 * cover)
     start, end = middle - half, middle + half
-    profile = square_circle(0.6, 1.2 * width, 0.7 * chair.unit, 12).translated(0.0, 0.5 * height + 0.1 * chair.unit)
-    lean = arm.frames(start, up=UP)[:3, 1]
-    return Part("arm pad", sweep(arm.part(start, end), profile, up=lean, caps="round"), LEATHER)
+    profile = square_circle(0.6, 1.2 * width, 0.7 * chair.unit, 12)
+    covered = arm.part(start, end)
+    above = covered.frames(covered.positions, up=arm.frames(start, up=UP)[:3, 1])[:, :3, 1]
+    points = covered.points + (0.5 * height + 0.1 * chair.unit) * above
+    rail = polyline(eased(points, np.full(len(points), 0.5 * np.hypot(*profile.size))))
+    return Part("arm pad", sweep(rail, profile, up=above[0], caps="round"), LEATHER)

@@ -15,7 +15,8 @@ from stages.programs.curves import (
     sweep,
     symmetric,
 )
-from stages.programs.library.chair_dimensions import FABRIC, SEAT, WOOD, ChairDimensions, post
+from stages.programs.library.chair_dimensions import FABRIC, SEAT, WOOD, ChairDimensions, post, section
+from stages.programs.library.rails import eased
 from stages.shape.arrays import FloatArray
 
 __all__ = ["back_parts"]
@@ -30,8 +31,7 @@ def back_parts(chair: ChairDimensions) -> list[Part]:
     share = np.linspace(0.0, 1.0, 9)
     centers = chair.back(chair.x, share)
     foot = np.array([[chair.x, chair.seat_middle, -chair.z]])
-    profile = square_circle(float(values["legs_bevel"]), 1.05 * chair.unit)
-    side = post(np.concatenate([foot, centers]), profile, np.concatenate([[1.0], 1.0 - 0.2 * share]))
+    side = post(np.concatenate([foot, centers]), section(chair, 1.05), np.concatenate([[1.0], 1.0 - 0.2 * share]))
     parts = symmetric([Part("back post", side, WOOD)], "x")
     if values["is_top_rail"]:
         parts.append(_top_rail(chair))
@@ -77,10 +77,11 @@ def _top_rail(chair: ChairDimensions) -> Part:
         x = np.concatenate([[-end], x, [end]])
     up = chair.up(level)
     rise = _rise(chair, x)
-    rail = polyline(chair.back(x, level) + rise[:, None] * up)
-    depth = 0.8 * chair.unit * float(chair.values["tr_scale_y"])
-    profile = rounded_rectangle(depth, height, 0.3 * min(depth, height), 2)
+    depth = chair.unit * (1.3 * float(chair.values["tr_scale_y"]) - 0.3)
     swell = 1.0 + 0.5 * float(chair.values["tr_shape_1"]) * (rise / max(rise.max(), 1e-9))
+    reach = 0.5 * np.hypot(depth, height * swell)
+    rail = polyline(eased(chair.back(x, level) + rise[:, None] * up, reach))
+    profile = rounded_rectangle(depth, height, 0.3 * min(depth, height), 2)
     return Part("top rail", sweep(rail, profile, _styled(rail, 1.0, swell), up=up), WOOD)
 
 
@@ -92,41 +93,61 @@ def _styled(rail: Curve, x: float | FloatArray, y: float | FloatArray) -> Style:
     return Style(positions, scale, np.zeros(len(positions)))
 
 
+def _turned(chair: ChairDimensions, share: FloatArray, size: tuple[float, float], room: float) -> FloatArray:
+    """The scale of a rail's section, of a `size` in both directions, at shares of its length, float64 (n, 2).
+
+    A round rail is turned: it swells towards its middle, in its second direction by no more than there is `room` for.
+    """
+    girth = 0.95 * chair.unit * float(chair.values["bevel_rails"])
+    swell = 4.0 * share * (1.0 - share)
+    scale: FloatArray = 1.0 + swell[:, None] * (np.array([girth, min(girth, room)]) / size)
+    return scale
+
+
 def _cross_rails(chair: ChairDimensions) -> list[Part]:
     """Slats from post to post; they share the room from the lowest to the highest and never touch each other."""
     values = chair.values
-    count, size = int(values["cr_count"]), float(values["cr_scale_z"])
+    count = int(values["cr_count"])
     room = _room(chair)
     low, high = room * float(values["cr_offset_bottom"]), room * float(values["cr_offset_top"])
-    pitch = chair.back_height * (high - low) / (count - 1)
-    height = min(size * min(0.9 * chair.unit, 0.055 * chair.back_height), (0.25 + 0.3 * size) * pitch)
-    profile = square_circle(float(values["bevel_rails"]), 0.55 * chair.unit * float(values["cr_scale_y"]), height, 12)
+    # Each has a slot, and fills so much of it.
+    slot = chair.back_height * (high - low) / count
+    height = (0.525 * float(values["cr_scale_z"]) - 0.08) * slot
+    size = chair.unit * (1.2 * float(values["cr_scale_y"]) - 0.32), height
+    half = 0.5 * height / chair.back_height
+    profile = square_circle(float(values["bevel_rails"]), *size, 12)
     # Arched: the ends lie lower than the middle, the lowest ones still above the seat.
     shape = float(values["cr_shape_1"])
     drop, lens = 0.045 * shape * ACROSS**2, 1.0 - 0.15 * shape * ACROSS**2
+    scale = _turned(chair, (ACROSS + 1.0) / 2.0, size, 0.7 * (slot - height))
+    scale[:, 1] *= lens
     parts = []
-    for level in np.linspace(low, high, count).tolist():
+    for level in np.linspace(low + half, high - half, count).tolist():
         rail = polyline(chair.back(chair.x * ACROSS, level - drop))
-        parts.append(Part("cross rail", sweep(rail, profile, _styled(rail, 1.0, lens), up=chair.up(level)), SEAT))
+        swept = sweep(rail, profile, Style(rail.positions, scale, np.zeros(len(scale))), up=chair.up(level))
+        parts.append(Part("cross rail", swept, SEAT))
     return parts
 
 
 def _vertical_rails(chair: ChairDimensions) -> list[Part]:
     """Spindles from the seat up into the top rail."""
     values = chair.values
-    count, size = int(values["vr_count"]), float(values["vr_scale_x"])
+    count, shape = int(values["vr_count"]), float(values["vr_shape_1"])
     spacing = 2.0 * chair.x / (count + 1)
-    width = min(0.6 * chair.unit * size, (0.2 + 0.3 * size) * spacing)
-    profile = square_circle(float(values["bevel_rails"]), width, 0.65 * chair.unit * float(values["vr_scale_y"]), 12)
-    share = np.linspace(0.0, 1.0, 8)
-    bulge = 1.0 - 1.6 * float(values["vr_shape_1"]) * (2.0 * share - 1.0) ** 2
+    size = 0.41 * float(values["vr_scale_x"]) * spacing, chair.unit * float(values["vr_scale_y"])
+    profile = square_circle(float(values["bevel_rails"]), *size, 12)
+    share = np.linspace(0.0, 1.0, 9)
+    scale = _turned(chair, share, size[::-1], 0.6 * (spacing - size[0]))[:, ::-1]
+    scale *= 1.0 - 1.5 * shape * (2.0 * share[:, None] - 1.0) ** 2
+    # They bow towards the sitter, and end where the back does.
+    bow = 0.16 * shape * chair.back_height * (4.0 * share * (1.0 - share)) ** 2
     level = _top_level(chair)
     parts = []
     for x in (spacing * (np.arange(1, count + 1) - (count + 1) / 2.0)).tolist():
         top = level + float(_rise(chair, np.array([x]))[0]) / chair.back_height
-        centers = chair.back(x, top * share)
+        centers = chair.back(x, top * share) + bow[:, None] * [0.0, 0.0, 1.0]
         centers[0, 1] = chair.seat_middle
-        parts.append(Part("vertical rail", post(centers, profile, bulge), SEAT))
+        parts.append(Part("vertical rail", post(centers, profile, scale), SEAT))
     return parts
 
 

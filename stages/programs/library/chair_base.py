@@ -12,13 +12,15 @@ from stages.programs.curves import (
     bezier,
     circle,
     cylinder,
+    polyline,
     radial,
     square_circle,
     sweep,
     symmetric,
     translation,
 )
-from stages.programs.library.chair_dimensions import METAL, WOOD, ChairDimensions, post
+from stages.programs.library.chair_dimensions import METAL, WOOD, ChairDimensions, post, section
+from stages.programs.library.rails import cubic, eased
 from stages.shape.arrays import FloatArray
 
 __all__ = ["base_parts"]
@@ -43,15 +45,15 @@ def _four_legs(chair: ChairDimensions) -> list[Part]:
     centers = np.stack([np.full(RINGS, chair.x), top * (1.0 - share), np.full(RINGS, chair.z)], axis=1)
     behind = centers * [1.0, 1.0, -1.0]
     behind[:, 2] -= 3.0 * share * (1.0 - share) * middle + share**2 * foot
-    profile = square_circle(float(chair.values["legs_bevel"]), 1.2 * chair.unit)
+    profile = section(chair, 1.2)
     width = _width(chair, share)
     return symmetric([Part("leg", post(each, profile, width), WOOD) for each in (centers, behind)], "x")
 
 
 def _width(chair: ChairDimensions, share: FloatArray) -> FloatArray:
     """Relative width of a leg at shares of the way from its top down to its foot."""
-    foot = 0.5 + 0.5 * float(chair.values["legs_shape_1"])
-    waist = (0.62 + 0.38 * float(chair.values["legs_shape_2"])) * (1.0 + foot) / 2.0
+    foot = 0.38 + 0.74 * float(chair.values["legs_shape_1"])
+    waist = (0.36 + 0.74 * float(chair.values["legs_shape_2"])) * (1.0 + foot) / 2.0
     width: FloatArray = (1.0 - share) * (1.0 - 2.0 * share) + 4.0 * share * (1.0 - share) * waist
     width += share * (2.0 * share - 1.0) * foot
     return width
@@ -96,19 +98,18 @@ def _star(chair: ChairDimensions) -> list[Part]:
     reach = 0.5 * (chair.width * chair.depth) ** 0.5
     level = chair.seat_middle * float(values["monoleg_tent_pct"])
     hub = 0.6 * unit + 0.45 * reach * float(values["monoleg_bezier_start_x_offset"])
-    end, foot = reach * (0.55 + 0.55 * float(values["monoleg_bezier_end_x_offset"])), 0.5 * unit
+    end, foot = reach * (0.55 + 0.55 * float(values["monoleg_bezier_end_x_offset"])), 0.6 * unit
     # The upper handle stays in the upper part and the lower one in the lower, or thick legs would cut themselves.
     handles = _handles(chair) * [reach, 0.75] + [[0.0, 0.0], [0.0, 0.25]]
-    rail = bezier(
-        [[0.0, level + (foot - level) * down, out] for out, down in [(hub, 0.0), *handles.tolist(), (end, 1.0)]],
-        count=12,
-    )
-    profile = square_circle(float(values["legs_bevel"]), 0.92 * unit)
+    controls = [[0.0, level + (foot - level) * down, out] for out, down in [(hub, 0.0), *handles.tolist(), (end, 1.0)]]
+    profile = section(chair, 0.92)
+    girth = np.hypot(*profile.points[0]) * _width(chair, np.linspace(0.0, 1.0, 13))
+    rail = polyline(eased(cubic(controls, 12), girth))
     width = _width(chair, rail.positions)
     style = Style(rail.positions, np.stack([width, width], axis=1), np.zeros(len(width)))
     leg = Part("leg", sweep(rail, profile, style, up=(1.0, 0.0, 0.0), caps=("flat", "round")), METAL)
-    glide = Part("glide", cylinder(0.5 * unit, 0.7 * unit).transformed(translation(0.0, 0.0, end)), METAL)
-    column = square_circle(float(values["legs_bevel"]), 1.3 * unit)
+    glide = Part("glide", cylinder(0.5 * unit, 0.75 * unit).transformed(translation(0.0, 0.0, end)), METAL)
+    column = section(chair, 1.3)
     heights, plate = np.array([level - 0.45 * unit, level + 0.45 * unit]), hub + 0.5 * unit
     return [
         Part("column", _upright(column, np.array([level, chair.seat_middle]), np.ones(2)), METAL),

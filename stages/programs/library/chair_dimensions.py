@@ -12,7 +12,7 @@ from stages.programs.curves import Profile, QuadMesh, loft_rings, square_circle
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["FABRIC", "LEATHER", "METAL", "SEAT", "WOOD", "ChairDimensions", "post"]
+__all__ = ["FABRIC", "LEATHER", "METAL", "SEAT", "WOOD", "ChairDimensions", "post", "section"]
 
 WOOD, SEAT, METAL = (151, 104, 66), (176, 128, 84), (92, 96, 102)
 FABRIC, LEATHER = (64, 104, 122), (118, 66, 50)
@@ -36,7 +36,7 @@ class ChairDimensions:
     def unit(self) -> float:
         """Thicknesses grow with the chair, but much less."""
         size = float(self.values["scale x"] * self.values["scale y"] * self.values["scale z"])
-        return float(0.036 * size ** (1.0 / 6.0))
+        return float(0.04 * size**0.25)
 
     @cached_property
     def width(self) -> float:
@@ -112,9 +112,17 @@ class ChairDimensions:
         return np.stack([x, self.seat_top + self.back_height * u, -self.z - behind], axis=-1)
 
 
+def section(chair: ChairDimensions, thickness: float) -> Profile:
+    """The section of legs, column and posts of so many units: a sharp square, or a circle that fits well within it."""
+    round_ = float(chair.values["legs_bevel"])
+    return square_circle(round_, (1.1 - 0.14 * round_) * thickness * chair.unit)
+
+
 def post(centers: FloatArray, profile: Profile, scale: FloatArray) -> QuadMesh:
-    """A post with level sections around centers (n, 3) from the lowest to the highest, each scaled by `scale` (n,):
-    it stands flat on the ground however it leans."""
+    """A post with level sections around centers (n, 3) from the lowest to the highest, each scaled by `scale`, (n,) or
+    (n, 2) for the profile's x and y: it stands flat on the ground however it leans."""
     flat = np.zeros((len(profile), 3))
     flat[:, 0], flat[:, 2] = profile.points[:, 0], -profile.points[:, 1]
-    return loft_rings(centers[:, None] + scale[:, None, None] * flat)
+    factors = np.ones((len(scale), 3))
+    factors[:, [0, 2]] = scale[:, None] if scale.ndim == 1 else scale
+    return loft_rings(centers[:, None] + factors[:, None] * flat)
