@@ -6,15 +6,16 @@ import numpy as np
 
 from stages.programs.curves import (
     Part,
+    Profile,
     QuadMesh,
     Style,
     extrude,
     line,
     loft_rings,
-    rectangle,
     square_circle,
     sweep,
     symmetric,
+    translation,
 )
 from stages.programs.library.cabinet_dimensions import CabinetDimensions, block
 
@@ -24,6 +25,12 @@ OAK, SHADE, DARK = (205, 172, 128), (184, 150, 106), (84, 66, 54)
 
 SUNK = 0.004
 """How far boards reach into each other."""
+
+CORNER = 6
+"""Sides of a round corner."""
+
+SIDEWAYS = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""Takes x and z of what is extruded upwards to z and y, and its height to x."""
 
 
 def case_parts(cabinet: CabinetDimensions) -> list[Part]:
@@ -66,14 +73,23 @@ def top_parts(cabinet: CabinetDimensions) -> list[Part]:
     values = cabinet.values
     thick, flare = values["top_thickness"], 0.7 * cabinet.crown
     out = values["top_overhang"] + flare
-    depth = cabinet.face + out - cabinet.back
     bevel = 0.45 * thick * values["edge_roundness"]
-    outline = rectangle(2.0 * (cabinet.half + out), depth).translated(0.0, (cabinet.face + out + cabinet.back) / 2.0)
+    # It grows by what its round corners in front would let look out.
+    radius = 0.14 * values["edge_roundness"]
+    out += (1.0 - np.sqrt(0.5)) * (radius - bevel) + bevel
+    outline = _rounded_in_front(cabinet.half + out, cabinet.back, cabinet.face + out, radius)
     mesh = extrude(outline, thick, base=values["height"] - thick, bevel=bevel, steps=3)
     parts = [Part("top", mesh, OAK)]
     if cabinet.crown:
         parts.append(Part("crown", _crown(cabinet, flare), OAK))
     return parts
+
+
+def _rounded_in_front(half: float, back: float, front: float, radius: float) -> Profile:
+    """A rectangle from -half to half and from back to front, whose corners in front have a radius."""
+    turn = np.linspace(0.0, np.pi / 2.0, CORNER + 1)
+    corner = np.stack([np.cos(turn) - 1.0, np.sin(turn) - 1.0], axis=1) * radius + [half, front]
+    return Profile.of(np.concatenate([[[-half, back], [half, back]], corner, corner[::-1] * [-1.0, 1.0]]))
 
 
 def _crown(cabinet: CabinetDimensions, flare: float) -> QuadMesh:
@@ -101,11 +117,12 @@ def base_parts(cabinet: CabinetDimensions) -> list[Part]:
             (cabinet.half - 0.005 - inset, top, cabinet.front - inset),
         )
         return [Part("plinth", block(low, high), DARK)]
-    thick = 0.06 if kind == 1 else 0.03
+    thick = 0.065 + 0.03 * cabinet.half if kind == 1 else 0.03
     x, z = cabinet.half - thick / 2.0 - 0.006 - inset, cabinet.front - thick / 2.0 - 0.006 - 0.6 * inset
     if kind == 2:
         return symmetric([Part("runner", _runner(x, z, thick, top), DARK)], "x")
-    section = square_circle(cabinet.values["leg_roundness"], thick)
+    # A square is as wide as its leg, and a circle fits well within it.
+    section = square_circle(cabinet.values["leg_roundness"], (1.0 - 0.12 * cabinet.values["leg_roundness"]) * thick)
     style = Style.taper(1.0 - 0.6 * cabinet.values["leg_taper"], 1.0)
     # A wide cabinet has a pair of legs in its middle, too.
     sides = [(x, z), (x, -z), (-x, z), (-x, -z), *([(0.0, z), (0.0, -z)] if cabinet.half > 0.9 else [])]
@@ -117,7 +134,8 @@ def base_parts(cabinet: CabinetDimensions) -> list[Part]:
 
 def _runner(x: float, z: float, thick: float, top: float) -> QuadMesh:
     """A flat bar on the ground with a post at each end."""
-    half = thick / 2.0
-    ground = block((x - half, 0.0, -z - half), (x + half, min(0.5 * top, thick), z + half))
-    posts = [block((x - half, 0.001, each - half), (x + half, top, each + half)) for each in (-z, z)]
-    return QuadMesh.joined([ground, *posts])
+    end, post, bar = z + thick / 2.0, z - thick / 2.0, min(0.5 * top, thick)
+    # Seen from the side: along z, and upwards.
+    side = [(-end, 0.0), (end, 0.0), (end, top), (post, top), (post, bar), (-post, bar), (-post, top), (-end, top)]
+    mesh = extrude(Profile.of(side), thick, base=-thick / 2.0)
+    return mesh.transformed(translation(x, 0.0, 0.0) @ SIDEWAYS)

@@ -10,7 +10,7 @@ from stages.programs.schema import Values
 
 __all__ = ["CabinetDimensions", "Opening", "block"]
 
-FRONT = 0.02
+FRONT = 0.03
 """Thickness of doors and drawer fronts."""
 
 CROWN = 0.06

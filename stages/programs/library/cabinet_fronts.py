@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from stages.programs.curves import (
     Part,
     QuadMesh,
     bezier,
-    box,
     circle,
-    ellipsoid,
-    line,
+    loft_rings,
+    polyline,
+    revolve,
     rotation,
     rounded_box,
     sweep,
     translation,
 )
 from stages.programs.library.cabinet_dimensions import FRONT, CabinetDimensions, Opening, block
+from stages.shape.arrays import FloatArray
 
 __all__ = ["front_parts"]
 
@@ -29,8 +32,14 @@ GAP = 0.002
 WIDEST = 0.55
 """A wider column has two doors."""
 
-ROOT = 0.014
+RECESS, MOULDING = 0.021, 0.008
+"""How deep a panel, slats and glass lie within their frame, and how wide the moulding around a panel is."""
+
+ROOT = 0.025
 """How deep handles are sunk: they reach the panel within a frame, too."""
+
+BAR, SUNK = 0.007, 0.004
+"""Half the width of a glazing bar; how far glass reaches into its frame."""
 
 SLAB, FRAMED, LOUVRED, GLAZED = range(4)
 
@@ -123,48 +132,76 @@ def _panel(cabinet: CabinetDimensions, leaf: Opening, style: int, label: str) ->
         radius = 0.4 * FRONT * cabinet.values["edge_roundness"]
         return [Part(label, rounded_box([*leaf.size, face - back], radius, middle, steps=2), PAINT)]
     stile = _stile(leaf)
-    (left, bottom), (right, top) = leaf.low, leaf.high
-    frame = [
-        block((left, bottom, back), (left + stile, top, face)),
-        block((right - stile, bottom, back), (right, top, face)),
-        block((left + stile, bottom, back), (right - stile, bottom + stile, face - 0.0005)),
-        block((left + stile, top - stile, back), (right - stile, top, face - 0.0005)),
-    ]
-    inner = leaf.grown(0.004 - stile, 0.004 - stile, 0.004 - stile, 0.004 - stile)
-    third = (face - back) / 3.0
-    if style == LOUVRED:
-        return [Part(label, QuadMesh.joined([*frame, *_slats(inner, back, face)]), PAINT)]
-    pane = block((*inner.low, back + 0.4 * third), (*inner.high, back + 1.4 * third))
+    inner = leaf.grown(-stile, -stile, -stile, -stile)
+    deep = face - RECESS
     if style == FRAMED:
-        return [Part(label, QuadMesh.joined([*frame, pane]), PAINT)]
-    return [Part(label, QuadMesh.joined([*frame, *_bars(inner, back, face)]), PAINT), Part("glass", pane, GLASS)]
+        return [Part(label, _framed(leaf, inner, back, deep, face), PAINT)]
+    if style == LOUVRED:
+        return [Part(label, _louvred(leaf, inner, back, deep, face), PAINT)]
+    glass = inner.grown(SUNK, SUNK, SUNK, SUNK)
+    pane = block((*glass.low, back + 0.002), (*glass.high, deep))
+    return [Part(label, _glazed(leaf, inner, back, face), PAINT), Part("glass", pane, GLASS)]
 
 
-def _slats(inner: Opening, back: float, face: float) -> list[QuadMesh]:
-    """Slanting slats, about five centimetres apart."""
-    width, height = inner.size
-    count = max(2, round(height / 0.05))
-    depth, step = 0.8 * (face - back), height / count
-    slat = box([width, 1.05 * step, 0.006]).transformed(rotation("x", -_lean(step, depth)))
-    x, z = (inner.low[0] + inner.high[0]) / 2.0, (back + face) / 2.0
-    return [slat.transformed(translation(x, inner.low[1] + (row + 0.5) * step, z)) for row in range(count)]
+def _corners(opening: Opening, z: float) -> FloatArray:
+    """The corners of an opening at a depth, counter-clockwise seen from the front, float64 (4, 3)."""
+    (left, bottom), (right, top) = opening.low, opening.high
+    return np.array([(left, bottom, z), (right, bottom, z), (right, top, z), (left, top, z)])
 
 
-def _lean(step: float, depth: float) -> float:
-    """How far slats lean, in degrees, to stay within a depth."""
-    return float(np.degrees(np.arcsin(min(0.7, (depth - 0.006) / (1.05 * step)))))
+def _framed(leaf: Opening, inner: Opening, back: float, deep: float, face: float) -> QuadMesh:
+    """A panel that lies `deep` within a frame, between slanting mouldings."""
+    panel = inner.grown(-MOULDING, -MOULDING, -MOULDING, -MOULDING)
+    return loft_rings([_corners(leaf, back), _corners(leaf, face), _corners(inner, face), _corners(panel, deep)])
 
 
-def _bars(inner: Opening, back: float, face: float) -> list[QuadMesh]:
-    """Glazing bars: one upright in a wide door, and level ones about every forty centimetres."""
+def _louvred(leaf: Opening, inner: Opening, back: float, deep: float, face: float) -> QuadMesh:
+    """Slats in a frame, about five centimetres apart: each leans from its nose at the face down to the next one's
+    foot, deep within."""
+    count = max(2, round(inner.size[1] / 0.05))
+    levels, sides = np.linspace(inner.low[1], inner.high[1], count + 1).tolist(), (inner.low[0], inner.high[0])
+    noses = [(x, level, face) for level in levels for x in sides]
+    feet = [(x, level, deep) for level in levels[1:] for x in sides]
+    last = 8 + 2 * count
+    quads = [
+        *[(0, 3, 2, 1), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+        *[(4, 5, 9, 8), (6, 7, last, last + 1), (4, last, 7, 7), (6, 9, 5, 5)],
+    ]
+    for left in range(8, last, 2):
+        right, above, beyond, foot, other = left + 1, left + 2, left + 3, left + 2 * count + 2, left + 2 * count + 3
+        quads += [(4, left, above, above), (6, beyond, right, right)]
+        quads += [(left, right, other, foot), (foot, other, beyond, above)]
+        quads += [(left, foot, above, above), (right, beyond, other, other)]
+    vertices = np.concatenate([_corners(leaf, back), _corners(leaf, face), noses, feet])
+    return QuadMesh(vertices, np.array(quads, dtype=np.int32))
+
+
+def _glazed(leaf: Opening, inner: Opening, back: float, face: float) -> QuadMesh:
+    """A frame with glazing bars: one upright in a wide door, and level ones about every forty centimetres."""
     (left, bottom), (right, top) = inner.low, inner.high
-    near, thick = back + 0.25 * (face - back), 0.007
-    middle = (left + right) / 2.0
-    levels = np.linspace(bottom, top, round((top - bottom) / 0.4) + 1)[1:-1].tolist()
-    bars = [block((left, level - thick, near), (right, level + thick, face - 0.003)) for level in levels]
-    if right - left > 0.34:
-        bars.append(block((middle - thick, bottom, near), (middle + thick, top, face - 0.002)))
-    return bars
+    uprights = [(left + right) / 2.0] if right - left > 0.34 else []
+    level = np.linspace(bottom, top, round((top - bottom) / 0.4) + 1)[1:-1].tolist()
+    x = [leaf.low[0], left, *(each + side for each in uprights for side in (-BAR, BAR)), right, leaf.high[0]]
+    y = [leaf.low[1], bottom, *(each + side for each in level for side in (-BAR, BAR)), top, leaf.high[1]]
+    return _grille(np.array(x), np.array(y), back, face)
+
+
+def _grille(x: FloatArray, y: FloatArray, back: float, face: float) -> QuadMesh:
+    """A plate from x[0] to x[-1] and y[0] to y[-1] with a hole in every other of the cells between, in both ways."""
+    vertices = np.array([(across, level, z) for z in (back, face) for level in y for across in x])
+    grid = np.arange(len(y) * len(x)).reshape(len(y), len(x))
+    front = grid.size
+    quads = []
+    for row in range(len(y) - 1):
+        for column in range(len(x) - 1):
+            a, b, d, c = grid[row : row + 2, column : column + 2].ravel().tolist()
+            if row % 2 == 0 or column % 2 == 0:
+                quads += [(a, d, c, b), (front + a, front + b, front + c, front + d)]
+            else:
+                quads += [(p, front + p, front + q, q) for p, q in pairwise((a, b, c, d, a))]
+    around = [*grid[0], *grid[1:, -1], *grid[-1, -2::-1], *grid[-2::-1, 0]]
+    quads += [(p, q, front + q, front + p) for p, q in pairwise(around)]
+    return QuadMesh(vertices, np.array(quads, dtype=np.int32))
 
 
 def _length(cabinet: CabinetDimensions, room: float) -> float:
@@ -173,18 +210,19 @@ def _length(cabinet: CabinetDimensions, room: float) -> float:
 
 
 def _handle(cabinet: CabinetDimensions, room: float) -> QuadMesh:
-    """A handle along x on the plane z = 0, its feet sunk into the front: a knob, a bar on posts, or a bow."""
+    """A handle along x on the plane z = 0, its feet sunk into the front: a knob, a bar with bent ends, or a bow."""
     kind, half = cabinet.values["handle_type"], _length(cabinet, room) / 2.0
     if kind == 0:
         radius = (0.009 + 0.01 * cabinet.values["handle_size"]) * min(1.0, room / 0.11)
-        stem = sweep(line((0.0, 0.0, -ROOT), (0.0, 0.0, 0.02)), circle(0.45 * radius, 8))
-        return QuadMesh.joined([stem, ellipsoid((radius, radius, 0.7 * radius), (0.0, 0.0, 0.02), count=12)])
+        # A ball on a stem that is a little less than half as thick, in one outline.
+        turn = np.linspace(np.arcsin(0.45), np.pi, 8)
+        outline = np.stack([radius * np.sin(turn), 0.02 - 0.7 * radius * np.cos(turn)], axis=1)
+        knob = revolve(polyline(np.concatenate([[[0.45 * radius, -ROOT]], outline])), count=12)
+        return knob.transformed(rotation("x", 90.0))
     # What is short is thin, or it would not bend.
     thick, rise = min(0.005, 0.2 * half), min(0.045, 1.5 * half)
     if kind == 1:
-        post = 0.75 * half
-        bar = sweep(line((-half, 0.0, 0.028), (half, 0.0, 0.028)), circle(thick, 8))
-        posts = [sweep(line((x, 0.0, -ROOT), (x, 0.0, 0.028)), circle(0.8 * thick, 8)) for x in (-post, post)]
-        return QuadMesh.joined([bar, *posts])
+        bar = polyline([(-half, 0.0, -ROOT), (-half, 0.0, 0.028), (half, 0.0, 0.028), (half, 0.0, -ROOT)])
+        return sweep(bar, circle(thick, 8), up=(0.0, 1.0, 0.0))
     bow = bezier([(-half, 0.0, -ROOT), (-0.9 * half, 0.0, rise), (0.9 * half, 0.0, rise), (half, 0.0, -ROOT)], 12)
     return sweep(bow, circle(thick, 8), up=(0.0, 1.0, 0.0))

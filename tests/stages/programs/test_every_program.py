@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from stages.programs.curves import Part, QuadMesh, mesh_faults
+from stages.programs.curves import Part, QuadMesh, box, mesh_faults
 from stages.programs.draws import Share
 from stages.programs.effect import same_geometry
 from stages.programs.intersection import meshes_meet
 from stages.programs.program import Program, find_program, program_names
 from stages.programs.sampling import Sampler, cells
 from stages.programs.schema import Values
+from stages.shape.geometry.triangles import build_tree, near_pairs
 
 TOYS = ("tests.stages.programs.stool", "tests.stages.programs.rack")
 NAMES = (*program_names(), *TOYS)
@@ -51,6 +52,15 @@ def holes(parts: Sequence[Part]) -> list[str]:
     """What is wrong with the meshes of parts."""
     faults = mesh_faults(QuadMesh.joined(part.mesh for part in parts))
     return [fault for fault in faults if not fault.endswith(FOLDED)]
+
+
+def crossings(mesh: QuadMesh) -> int:
+    """How many pairs of triangles of a mesh meet without a corner in common."""
+    tree = build_tree(mesh.vertices, mesh.triangles)
+    pairs = near_pairs(tree, tree, np.eye(4), 0.0)
+    one, other = tree[0][pairs[:, 0]], tree[0][pairs[:, 1]]
+    neighbours = (one[:, :, None] == other[:, None]).all(axis=-1).any(axis=(1, 2))
+    return int((~neighbours).sum())
 
 
 def check(program: Program, every: Sequence[Values]) -> None:
@@ -114,3 +124,19 @@ def test_parts_further_apart_than_a_hundredth_are_pieces() -> None:
     assert pieces([seat, leg, other, rail]) == 1
     assert pieces([seat, rail]) == 2
     assert pieces([leg, other]) == 2
+
+
+@pytest.mark.parametrize("count", [12, pytest.param(400, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", NAMES)
+def test_no_part_cuts_itself(name: str, count: int) -> None:
+    program = find_program(name)
+    for values in random_values(program, count, between=False):
+        for part in program.parts(values):
+            assert not crossings(part.mesh), (part.label, program.schema.text(values))
+
+
+def test_what_cuts_itself_is_found() -> None:
+    whole = box((1.0, 1.0, 1.0))
+    assert crossings(whole) == 0
+    assert crossings(QuadMesh.joined([whole, box((1.0, 1.0, 1.0), (3.0, 0.0, 0.0))])) == 0
+    assert crossings(QuadMesh.joined([whole, box((0.2, 0.2, 2.0), (0.1, 0.0, 0.0))])) > 0

@@ -97,6 +97,6 @@ def test_handles_of_framed_drawers_reach_the_panel() -> None:
         parts = build(values)
         for drawer, handle in itertools.pairwise(parts):
             if drawer.label == "drawer":
-                panel = drawer.mesh.vertices[-8:, 2].max()
+                panel = drawer.mesh.vertices[-4:, 2].max()
                 assert panel < CabinetDimensions(values).face - 0.005
                 assert handle.mesh.bounds[0, 2] < panel
