@@ -14,13 +14,13 @@ RINGS = 9
 """Rings of a leg."""
 
 SPANS = 12
-"""Pieces of an arched rail."""
+"""Pieces of a rail."""
 
 
 def leg_width(table: TableDimensions, share: FloatArray) -> FloatArray:
     """Relative width of a leg at shares (n,) of the way from its top down to its foot."""
-    foot = 0.45 + 0.55 * table.values["legs_shape_1"]
-    waist = (0.6 + 0.4 * table.values["legs_shape_2"]) * (1.0 + foot) / 2.0
+    foot = 0.4 + 0.7 * table.values["legs_shape_1"]
+    waist = (0.38 + 0.74 * table.values["legs_shape_2"]) * (1.0 + foot) / 2.0
     width: FloatArray = (1.0 - share) * (1.0 - 2.0 * share) + 4.0 * share * (1.0 - share) * waist
     width += share * (2.0 * share - 1.0) * foot
     return width
@@ -49,7 +49,9 @@ class _Frame:
     def __init__(self, table: TableDimensions) -> None:
         values = table.values
         angle = 90.0 * values["std_legs_rotation"]
-        self.section = square_circle(values["legs_bevel"], 0.94 * table.stick, 1.14 * table.stick).rotated(-angle)
+        # A sharp square, or an ellipse that fits well within it.
+        size = (1.08 - 0.12 * values["legs_bevel"]) * table.stick
+        self.section = square_circle(values["legs_bevel"], 0.94 * size, 1.14 * size).rotated(-angle)
         self.table = table
         sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
         self.way = np.array([sine, cosine])
@@ -74,7 +76,8 @@ class _Frame:
 
 def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:
     """The rail along x (axis 0) at +z, or along z (axis 1) at +x. Its ends lie in the middle of the legs at every
-    height, so that it leans with them; it may arch, and its highest place lets it carry the top."""
+    height, so that it leans with them; it may arch, and its highest place lets it carry the top. As thick there
+    as legs allow, it is as thick as asked in its middle."""
     values, prefix = table.values, f"std_legs_support_{name}"
     tall = (0.05 + 0.12 * values[f"{prefix}_profile_height"]) * table.under
     lowest, highest = 0.1 * table.under + tall / 2.0, table.under + 0.3 * table.thickness - tall / 2.0
@@ -83,19 +86,21 @@ def _rail(table: TableDimensions, frame: _Frame, name: str, axis: int) -> Part:
     arch = min(0.75 * (level - tall / 2.0 - 0.03 * table.under), 0.25 * table.under, 0.5 * span)
     arch *= values[f"{prefix}_curvature"]
     thinnest = float(leg_width(table, np.linspace(0.0, 1.0, RINGS)).min())
-    wide = (0.3 + 0.55 * values[f"{prefix}_profile_width"]) * 0.85 * thinnest * table.stick
-    profile = rounded_rectangle(wide, tall, 0.15 * min(wide, tall), steps=1)
-    return Part("support", _between_legs(frame, profile, axis, level, arch), WALNUT)
+    wide = (0.25 + 1.1 * values[f"{prefix}_profile_width"]) * table.stick
+    end = min(wide, 0.7 * thinnest * table.stick)
+    profile = rounded_rectangle(end, tall, 0.15 * min(end, tall), steps=1)
+    return Part("support", _between_legs(frame, profile, wide / end, axis, level, arch), WALNUT)
 
 
-def _between_legs(frame: _Frame, profile: Profile, axis: int, level: float, arch: float) -> QuadMesh:
-    """The rail at `level`, its ends lower by `arch`."""
-    along = np.linspace(-1.0, 1.0, SPANS + 1 if arch > 1e-9 else 2)
+def _between_legs(frame: _Frame, profile: Profile, swell: float, axis: int, level: float, arch: float) -> QuadMesh:
+    """The rail at `level`, its ends lower by `arch`, its middle so many times as thick."""
+    along = np.linspace(-1.0, 1.0, SPANS + 1)
     across, rise = profile.points.T
     ends = frame.at(level - arch + rise)
     rings = np.empty((len(along), len(profile), 3))
     rings[..., 1] = rise + (level - arch * along * along)[:, None]
     rings[..., 0 if axis == 0 else 2] = along[:, None] * ends[:, axis]
-    rings[..., 2 if axis == 0 else 0] = ends[:, 1 - axis] + across
+    thick = 1.0 + (swell - 1.0) * (1.0 - along**4)
+    rings[..., 2 if axis == 0 else 0] = ends[:, 1 - axis] + thick[:, None] * across
     # Seen from +x, z runs to the left; seen from +z, x runs to the right.
     return loft_rings(rings[:, ::-1] if axis == 0 else rings)
