@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["all_seen", "carry", "cut", "halve_turns", "measure", "place_rings"]
+__all__ = ["all_seen", "carry", "cut", "ease", "halve_turns", "measure", "place_rings"]
 
 
 @numba.njit(cache=True)
@@ -49,6 +49,40 @@ def halve_turns(directions, turns, closed, sharpest):
                 fold[i, k] = (b[k] - a[k]) / across
             excess[i] = min(2.0 / middle, sharpest) - 1.0
     return tangents, fold, excess
+
+
+@numba.njit(cache=True)
+def ease(points, girth, rounds, patience):
+    """The points (n, 3) with those beside a tight bend moved towards their neighbours, round by round, until no mitre
+    of a profile that reaches `girth` (n,) eats up its segments; from the round `patience` on, all are moved."""
+    count = len(points)
+    moved, before = points.copy(), np.empty_like(points)
+    lengths, mitres, near = np.empty(count - 1), np.zeros(count), np.zeros(count, dtype=np.bool_)
+    for turn in range(rounds):
+        before[:] = moved
+        for i in range(count - 1):
+            total = 0.0
+            for k in range(3):
+                total += (before[i + 1, k] - before[i, k]) ** 2
+            lengths[i] = np.sqrt(total)
+        for i in range(1, count - 1):
+            cosine = 0.0
+            for k in range(3):
+                cosine += (before[i + 1, k] - before[i, k]) * (before[i, k] - before[i - 1, k])
+            cosine /= lengths[i] * lengths[i - 1]
+            # A mitre eats so much of the segments on both of its sides: the tangent of half the turn.
+            mitres[i] = girth[i] * np.sqrt(max(1.0 - cosine, 0.0) / max(1.0 + cosine, 1e-6))
+        near[:] = False
+        for i in range(count - 1):
+            if mitres[i] + mitres[i + 1] > 0.9 * lengths[i]:
+                near[max(i - 1, 0) : i + 3] = True
+        if not near.any():
+            break
+        for i in range(1, count - 1):
+            if near[i] or turn >= patience:
+                for k in range(3):
+                    moved[i, k] += 0.45 * (before[i + 1, k] + before[i - 1, k] - 2.0 * before[i, k])
+    return moved
 
 
 @numba.njit(cache=True)

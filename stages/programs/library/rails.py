@@ -29,18 +29,7 @@ def eased(points: FloatArray, girth: FloatArray) -> FloatArray:
 
     girth: float64 (n,), how far the profile reaches from the rail at each of the points.
     """
-    moved = points.copy()
-    for turn in range(ROUNDS):
-        steps = moved[1:] - moved[:-1]
-        lengths = np.sqrt((steps * steps).sum(axis=1))
-        cosines = (steps[1:] * steps[:-1]).sum(axis=1) / (lengths[1:] * lengths[:-1])
-        # A mitre eats so much of the segments on both of its sides: the tangent of half the turn.
-        mitres = np.zeros(len(moved))
-        mitres[1:-1] = girth[1:-1] * np.sqrt((1.0 - cosines).clip(0.0) / (1.0 + cosines).clip(1e-6))
-        tight = mitres[1:] + mitres[:-1] > 0.9 * lengths
-        if not tight.any():
-            break
-        ends = np.concatenate([[False], tight]) | np.concatenate([tight, [False]])
-        near = (ends[1:-1] | ends[2:] | ends[:-2] | (turn >= PATIENCE))[:, None]
-        moved[1:-1] += np.where(near, 0.45 * (moved[2:] + moved[:-2] - 2.0 * moved[1:-1]), 0.0)
+    from stages.programs.curves.kernels import ease
+
+    moved: FloatArray = ease(points, girth, ROUNDS, PATIENCE)
     return moved
