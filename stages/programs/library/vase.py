@@ -56,7 +56,7 @@ def _body(values: Values, lift: float) -> FloatArray:
         [0.25 + 1.35 * values["body_top_curve_width"], 1.0 - values["body_top_curve_height"]],
         [0.3 + values["body_mouth_width"], 1.0],
     ]
-    return bezier(np.array(controls) * [width, height] + [0.0, lift], 16).points[:, :2]
+    return bezier(np.array(controls) * [width, height] + [0.0, lift], 20).points[:, :2]
 
 
 def _neck(values: Values, body: FloatArray) -> FloatArray:
@@ -65,18 +65,24 @@ def _neck(values: Values, body: FloatArray) -> FloatArray:
     height = 0.08 + 0.37 * values["neck_end_z"]
     end = 0.55 * mouth + (values["neck_end_x"] - 0.1) / 0.9 * (0.45 * mouth + 0.4 * values["body_width"])
     slope = (body[-1, 0] - body[-2, 0]) / (body[-1, 1] - body[-2, 1])
-    on = np.clip(0.33 * height * slope, -0.3 * mouth, 0.3 * mouth)
-    narrow, wide = 0.5 * min(mouth, end), 1.1 * max(mouth, end)
-    controls = [
-        [mouth, top],
-        [mouth + on, top + 0.33 * height],
+    narrow, wide = 0.55 * min(mouth, end), 1.15 * max(mouth, end)
+    waist = narrow + (wide - narrow) * values["neck_end_bezier_handle_x"]
+    # It passes upright through its waist or bulge, and leaves the mouth as the body arrives there.
+    level = 0.8 - 0.6 * values["neck_end_bezier_handle_z"]
+    on = np.clip(0.33 * level * height * slope, -0.3 * mouth, 0.3 * mouth)
+    rest = 1.0 - level
+    shares = np.array(
         [
-            narrow + (wide - narrow) * values["neck_end_bezier_handle_x"],
-            top + height * (0.7 - 0.6 * values["neck_end_bezier_handle_z"]),
-        ],
-        [end, top + height],
-    ]
-    return bezier(controls, 12).points[1:, :2]
+            [mouth, 0.0],
+            [mouth + on, 0.33 * level],
+            [waist, 0.55 * level],
+            [waist, level],
+            [waist, level + 0.45 * rest],
+            [waist + 0.6 * (end - waist), level + 0.75 * rest],
+            [end, 1.0],
+        ]
+    )
+    return bezier(shares * [1.0, height] + [0.0, top], 7).points[1:, :2]
 
 
 def _base_height(values: Values) -> float:
@@ -91,7 +97,7 @@ def _base(values: Values, wall: Wall, height: float) -> FloatArray:
     )
     edge = 0.18 * height
     waist = edge + (0.2 + 0.6 * values["base_mid_z"]) * (height - edge)
-    t = np.linspace(0.0, 1.0, 7)
+    t = np.linspace(0.0, 1.0, 8)
     bend = t * t * (3.0 - 2.0 * t)
     lower = np.column_stack([foot + (middle - foot) * bend, edge + (waist - edge) * t])
     upper = np.column_stack([middle + (top - middle) * bend, waist + (height - waist) * t])[1:]
@@ -110,7 +116,7 @@ def _lid(values: Values, wall: Wall, section: CrossSection) -> list[Part]:
     plug = 0.9 * wall.opening(1.5 * depth)
     dome = 0.04 + 0.2 * radius
     edge = min(0.012, 0.2 * radius)
-    angles = np.linspace(0.0, np.pi / 2.0, 8)
+    angles = np.linspace(0.0, np.pi / 2.0, 11)
     vault = np.column_stack([radius * np.cos(angles), level + edge + dome * np.sin(angles)])
     vault[-1, 0] = 0.0
     under = [[0.0, level - depth], [plug, level - depth], [plug, level], [radius, level]]
@@ -119,7 +125,7 @@ def _lid(values: Values, wall: Wall, section: CrossSection) -> list[Part]:
         return [lid]
     knob = values["lid_handle_radius"] * min(1.0, radius / 0.14)
     middle = level + edge + dome + 0.7 * knob
-    return [lid, Part("lid_handle", ellipsoid([knob] * 3, (0.0, middle, 0.0), 16), KNOB)]
+    return [lid, Part("lid_handle", ellipsoid([knob] * 3, (0.0, middle, 0.0), 24), KNOB)]
 
 
 PROGRAM = Program(
@@ -152,7 +158,14 @@ PROGRAM = Program(
         continuous("hndl_profile_width", 0.0, 1.0, 6, 1.0, "handles", "Width of a handle.", "handle_count > 0"),
         continuous("hndl_profile_height", 0.0, 1.0, 6, 0.2, "handles", "Thickness of a handle.", "handle_count > 0"),
         continuous(
-            "hndl_profile_blend", 0.0, 1.0, 6, 0.8, "handles", "Profile: from square to round.", "handle_count > 0"
+            "hndl_profile_blend",
+            0.0,
+            1.0,
+            6,
+            0.8,
+            "handles",
+            "Profile: from a square strap to a round cord.",
+            "handle_count > 0",
         ),
         continuous(
             "hndl_base_z", 0.1, 0.6, 6, 0.47, "handles", "How high up the body a handle starts.", "handle_count > 0"
@@ -235,7 +248,7 @@ PROGRAM = Program(
             11,
             0.8,
             "neck",
-            "Width of the neck below its lip: from a waist to a bulge.",
+            "Width of the neck where it is narrowest or widest: from a waist to a bulge.",
             "has_neck",
         ),
         continuous(

@@ -12,7 +12,7 @@ from stages.shape.arrays import FloatArray
 
 __all__ = ["handles"]
 
-STEPS, AROUND = 14, 12
+STEPS, AROUND = 16, 12
 """Segments of a handle's curve and points of its profile."""
 
 
@@ -58,7 +58,10 @@ def _path(values: Values, wall: Wall, body_top: float, size: float) -> FloatArra
 
 def _girth(values: Values, size: float) -> tuple[float, float]:
     """How thick and how wide a handle is at its start."""
-    return size * (0.07 + 0.17 * values["hndl_profile_height"]), size * (0.08 + 0.22 * values["hndl_profile_width"])
+    # A square handle is a strap, a round one a cord.
+    strap = 1.45 - 0.8 * values["hndl_profile_blend"]
+    thick, wide = 0.07 + 0.17 * values["hndl_profile_height"], 0.08 + 0.22 * values["hndl_profile_width"]
+    return size * thick, size * strap * wide
 
 
 def _bounded(rise: float, room: float) -> float:
@@ -85,7 +88,7 @@ def _handle(values: Values, wall: Wall, section: CrossSection, path: FloatArray,
     t = np.linspace(0.0, 1.0, len(path))
     ends = wall.radius(heights[[0, -1]]) - clear[[0, -1]]
     clear = clear + (1.0 - t) ** 5 * ends[0] + (0.0 if free else t**5 * ends[1])
-    swell = 0.45 + values["hndl_radius_along_path"]
+    swell = 0.3 + 1.6 * values["hndl_radius_along_path"]
     last = 0.5 + 0.5 * swell if free else 1.0
     rise = np.sin(np.pi * t) ** 2
     scale = np.where(t < 0.5, 1.0, last) * (1.0 - rise) + swell * rise

@@ -8,13 +8,13 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from stages.programs.curves import QuadMesh, loft_rings, square_circle
+from stages.programs.curves import QuadMesh, loft_rings
 from stages.shape.arrays import FloatArray
 
 __all__ = ["CrossSection", "Wall"]
 
-AROUND = 32
-"""Points of a ring."""
+EIGHTH = 6
+"""Segments of an eighth of a ring, from the middle of a side to a corner."""
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,36 @@ class CrossSection:
 
     def reach(self, angle: npt.ArrayLike) -> FloatArray:
         """Radius in a direction, as a multiple of half the width; degrees from +x towards -z."""
-        radians = np.radians(np.asarray(angle, dtype=np.float64))
-        exponent = 2.0 / self._shape
-        powers = np.abs(np.cos(radians)) ** exponent + np.abs(np.sin(radians)) ** exponent
-        found: FloatArray = powers ** (-1.0 / exponent)
-        return found
+        return _reach(np.radians(np.asarray(angle, dtype=np.float64)), 2.0 / self._shape)
 
 
 @lru_cache(maxsize=64)
 def _directions(shape: float) -> FloatArray:
-    """A ring of half-width 1, counter-clockwise seen from above, float64 (AROUND, 3)."""
-    x, y = square_circle(shape, 2.0, count=AROUND).points.T
-    return np.stack([x, np.zeros(AROUND), -y], axis=1)
+    """A ring of half-width 1, counter-clockwise seen from above, float64 (8 * EIGHTH, 3): a superellipse whose points
+    stand as close to each other as its length and its turning, half and half, ask for."""
+    exponent = 2.0 / shape
+    angles = np.linspace(0.0, np.pi / 4.0, 65)
+    points = _superellipse(angles, exponent)
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    turning = np.arctan2(np.sin(angles) ** (exponent - 1.0), np.cos(angles) ** (exponent - 1.0))
+    eighth = np.interp(np.linspace(0.0, 2.0, EIGHTH + 1), length / length[-1] + turning / turning[-1], angles)
+    quarter = np.concatenate([eighth, np.pi / 2.0 - eighth[-2:0:-1]])
+    x, y = _superellipse((quarter + np.pi / 2.0 * np.arange(4)[:, None]).ravel(), exponent).T
+    return np.stack([x, np.zeros_like(x), -y], axis=1)
+
+
+def _reach(radians: FloatArray, exponent: float) -> FloatArray:
+    """How far a superellipse of half-width 1 reaches in directions."""
+    powers = np.abs(np.cos(radians)) ** exponent + np.abs(np.sin(radians)) ** exponent
+    found: FloatArray = powers ** (-1.0 / exponent)
+    return found
+
+
+def _superellipse(radians: FloatArray, exponent: float) -> FloatArray:
+    """Its points in directions (n,), float64 (n, 2)."""
+    rays = np.stack([np.cos(radians), np.sin(radians)], axis=1)
+    points: FloatArray = _reach(radians, exponent)[:, None] * rays
+    return points
 
 
 @dataclass(frozen=True, eq=False)
