@@ -11,8 +11,9 @@ from stages.programs.curves import (
     Part,
     QuadMesh,
     Style,
-    ellipsoid,
     loft_rings,
+    polyline,
+    revolve,
     rotation,
     square_circle,
     sweep,
@@ -26,7 +27,7 @@ from stages.shape.arrays import FloatArray
 
 PLATE, BRASS, LIGHT = (150, 158, 168), (186, 148, 84), (250, 238, 196)
 
-PLAN, STEPS, AROUND, GLASS = 32, 16, 12, 16
+PLAN, STEPS, AROUND, GLASS = 48, 20, 12, 24
 """Points around the plate; segments of an arm and points around it; points around a bulb."""
 
 
@@ -44,15 +45,18 @@ def build(values: Values) -> Sequence[Part]:
     needed = (1.3 * bulb + 0.015) / np.sin(np.pi / count) if count > 1 else 0.0
     reach = max(float(needed) - float(seat.min()), 0.0) + values["light_frame_end_point_y"]
     taper = Style.knots([(0.0, 1.0), (0.7, 0.7 + 0.15 * end), (1.0, end)], smooth=True, count=8)
-    rail = _rail(values, reach, 0.6 * max(wide, thick) * taper.scale.max())
+    # A round arm is turned: it swells on its way.
+    swell = values["light_frame_roundness"] * (0.3 * max(wide, thick) + 0.036)
+    rail = _rail(values, reach, 0.6 * (max(wide, thick) * taper.scale.max() + swell))
     profile = square_circle(0.1 + 0.9 * values["light_frame_roundness"], thick, wide, count=AROUND)
-    scale, twist = taper.at(rail.positions)
-    swept = sweep(rail, profile, Style(rail.positions, scale, twist), up=(0.0, 0.0, 1.0))
+    turned = np.sin(np.pi * rail.positions)[:, None] ** 2 * swell / np.array([thick, wide])
+    style = Style(rail.positions, taper.at(rail.positions)[0] + turned, np.zeros(len(rail.positions)))
+    swept = sweep(rail, profile, style, up=(0.0, 0.0, 1.0))
     # An arm is cut level within the plate, whichever way it leaves.
     level = swept.vertices.copy()
     level[:AROUND, 1] = level[-2, 1] = -0.5 * values["base_thickness"]
     arm = QuadMesh(level, swept.quads)
-    light = ellipsoid([bulb] * 3, rail.at(1.0) + 0.75 * bulb * rail.tangents(1.0), GLASS)
+    light = _bulb(bulb, 0.4 * end * min(wide, thick)).transformed(rail.frames(1.0, up=(0.0, 0.0, 1.0)))
     shape = 0.1 + 0.9 * values["base_roundness"]
     for angle in (360.0 / count * np.arange(count)).tolist():
         across, along = np.cos(np.radians(angle)), np.sin(np.radians(angle))
@@ -61,6 +65,17 @@ def build(values: Values) -> Sequence[Part]:
         parts.append(Part("light_frame", arm.transformed(place), BRASS))
         parts.append(Part("lightbulb", light.transformed(place), LIGHT))
     return parts
+
+
+def _bulb(radius: float, neck: float) -> QuadMesh:
+    """A bulb along z, from a neck within the end of its arm at 0 to a ball around a point farther out."""
+    neck = min(neck, 0.6 * radius)
+    turn = np.linspace(0.3 * np.pi, np.pi, 10)
+    ball = np.stack([np.sin(turn), 1.35 - np.cos(turn)], axis=1) * radius
+    arriving = ball[0] - 0.5 * radius * np.array([np.cos(turn[0]), np.sin(turn[0])])
+    throat = cubic([[neck, -0.3 * radius], [neck, 0.4 * radius], arriving, ball[0]], 5)
+    outline = polyline(np.concatenate([throat, ball[1:]]))
+    return revolve(outline, count=GLASS).transformed(rotation("x", 90.0))
 
 
 def _inset(values: Values, half: FloatArray) -> float:
@@ -119,7 +134,9 @@ PROGRAM = Program(
         continuous("light_frame_radius", 0.0, 1.0, 8, 0.79, "arms", "How far from the middle of the plate arms start."),
         continuous("light_frame_thickness_x", 0.02, 0.12, 5, 0.04, "arms", "Thickness of an arm across its plane."),
         continuous("light_frame_thickness_y", 0.02, 0.12, 5, 0.02, "arms", "Thickness of an arm within its plane."),
-        continuous("light_frame_roundness", 0.0, 1.0, 6, 0.64, "arms", "Profile of an arm: from square to round."),
+        continuous(
+            "light_frame_roundness", 0.0, 1.0, 6, 0.64, "arms", "Profile of an arm: from square to round and turned."
+        ),
         continuous("light_frame_style", 0.0, 1.0, 6, 0.5, "arms", "Girth at the end of an arm: from slim to flared."),
         continuous("lightbulb_ radius", 0.02, 0.1, 6, 0.08, "bulbs", "Radius of a bulb."),
         continuous("light_frame_mid_point_pos", 0.0, 1.0, 6, 0.516, "arms", "How far along an arm it bends."),
