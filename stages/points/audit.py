@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from stages.points.visibility import SHORTEST, view_directions
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
@@ -42,6 +43,9 @@ def point_faults(sample: Packaged) -> Iterator[str]:
         yield f"{off} of its {len(points):,} points are not on the surface of their part"
     if turned:
         yield f"{turned} of its {len(points):,} normals are not those of their part"
+    unseen = _unseen(sample, points) if described["surface"] == "visible" else 0
+    if unseen:
+        yield f"{unseen} of its {len(points):,} points cannot be seen from outside"
 
 
 def _strangers(
@@ -52,8 +56,8 @@ def _strangers(
     The nearest triangle of all answers for nearly all points; the others, where parts meet or at edges, are held
     against each triangle of their part.
     """
-    corners, parts = sample.triangles
-    nearest, distances = sample.nearest(points)
+    corners, parts = sample.casting.triangles
+    nearest, distances = sample.casting.nearest(points)
     own = parts[nearest] == instances
     along = np.einsum("ij,ij->i", normals, _unit_normals(corners[nearest])) > 1.0 - ALONG
     doubtful = np.flatnonzero(~(own & along & (distances <= near)))
@@ -67,6 +71,17 @@ def _strangers(
         fitting = normals[mine] @ _unit_normals(triangles).T > 1.0 - ALONG
         turned += int((touching.any(axis=1) & ~(touching & fitting).any(axis=1)).sum())
     return off, turned
+
+
+def _unseen(sample: Packaged, points: FloatArray) -> int:
+    """How many points nobody sees who looks at the shape from outside; they were found by looking outwards."""
+    away = 2.0 * sample.size
+    for view in view_directions():
+        ways = np.broadcast_to(-view, points.shape)
+        points = points[sample.casting.hit(points + away * view, ways, most=away - 2.0 * SHORTEST * sample.size)]
+        if not len(points):
+            break
+    return len(points)
 
 
 def _unit_normals(corners: FloatArray) -> FloatArray:

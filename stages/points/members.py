@@ -15,12 +15,14 @@ from stages.shape.views.camera import Camera
 
 __all__ = ["MEMBERS"]
 
+POINTS = {"all": "Point cloud.", "visible": "Point cloud of what is seen from outside."}
+
 
 def _members(config: Config) -> tuple[Member, ...]:
     section = config.section(PointsConfig)
     count = section.uniform + section.farthest
     return (
-        Member("points.npy", "Point cloud.", "float32", (count, 3)),
+        Member("points.npy", POINTS[section.surface], "float32", (count, 3)),
         Member("normals.npy", "Unit normals of the points.", "float32", (count, 3)),
         Member("labels.npy", "Class of the part that each point lies on: its id in `classes.json`.", "int16", (count,)),
         Member("instances.npy", "Part that each point lies on, by its place in the record.", "int16", (count,)),
@@ -33,15 +35,17 @@ def _fields(_: Config) -> Mapping[str, Field]:
         "points": Field(
             {
                 "description": "how the cloud was made: the first `farthest` points are picked farthest first, the "
-                "others drawn by area; (coordinates of the mesh - centre) * scale are those of the points",
+                "others drawn by area; of a `visible` surface only what is seen from outside; (coordinates of "
+                "the mesh - centre) * scale are those of the points",
                 "type": "object",
                 "properties": {
                     "farthest": count,
                     "uniform": count,
+                    "surface": {"enum": ["all", "visible"]},
                     "centre": {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
                     "scale": {"type": "number", "exclusiveMinimum": 0},
                 },
-                "required": ["farthest", "uniform", "centre", "scale"],
+                "required": ["farthest", "uniform", "surface", "centre", "scale"],
                 "additionalProperties": False,
             }
         )
@@ -50,7 +54,8 @@ def _fields(_: Config) -> Mapping[str, Field]:
 
 def _caption(config: Config) -> str:
     section = config.section(PointsConfig)
-    return f"{section.uniform + section.farthest:,} a shape, coloured by part label"
+    visible = ", on what is seen from outside" if section.surface == "visible" else ""
+    return f"{section.uniform + section.farthest:,} a shape{visible}, coloured by part label"
 
 
 def _draw(members: Mapping[str, bytes], camera: Camera, size: int) -> ByteArray:

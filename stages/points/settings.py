@@ -8,7 +8,9 @@ from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
 
-__all__ = ["PointsConfig"]
+__all__ = ["PointsConfig", "Surface"]
+
+Surface = Literal["all", "visible"]
 
 
 class PointsConfig(StrictModel):
@@ -23,6 +25,11 @@ class PointsConfig(StrictModel):
         le=100_000,
         description="points picked by farthest-point sampling out of `pool`; they stand before the uniform ones; "
         "unit: points (0: none of this kind)",
+    )
+    surface: Surface = Field(
+        "all",
+        description="all: every surface, also what lies inside other parts; visible: what a scanner sees: points from "
+        "which a way leads straight out of the shape in one of 64 directions",
     )
     pool: int = Field(
         30_000, ge=1, le=10_000_000, description="uniform points that the farthest are picked from; unit: points"

@@ -24,12 +24,13 @@ def run_shard(task: Task) -> Outcome:
 
     def cloud_members(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
         shape = collection.shape(sample)
-        cloud = sample_cloud(shape, config.uniform, config.farthest, config.pool, task.rng(sample.key))
+        cloud = sample_cloud(shape, config.uniform, config.farthest, config.pool, config.surface, task.rng(sample.key))
         moved = normalization(shape, config.normalize)
         points = (cloud.points - moved.centre) * moved.scale
         described = {
             "farthest": config.farthest,
             "uniform": config.uniform,
+            "surface": config.surface,
             "centre": list(moved.centre),
             "scale": moved.scale,
         }

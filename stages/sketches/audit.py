@@ -88,7 +88,7 @@ def outline_shares(inked: npt.NDArray[np.bool_], camera: Mapping[str, Any], samp
     step = max(1, -(-max(inked.shape) // SEEN_FINE))
     rows, columns = (np.arange(step // 2, length, step) for length in inked.shape)
     origins, directions = _rays(camera, columns + 0.5, rows + 0.5)
-    hit = sample.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).reshape(len(rows), len(columns))
+    hit = sample.casting.hit(origins.reshape(-1, 3), directions.reshape(-1, 3)).reshape(len(rows), len(columns))
     if not hit.any():
         return 0.0, 1.0
     near = camera["line_width"] / 2 + 1.5 * step

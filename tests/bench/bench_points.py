@@ -1,4 +1,4 @@
-"""Points a second: uniform and farthest, beside trimesh, Open3D and fpsample on the same input."""
+"""Points a second: uniform, visible and farthest, beside trimesh, Open3D and fpsample on the same input."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from stages.points.area_sampling import sample_surface
+from stages.points.cloud import sample_cloud
 from stages.points.farthest import farthest_points
+from stages.programs.files import random_shapes
+from stages.programs.program import find_program, shape_of
 from tests.bench.measure import Measure, rate
 
 UNIFORM, PICKED, POOL = 2048, 1500, 30_000
@@ -49,6 +52,7 @@ def bench() -> Iterator[Measure]:
     yield Measure(name, "clouds", ours, "trimesh", rate(uniform_trimesh, seconds=0.5))
     yield Measure(name, "clouds", ours, "Open3D", rate(uniform_open3d, seconds=0.5))
 
+    yield from _visible(rng)
     pool = sample_surface(vertices, faces, POOL, rng)[0]
     open3d_pool = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(pool))
 
@@ -72,3 +76,16 @@ def bench() -> Iterator[Measure]:
 
     fpsample_rate = rate(farthest_fpsample, seconds=0.5)
     yield Measure(name, "clouds", ours, "fpsample", fpsample_rate, "fpsample ignores the start it is given")
+
+
+def _visible(rng: np.random.Generator) -> Iterator[Measure]:
+    """Clouds of what a scanner sees of ten chairs."""
+    chair = find_program("chair")
+    shapes = [shape_of(chair, values) for values in random_shapes(chair, 10, 0)]
+    for uniform, picked, pool in ((UNIFORM, 0, 1), (0, PICKED, POOL)):
+
+        def visible(uniform: int = uniform, picked: int = picked, pool: int = pool) -> int:
+            return sum(len(sample_cloud(shape, uniform, picked, pool, "visible", rng).points) > 0 for shape in shapes)
+
+        what = f"{uniform} uniform" if uniform else f"{picked} farthest of {pool}"
+        yield Measure(f"points, {what}, visible", "clouds", rate(visible, seconds=0.5), note="of random chairs")

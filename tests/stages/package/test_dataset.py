@@ -95,7 +95,7 @@ def test_the_json_says_what_the_collection_holds(toy_folder: Path) -> None:
     }
     assert record["lineage"] == sample.lineage
     assert record["contact_tolerance"] == toy_kit(sample.kit).contact_tolerance
-    assert record["points"] == {"farthest": 16, "uniform": 64, "centre": [0, 0, 0], "scale": 1.0}
+    assert record["points"] == {"farthest": 16, "uniform": 64, "surface": "all", "centre": [0, 0, 0], "scale": 1.0}
 
 
 def test_classes_are_listed_with_what_has_them_by_split(toy_folder: Path) -> None:
