@@ -11,7 +11,7 @@ from stages.programs.__main__ import main
 from stages.programs.curves import Part, box
 from stages.programs.movement import movement_table, movements
 from stages.programs.parameters import binary, continuous
-from stages.programs.program import Program
+from stages.programs.program import Program, find_program, program_names
 from tests.stages.programs.block import PROGRAM
 
 
@@ -57,3 +57,10 @@ def test_what_is_hidden_is_not_counted_and_what_hardly_moves_is_weak() -> None:
 def test_the_command_prints_a_line_a_parameter(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["movement", "tests.stages.programs.block", "--count", "3"]) == 0
     assert [line.split(" | ")[0] for line in capsys.readouterr().out.splitlines()[2:]] == ["| `width`", "| `height`"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", program_names())
+def test_every_parameter_of_the_library_can_be_read_from_its_shapes(name: str) -> None:
+    weak = [each for each in movements(find_program(name), 40, 0) if each.weak]
+    assert not weak, movement_table(weak)
