@@ -9,14 +9,17 @@ Walking a string, each part has a *frame*: its pose followed by one of its symme
 parent followed by the pose of its category, so that frames are carried along the string, and a category tells of a
 turn: beyond a tower, the next wall goes on straight or to the left, wherever the tower itself was put. All categories
 right are all poses right, and nothing is left to search for. A cycle number has the category of its edge, seen from the
-part that it stands behind. The frame of the first part may be any of its symmetric ones; taken is the one with the
-lexicographically least categories, so that a string of an assembly has one sequence of them.
+part that it stands behind.
+
+A string of an assembly has one sequence of categories: of all that differ by the frame of the first part, which may be
+any of its symmetric ones, and by which of some equal branches of a part is which, the lexicographically least.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +35,7 @@ from stages.strings.encoder import Encoded
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-__all__ = ["DUMMY", "CategorySpace", "NoCategoryError", "PairPlaces", "token_edges"]
+__all__ = ["DUMMY", "CategorySpace", "Labelled", "NoCategoryError", "PairPlaces", "token_edges"]
 
 DUMMY = 0
 """The category of brackets."""
@@ -45,6 +48,19 @@ Indices = npt.NDArray[np.int16]
 
 class NoCategoryError(ValueError):
     """Two parts stand as the kit has not seen parts of their types stand."""
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """A string with categories.
+
+    nodes: int64 (n,), the part at each node of the string, those of equal branches in the order of their categories;
+    categories: int32 (tokens,), one for each token.
+    """
+
+    string: str
+    nodes: npt.NDArray[np.int64]
+    categories: IntArray
 
 
 @dataclass(frozen=True)
@@ -68,7 +84,8 @@ class CategorySpace:
     """All categories of a kit; `len` of it is the radix of a token.
 
     types: int16 (categories, 2), those of parent and child, -1 where there is none; poses: float64 (categories, 4, 4),
-    the child's frame in the parent's, the identity where there is no parent.
+    the child's frame in the parent's, the identity where there is no parent; masks: bool (labels + 1, labels + 1,
+    categories), which categories an edge may have, by the labels at its ends plus one, 0 where there is none.
     """
 
     def __init__(self, kit: Kit) -> None:
@@ -95,28 +112,38 @@ class CategorySpace:
             first += len(places.poses)
         self.types: TypeArray = np.concatenate(types).astype(np.int16)
         self.poses: FloatArray = np.concatenate(poses)
-        self._masks: dict[tuple[int, int], BoolArray] = {}
+        labels = np.append(kit.label_of, -1)[self.types]  # type -1 has label -1
+        ends = np.arange(-1, len(kit.labels))
+        self.masks: BoolArray = (labels[:, 0] == ends[:, None, None]) & (labels[:, 1] == ends[:, None])
 
     def __len__(self) -> int:
         return len(self.types)
 
-    def label(self, assembly: Assembly, strings: Sequence[Encoded]) -> list[IntArray]:
-        """The category of each token of some strings of an assembly, int32 (tokens,) each.
+    def label(self, assembly: Assembly, strings: Sequence[Encoded], either_hand: bool = False) -> list[Labelled]:
+        """Some strings of an assembly with their categories.
+
+        With `either_hand`, those of the assembly or of its mirror image, whichever are less, if its parts are their own
+        mirror images and stand in the mirror as parts of the kit do: a string does not tell left from right.
 
         Raises NoCategoryError for an edge of a string whose parts stand as none of their types was seen to.
         """
-        edges = np.concatenate([assembly.edges, assembly.edges[:, ::-1]])
-        relative = relative_poses(assembly.poses, edges)
-        place, symmetry = np.full(len(edges), -1), np.zeros(len(edges), np.int64)
-        ends = assembly.types[edges]
-        for a, b in np.unique(ends, axis=0).tolist():
-            rows = np.flatnonzero((ends[:, 0] == a) & (ends[:, 1] == b))
-            if (a, b) in self.pairs:
-                found, turn, gap = self.nearest(a, b, relative[rows])
-                place[rows] = np.where(gap <= REACH * self.pairs[a, b].slack[found], found, -1)
-                symmetry[rows] = turn
-        docked = dict(zip(map(tuple, edges.tolist()), zip(place.tolist(), symmetry.tolist(), strict=True), strict=True))
-        return [self._walk(assembly.types, docked, each) for each in strings]
+        found = self._label(assembly, strings)
+        image = self.mirror_image(assembly) if either_hand else None
+        if image is None:
+            return found
+        try:
+            others = self._label(image, strings)
+        except NoCategoryError:
+            return found
+        return [min(pair, key=lambda each: each.categories.tolist()) for pair in zip(found, others, strict=True)]
+
+    def mirror_image(self, assembly: Assembly) -> Assembly | None:
+        """An assembly in the mirror, if each of its parts is its own mirror image."""
+        mirrors = [self._mirrors[kind] for kind in assembly.types.tolist()]
+        if any(each is None for each in mirrors):
+            return None
+        poses = np.diag([-1.0, 1.0, 1.0, 1.0]) @ assembly.poses @ np.array(mirrors)
+        return Assembly(assembly.types, poses, assembly.edges)
 
     def place(self, string: str, categories: Sequence[int] | npt.NDArray[np.integer]) -> Assembly:
         """The parts of a string, in its order, where its categories put them; the first stands at the identity.
@@ -131,9 +158,10 @@ class CategorySpace:
             raise ValueError(f"{len(edges)} tokens have {len(categories)} categories")
         types = np.full(len(decoded.types), -1, dtype=np.int16)
         frames = np.empty((len(types), 4, 4))
+        allowed = self._allowed(decoded, edges)
         seen: list[tuple[int, int, int]] = []
         for token, ((here, there), category) in enumerate(zip(edges.tolist(), categories, strict=True)):
-            if not 0 <= category < len(self) or not self._allowed(decoded, here, there)[category]:
+            if not 0 <= category < len(self) or not allowed[token, category]:
                 raise ValueError(f"token {token} has category {category}, which is none of its kind")
             if there < 0:
                 continue
@@ -150,8 +178,11 @@ class CategorySpace:
         """Which categories each token of a string may have, by the labels of its parts alone, bool (tokens,
         categories): the mask of §6. A row is empty where the kit knows no contact of two labels. Raises StringError."""
         decoded = decode(string, self.alphabet)
-        rows = [self._allowed(decoded, here, there) for here, there in token_edges(decoded).tolist()]
-        found: BoolArray = np.array(rows)
+        return self._allowed(decoded, token_edges(decoded))
+
+    def _allowed(self, decoded: Decoded, edges: IntArray) -> BoolArray:
+        here, there = np.append(decoded.types + 1, 0)[edges].T
+        found: BoolArray = self.masks[here, there]
         return found
 
     def beside(self, parent: int | None, label: int) -> range:
@@ -168,15 +199,43 @@ class CategorySpace:
         place, symmetry = np.divmod(index, len(self._groups[b]))
         return place.astype(np.int16), symmetry.astype(np.int16), gap
 
-    def _walk(self, types: TypeArray, docked: dict[tuple[int, ...], tuple[int, int]], encoded: Encoded) -> IntArray:
-        """The categories of a string, by the places and symmetries of its edges beside the parts' own poses."""
+    @cached_property
+    def _mirrors(self) -> list[FloatArray | None]:
+        """For each type a reflection (4, 4) that maps its parts onto themselves."""
+        from stages.exemplars.congruence import comparable_mesh, congruences
+
+        found: list[FloatArray | None] = []
+        for each in self.kit.types:
+            mesh = comparable_mesh(each.vertices, each.faces)
+            motions = congruences(mesh, mesh, self.kit.pose_tolerance / each.diagonal, reflections=True)
+            turning = motions[np.linalg.det(motions[:, :3, :3]) < 0]
+            found.append(turning[0] if len(turning) else None)
+        return found
+
+    def _label(self, assembly: Assembly, strings: Sequence[Encoded]) -> list[Labelled]:
+        edges = np.concatenate([assembly.edges, assembly.edges[:, ::-1]])
+        relative = relative_poses(assembly.poses, edges)
+        place, symmetry = np.full(len(edges), -1), np.zeros(len(edges), np.int64)
+        ends = assembly.types[edges]
+        for a, b in np.unique(ends, axis=0).tolist():
+            rows = np.flatnonzero((ends[:, 0] == a) & (ends[:, 1] == b))
+            if (a, b) in self.pairs:
+                found, turn, gap = self.nearest(a, b, relative[rows])
+                place[rows] = np.where(gap <= REACH * self.pairs[a, b].slack[found], found, -1)
+                symmetry[rows] = turn
+        docked = dict(zip(map(tuple, edges.tolist()), zip(place.tolist(), symmetry.tolist(), strict=True), strict=True))
+        return [self._walk(assembly.types, docked, each) for each in strings]
+
+    def _walk(self, types: TypeArray, docked: dict[tuple[int, ...], tuple[int, int]], encoded: Encoded) -> Labelled:
+        """A string with its categories, by the places and symmetries of its edges beside the parts' own poses."""
         decoded, nodes = decode(encoded.string, self.alphabet), encoded.nodes.tolist()
         kinds = types[encoded.nodes].tolist()
         edges = token_edges(decoded)
-        found = np.full(len(edges), DUMMY, dtype=np.int32)
-        # For each node its frame's symmetry, one for each frame of the first part that is still among the least.
-        frames = np.zeros((len(kinds), len(self._groups[kinds[0]])), dtype=np.int16)
-        frames[0] = np.arange(frames.shape[1])
+        # A column for each frame of the first part: the categories, and for each node the symmetry of its frame.
+        columns = np.arange(len(self._groups[kinds[0]]))
+        found = np.full((len(edges), len(columns)), DUMMY, dtype=np.int32)
+        frames = np.zeros((len(kinds), len(columns)), dtype=np.int16)
+        frames[0] = columns
         found[0] = 1 + kinds[0]
         for token, (here, there) in enumerate(edges.tolist()):
             if here < 0:
@@ -186,14 +245,14 @@ class CategorySpace:
                 names = (self.kit.types[kinds[each]].name for each in (here, there))
                 raise NoCategoryError(f"{' and '.join(names)} stand as the kit has not seen them")
             pair = self.pairs[kinds[here], kinds[there]]
-            turned = pair.turned[frames[here], place]
-            least = turned.min()
-            found[token] = pair.first + least
-            if (turned > least).any():
-                frames = frames[:, turned == least]
+            found[token] = pair.first + pair.turned[frames[here], place]
             if decoded.texts[token] in self.alphabet.types:
                 frames[there] = self._products[kinds[there]][symmetry, pair.shifted[frames[here], place]]
-        return found
+        parts = np.repeat(encoded.nodes[:, None], len(columns), axis=1)
+        for branches in _equal_branches(decoded, edges, self.alphabet):
+            _sort_branches(found, parts, branches, np.array(decoded.token_nodes))
+        least = min(columns.tolist(), key=lambda column: found[:, column].tolist())
+        return Labelled(encoded.string, parts[:, least], found[:, least])
 
     def _places(self, a: int, b: int, first: int, dockings: list[tuple[FloatArray, float]]) -> PairPlaces:
         """The places of a pair of types. All places of one docking are images of its first under symmetries of the
@@ -217,15 +276,6 @@ class CategorySpace:
         self.pairs[a, b] = places
         return places
 
-    def _allowed(self, decoded: Decoded, here: int, there: int) -> BoolArray:
-        """The mask of a token by the nodes of its edge."""
-        parent, child = (int(decoded.types[each]) if each >= 0 else -1 for each in (here, there))
-        if (parent, child) not in self._masks:
-            labels = np.append(self.kit.label_of, -1)[self.types]  # type -1 has label -1
-            fits: BoolArray = (labels == (parent, child)).all(axis=1)
-            self._masks[parent, child] = fits
-        return self._masks[parent, child]
-
 
 def token_edges(decoded: Decoded) -> IntArray:
     """The edge of each token as it sees it, int32 (tokens, 2): from its parent to a part, from -1 to the first one,
@@ -240,6 +290,44 @@ def token_edges(decoded: Decoded) -> IntArray:
     found[nodes < 0] = -1
     found[0] = -1, 0
     return found.astype(np.int32)
+
+
+def _equal_branches(decoded: Decoded, edges: IntArray, alphabet: Alphabet) -> list[list[range]]:
+    """The branches of a part that are equal, token for token, and that no cycle number ties to others; as the tokens of
+    each, the innermost first."""
+    ends = [0] * len(decoded.texts)
+    opened: list[list[int]] = [[]]  # of each open bracket, and of the whole string, the parts without an end
+    for token, text in enumerate(decoded.texts):
+        if text == "(":
+            opened.append([])
+        elif text == ")":
+            for part in opened.pop():
+                ends[part] = token
+        elif text in alphabet.types:
+            opened[-1].append(token)
+    for part in opened[0]:
+        ends[part] = len(ends)
+    groups: dict[tuple[int, tuple[str, ...]], list[range]] = {}
+    for token, (here, _) in enumerate(edges.tolist()):
+        if here >= 0 and decoded.texts[token] in alphabet.types:
+            branch = range(token, ends[token])
+            texts = decoded.texts[token : ends[token]]
+            if all(text in alphabet.types or text in "()" for text in texts):
+                groups.setdefault((here, texts), []).append(branch)
+    return [each for each in reversed(groups.values()) if len(each) > 1]
+
+
+def _sort_branches(
+    found: IntArray, parts: npt.NDArray[np.int64], branches: Sequence[range], nodes: npt.NDArray[np.integer]
+) -> None:
+    """Let equal branches have their categories in ascending order, and their parts with them, in each column."""
+    of_tokens = np.array([list(each) for each in branches])
+    of_nodes = nodes[of_tokens]
+    of_nodes = of_nodes[:, of_nodes[0] >= 0]
+    for column in range(found.shape[1]):
+        order = sorted(range(len(branches)), key=found[of_tokens, column].tolist().__getitem__)
+        found[of_tokens, column] = found[of_tokens[order], column]
+        parts[of_nodes, column] = parts[of_nodes[order], column]
 
 
 def _directed_dockings(kit: Kit) -> dict[tuple[int, int], list[tuple[FloatArray, float]]]:

@@ -56,7 +56,7 @@ def strings_of(space: CategorySpace, assembly: Assembly, edges: Edges, count: in
 
 def labelled(space: CategorySpace, assembly: Assembly, encoded: Encoded) -> list[int]:
     (found,) = space.label(assembly, [encoded])
-    return list(found.tolist())
+    return list(found.categories.tolist())
 
 
 def gap(kit: Kit, found: Assembly, wanted: Assembly) -> float:
@@ -79,8 +79,10 @@ def gap(kit: Kit, found: Assembly, wanted: Assembly) -> float:
 
 
 def assert_comes_back(space: CategorySpace, assembly: Assembly, encoded: Encoded) -> list[int]:
-    categories = labelled(space, assembly, encoded)
-    wanted = Assembly(assembly.types[encoded.nodes], assembly.poses[encoded.nodes], assembly.edges)
+    (one,) = space.label(assembly, [encoded])
+    categories = list(one.categories.tolist())
+    assert space.label(assembly, [Encoded(one.string, one.nodes)])[0].nodes.tolist() == one.nodes.tolist()
+    wanted = Assembly(assembly.types[one.nodes], assembly.poses[one.nodes], assembly.edges)
     found = space.place(encoded.string, categories)
     assert gap(space.kit, found, wanted) <= 1.0
     allowed = space.allowed(encoded.string)
