@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import scaled_dot_product_attention
 
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import END
+from stages.training.transformer import Block
 
 __all__ = ["Decoder", "DecoderState", "StringVae", "shifted"]
 
@@ -107,7 +107,7 @@ class TransformerDecoder(Decoder):
         self.embedding = nn.Embedding(tokens, entry.hidden)
         self.places = nn.Embedding(longest + 1, entry.hidden)
         self.point = nn.Linear(entry.latent, entry.hidden)
-        self.blocks = nn.ModuleList(_Block(entry.hidden) for _ in range(entry.layers))
+        self.blocks = nn.ModuleList(Block(entry.hidden) for _ in range(entry.layers))
         self.norm = nn.LayerNorm(entry.hidden)
         self.logits = nn.Linear(entry.hidden, tokens)
 
@@ -130,28 +130,6 @@ class TransformerDecoder(Decoder):
             seen, keys, values = block(seen, (state[2 * number], state[2 * number + 1]))
             grown += [keys, values]
         return self.logits(self.norm(seen[:, 0])), grown
-
-
-class _Block(nn.Module):
-    """Attention to what stands before, then two layers; normed first."""
-
-    HEAD = 32
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.heads = max(width // self.HEAD, 1)
-        self.attention_norm, self.feed_norm = nn.LayerNorm(width), nn.LayerNorm(width)
-        self.projections, self.joined = nn.Linear(width, 3 * width), nn.Linear(width, width)
-        self.feed = nn.Sequential(nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width))
-
-    def forward(self, seen: Tensor, before: tuple[Tensor, Tensor] | None) -> tuple[Tensor, Tensor, Tensor]:
-        queries, keys, values = self.projections(self.attention_norm(seen)).chunk(3, dim=-1)
-        if before is not None:
-            keys, values = torch.cat([before[0], keys], dim=1), torch.cat([before[1], values], dim=1)
-        heads = [each.unflatten(-1, (self.heads, -1)).transpose(1, 2) for each in (queries, keys, values)]
-        mixed = scaled_dot_product_attention(heads[0], heads[1], heads[2], is_causal=before is None)
-        seen = seen + self.joined(mixed.transpose(1, 2).flatten(2))
-        return seen + self.feed(self.feed_norm(seen)), keys, values
 
 
 def shifted(codes: Tensor) -> Tensor:

@@ -1,0 +1,32 @@
+"""The block of a transformer, for whole sequences and for one token after another."""
+
+from __future__ import annotations
+
+from torch import Tensor, cat, nn
+from torch.nn.functional import scaled_dot_product_attention
+
+__all__ = ["Block"]
+
+
+class Block(nn.Module):
+    """Attention to what stands before, then two layers; normed first."""
+
+    HEAD = 32
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.heads = max(width // self.HEAD, 1)
+        self.attention_norm, self.feed_norm = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.projections, self.joined = nn.Linear(width, 3 * width), nn.Linear(width, width)
+        self.feed = nn.Sequential(nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width))
+
+    def forward(self, seen: Tensor, before: tuple[Tensor, Tensor] | None) -> tuple[Tensor, Tensor, Tensor]:
+        """What follows from float (n, tokens, width), and keys and values of all tokens so far, `before` among them;
+        with these, `seen` is one token."""
+        queries, keys, values = self.projections(self.attention_norm(seen)).chunk(3, dim=-1)
+        if before is not None:
+            keys, values = cat([before[0], keys], dim=1), cat([before[1], values], dim=1)
+        heads = [each.unflatten(-1, (self.heads, -1)).transpose(1, 2) for each in (queries, keys, values)]
+        mixed = scaled_dot_product_attention(heads[0], heads[1], heads[2], is_causal=before is None)
+        seen = seen + self.joined(mixed.transpose(1, 2).flatten(2))
+        return seen + self.feed(self.feed_norm(seen)), keys, values
