@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["ModelEntry"]
+__all__ = ["ModelEntry", "Source"]
+
+Source = Literal["strings", "shapes"]
+"""What models of a kit learn from: the strings that stage `strings` has written, or the shapes themselves."""
 
 
 class ModelEntry(StrictModel):
-    """One entry of `training.models`: a model for each of its kits and each of its seeds."""
+    """One entry of `training.models`: a model for each of its kits and each of its seeds.
+
+    learns_from: what `prepare` of the kind reads.
+    """
+
+    learns_from: ClassVar[Source] = "strings"
 
     name: str = Field(
         pattern=r"^[a-z][a-z0-9]*(_[a-z0-9]+)*$",

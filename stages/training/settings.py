@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
+from stages.training.edge_categories.settings import EdgeCategoriesEntry
 from stages.training.string_vae.settings import StringVaeEntry
 
 __all__ = ["AnyEntry", "TrainingConfig"]
 
-AnyEntry = StringVaeEntry
-"""An entry of any kind."""
+AnyEntry = Annotated[StringVaeEntry | EdgeCategoriesEntry, Field(discriminator="kind")]
+"""An entry of any kind, which its key `kind` tells."""
 
 
 class TrainingConfig(StrictModel):

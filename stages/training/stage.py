@@ -8,17 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
+from typing import Any
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection.shards import PRODUCERS, collection_shards, planned_producer
+from stages.strings.settings import StringsConfig
 from stages.training.rounds import Chain, kind_of, module_of, rounds, run_round
 from stages.training.settings import AnyEntry, TrainingConfig
 from stages.training.trained import FILES, run_trained
 
 __all__ = ["STAGE"]
 
+LEARNT = ("train", "val")
+"""The splits that models see."""
 BYTES_A_ROUND = 16_000_000
 """Weights and two moments of a model of about a million parameters."""
 
@@ -28,7 +33,7 @@ def plan(plan: Plan) -> list[Shard]:
     each model whose rounds have ended."""
     shards: dict[str, Shard] = {}
     for entry, kit, seed in _models(plan):
-        data = _data_shard(plan, entry.kind, kit)
+        data = _data_shard(plan, entry, kit)
         shards.setdefault(data.name, data)
         chain = rounds(plan, entry, entry.kind, kit, seed, data.name)
         shards.update((shard.name, shard) for shard in chain.shards)
@@ -99,21 +104,25 @@ def _name(entry: AnyEntry, kit: str, seed: int) -> str:
     return f"{entry.name}-{kit}-{seed}"
 
 
-def _data_shard(plan: Plan, kind: str, kit: str) -> Shard:
-    splits = {}
-    for name in plan.shards("strings"):
-        summary = plan.summary("strings", name)
-        if summary is not None and summary.get("split") in ("train", "val"):
-            splits[name] = summary["split"]
-    params = {
+def _data_shard(plan: Plan, entry: AnyEntry, kit: str) -> Shard:
+    """The samples of a kit made ready, for all models of a kind."""
+    params: dict[str, Any] = {
         "job": "data",
-        "kind": kind,
+        "kind": entry.kind,
         "kit": kit,
-        "splits": splits,
         "longest": plan.config.section(TrainingConfig).longest,
     }
-    inputs = (f"exemplars/{kit}", *(f"strings/{name}" for name in splits))
-    return Shard(f"{kit}-{kind}", params, inputs, (module_of(kind),))
+    if entry.learns_from == "strings":
+        stage = "strings"
+        found = {name: plan.summary(stage, name) or {} for name in plan.shards(stage)}
+        splits = {name: each["split"] for name, each in found.items() if each.get("split") in LEARNT}
+    else:
+        stage = planned_producer(plan) or ""
+        splits = {each.name: each.params["split"] for each in collection_shards(plan) if each.params["split"] in LEARNT}
+        strings = plan.config.section(StringsConfig)
+        params |= {"producer": stage, "edges": strings.edges, "strings": strings.strings_per_shape}
+    inputs = (f"exemplars/{kit}", *(f"{stage}/{name}" for name in splits))
+    return Shard(f"{kit}-{entry.kind}", {**params, "splits": splits}, inputs, (module_of(entry.kind),))
 
 
 def _trained_shard(plan: Plan, entry: AnyEntry, kit: str, seed: int, chain: Chain) -> Shard:
@@ -136,7 +145,7 @@ STAGE = Stage(
     name="training",
     module=__name__,
     config=TrainingConfig,
-    inputs=("exemplars", "strings"),
+    inputs=("exemplars", "strings", PRODUCERS),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

@@ -24,6 +24,7 @@ from stages.strings.encoder import canonical_string, random_strings
 from stages.strings.settings import StringsConfig
 from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
+from tests.stages.shape.collection.absent import named_inputs
 from tests.stages.strings.graphs import arrays
 
 __all__ = ["ALPHABET", "SPLITS", "STAGES", "config", "grammar", "graphs", "kit", "strings", "train"]
@@ -112,15 +113,17 @@ def plan_strings(plan: Plan) -> list[Shard]:
     return [Shard(name, inputs=("exemplars/toy",)) for name in SPLITS]
 
 
-STAGES: Mapping[str, Stage] = {
-    "exemplars": Stage("exemplars", __name__, NothingConfig, (), lambda _: [Shard("toy")], make_kit, lambda _: 0),
-    "strings": Stage("strings", __name__, StringsConfig, ("exemplars",), plan_strings, make_strings, lambda _: 0),
-    "training": STAGE,
-}
+STAGES: Mapping[str, Stage] = named_inputs(
+    [
+        Stage("exemplars", __name__, NothingConfig, (), lambda _: [Shard("toy")], make_kit, lambda _: 0),
+        Stage("strings", __name__, StringsConfig, ("exemplars",), plan_strings, make_strings, lambda _: 0),
+        STAGE,
+    ]
+)
 
 TINY: Mapping[str, Any] = {
-    "name": "tiny", "decoder": "masked", "latent": 4, "embedding": 4, "hidden": 8, "batch": 16, "steps": 4, "rounds": 4,
-    "anneal": 8,
+    "kind": "string_vae", "name": "tiny", "decoder": "masked", "latent": 4, "embedding": 4, "hidden": 8, "batch": 16,
+    "steps": 4, "rounds": 4, "anneal": 8,
 }  # fmt: skip
 
 

@@ -1,0 +1,31 @@
+"""What the config says of a model of edge categories."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from stages.training.entry import ModelEntry, Source
+
+__all__ = ["EdgeCategoriesEntry"]
+
+
+class EdgeCategoriesEntry(ModelEntry):
+    """A model of edge categories (strings §6). Sizes are not published: these train in minutes on one core."""
+
+    learns_from: ClassVar[Source] = "shapes"
+
+    kind: Literal["edge_categories"] = Field(
+        description="reads from a string where each part stands beside the one that it hangs on"
+    )
+    reader: Literal["lstm", "walker"] = Field(
+        "walker",
+        description="`lstm`: an LSTM that reads a string both ways, and a dense layer that judges each token by itself "
+        "(strings §6); `walker`: the same LSTM, and a transformer that walks the string and sees the parts that stand "
+        "already, so that a choice agrees with those before it",
+    )
+    mask: bool = Field(True, description="whether only categories of a token's pair of labels have a probability")
+    embedding: int = Field(32, ge=1, le=4096, description="numbers that stand for a token")
+    hidden: int = Field(128, ge=2, le=8192, description="size of the LSTM, both ways together, and of the walker; even")
+    layers: int = Field(2, ge=1, le=24, description="layers of the LSTM, and of the walker")

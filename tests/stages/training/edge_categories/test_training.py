@@ -1,0 +1,63 @@
+"""Training on the real mill: what is made ready, and what is published."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.places import Places
+from pipeline.survey import Survey
+from stages.training.edge_categories.batches import Strings
+from stages.training.edge_categories.trained import load_edge_categories
+from tests.stages.training.edge_categories.networks import STAGES, config, kit, network, space, train_networks, writer
+
+pytestmark = pytest.mark.slow
+
+WORK = Path(".work/nets/training")
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("networks")
+    assert not train_networks(config(), folder).failed
+    return folder
+
+
+def made_ready(out: Path, split: str) -> Strings:
+    name = out / WORK / f"toy-edge_categories.{split}"
+    rows = np.fromfile(f"{name}.rows", dtype="<i2").reshape(-1, 4)
+    return Strings(rows, np.load(f"{name}.first.npy"), np.load(f"{name}.graph.npy"))
+
+
+def test_what_is_made_ready_are_strings_of_the_shapes_with_their_categories(out: Path) -> None:
+    described = json.loads((out / WORK / "toy-edge_categories.json").read_text())
+    for split, seeds in (("train", range(12)), ("val", range(12, 18))):
+        found = made_ready(out, split)
+        assert described["counts"][split] == {"strings": len(found), "graphs": len(seeds), "tokens": len(found.rows)}
+        assert found.first[-1] == len(found.rows)
+        sizes = {seed: len(network(seed, 3 + (seed // 6))) for seed in seeds}
+        parts = [int((found.row(each)[:, 0] <= 3).sum()) for each in range(len(found))]
+        assert [sizes[seeds[shape]] for shape in found.graph.tolist()] == parts
+    first = made_ready(out, "train").row(0)[:, 3]
+    (canonical,) = writer().strings(writer().graph(network(0, 3)), 0, np.random.default_rng(0))
+    assert first.tolist() == space().label(network(0, 3), [canonical], either_hand=True)[0].categories.tolist()
+
+
+def test_model_is_published_and_read_beside_its_kit(out: Path) -> None:
+    folder = out / "nets-models/tiny-toy-0"
+    rows = list(csv.DictReader((folder / "curves.csv").read_text().splitlines()))
+    assert [int(row["step"]) for row in rows] == [4, 8]
+    assert {"val_accuracy", "val_tokens", "val_strings", "train_accuracy"} <= set(rows[0])
+    model = load_edge_categories(folder / "weights.safetensors", kit())
+    (chosen,) = model.choose(["ABA"])
+    space().place("ABA", chosen)
+
+
+def test_second_run_trains_nothing_and_other_strings_are_made_ready_anew(out: Path) -> None:
+    assert train_networks(config(), out).made == 0
+    survey = Survey(config({"strings_per_shape": 2}), STAGES, Places(out, "nets")).stage("training")
+    assert "toy-edge_categories" not in survey.records, "they are drawn by that number"
