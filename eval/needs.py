@@ -5,8 +5,9 @@ from __future__ import annotations
 from eval.evaluation import Need
 from eval.subject import Subject
 from stages.shape.collection.declared import language_of, producers
+from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["FINISHED", "KITS", "SEARCH", "STRING_VAE"]
+__all__ = ["EDGE_CATEGORIES", "FINISHED", "KITS", "SEARCH", "STRING_VAE"]
 
 
 def _finished(subject: Subject) -> str:
@@ -39,10 +40,15 @@ SEARCH = Need("the records of a search", _search)
 """The mill's folder holds what the search of stage `variations` has found, round by round."""
 
 
-def _string_vae(subject: Subject) -> str:
-    there = any(subject.models.glob("*/weights.safetensors"))
-    return "" if there else f"no trained model in {subject.models}; make train"
+def _trained(kind: str, what: str) -> Need:
+    """The need of weights of a kind in `Subject.models`."""
+
+    def missing(subject: Subject) -> str:
+        there = weights_of_kind(subject.models, kind)
+        return "" if there else f"no trained {what} in {subject.models}; make train"
+
+    return Need(f"a trained {what}", missing)
 
 
-STRING_VAE = Need("a trained string VAE", _string_vae)
-"""`Subject.models` holds weights."""
+STRING_VAE = _trained("string_vae", "string VAE")
+EDGE_CATEGORIES = _trained("edge_categories", "model of edge categories")

@@ -5,21 +5,17 @@ The ways of sampling are those of strings §5.2, the graphs of latent points tho
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
-from statistics import fmean, stdev
 
 import numpy as np
 
+from eval.models import Trained, by_group, over_seeds, trained_models
 from eval.table import Cell, Published, Table
-from pipeline.errors import ConfigError
 from pipeline.randomness import decision_rng
 from stages.shape.graphs.canonical import graph_digest
 from stages.strings.decoder import decode
-from stages.training.checkpoint import CheckpointError
 from stages.training.string_vae.sampling import sample
 from stages.training.string_vae.structuring import PathFigures, naive_graph, path_figures, search_graph
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
@@ -28,17 +24,15 @@ __all__ = [
     "PUBLISHED",
     "Reconstruction",
     "Sampling",
-    "Trained",
     "corpus_strings",
     "model_rng",
     "reconstruction",
     "reconstruction_table",
     "sampling",
     "sampling_table",
+    "string_vaes",
     "structure",
     "structure_table",
-    "trained_models",
-    "training_curve",
 ]
 
 NODES = 1000
@@ -55,26 +49,6 @@ PUBLISHED = tuple(
         ("greek houses", "search graph", 1, 0.31, 0.49),
     )
 )
-
-
-@dataclass(frozen=True)
-class Trained:
-    """A trained model: what it is called in the config, its kit, its seed, and the model itself."""
-
-    name: str
-    kit: str
-    seed: int
-    model: TrainedStringVae
-
-    @property
-    def group(self) -> str:
-        """Name of the models that differ by their seeds alone."""
-        return f"{self.name}-{self.kit}"
-
-    @property
-    def folder(self) -> str:
-        """Name of its folder among the published models."""
-        return f"{self.group}-{self.seed}"
 
 
 @dataclass(frozen=True)
@@ -100,25 +74,10 @@ class Sampling:
     novel: float
 
 
-def trained_models(folder: Path) -> list[Trained]:
+def string_vaes(folder: Path) -> list[Trained[TrainedStringVae]]:
     """The string VAEs in a folder of published models, by kit, name and seed. Raises ConfigError for weights that are
     not what they should be."""
-    found = []
-    for path in sorted(folder.glob("*/weights.safetensors")):
-        try:
-            model = load_string_vae(path)
-        except CheckpointError as error:
-            raise ConfigError(f"{error}; make train") from error
-        kit, whole = model.header["kit"], model.header["name"]
-        name, seed = whole.split(f"-{kit}-", 1)
-        found.append(Trained(name, kit, int(seed), model))
-    return sorted(found, key=lambda each: (each.kit, each.name, each.seed))
-
-
-def training_curve(folder: Path) -> list[tuple[float, float]]:
-    """Steps, and nats of a validation string after so many, of a published model."""
-    with open(folder / "curves.csv", newline="") as stream:
-        return [(float(row["step"]), float(row["val_nats"])) for row in csv.DictReader(stream)]
+    return trained_models(folder, "string_vae", lambda path, _: load_string_vae(path))
 
 
 def corpus_strings(folder: Path, kit: str, split: str, model: TrainedStringVae) -> list[str]:
@@ -185,12 +144,12 @@ def structure(
     return len(nodes), figures
 
 
-def reconstruction_table(found: Iterable[tuple[Trained, Reconstruction]]) -> Table:
+def reconstruction_table(found: Iterable[tuple[Trained[TrainedStringVae], Reconstruction]]) -> Table:
     """One row for the models of a name and a kit, over their seeds."""
     columns = ("model", "seeds", "strings", "tokens %", "strings %", "graphs %", "valid %")
     rows = [
-        (group, len(each), each[0].strings, *_over_seeds(each, ("tokens", "same", "graphs", "valid")))
-        for group, each in _by_group(found).items()
+        (group, len(each), each[0].strings, *over_seeds(each, ("tokens", "same", "graphs", "valid")))
+        for group, each in by_group(found).items()
     ]
     notes = (
         "Strings that training has not seen, encoded and decoded, the likeliest token each time. Tokens: the same at "
@@ -199,14 +158,14 @@ def reconstruction_table(found: Iterable[tuple[Trained, Reconstruction]]) -> Tab
     return Table("String VAE: reconstruction", columns, tuple(rows), notes)
 
 
-def sampling_table(found: Iterable[tuple[Trained, str, Sampling]]) -> Table:
+def sampling_table(found: Iterable[tuple[Trained[TrainedStringVae], str, Sampling]]) -> Table:
     """One row for the models of a name and a kit and a way, over their seeds."""
     columns = ("model", "way", "seeds", "searches", "valid %", "found %", "unique %", "novel %")
     groups: dict[tuple[str, str], list[Sampling]] = {}
     for trained, way, each in found:
         groups.setdefault((trained.group, way), []).append(each)
     rows = [
-        (group, way, len(each), each[0].searches, *_over_seeds(each, ("valid", "found", "unique", "novel")))
+        (group, way, len(each), each[0].searches, *over_seeds(each, ("valid", "found", "unique", "novel")))
         for (group, way), each in groups.items()
     ]
     notes = (
@@ -218,7 +177,7 @@ def sampling_table(found: Iterable[tuple[Trained, str, Sampling]]) -> Table:
     return Table("String VAE: new shapes by way of sampling", columns, tuple(rows), notes)
 
 
-def structure_table(found: Iterable[tuple[Trained, int, Mapping[str, PathFigures]]]) -> Table:
+def structure_table(found: Iterable[tuple[Trained[TrainedStringVae], int, Mapping[str, PathFigures]]]) -> Table:
     """One row for each model and graph; the published rows below."""
     rows: list[tuple[Cell, ...]] = []
     for trained, nodes, figures in found:
@@ -234,7 +193,7 @@ def structure_table(found: Iterable[tuple[Trained, int, Mapping[str, PathFigures
     return Table("String VAE: shortest paths", columns, tuple(rows), notes, PUBLISHED)
 
 
-def model_rng(seed: int, trained: Trained, decision: str) -> np.random.Generator:
+def model_rng(seed: int, trained: Trained[TrainedStringVae], decision: str) -> np.random.Generator:
     """The random stream of one decision about a model."""
     return decision_rng(seed, "eval", "strings", trained.group, trained.seed, decision)
 
@@ -247,16 +206,3 @@ def _codes(model: TrainedStringVae, string: str) -> list[int]:
 def _graph(model: TrainedStringVae, string: str) -> str:
     decoded = decode(string, model.vocabulary.alphabet)
     return graph_digest(decoded.types, decoded.edges)
-
-
-def _by_group(found: Iterable[tuple[Trained, Reconstruction]]) -> dict[str, list[Reconstruction]]:
-    return {group: [each for _, each in of_group] for group, of_group in groupby(found, key=lambda each: each[0].group)}
-
-
-def _over_seeds(found: Sequence[Reconstruction] | Sequence[Sampling], names: Sequence[str]) -> list[Cell]:
-    """Means of some figures, with their standard deviation where there are several seeds."""
-    cells: list[Cell] = []
-    for name in names:
-        values = [float(getattr(each, name)) for each in found]
-        cells.append(f"{fmean(values):.1f} ± {stdev(values):.1f}" if len(values) > 1 else values[0])
-    return cells

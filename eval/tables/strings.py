@@ -8,6 +8,7 @@ from pathlib import Path
 from eval.evaluation import Answer, Curve, Evaluation, Need
 from eval.needs import STRING_VAE
 from eval.subject import Subject
+from stages.training.checkpoint import weights_of_kind
 
 __all__ = ["TABLE"]
 
@@ -21,6 +22,7 @@ def _corpus(subject: Subject) -> Path:
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
+    from eval.models import training_curve
     from eval.strings import (
         corpus_strings,
         model_rng,
@@ -28,15 +30,14 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         reconstruction_table,
         sampling,
         sampling_table,
+        string_vaes,
         structure,
         structure_table,
-        trained_models,
-        training_curve,
     )
     from stages.training.string_vae.sampling import WAYS
 
     rebuilt, sampled, joined, lines, seed = [], [], [], {}, subject.config.seed
-    for each in trained_models(subject.models):
+    for each in string_vaes(subject.models):
         train, test = (corpus_strings(_corpus(subject), each.kit, split, each.model) for split in ("train", "test"))
         if test:
             rebuilt.append((each, reconstruction(each.model, test)))
@@ -44,7 +45,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             rng = model_rng(seed, each, way)
             sampled.append((each, way, sampling(each.model, way, train, asked.searches, rng)))
         joined.append((each, *structure(each.model, train, model_rng(seed, each, "structure"))))
-        lines[each.folder] = training_curve(subject.models / each.folder)
+        lines[each.folder] = training_curve(subject.models / each.folder, "val_nats")
     return Answer(
         [reconstruction_table(rebuilt), sampling_table(sampled), structure_table(joined)],
         [Curve("What a string that was not learnt takes", "steps of training", "nats a string", lines)],
@@ -58,7 +59,7 @@ def _options(parser: ArgumentParser) -> None:
 TABLE = Evaluation(
     question="Do strings come back from a string VAE, and how many new shapes does each way of sampling find?",
     needs=(STRING_VAE, Need("the corpus of its dataset", _no_corpus)),
-    seconds=lambda subject: 150.0 * len(list(subject.models.glob("*/weights.safetensors"))),
+    seconds=lambda subject: 150.0 * len(weights_of_kind(subject.models, "string_vae")),
     answer=_answer,
     options=_options,
 )

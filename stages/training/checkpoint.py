@@ -5,11 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from torch import Tensor
+if TYPE_CHECKING:
+    from torch import Tensor
 
-__all__ = ["VERSION", "CheckpointError", "checkpoint_bytes", "load_checkpoint", "tensors_of"]
+__all__ = [
+    "VERSION",
+    "CheckpointError",
+    "checkpoint_bytes",
+    "load_checkpoint",
+    "tensors_of",
+    "weights_header",
+    "weights_of_kind",
+]
 
 VERSION = 1
 """Of what stands in the header. A file of another version is refused."""
@@ -41,23 +50,50 @@ def load_checkpoint(path: Path, expected: Mapping[str, Any]) -> tuple[dict[str, 
     """
     from safetensors import SafetensorError, safe_open
 
+    header = weights_header(path)
+    for key, wanted in {"version": VERSION, **expected}.items():
+        if header.get(key) != wanted:
+            raise CheckpointError(f"{path} is of another {key}: {_difference(header.get(key), wanted)}")
+    try:
+        with safe_open(path, framework="pt", device="cpu") as stored:
+            tensors: dict[str, Tensor] = {name: stored.get_tensor(name) for name in sorted(stored.keys())}
+    except (SafetensorError, OSError, ValueError) as error:
+        raise CheckpointError(f"{path} is cut off or damaged: {error}") from error
+    return tensors, header
+
+
+def weights_header(path: Path) -> dict[str, Any]:
+    """What a file of weights says of itself. Raises CheckpointError for a pickle and for a file that is cut off or
+    damaged, or that Shapemill did not write."""
+    from safetensors import SafetensorError, safe_open
+
     with open(path, "rb") as stream:
         beginning = stream.read(8)
     if beginning.startswith(_PICKLES):
         raise CheckpointError(f"{path} is a pickle, which may run any code when it is read: refused; only safetensors")
     try:
-        with safe_open(path, framework="pt", device="cpu") as stored:
+        with safe_open(path, framework="np") as stored:
             metadata = stored.metadata() or {}
-            tensors: dict[str, Tensor] = {name: stored.get_tensor(name) for name in sorted(stored.keys())}
     except (SafetensorError, OSError, ValueError) as error:
         raise CheckpointError(f"{path} is cut off or damaged: {error}") from error
     if _KEY not in metadata:
         raise CheckpointError(f"{path} holds tensors, but Shapemill did not write it: its header does not say what of")
     header: dict[str, Any] = json.loads(metadata[_KEY])
-    for key, wanted in {"version": VERSION, **expected}.items():
-        if header.get(key) != wanted:
-            raise CheckpointError(f"{path} is of another {key}: {_difference(header.get(key), wanted)}")
-    return tensors, header
+    return header
+
+
+def weights_of_kind(folder: Path, kind: str) -> list[Path]:
+    """The weights of one kind in a folder of published models, by name; among them those that do not say of what kind
+    they are, for `load_checkpoint` to say why they cannot be read."""
+    return [path for path in sorted(folder.glob("*/weights.safetensors")) if _kind(path) in (kind, None)]
+
+
+def _kind(path: Path) -> str | None:
+    try:
+        kind: str | None = weights_header(path).get("kind")
+    except CheckpointError:
+        return None
+    return kind
 
 
 def _difference(found: Any, wanted: Any) -> str:

@@ -7,20 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eval.models import Trained, training_curve
 from eval.strings import (
     Reconstruction,
     Sampling,
-    Trained,
     corpus_strings,
     model_rng,
     reconstruction,
     reconstruction_table,
     sampling,
     sampling_table,
+    string_vaes,
     structure,
     structure_table,
-    trained_models,
-    training_curve,
 )
 from pipeline.errors import ConfigError
 from stages.training.checkpoint import checkpoint_bytes
@@ -78,7 +77,10 @@ def test_models_are_found_with_their_kit_and_seed(tmp_path: Path) -> None:
         header = {**model.header, "kind": "string_vae", "kit": kit, "name": name}
         content = checkpoint_bytes(model.module.state_dict(), header)
         (tmp_path / name / "weights.safetensors").write_bytes(content)
-    found = [(each.name, each.kit, each.seed) for each in trained_models(tmp_path)]
+    (tmp_path / "other-toy-0").mkdir()
+    content = checkpoint_bytes(model.module.state_dict(), {"kind": "another", "kit": "toy", "name": "other-toy-0"})
+    (tmp_path / "other-toy-0" / "weights.safetensors").write_bytes(content)
+    found = [(each.name, each.kit, each.seed) for each in string_vaes(tmp_path)]
     assert found == [("masked", "space-base", 0), ("masked", "space-base", 1), ("plain", "toy", 0)]
 
 
@@ -86,13 +88,13 @@ def test_weights_that_cannot_be_read_are_named(tmp_path: Path) -> None:
     (tmp_path / "masked-toy-0").mkdir()
     (tmp_path / "masked-toy-0" / "weights.safetensors").write_bytes(b"\x80\x04 a pickle")
     with pytest.raises(ConfigError, match=r"masked-toy-0/weights\.safetensors is a pickle.*make train"):
-        trained_models(tmp_path)
+        string_vaes(tmp_path)
 
 
 def test_curve_is_what_the_training_wrote(tmp_path: Path) -> None:
     rows = [{"round": number, "step": 10 * number, "val_nats": 9.0 - number} for number in range(3)]
     (tmp_path / "curves.csv").write_text(curves_csv(rows))
-    assert training_curve(tmp_path) == [(0.0, 9.0), (10.0, 8.0), (20.0, 7.0)]
+    assert training_curve(tmp_path, "val_nats") == [(0.0, 9.0), (10.0, 8.0), (20.0, 7.0)]
 
 
 def test_strings_that_a_model_cannot_read_are_left_out(tmp_path: Path) -> None:
@@ -102,7 +104,7 @@ def test_strings_that_a_model_cannot_read_are_left_out(tmp_path: Path) -> None:
     assert max(map(len, toy_strings())) <= MOST
 
 
-def as_trained(model: TrainedStringVae, seed: int) -> Trained:
+def as_trained(model: TrainedStringVae, seed: int) -> Trained[TrainedStringVae]:
     return Trained("masked", "toy", seed, model)
 
 
