@@ -173,6 +173,10 @@ def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
         known = _schema_at(schema, loc[:-1]).get("properties", {})
         return f"unknown key; {_known(str(loc[-1]), known)}"
     field = _schema_at(schema, loc)
+    if kind in {"union_tag_not_found", "union_tag_invalid"}:
+        key, kinds = field["discriminator"]["propertyName"], field["discriminator"]["mapping"]
+        said = error["input"].get(key) if isinstance(error["input"], Mapping) else None
+        return f"{key} {'is missing' if said is None else f'is {said}'}; it is one of {', '.join(kinds)}"
     described = f" ({field['description']})" if field.get("description") else ""
     if kind == "missing":
         return f"is missing{described}"
@@ -206,6 +210,8 @@ def _schema_at(schema: Mapping[str, Any], loc: tuple[str | int, ...]) -> Mapping
             return here
         if isinstance(step, int):
             here = here.get("items", {})
+        elif "discriminator" in here:  # the step is what the entry says of itself
+            here = {"$ref": here["discriminator"]["mapping"][step]}
         else:
             below = here.get("properties", {}).get(step, here.get("additionalProperties", {}))
             here = below if isinstance(below, dict) else {}

@@ -39,22 +39,37 @@ def _table(title: str, prefix: str, model: type[StrictModel]) -> list[str]:
 
 def _rows(prefix: str, model: type[StrictModel]) -> Iterator[tuple[str, str, str, str]]:
     for name, field in model.model_fields.items():
-        inner, many = _inner_model(field.annotation)
+        inner, many = _inner_models(field.annotation)
         key = f"{prefix}{name}{'[]' if many else ''}"
         text = (field.description or "").strip()
         yield key, _kind(field), "" if inner else _default(field), text[:1].upper() + text[1:]
-        if inner is not None:
-            yield from _rows(f"{key}.", inner)
+        yield from _rows_of_any(f"{key}.", inner)
 
 
-def _inner_model(annotation: Any) -> tuple[type[StrictModel] | None, bool]:
-    """The section model that a key holds, and whether it holds a list of them."""
-    if isinstance(annotation, type) and issubclass(annotation, StrictModel):
-        return annotation, False
-    for argument in get_args(annotation):
-        if isinstance(argument, type) and issubclass(argument, StrictModel):
-            return argument, get_origin(annotation) in (tuple, list)
-    return None, False
+def _rows_of_any(prefix: str, models: Mapping[str, type[StrictModel]]) -> Iterator[tuple[str, str, str, str]]:
+    """The rows of models one of which a key holds, by what its entry says of itself: what all of them know first, then
+    what each knows besides."""
+    rows = {kind: list(_rows(prefix, model)) for kind, model in models.items()}
+    shared = [row for row in next(iter(rows.values()), []) if all(row in of_kind for of_kind in rows.values())]
+    yield from shared
+    for kind, of_kind in rows.items():
+        for key, value, default, text in (row for row in of_kind if row not in shared):
+            yield key, value, default, f"Of `{kind}`: {text[:1].lower()}{text[1:]}"
+
+
+def _inner_models(annotation: Any) -> tuple[dict[str, type[StrictModel]], bool]:
+    """The section models that a key may hold, by the value of the key that tells them apart, and whether it holds a
+    list of them."""
+    many = get_origin(annotation) in (tuple, list)
+    inner = get_args(annotation)[0] if many else annotation
+    metadata: Sequence[Any] = ()
+    if get_origin(inner) is Annotated:
+        inner, *metadata = get_args(inner)
+    models = [each for each in (inner, *get_args(inner)) if isinstance(each, type) and issubclass(each, StrictModel)]
+    told_by = next((each.discriminator for each in metadata if isinstance(each, FieldInfo)), None)
+    if not isinstance(told_by, str):
+        return ({"": models[0]}, many) if models else ({}, False)
+    return {str(get_args(each.model_fields[told_by].annotation)[0]): each for each in models}, many
 
 
 def _kind(field: FieldInfo) -> str:
@@ -86,7 +101,7 @@ def _words(annotation: Any) -> str:
     if origin in (tuple, list):
         return f"list of {_words(arguments[0])}"
     if origin in (Union, types.UnionType):
-        return " or ".join(_words(each) for each in arguments)
+        return " or ".join(dict.fromkeys(map(_words, arguments)))
     if annotation is type(None):
         return "nothing"
     if isinstance(annotation, type) and issubclass(annotation, StrictModel):

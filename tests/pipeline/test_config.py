@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import pytest
 from pydantic import Field, model_validator
@@ -23,9 +23,20 @@ class Loaf(StrictModel):
     grams: int = Field(500, gt=0, lt=5000, description="weight; unit: grams")
 
 
+class Bun(StrictModel):
+    kind: Literal["bun"]
+    seeds: int = Field(3, ge=0, description="seeds on top")
+
+
+class Roll(StrictModel):
+    kind: Literal["roll"]
+    butter: bool = Field(True, description="whether it is buttered")
+
+
 class Bakery(StrictModel):
     loaves: list[Loaf] = Field(default_factory=list, description="what is baked")
     recipe: ExistingFile | None = None
+    small: tuple[Annotated[Bun | Roll, Field(discriminator="kind")], ...] = Field((), description="small things")
 
     @model_validator(mode="after")
     def _not_too_many(self) -> Bakery:
@@ -97,6 +108,16 @@ def test_exponent_without_a_point_is_a_number(tmp_path: Path) -> None:
         (
             "name: bread\nbakery:\n  loaves: [{flour: a}, {flour: b}, {flour: c}, {flour: d}]\n",
             ["bread.yaml:2: bakery: 4 loaves do not fit into the oven: at most 3"],
+        ),
+        (
+            "name: bread\nbakery:\n  small:\n    - {kind: bun, sedes: 4}\n    - {butter: true}\n    - {kind: pie}\n"
+            "    - {kind: roll}\n    - {kind: bun, seeds: -1}\n",
+            [
+                "bread.yaml:4: bakery.small.0.bun.sedes: unknown key; did you mean seeds?",
+                "bread.yaml:5: bakery.small.1: kind is missing; it is one of bun, roll",
+                "bread.yaml:6: bakery.small.2: kind is pie; it is one of bun, roll",
+                "bread.yaml:8: bakery.small.4.bun.seeds: must lie in [0, inf), and is -1 (seeds on top)",
+            ],
         ),
         ("name: White Bread\n", ["bread.yaml:1: name: string should match pattern"]),
         ("name: bread\nversion: '1.0'\n", ["bread.yaml:2: version: string should match pattern"]),
