@@ -50,7 +50,7 @@ class TrainedEdgeCategories:
         A walker's are those after its own likeliest choices. With `voters`, so many other strings of the same graph,
         drawn from `rng`, have a say: see `vote`. Raises StringError, and ValueError for voters without `rng`.
         """
-        own = self._log_probabilities([string], self.choose([string]))[0]
+        own = self.log_probabilities([string], self.choose([string]))[0]
         if not voters:
             return own
         if rng is None:
@@ -108,7 +108,7 @@ class TrainedEdgeCategories:
             proposed[tuple(tuple(each.tolist()) for each in read)] = read
         ballots = []
         for read in proposed.values():
-            judged = self._log_probabilities(texts, read)
+            judged = self.log_probabilities(texts, read)
             total = sum(
                 float(of_string[np.arange(len(each)), each].sum()) for of_string, each in zip(judged, read, strict=True)
             )
@@ -121,7 +121,7 @@ class TrainedEdgeCategories:
         return bool(self.header["settings"]["mask"])
 
     @torch.no_grad()
-    def _log_probabilities(self, strings: Sequence[str], categories: Sequence[IntArray]) -> list[FloatArray]:
+    def log_probabilities(self, strings: Sequence[str], categories: Sequence[IntArray]) -> list[FloatArray]:
         """Of each token given the categories of those before it, float64 (tokens, categories) each."""
         found: list[FloatArray] = []
         for start in range(0, len(strings), AT_ONCE):

@@ -115,7 +115,7 @@ def test_token_by_token_a_model_says_what_it_says_of_the_whole(reader: str) -> N
         steps.scores()
         steps.take(np.array([category, category if steps.token == 0 else 0, category]))
     assert steps.chosen()[0].tolist() == steps.chosen()[2].tolist() == right(5).tolist()
-    (whole,) = model._log_probabilities([encoded.string], [right(5)])
+    (whole,) = model.log_probabilities([encoded.string], [right(5)])
     again = model.steps([encoded.string])
     for token, category in enumerate(right(5).tolist()):
         np.testing.assert_allclose(again.scores()[0], whole[token], rtol=1e-3, atol=1e-3)

@@ -1,0 +1,59 @@
+"""`make eval TABLE=categories`: how well is it read from a string where its parts stand? (strings §6)"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from eval.evaluation import Answer, Curve, Evaluation
+from eval.needs import EDGE_CATEGORIES, KITS
+from eval.subject import Subject
+from stages.training.checkpoint import weights_of_kind
+
+__all__ = ["TABLE"]
+
+
+def _answer(subject: Subject, asked: Namespace) -> Answer:
+    from itertools import islice
+
+    from eval.categories import categories_table, category_models, clusters_table, judge, made_shapes
+    from eval.clusters import clusters_of
+    from eval.models import training_curve
+    from pipeline.randomness import decision_rng
+    from stages.exemplars.language import made_kits
+    from stages.strings.categories import CategorySpace
+    from stages.strings.kit_strings import KitStrings
+    from stages.strings.settings import StringsConfig
+
+    kits = made_kits(subject.places)
+    edges = subject.config.section(StringsConfig).edges
+    writers = {name: KitStrings(kit, edges) for name, kit in kits.items()}
+    judged, clusters, lines = [], [], {}
+    for each in category_models(subject.models, kits):
+        for split in ("val", "test"):
+            rng = decision_rng(subject.config.seed, "eval", "categories", each.kit, split)
+            shapes = islice(made_shapes(subject, each.kit, split), asked.graphs)
+            judged.append((each, split, judge(each.model, writers[each.kit], shapes, asked.voters, rng)))
+        lines[each.folder] = [
+            (step, 100 * share) for step, share in training_curve(subject.models / each.folder, "val_tokens")
+        ]
+    for name in dict.fromkeys(each.kit for each, _, _ in judged):
+        learnt = list(islice(made_shapes(subject, name, "train"), asked.graphs))
+        clusters.append((name, len(learnt), clusters_of(CategorySpace(kits[name]), learnt)))
+    return Answer(
+        [categories_table(judged), clusters_table(clusters)],
+        [Curve("Tokens with the right category, each after the right ones before it", "steps", "% of val", lines)],
+    )
+
+
+def _options(parser: ArgumentParser) -> None:
+    parser.add_argument("--graphs", type=int, default=100, help="shapes of a kit and split that are looked at")
+    parser.add_argument("--voters", type=int, default=7, help="strings of a shape beside its canonical one")
+
+
+TABLE = Evaluation(
+    question="How often is it read from a string where each of its parts stands, and does it help to ask several?",
+    needs=(KITS, EDGE_CATEGORIES),
+    seconds=lambda subject: 5 + 60.0 * len(weights_of_kind(subject.models, "edge_categories")),
+    answer=_answer,
+    options=_options,
+)

@@ -1,0 +1,76 @@
+"""The figures of models of edge categories."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eval.categories import Judged, Shares, categories_table, category_models, clusters_table, judge
+from eval.clusters import Clusters
+from eval.models import Trained
+from pipeline.errors import ConfigError
+from stages.training.checkpoint import checkpoint_bytes
+from tests.stages.training.edge_categories.networks import kit, network, random_model, trained_model, writer
+
+
+@pytest.mark.slow
+def test_a_model_that_has_learnt_is_right_more_often_and_strings_that_vote_agree_on_shapes_that_close() -> None:
+    shapes = [network(seed) for seed in range(6)]
+    learnt, random = (
+        judge(model, writer(), shapes, 3, np.random.default_rng(0))
+        for model in (trained_model(reader="walker"), random_model(reader="walker"))
+    )
+    for each in (learnt, random):
+        assert each.graphs == len(shapes)
+        assert each.strings == sum(
+            len(writer().strings(writer().graph(shape), 3, np.random.default_rng(0))) for shape in shapes
+        )
+        assert each.voted.closes >= each.alone.closes
+        for shares in (each.alone, each.voted):
+            assert 0 <= shares.whole <= shares.closes <= 100
+            assert shares.open <= shares.tokens <= 100
+    assert learnt.given > random.given
+    assert learnt.alone.tokens > random.alone.tokens
+
+
+def test_shapes_that_have_no_string_are_left_out() -> None:
+    whole = network(1)
+    parts = np.array([0, len(whole) - 2])
+    apart = whole.select(parts)
+    assert not len(apart.edges)
+    found = judge(random_model(reader="lstm"), writer(), [apart, network(2)], 1, np.random.default_rng(0))
+    assert (found.graphs, found.strings) == (1, 2)
+
+
+def test_models_are_read_beside_their_kits(tmp_path: Path) -> None:
+    model = random_model(reader="lstm")
+    folder = tmp_path / "lstm-toy-0"
+    folder.mkdir()
+    header = {**model.header, "name": "lstm-toy-0"}
+    (folder / "weights.safetensors").write_bytes(checkpoint_bytes(model.module.state_dict(), header))
+    (found,) = category_models(tmp_path, {"toy": kit()})
+    assert (found.name, found.kit, found.seed) == ("lstm", "toy", 0)
+    (folder / "weights.safetensors").write_bytes(
+        checkpoint_bytes(model.module.state_dict(), {**header, "names": ["post", "rod"]})
+    )
+    with pytest.raises(ConfigError, match=r"another names: it has 2 entries.*make train"):
+        category_models(tmp_path, {"toy": kit()})
+
+
+def test_a_row_says_what_strings_say_alone_and_one_what_they_vote_for() -> None:
+    model = random_model(reader="lstm")
+    judged = Judged(5, 20, 91.0, Shares(90.0, 80.0, 10.0, 30.0), Shares(95.0, 85.0, 40.0, 60.0))
+    found = [(Trained("lstm", "toy", 0, model), split, judged) for split in ("val", "test")]
+    table = categories_table(found)
+    assert [row[:2] + row[5:] for row in table.rows] == [
+        ("lstm-toy", "test", "alone", 91.0, 90.0, 80.0, 10.0, 30.0),
+        ("lstm-toy", "test", "voted", "", 95.0, 85.0, 40.0, 60.0),
+        ("lstm-toy", "val", "alone", 91.0, 90.0, 80.0, 10.0, 30.0),
+        ("lstm-toy", "val", "voted", "", 95.0, 85.0, 40.0, 60.0),
+    ]
+    (published,) = table.published_by_source()["strings, §6"]
+    assert published[table.columns.index("tokens %")] == 90.0
+    (row,) = clusters_table([("toy", 3, Clusters(10, 9, 8, 8, 8, 0.5))]).rows
+    assert row == ("toy", 3, 10, 9, 8, 8, 8, 0.5)
