@@ -96,7 +96,7 @@ def judge(
         texts = [each.string for each in strings]
         for scores, wanted in zip(model.log_probabilities(texts, truth), truth, strict=True):
             given = [given[0] + int((scores.argmax(axis=1) == wanted).sum()), given[1] + len(wanted)]
-        own = model.choose(texts)
+        own = model.choose(texts, None)
         ballots = model.vote(strings)
         together = ballots[0].categories if ballots else own
         for each, one, all_said in zip(labelled, own, together, strict=True):

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.errors import Rejected
-from pipeline.shards import array_bytes, json_bytes
+from pipeline.shards import array_bytes, bytes_array, json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.kit import Assembly
 from stages.shape.kit_input import input_kit
@@ -85,10 +86,9 @@ def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], CategoryTables, 
     strings = {}
     for split in ("train", "val"):
         rows = np.memmap(task.input("training", f"{data}.{split}.rows"), dtype="<i2", mode="r").reshape(-1, 4)
-        first, graph = (np.load(task.input("training", f"{data}.{split}.{each}.npy")) for each in ("first", "graph"))
+        first, graph = (_array(task, f"{data}.{split}.{each}") for each in ("first", "graph"))
         strings[split] = Strings(rows, first, graph)
-    masks, poses = (np.load(task.input("training", f"{data}.{each}.npy")) for each in ("masks", "poses"))
-    return described, CategoryTables(masks, poses), strings
+    return described, CategoryTables(_array(task, f"{data}.masks"), _array(task, f"{data}.poses")), strings
 
 
 def described_space(space: CategorySpace) -> dict[str, Any]:
@@ -107,3 +107,7 @@ def _shapes(task: Task, split: str) -> Iterator[tuple[str, Assembly]]:
             if sample.kit == params["kit"]:
                 yield sample.key, sample.assembly
         task.progress(done + 1, len(shards))
+
+
+def _array(task: Task, name: str) -> npt.NDArray[Any]:
+    return bytes_array(task.input("training", f"{name}.npy").read_bytes())

@@ -15,7 +15,7 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly, Kit
 from stages.strings.categories import CategorySpace, NoCategoryError
 from stages.strings.decoder import decode
-from stages.strings.encoder import Encoded, random_strings
+from stages.strings.encoder import Encoded
 from stages.training.checkpoint import load_checkpoint
 from stages.training.edge_categories.batches import Batch, CategoryTables, batch_of, read_string
 from stages.training.edge_categories.corpus import described_space
@@ -44,20 +44,16 @@ class TrainedEdgeCategories:
     space: CategorySpace
     header: Mapping[str, Any]
 
-    def scores(self, string: str, voters: int = 0, rng: np.random.Generator | None = None) -> FloatArray:
+    def scores(self, string: str, others: Sequence[Encoded] = ()) -> FloatArray:
         """Log-probabilities of the categories of each token, float64 (tokens, categories), -inf where the mask is.
 
-        A walker's are those after its own likeliest choices. With `voters`, so many other strings of the same graph,
-        drawn from `rng`, have a say: see `vote`. Raises StringError, and ValueError for voters without `rng`.
+        A walker's are those after its own likeliest choices. With `others`, strings of the graph of `string` and the
+        node of `string` at each of their nodes (`random_strings` of its decoded graph draws such), these have a say:
+        see `vote`. Raises StringError.
         """
-        own = self.log_probabilities([string], self.choose([string]))[0]
-        if not voters:
-            return own
-        if rng is None:
-            raise ValueError("other strings of a graph are drawn at random: an rng is needed")
-        decoded = decode(string, self.space.alphabet)
-        others = random_strings(decoded.types, decoded.edges, self.space.alphabet, voters, rng, {string})
-        ballots = self.vote([Encoded(string, np.arange(len(decoded.types))), *others])
+        (own,) = self.log_probabilities([string], self.choose([string], None))
+        nodes = len(decode(string, self.space.alphabet).types)
+        ballots = self.vote([Encoded(string, np.arange(nodes)), *others]) if others else []
         if not ballots:
             return own
         weights = np.exp([each.log_probability - ballots[0].log_probability for each in ballots])
@@ -72,7 +68,7 @@ class TrainedEdgeCategories:
         """The strings, before their first tokens; the same string may stand there several times."""
         return Steps(self, self._batch(strings))
 
-    def choose(self, strings: Sequence[str], rng: np.random.Generator | None = None) -> list[IntArray]:
+    def choose(self, strings: Sequence[str], rng: np.random.Generator | None) -> list[IntArray]:
         """Categories of each string, int32 (tokens,): drawn by their probabilities, or, without `rng`, the likeliest of
         each token, given those before it."""
         found: list[IntArray] = []
@@ -96,7 +92,7 @@ class TrainedEdgeCategories:
         """
         texts = [each.string for each in strings]
         proposed: dict[tuple[tuple[int, ...], ...], list[IntArray]] = {}
-        for encoded, categories in zip(strings, self.choose(texts), strict=True):
+        for encoded, categories in zip(strings, self.choose(texts, None), strict=True):
             try:
                 placed = self.space.place(encoded.string, categories)
                 order = np.argsort(encoded.nodes)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.places import Places
+from pipeline.shards import bytes_array
 from pipeline.survey import Survey
 from stages.training.edge_categories.batches import Strings
 from stages.training.edge_categories.trained import load_edge_categories
@@ -30,7 +31,9 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def made_ready(out: Path, split: str) -> Strings:
     name = out / WORK / f"toy-edge_categories.{split}"
     rows = np.fromfile(f"{name}.rows", dtype="<i2").reshape(-1, 4)
-    return Strings(rows, np.load(f"{name}.first.npy"), np.load(f"{name}.graph.npy"))
+    return Strings(
+        rows, bytes_array(Path(f"{name}.first.npy").read_bytes()), bytes_array(Path(f"{name}.graph.npy").read_bytes())
+    )
 
 
 def test_what_is_made_ready_are_strings_of_the_shapes_with_their_categories(out: Path) -> None:
@@ -53,7 +56,7 @@ def test_model_is_published_and_read_beside_its_kit(out: Path) -> None:
     assert [int(row["step"]) for row in rows] == [4, 8]
     assert {"val_accuracy", "val_tokens", "val_strings", "train_accuracy"} <= set(rows[0])
     model = load_edge_categories(folder / "weights.safetensors", kit())
-    (chosen,) = model.choose(["ABA"])
+    (chosen,) = model.choose(["ABA"], None)
     space().place("ABA", chosen)
 
 
