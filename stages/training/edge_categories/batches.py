@@ -15,6 +15,7 @@ from stages.strings.alphabet import Alphabet
 from stages.strings.categories import CategorySpace, token_edges
 from stages.strings.decoder import decode
 from stages.strings.tokens import number_value
+from stages.training.pooling import pooled
 
 __all__ = ["COLUMNS", "PAD", "Batch", "CategoryTables", "Strings", "batch_of", "batches", "read_string"]
 
@@ -22,8 +23,6 @@ PAD = 0
 """The code of what stands behind a string; the code of a part is its label's number plus one."""
 COLUMNS = ("code", "here", "there")
 """What a string has for each token: its code, and the tokens of the parts at the two ends of its edge, or -1."""
-POOLED = 16
-"""Strings of like length stand together in a batch, chosen from so many batches at once."""
 
 Rows = npt.NDArray[np.int16]
 
@@ -116,16 +115,8 @@ class Batch:
 
 def batches(strings: Strings, size: int, masks: BoolArray, rng: np.random.Generator | None) -> Iterator[Batch]:
     """All strings once, in random order and in batches of strings of like length; with no `rng`, in their order."""
-    lengths = strings.lengths
-    order = np.arange(len(strings)) if rng is None else rng.permutation(len(strings))
-    chosen: list[npt.NDArray[np.int64]] = []
-    for start in range(0, len(order), size * POOLED):
-        pool = order[start : start + size * POOLED]
-        if rng is not None:
-            pool = pool[np.argsort(lengths[pool], kind="stable")]
-        chosen += [pool[begin : begin + size] for begin in range(0, len(pool), size)]
-    for number in range(len(chosen)) if rng is None else rng.permutation(len(chosen)):
-        yield batch_of([strings.row(each) for each in chosen[int(number)].tolist()], masks)
+    for chosen in pooled(strings.lengths, size, rng):
+        yield batch_of([strings.row(each) for each in chosen.tolist()], masks)
 
 
 def batch_of(strings: Sequence[Rows], masks: BoolArray) -> Batch:

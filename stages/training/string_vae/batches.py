@@ -11,10 +11,9 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-__all__ = ["Batch", "Strings", "batches"]
+from stages.training.pooling import pooled
 
-POOLED = 16
-"""Strings of like length stand together in a batch, chosen from so many batches at once."""
+__all__ = ["Batch", "Strings", "batches"]
 
 
 @dataclass(frozen=True)
@@ -67,16 +66,8 @@ class Batch:
 
 def batches(strings: Strings, size: int, vocabulary: int, rng: np.random.Generator | None) -> Iterator[Batch]:
     """All strings once, in random order and in batches of strings of like length; with no `rng`, in their order."""
-    lengths = strings.lengths
-    order = np.arange(len(strings)) if rng is None else rng.permutation(len(strings))
-    chosen: list[npt.NDArray[np.int64]] = []
-    for start in range(0, len(order), size * POOLED):
-        pool = order[start : start + size * POOLED]
-        if rng is not None:
-            pool = pool[np.argsort(lengths[pool], kind="stable")]
-        chosen += [pool[begin : begin + size] for begin in range(0, len(pool), size)]
-    for number in range(len(chosen)) if rng is None else rng.permutation(len(chosen)):
-        yield batch_of(strings, chosen[int(number)], vocabulary)
+    for rows in pooled(strings.lengths, size, rng):
+        yield batch_of(strings, rows, vocabulary)
 
 
 def batch_of(strings: Strings, rows: npt.NDArray[np.int64], vocabulary: int) -> Batch:
