@@ -69,12 +69,14 @@ def weights_header(path: Path) -> dict[str, Any]:
 
     with open(path, "rb") as stream:
         beginning = stream.read(8)
-    if beginning.startswith(_PICKLES):
-        raise CheckpointError(f"{path} is a pickle, which may run any code when it is read: refused; only safetensors")
     try:
         with safe_open(path, framework="np") as stored:
             metadata = stored.metadata() or {}
     except (SafetensorError, OSError, ValueError) as error:
+        # Asked afterwards: safetensors begin with the length of their header, which may look like a pickle.
+        if beginning.startswith(_PICKLES):
+            told = "is a pickle, which may run any code when it is read: refused; only safetensors"
+            raise CheckpointError(f"{path} {told}") from error
         raise CheckpointError(f"{path} is cut off or damaged: {error}") from error
     if _KEY not in metadata:
         raise CheckpointError(f"{path} holds tensors, but Shapemill did not write it: its header does not say what of")

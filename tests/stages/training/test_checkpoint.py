@@ -40,6 +40,15 @@ def test_pickle_is_refused_before_it_is_read(tmp_path: Path, zipped: bool) -> No
         load_checkpoint(written(tmp_path, stream.getvalue()), {})
 
 
+def test_weights_whose_first_byte_is_that_of_a_pickle_are_none(tmp_path: Path) -> None:
+    """The first bytes of safetensors are the length of their header: of each 32 files one begins like a pickle."""
+    contents = [checkpoint_bytes(TENSORS, {**HEADER, "note": "x" * length}) for length in range(256)]
+    alike = [content for content in contents if content.startswith(b"\x80")]
+    assert alike
+    tensors, _ = load_checkpoint(written(tmp_path, alike[0]), HEADER)
+    assert set(tensors) == set(TENSORS)
+
+
 @pytest.mark.parametrize("kept", [0, 5, 100, -1])
 def test_truncated_file_is_refused(tmp_path: Path, kept: int) -> None:
     with pytest.raises(CheckpointError, match="is cut off or damaged"):
