@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from stages.training.edge_categories.trained import TrainedEdgeCategories, load_
 
 __all__ = [
     "PUBLISHED", "Judged", "Shares", "categories_table", "category_models", "clusters_table", "judge", "made_shapes",
+    "read_back",
 ]  # fmt: skip
 
 PUBLISHED = (Published("validation samples", "strings, §6", {"tokens %": 90.0}),)
@@ -103,6 +104,22 @@ def judge(
             alone.add(model, each, one)
             voted.add(model, each, all_said)
     return Judged(graphs, alone.strings, 100 * given[0] / max(given[1], 1), alone.shares(), voted.shares())
+
+
+def read_back(
+    model: TrainedEdgeCategories, writer: KitStrings, shape: Assembly, voters: int, rng: np.random.Generator
+) -> Assembly | None:
+    """What strings of a shape vote for, if anything that they propose closes, with its first part where it stands in
+    the shape, turned as brings the others nearest to theirs. Raises NotConnectedError for a shape without strings."""
+    strings = writer.strings(writer.graph(shape), voters, rng)
+    ballots = model.vote(strings)
+    if not ballots:
+        return None
+    placed = model.space.place(strings[0].string, ballots[0].categories[0])
+    wanted = shape.poses[strings[0].nodes]
+    ways = wanted[0] @ model.space.kit.types[placed.types[0]].symmetries[:, None] @ placed.poses
+    gaps = np.linalg.norm(ways[..., :3, 3] - wanted[:, :3, 3], axis=-1).sum(axis=1)
+    return replace(placed, poses=ways[gaps.argmin()])
 
 
 class _Tally:

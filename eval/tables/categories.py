@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.evaluation import Answer, Curve, Evaluation
+from eval.evaluation import Answer, Curve, Evaluation, Strip
 from eval.needs import EDGE_CATEGORIES, KITS
 from eval.subject import Subject
 from stages.training.checkpoint import weights_of_kind
 
 __all__ = ["TABLE"]
 
+SHOWN = 3
+"""So many shapes are drawn beside what was read of them."""
+
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
     from itertools import islice
 
-    from eval.categories import categories_table, category_models, clusters_table, judge, made_shapes
+    from eval.categories import categories_table, category_models, clusters_table, judge, made_shapes, read_back
     from eval.clusters import clusters_of
     from eval.models import training_curve
+    from eval.pictures import shape_picture
     from pipeline.randomness import decision_rng
     from stages.exemplars.language import made_kits
+    from stages.shape.shape import kit_shape
     from stages.strings.categories import CategorySpace
     from stages.strings.kit_strings import KitStrings
     from stages.strings.settings import StringsConfig
@@ -27,12 +32,20 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     kits = made_kits(subject.places)
     edges = subject.config.section(StringsConfig).edges
     writers = {name: KitStrings(kit, edges) for name, kit in kits.items()}
-    judged, clusters, lines = [], [], {}
+    judged, clusters, lines, strips = [], [], {}, []
     for each in category_models(subject.models, kits):
         for split in ("val", "test"):
             rng = decision_rng(subject.config.seed, "eval", "categories", each.kit, split)
             shapes = islice(made_shapes(subject, each.kit, split), asked.graphs)
             judged.append((each, split, judge(each.model, writers[each.kit], shapes, asked.voters, rng)))
+        pictures = []
+        for number, shape in enumerate(islice(made_shapes(subject, each.kit, "test"), SHOWN)):
+            rng = decision_rng(subject.config.seed, "eval", "categories", each.kit, "shown", number)
+            found = read_back(each.model, writers[each.kit], shape, asked.voters, rng)
+            pictures.append((f"{each.kit}, {len(shape)} parts", shape_picture(kit_shape(kits[each.kit], shape))))
+            if found is not None:
+                pictures.append((f"as {each.folder} reads it", shape_picture(kit_shape(kits[each.kit], found))))
+        strips.append(Strip(f"Shapes of test, and what {each.folder} reads from their strings", pictures))
         lines[each.folder] = [
             (step, 100 * share) for step, share in training_curve(subject.models / each.folder, "val_tokens")
         ]
@@ -42,6 +55,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     return Answer(
         [categories_table(judged), clusters_table(clusters)],
         [Curve("Tokens with the right category, each after the right ones before it", "steps", "% of val", lines)],
+        strips,
     )
 
 

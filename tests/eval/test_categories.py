@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.categories import Judged, Shares, categories_table, category_models, clusters_table, judge
+from eval.categories import Judged, Shares, categories_table, category_models, clusters_table, judge, read_back
 from eval.clusters import Clusters
 from eval.models import Trained
 from pipeline.errors import ConfigError
@@ -33,6 +33,19 @@ def test_a_model_that_has_learnt_is_right_more_often_and_strings_that_vote_agree
             assert shares.open <= shares.tokens <= 100
     assert learnt.given > random.given
     assert learnt.alone.tokens > random.alone.tokens
+
+
+@pytest.mark.slow
+def test_what_is_read_back_stands_where_the_shape_stands() -> None:
+    """Two posts, a rod and a sign leave little to guess: the same places, or the sign at another side."""
+    shape = network(2, 2)
+    found = read_back(trained_model(reader="walker"), writer(), shape, 3, np.random.default_rng(0))
+    assert found is not None
+    assert sorted(found.types.tolist()) == sorted(shape.types.tolist())
+    first, place = found.poses[0], found.poses[:, :3, 3]
+    same = [kind for kind, pose in zip(shape.types, shape.poses, strict=True) if np.allclose(pose[:3, 3], first[:3, 3])]
+    assert same == [found.types[0]]
+    assert np.ptp(place, axis=0).max() == pytest.approx(np.ptp(shape.poses[:, :3, 3], axis=0).max(), abs=0.7)
 
 
 def test_shapes_that_have_no_string_are_left_out() -> None:
