@@ -88,7 +88,7 @@ def _handle(values: Values, wall: Wall, section: CrossSection, path: FloatArray,
     t = np.linspace(0.0, 1.0, len(path))
     ends = wall.radius(heights[[0, -1]]) - clear[[0, -1]]
     clear = clear + (1.0 - t) ** 5 * ends[0] + (0.0 if free else t**5 * ends[1])
-    swell = 0.3 + 1.6 * values["hndl_radius_along_path"]
+    swell = 0.25 + 1.75 * values["hndl_radius_along_path"]
     last = 0.5 + 0.5 * swell if free else 1.0
     rise = np.sin(np.pi * t) ** 2
     scale = np.where(t < 0.5, 1.0, last) * (1.0 - rise) + swell * rise
