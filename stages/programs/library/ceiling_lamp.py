@@ -54,7 +54,7 @@ def build(values: Values) -> Sequence[Part]:
     swept = sweep(rail, profile, style, up=(0.0, 0.0, 1.0))
     # An arm is cut level within the plate, whichever way it leaves.
     level = swept.vertices.copy()
-    level[:AROUND, 1] = level[-2, 1] = -0.5 * values["base_thickness"]
+    level[:AROUND, 1] = level[-2, 1] = -0.5 * _thickness(values)
     arm = QuadMesh(level, swept.quads)
     light = _bulb(bulb, 0.4 * end * min(wide, thick)).transformed(rail.frames(1.0, up=(0.0, 0.0, 1.0)))
     shape = 0.1 + 0.9 * values["base_roundness"]
@@ -78,15 +78,20 @@ def _bulb(radius: float, neck: float) -> QuadMesh:
     return revolve(outline, count=GLASS).transformed(rotation("x", 90.0))
 
 
+def _thickness(values: Values) -> float:
+    """Thickness of the plate: the thinnest shows its edge, too."""
+    return 0.015 + float(values["base_thickness"])
+
+
 def _inset(values: Values, half: FloatArray) -> float:
     """How much smaller the plate is at its underside."""
-    strength = 0.25 + 0.75 * values["base_profile_strength"]
-    return float(strength * min(0.45 * half.min(), 0.03 + 0.6 * values["base_thickness"]))
+    strength = 0.35 + 0.65 * values["base_profile_strength"]
+    return float(strength * min(0.6 * half.min(), 0.05 + 0.8 * _thickness(values)))
 
 
 def _base(values: Values, half: FloatArray) -> QuadMesh:
     """The plate: its edge is slanted, rounded, hollowed or stepped."""
-    inset, thickness = _inset(values, half), values["base_thickness"]
+    inset, thickness = _inset(values, half), _thickness(values)
     turn = np.linspace(0.0, np.pi / 2.0, 7)
     # Pairs of how far in and how far down, as shares, from the ceiling to the underside.
     edges = (
@@ -106,7 +111,7 @@ def _base(values: Values, half: FloatArray) -> QuadMesh:
 def _rail(values: Values, reach: float, girth: float) -> Curve:
     """The curve of an arm from within the plate at x = 0 to its end at x = `reach`, bowed sideways on its
     way; `girth` is how far its profile reaches."""
-    under = -values["base_thickness"]
+    under = -_thickness(values)
     position = 0.25 + 0.5 * values["light_frame_mid_point_pos"]
     out = position * reach + 0.04 + 0.24 * values["light_frame_mid_point_offset_y"]
     down = 0.08 + 0.2 * out
