@@ -159,19 +159,18 @@ class CategorySpace:
         types = np.full(len(decoded.types), -1, dtype=np.int16)
         frames = np.empty((len(types), 4, 4))
         allowed = self._allowed(decoded, edges)
-        seen: list[tuple[int, int, int]] = []
         for token, ((here, there), category) in enumerate(zip(edges.tolist(), categories, strict=True)):
             if not 0 <= category < len(self) or not allowed[token, category]:
                 raise ValueError(f"token {token} has category {category}, which is none of its kind")
-            if there < 0:
+            if decoded.texts[token] not in self.alphabet.types:
                 continue
-            seen.append((here, there, int(category)))
-            if decoded.texts[token] in self.alphabet.types:
-                types[there] = self.types[category, 1]
-                frames[there] = self.poses[category] if here < 0 else frames[here] @ self.poses[category]
-        for here, there, category in seen:
-            if (types[here] if here >= 0 else -1, types[there]) != tuple(self.types[category].tolist()):
-                raise ValueError(f"category {category} is of other types than parts {here} and {there} are")
+            parent, child = self.types[category].tolist()
+            if here >= 0 and types[here] != parent:
+                raise ValueError(
+                    f"part {there} has category {category}, which is beside another type than part {here} is"
+                )
+            types[there] = child
+            frames[there] = self.poses[category] if here < 0 else frames[here] @ self.poses[category]
         return Assembly(types, frames, decoded.edges)
 
     def allowed(self, string: str) -> BoolArray:

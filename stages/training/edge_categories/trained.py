@@ -154,7 +154,7 @@ class Steps:
         self._space, self._is_masked = model.space, model.is_masked
         self._module = model.module
         self._batch = batch
-        self._types = np.full(batch.codes.shape, -1)
+        self._types = np.full(batch.codes.shape, -1)  # of the part of each token, once a category tells it
         self.token = 0
         """The token that comes next."""
         self._logits: Tensor
@@ -178,19 +178,23 @@ class Steps:
     @torch.no_grad()
     def scores(self) -> FloatArray:
         """Log-probabilities of the next token of each string, float64 (strings, categories), given those taken; of the
-        categories that are left by the labels and by the types of the parts that stand."""
-        allowed = self._batch.allowed[:, self.token] & torch.from_numpy(self._fitting())
-        logits = masked(self._next().double(), self._batch.allowed[:, self.token])
-        found: FloatArray = torch.log_softmax(masked(logits, allowed), dim=-1).numpy()
+        categories that are left by the labels and by the types of parts that are told already."""
+        allowed = self._batch.allowed[:, self.token]
+        logits = masked(self._next().double(), allowed)
+        for ends, types in zip((self._batch.here, self._batch.there), self._space.types.T, strict=True):
+            # Where nothing is left the part at the other end of a cycle has less to say than the parent.
+            allowed = allowed & torch.from_numpy(self._fitting(ends[:, self.token].numpy(), types))
+            logits = masked(logits, allowed)
+        found: FloatArray = torch.log_softmax(logits, dim=-1).numpy()
         return found
 
     def take(self, categories: np.ndarray) -> None:
         """Choose the categories int (strings,) of the next token."""
         chosen = torch.from_numpy(np.asarray(categories, dtype=np.int64))
         self._batch.categories[:, self.token] = chosen
-        there, row = self._batch.there[:, self.token].numpy(), np.arange(len(self))
-        placed = there == self.token
-        self._types[row[placed], self.token] = self._space.types[chosen.numpy()[placed], 1]
+        there = self._batch.there[:, self.token].numpy()
+        rows = np.flatnonzero(there >= 0)
+        self._types[rows, there[rows]] = self._space.types[chosen.numpy()[rows], 1]
         if isinstance(self._module, Walker):
             here = self._batch.here[:, self.token]
             self._frames[:, self.token] = self._module.step(self._frames, here, self._module.poses[chosen])
@@ -214,16 +218,12 @@ class Steps:
         taken = self._batch.categories.numpy().astype(np.int32)
         return [taken[row, :length] for row, length in enumerate(lengths.tolist())]
 
-    def _fitting(self) -> np.ndarray:
-        """Categories whose types are those of the parts that stand, bool (strings, categories)."""
-        fits = np.ones((len(self), len(self._space)), dtype=np.bool_)
-        if not self._is_masked:
-            return fits
-        for column, ends in enumerate((self._batch.here, self._batch.there)):
-            tokens = ends[:, self.token].numpy()
-            stands = (tokens >= 0) & (tokens < self.token)
-            types = self._types[np.arange(len(self)), np.maximum(tokens, 0)]
-            fits[stands] &= self._space.types[:, column] == types[stands, None]
+    def _fitting(self, parts: np.ndarray, types: np.ndarray) -> np.ndarray:
+        """Which categories, by their types int (categories,) at one end, fit the parts there, by their tokens int
+        (strings,), as far as the types of these are told; bool (strings, categories)."""
+        of_parts = self._types[np.arange(len(self)), np.maximum(parts, 0)]
+        untold = (parts < 0) | (of_parts < 0) | (not self._is_masked)
+        fits: np.ndarray = untold[:, None] | (types == of_parts[:, None])
         return fits
 
     def _next(self) -> Tensor:

@@ -8,14 +8,20 @@ import numpy as np
 import pytest
 import torch
 
+from stages.exemplars.build import read_kit
+from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shape.geometry.pose import pose_vectors
+from stages.strings.categories import CategorySpace, token_edges
+from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded
+from stages.strings.kit_strings import KitStrings
 from stages.strings.tokens import split_tokens
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
-from stages.training.edge_categories.batches import PAD, batch_of, batches, read_string
+from stages.training.edge_categories.batches import PAD, CategoryTables, batch_of, batches, read_string
 from stages.training.edge_categories.model import Walker
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
+from stages.training.edge_categories.training import new_model
 from tests.stages.training.edge_categories.networks import (
     CYCLES,
     kit,
@@ -28,6 +34,7 @@ from tests.stages.training.edge_categories.networks import (
     trained_model,
     writer,
 )
+from tests.stages.variations.chairs import write_chairs
 
 READERS = ("lstm", "walker")
 
@@ -146,6 +153,29 @@ def test_only_what_the_mask_allows_is_chosen(reader: str) -> None:
         np.testing.assert_allclose(np.exp(scores).sum(axis=1), 1.0)
     without = random_model(reader=reader, mask=False)
     assert (without.scores(strings(0)[0].string) > -np.inf).all()
+
+
+@pytest.mark.slow
+def test_parts_of_one_label_have_one_surface_in_all_their_categories(tmp_path: Path) -> None:
+    """Labels do not tell the type of a part; the category of a part binds those beside it, if there are any."""
+    shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
+    chairs = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").decide(STRICTEST))
+    of_chairs, of_kit = CategorySpace(chairs), KitStrings(chairs, "all")
+    settings = model_entry(random_model(reader="walker"))
+    module = new_model(settings, CategoryTables.of(of_chairs), CYCLES, 0)
+    model = TrainedEdgeCategories(module.eval(), of_chairs, random_model().header)
+    for seed, exemplar in enumerate(chairs.exemplars):
+        texts = [
+            each.string for each in of_kit.strings(of_kit.graph(exemplar.assembly), 2, np.random.default_rng(seed))
+        ]
+        for string, chosen in zip(texts, model.choose(texts, np.random.default_rng(seed)), strict=True):
+            decoded = decode(string, of_chairs.alphabet)
+            types: dict[int, int] = {}
+            for text, (here, there), each in zip(decoded.texts, token_edges(decoded).tolist(), chosen, strict=True):
+                if text in of_chairs.alphabet.types:
+                    beside = of_chairs.beside(types.get(here), int(decoded.types[there]))
+                    assert each in beside or not beside
+                    types[there] = int(of_chairs.types[each, 1])
 
 
 def model_entry(model: TrainedEdgeCategories) -> EdgeCategoriesEntry:
