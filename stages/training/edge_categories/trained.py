@@ -193,7 +193,8 @@ class Steps:
         chosen = torch.from_numpy(np.asarray(categories, dtype=np.int64))
         self._batch.categories[:, self.token] = chosen
         there = self._batch.there[:, self.token].numpy()
-        rows = np.flatnonzero(there >= 0)
+        # Of a part that stands already nothing is told anew.
+        rows = np.flatnonzero(there >= self.token)
         self._types[rows, there[rows]] = self._space.types[chosen.numpy()[rows], 1]
         if isinstance(self._module, Walker):
             here = self._batch.here[:, self.token]
