@@ -8,27 +8,29 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["ModelEntry", "Source"]
+__all__ = ["KitModelEntry", "ModelEntry", "Source", "Subject"]
+
+Subject = Literal["kit", "program"]
+"""What a model learns from: the samples of a kit, or a program."""
 
 Source = Literal["strings", "shapes"]
 """What models of a kit learn from: the strings that stage `strings` has written, or the shapes themselves."""
 
 
 class ModelEntry(StrictModel):
-    """One entry of `training.models`: a model for each of its kits and each of its seeds.
+    """One entry of `training.models`: a model for each of its subjects and each of its seeds.
 
-    learns_from: what `prepare` of the kind reads.
+    subject: what a model of the kind learns from.
     """
 
-    learns_from: ClassVar[Source] = "strings"
+    subject: ClassVar[Subject]
 
     name: str = Field(
         pattern=r"^[a-z][a-z0-9]*(_[a-z0-9]+)*$",
         max_length=32,
-        description="what the model is called; its weights stand in `OUT/<dataset>-models/<name>-<kit>-<seed>`; "
-        "lower-case letters, digits and single underscores",
+        description="what the model is called; its weights stand in `OUT/<dataset>-models/<name>-<subject>-<seed>`, "
+        "the subject being a kit or a program; lower-case letters, digits and single underscores",
     )
-    kits: tuple[str, ...] = Field((), description="the kits that it is trained on, each by itself; all if empty")
     seeds: int = Field(1, ge=1, le=100, description="how often it is trained, from other weights; unit: models")
     learning_rate: float = Field(1e-3, gt=0, le=1, description="of Adam at the start; it falls to a twentieth")
     batch: int = Field(64, ge=1, le=65_536, description="samples that a step of the optimiser sees; unit: samples")
@@ -50,3 +52,15 @@ class ModelEntry(StrictModel):
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="numbers of the forward pass; `bfloat16` is faster where the processor knows it"
     )
+
+
+class KitModelEntry(ModelEntry):
+    """A model that learns from the samples of a kit.
+
+    learns_from: what `prepare` of the kind reads.
+    """
+
+    subject: ClassVar[Subject] = "kit"
+    learns_from: ClassVar[Source] = "strings"
+
+    kits: tuple[str, ...] = Field((), description="the kits that it is trained on, each by itself; all if empty")

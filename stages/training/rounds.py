@@ -6,28 +6,30 @@ import importlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, cast, get_args
 
 from pipeline.code import code_digest, reached
 from pipeline.errors import ShardFailed
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
-from stages.training.entry import ModelEntry
+from stages.programs.program import program_module
+from stages.training.entry import ModelEntry, Subject
 
-__all__ = ["Chain", "Kind", "kind_of", "rounds", "run_round"]
+__all__ = ["Chain", "Kind", "kind_of", "model_name", "module_of", "rounds", "run_round", "subject_of"]
 
 
 class Kind(Protocol):
     """What the `training.py` of a kind holds; its folder is found by the kind's name."""
 
     def prepare(self, task: Task) -> Outcome:
-        """Make the samples of a kit ready, as files `<shard>.<anything>`."""
+        """Make samples of a kit or a program ready, as files `<shard>.<anything>`."""
 
     def entry(self, settings: Mapping[str, Any]) -> ModelEntry:
         """The entry whose JSON is `settings`."""
 
     def learner(self, task: Task, entry: Any, seed: int) -> Any:
-        """A `Learner` with fresh weights, of `task.shard.params`: `kit`, and `data`, the shard that `prepare` made."""
+        """A `Learner` with fresh weights, of `task.shard.params`: `kit` or `program`, and `data`, the shard that
+        `prepare` made."""
 
 
 def module_of(kind: str) -> str:
@@ -53,26 +55,36 @@ class Chain:
     ended: bool
 
 
-def rounds(plan: Plan, entry: ModelEntry, kind: str, kit: str, seed: int, data: str) -> Chain:
+def model_name(entry: ModelEntry, subject: str, seed: int) -> str:
+    """What a model's shards and its folder are called. A program may be a module, whose dots no file name has."""
+    return f"{entry.name}-{subject.replace('.', '_')}-{seed}"
+
+
+def subject_of(params: Mapping[str, Any]) -> dict[str, Any]:
+    """What a shard's model learns from: `{"kit": name}` or `{"program": name}`."""
+    return {key: params[key] for key in get_args(Subject) if key in params}
+
+
+def rounds(plan: Plan, entry: ModelEntry, kind: str, subject: str, seed: int, data: str) -> Chain:
     """The chain of one model: a round follows the one before it, until there are `rounds`, or `patience` of them in a
     row were no better than the best.
 
     So a training that ends early has made nothing that says nothing. What decides about the end, and which kits and
     seeds there are besides, is no setting of a round.
     """
-    settings = entry.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"})
+    settings = entry.model_dump(mode="json", exclude={"name", "kits", "programs", "seeds", "patience"})
     shards: list[Shard] = []
     summaries: list[Mapping[str, Any]] = []
     best = 0
     for number in range(entry.rounds):
-        name = f"{entry.name}-{kit}-{seed}-r{number:04}"
+        name = f"{model_name(entry, subject, seed)}-r{number:04}"
         before = [shards[-1].name] if shards else []
         params = {
-            "job": "round", "kind": kind, "kit": kit, "seed": seed, "round": number, "data": data, "before": before,
-            "settings": settings,
+            "job": "round", "kind": kind, entry.subject: subject, "seed": seed, "round": number, "data": data,
+            "before": before, "settings": settings,
         }  # fmt: skip
         inputs = tuple(f"training/{each}" for each in (data, *before))
-        shards.append(Shard(name, params, inputs, (module_of(kind),), entry.threads))
+        shards.append(Shard(name, params, inputs, _modules(params), entry.threads))
         summary = plan.summary("training", name)
         if summary is None:
             return Chain(tuple(shards), tuple(summaries), best, ended=False)
@@ -95,7 +107,7 @@ def run_round(task: Task) -> Outcome:
     same_arithmetic(entry.threads)
     learner = kind.learner(task, entry, _seed(task, "weights"))
     trainee = Trainee.of(learner, entry)
-    described = {"kind": params["kind"], "kit": params["kit"], "settings": params["settings"], **learner.header}
+    described = {"kind": params["kind"], **subject_of(params), "settings": params["settings"], **learner.header}
     for before in params["before"]:
         tensors, header = load_checkpoint(task.input("training", f"{before}.safetensors"), described)
         trainee.restore(tensors, header["step"])
@@ -114,7 +126,7 @@ def run_round(task: Task) -> Outcome:
     header = {
         **described,
         "step": trainee.step,
-        "code": code_digest(reached((module_of(params["kind"]),))),
+        "code": code_digest(reached(_modules(params))),
         "device": device.type,
         "figures": figures,
     }
@@ -123,6 +135,12 @@ def run_round(task: Task) -> Outcome:
     with task.output(f"{name}.json") as stream:
         stream.write(json_bytes(figures))
     return Outcome(samples=0, summary={"loss": found["loss"], "step": trainee.step, "device": device.type})
+
+
+def _modules(params: Mapping[str, Any]) -> tuple[str, ...]:
+    """The modules that a round finds by name: its kind's, and that of its program."""
+    own = (module_of(params["kind"]),)
+    return (*own, program_module(params["program"])) if "program" in params else own
 
 
 def _seed(task: Task, decision: str) -> int:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.stage import Outcome, Task
+from stages.training.rounds import subject_of
 
 __all__ = ["FILES", "curves_csv", "curves_png", "model_card", "run_trained"]
 
@@ -25,7 +26,7 @@ def run_trained(task: Task) -> Outcome:
     params = task.shard.params
     rows = [json.loads(task.input("training", f"{each}.json").read_bytes()) for each in params["rounds"]]
     best = task.input("training", f"{params['rounds'][params['best']]}.safetensors")
-    tensors, header = load_checkpoint(best, {"kind": params["kind"], "kit": params["kit"]})
+    tensors, header = load_checkpoint(best, {"kind": params["kind"], **subject_of(params)})
     weights = tensors_of(tensors, "weights")
     header |= {key: params[key] for key in ("name", "dataset", "license")}
     figures = {"rounds": len(rows), "best": rows[params["best"]]}
@@ -83,6 +84,7 @@ def model_card(header: Mapping[str, Any], figures: Mapping[str, Any], parameters
         for split, of_split in header["counts"].items()
     ]
     kinds = list(next(iter(header["counts"].values())))
+    subject = " ".join(f"{what} `{name}`" for what, name in subject_of(header).items())
     lines = [
         "---",
         f"license: {header['license'].lower()}",
@@ -90,7 +92,7 @@ def model_card(header: Mapping[str, Any], figures: Mapping[str, Any], parameters
         "",
         f"# {header['name']}",
         "",
-        f"A `{header['kind']}` of kit `{header['kit']}`, trained on dataset {header['dataset']}: {parameters:,} "
+        f"A `{header['kind']}` of {subject}, trained on dataset {header['dataset']}: {parameters:,} "
         f"parameters, the best of {figures['rounds']} rounds, after {best['step']:,} steps on {header['device']}.",
         "",
         "`weights.safetensors` says in its header all that is needed to read it again: kind, settings, vocabulary, and "

@@ -6,12 +6,12 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.entry import ModelEntry, Source
+from stages.training.entry import KitModelEntry, Source
 
 __all__ = ["EdgeCategoriesEntry"]
 
 
-class EdgeCategoriesEntry(ModelEntry):
+class EdgeCategoriesEntry(KitModelEntry):
     """A model of edge categories (strings §6). Sizes are not published: these train in minutes on one core."""
 
     learns_from: ClassVar[Source] = "shapes"

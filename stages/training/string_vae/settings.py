@@ -6,12 +6,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from stages.training.entry import ModelEntry
+from stages.training.entry import KitModelEntry
 
 __all__ = ["StringVaeEntry"]
 
 
-class StringVaeEntry(ModelEntry):
+class StringVaeEntry(KitModelEntry):
     """A string VAE (strings §5). Sizes are not published: these train in minutes on one core."""
 
     kind: Literal["string_vae"] = Field("string_vae", description="a variational autoencoder of strings")
