@@ -1,7 +1,7 @@
-"""Stage `training`: models learn from the samples of a dataset, round by round.
+"""Stage `training`: models learn from the samples of a dataset, or from a program, round by round.
 
-Its shards are the samples of each kit made ready, the rounds of each model, and the finished models. It is no part of
-a dataset: `make train`.
+Its shards are the samples of each kit and model made ready, the rounds of each model, and the finished models. It is no
+part of a dataset: `make train`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,14 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.programs.program import program_module
+from stages.programs.settings import ProgramsConfig
 from stages.shape.collection.shards import PRODUCERS, collection_shards, planned_producer
+from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
-from stages.training.rounds import Chain, kind_of, module_of, rounds, run_round
+from stages.training.entry import KitModelEntry
+from stages.training.recovery.settings import RecoveryEntry
+from stages.training.rounds import Chain, kind_of, model_name, module_of, rounds, run_round
 from stages.training.settings import AnyEntry, TrainingConfig
 from stages.training.trained import FILES, run_trained
 
@@ -29,16 +34,19 @@ BYTES_A_ROUND = 16_000_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """The samples of each kit that a model learns from; then the rounds of every model as far as they are known, and
-    each model whose rounds have ended."""
+    """The samples that models learn from; then the rounds of every model as far as they are known, and each model whose
+    rounds have ended."""
     shards: dict[str, Shard] = {}
-    for entry, kit, seed in _models(plan):
-        data = _data_shard(plan, entry, kit)
+    for entry, subject, seed in _models(plan):
+        if isinstance(entry, KitModelEntry):
+            data = _kit_shard(plan, entry, entry.kind, subject)
+        else:
+            data = _program_shard(plan, entry, subject)
         shards.setdefault(data.name, data)
-        chain = rounds(plan, entry, entry.kind, kit, seed, data.name)
+        chain = rounds(plan, entry, entry.kind, subject, seed, data.name)
         shards.update((shard.name, shard) for shard in chain.shards)
         if chain.ended:
-            trained = _trained_shard(plan, entry, kit, seed, chain)
+            trained = _trained_shard(plan, entry, subject, seed, chain)
             shards[trained.name] = trained
     return list(shards.values())
 
@@ -53,12 +61,12 @@ def run_shard(task: Task) -> Outcome:
 def report(plan: Plan) -> Sequence[str]:
     """How far each model is."""
     lines = []
-    for entry, kit, seed in _models(plan):
-        chain = rounds(plan, entry, entry.kind, kit, seed, "")
+    for entry, subject, seed in _models(plan):
+        chain = rounds(plan, entry, entry.kind, subject, seed, "")
         if chain.summaries:
             state = "ended" if chain.ended else f"of {entry.rounds} at most"
             lines.append(
-                f"{_name(entry, kit, seed)}: {len(chain.summaries)} rounds {state}, "
+                f"{model_name(entry, subject, seed)}: {len(chain.summaries)} rounds {state}, "
                 f"{chain.summaries[-1]['step']:,} steps; best loss {chain.summaries[chain.best]['loss']:.4g} "
                 f"after {chain.summaries[chain.best]['step']:,}"
             )
@@ -68,19 +76,34 @@ def report(plan: Plan) -> Sequence[str]:
 def publish(plan: Plan) -> Mapping[str, str]:
     """The folder of each finished model."""
     folder = f"{plan.config.name}-models"
-    names = (_name(*model) for model in _models(plan))
+    names = (model_name(*model) for model in _models(plan))
     finished = (name for name in names if plan.summary("training", f"{name}-trained") is not None)
     return {f"{folder}/{name}/{file}": f"{name}-trained.{file}" for name, file in product(finished, sorted(FILES))}
 
 
 def check(config: Config) -> None:
-    """Raises ConfigError for models of kits that the config has not."""
+    """Raises ConfigError for models of kits that the config has not, and of programs that are not there."""
     kits = [kit.name for kit in config.section(ExemplarsConfig).kits]
     for entry in config.section(TrainingConfig).models:
-        unknown = [kit for kit in entry.kits if kit not in kits]
-        if unknown or not kits:
-            which = f"there is no kit {unknown[0]}" if unknown else "it learns from kits, and there are none"
-            raise ConfigError(f"{config.path}: training.models: {entry.name}: {which}; kits are {', '.join(kits)}")
+        where = f"{config.path}: training.models: {entry.name}"
+        if isinstance(entry, KitModelEntry):
+            unknown = [kit for kit in entry.kits if kit not in kits]
+            if unknown or not kits:
+                which = f"there is no kit {unknown[0]}" if unknown else "it learns from kits, and there are none"
+                raise ConfigError(f"{where}: {which}; kits are {', '.join(kits)}")
+            continue
+        programs = _programs(config, entry)
+        if not programs:
+            raise ConfigError(f"{where}: it learns from programs, and there are none; set programs.program")
+        views = [view.name for view in config.section(SketchesConfig).views]
+        unknown = [view for view in entry.views if view not in views]
+        if unknown:
+            raise ConfigError(f"{where}: there is no view {unknown[0]}; sketches.views are {', '.join(views)}")
+        try:
+            for program in programs:
+                program_module(program)
+        except ConfigError as error:
+            raise ConfigError(f"{where}: {error}") from error
 
 
 def estimate_bytes(plan: Plan) -> int:
@@ -94,21 +117,27 @@ def trial(config: Config) -> TrainingConfig:
 
 
 def _models(plan: Plan) -> Iterator[tuple[AnyEntry, str, int]]:
-    """Each model of the config: its entry, its kit, its seed."""
+    """Each model of the config: its entry, its kit or program, its seed."""
     for entry in plan.config.section(TrainingConfig).models:
-        for kit, seed in product(entry.kits or plan.shards("exemplars"), range(entry.seeds)):
-            yield entry, kit, seed
+        if isinstance(entry, KitModelEntry):
+            subjects: Sequence[str] = entry.kits or plan.shards("exemplars")
+        else:
+            subjects = _programs(plan.config, entry)
+        for subject, seed in product(subjects, range(entry.seeds)):
+            yield entry, subject, seed
 
 
-def _name(entry: AnyEntry, kit: str, seed: int) -> str:
-    return f"{entry.name}-{kit}-{seed}"
+def _programs(config: Config, entry: RecoveryEntry) -> tuple[str, ...]:
+    """The programs that a model learns from, by default that of the dataset."""
+    own = config.section(ProgramsConfig).program if not entry.programs else ""
+    return entry.programs or ((own,) if own else ())
 
 
-def _data_shard(plan: Plan, entry: AnyEntry, kit: str) -> Shard:
+def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
     """The samples of a kit made ready, for all models of a kind."""
     params: dict[str, Any] = {
         "job": "data",
-        "kind": entry.kind,
+        "kind": kind,
         "kit": kit,
         "longest": plan.config.section(TrainingConfig).longest,
     }
@@ -122,17 +151,30 @@ def _data_shard(plan: Plan, entry: AnyEntry, kit: str) -> Shard:
         strings = plan.config.section(StringsConfig)
         params |= {"producer": stage, "edges": strings.edges, "strings": strings.strings_per_shape}
     inputs = (f"exemplars/{kit}", *(f"{stage}/{name}" for name in splits))
-    return Shard(f"{kit}-{entry.kind}", {**params, "splits": splits}, inputs, (module_of(entry.kind),))
+    return Shard(f"{kit}-{kind}", {**params, "splits": splits}, inputs, (module_of(kind),))
 
 
-def _trained_shard(plan: Plan, entry: AnyEntry, kit: str, seed: int, chain: Chain) -> Shard:
-    name = _name(entry, kit, seed)
+def _program_shard(plan: Plan, entry: RecoveryEntry, program: str) -> Shard:
+    params: dict[str, Any] = {
+        "job": "data",
+        "kind": entry.kind,
+        "program": program,
+        "settings": {key: getattr(entry, key) for key in ("input", "points", "validation", "pool", "views")},
+    }
+    if entry.input == "sketch":
+        params["sketches"] = plan.config.section(SketchesConfig).model_dump(mode="json")
+    code = (module_of(entry.kind), program_module(program))
+    return Shard(model_name(entry, program, 0).removesuffix("0") + "data", params, (), code)
+
+
+def _trained_shard(plan: Plan, entry: AnyEntry, subject: str, seed: int, chain: Chain) -> Shard:
+    name = model_name(entry, subject, seed)
     names = [shard.name for shard in chain.shards]
     params = {
         "job": "trained",
         "name": name,
         "kind": entry.kind,
-        "kit": kit,
+        entry.subject: subject,
         "dataset": f"{plan.config.name} {plan.config.version}",
         "license": plan.config.license,
         "rounds": names,
@@ -152,6 +194,7 @@ STAGE = Stage(
     report=report,
     publish=publish,
     check=check,
+    sections=("programs", "sketches"),
     trial=trial,
     whole_section=False,
     publishes_parts=True,

@@ -15,10 +15,12 @@ from pipeline.places import Places
 from pipeline.run import RunResult, run_stage
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.programs.settings import ProgramsConfig
 from stages.shape.arrays import IntArray, TypeArray
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Grammar, Kit, Multiset, PartType
 from stages.shape.kit_files import write_kit
+from stages.sketches.settings import SketchesConfig
 from stages.strings.alphabet import Alphabet, make_alphabet
 from stages.strings.encoder import canonical_string, random_strings
 from stages.strings.settings import StringsConfig
@@ -132,6 +134,7 @@ def config(*models: Mapping[str, Any]) -> Config:
     entries = [{**TINY, **changes} for changes in models or ({},)]
     training = TrainingConfig.model_validate_json(json_bytes({"models": entries}))
     sections = {"exemplars": NothingConfig(), "strings": StringsConfig(), "training": training}
+    sections |= {"programs": ProgramsConfig(), "sketches": SketchesConfig()}
     return Config("toys", "1.0.0", 3, sections, Path("toys.yaml"), license="CC0-1.0")
 
 

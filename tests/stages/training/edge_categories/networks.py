@@ -19,6 +19,7 @@ from stages.shape.collection.shards import PRODUCERS
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, write_sample
+from stages.sketches.settings import SketchesConfig
 from stages.strings.categories import CategorySpace
 from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import StringsConfig
@@ -207,7 +208,12 @@ def config(strings: Mapping[str, Any] | None = None, **changes: Any) -> Config:
     model = entry(steps=4, rounds=2, **changes).model_dump(mode="json")
     training = TrainingConfig.model_validate_json(json_bytes({"models": [model], "longest": 60}))
     sections: dict[str, StrictModel] = {"exemplars": NothingConfig(), "variations": NothingConfig()}
-    sections |= {**ABSENT_SECTIONS, "strings": StringsConfig(**(strings or {})), "training": training}
+    sections |= {
+        **ABSENT_SECTIONS,
+        "sketches": SketchesConfig(),
+        "strings": StringsConfig(**(strings or {})),
+        "training": training,
+    }
     return Config("nets", "1.0.0", 3, sections, Path("nets.yaml"), license="CC0-1.0")
 
 

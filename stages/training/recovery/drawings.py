@@ -1,0 +1,54 @@
+"""Drawings as a network sees them: ink on a square, brought to one place and size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.programs.curves.part import Part
+from stages.programs.program import Program, shape_of_parts
+from stages.shape.arrays import BoolArray, ByteArray
+from stages.shape.views.scene import scene_of
+from stages.sketches.draw import draw_sketch, jittered_camera
+from stages.sketches.settings import SketchesConfig, SketchView
+
+__all__ = ["INK", "SIDE", "drawn", "fitted"]
+
+SIDE = 224
+"""Pixels of a side."""
+MARGIN = 8
+"""Pixels that are left free around the ink."""
+INK = 128
+"""A pixel of a dark drawing on white below this is ink."""
+
+
+def fitted(ink: BoolArray) -> BoolArray:
+    """Ink (h, w) of any size in the middle of a square (SIDE, SIDE), as large as the margin allows: a pixel there is
+    ink where any is that it covers, and lines of small drawings stay whole. Raises ValueError without ink."""
+    rows, columns = np.nonzero(ink)
+    if not len(rows):
+        raise ValueError("a drawing without a line")
+    height, width = np.ptp(rows) + 1, np.ptp(columns) + 1
+    scale = (SIDE - 2 * MARGIN) / max(height, width)
+    if scale > 1.0:
+        # each pixel of a small drawing is a square of the large one
+        grown = int(np.ceil(scale))
+        ink = np.repeat(np.repeat(ink[rows.min() :, columns.min() :][:height, :width], grown, axis=0), grown, axis=1)
+        rows, columns = np.nonzero(ink)
+        scale /= grown
+    else:
+        rows, columns = rows - rows.min(), columns - columns.min()
+    down, across = (SIDE - scale * ink_size for ink_size in (rows.max() + 1, columns.max() + 1))
+    square = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    square[(rows * scale + down / 2).astype(int), (columns * scale + across / 2).astype(int)] = True
+    return square
+
+
+def drawn(
+    program: Program, parts: tuple[Part, ...], view: SketchView, config: SketchesConfig, rng: np.random.Generator
+) -> BoolArray:
+    """A shape as stage `sketches` draws it, fitted."""
+    scene = scene_of(shape_of_parts(program, parts))
+    camera = jittered_camera(view, rng)
+    drawing: ByteArray
+    drawing, _ = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, config.backend)
+    return fitted(drawing < INK)

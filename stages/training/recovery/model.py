@@ -1,0 +1,143 @@
+"""The network: an encoder of clouds or of drawings, and a decoder for each parameter (geocode §3.3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import torch
+from torch import Generator, Tensor, nn
+from torch.nn.functional import leaky_relu
+from torch.nn.utils import convert_conv2d_weight_memory_format
+
+from stages.training.recovery.drawings import SIDE
+from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
+from stages.training.recovery.settings import RecoveryEntry
+
+__all__ = ["RecoveryNet"]
+
+SLOPE = 0.2
+
+
+class RecoveryNet(nn.Module):
+    """Inputs to logits float (n, parameters, most classes) of the classes of each parameter.
+
+    classes: how many each parameter has, the hidden class among them; logits of further ones are minus infinity.
+    """
+
+    def __init__(self, entry: RecoveryEntry, classes: Sequence[int]) -> None:
+        super().__init__()
+        self.encoder: nn.Module = Dgcnn(entry) if entry.input == "points" else Vgg(entry)
+        self.decoders = Decoders(classes, 2 * entry.embedding, entry.decoder, entry.dropout)
+
+    def forward(self, inputs: Tensor, noise: Generator | None = None) -> Tensor:
+        """Of clouds float (n, points, 3), normalised, or drawings float (n, 1, SIDE, SIDE), ink 1 on 0; `noise` says
+        what is dropped, and nothing is without."""
+        logits: Tensor = self.decoders(self.encoder(inputs), noise)
+        return logits
+
+
+class Dgcnn(nn.Module):
+    """Clouds float (n, points, 3) to embeddings (n, 2 embedding): edge convolutions over the neighbours in space, all
+    their features together, and of these the greatest and the mean over the points.
+
+    Published is a graph that is made anew of the features before each convolution.
+    """
+
+    def __init__(self, entry: RecoveryEntry) -> None:
+        super().__init__()
+        self.neighbors = entry.neighbors
+        self.convolutions = nn.ModuleList(EdgeConvolution(a, b) for a, b in pairwise((3, *entry.widths)))
+        self.mixed = nn.Linear(sum(entry.widths), entry.embedding, bias=False)
+        self.norm = nn.BatchNorm1d(entry.embedding)
+
+    def forward(self, points: Tensor) -> Tensor:
+        neighbors = nearest_neighbors(points, min(self.neighbors, points.shape[1]))
+        features, found = points, []
+        for convolution in self.convolutions:
+            features = convolution(features, neighbors)
+            found.append(features)
+        mixed = leaky_relu(_normed(self.norm, self.mixed(torch.cat(found, dim=-1))), SLOPE)
+        return torch.cat([mixed.amax(dim=1), mixed.mean(dim=1)], dim=-1)
+
+
+class EdgeConvolution(nn.Module):
+    """The greatest over the neighbours j of `W1 x_i + W2 (x_j - x_i)`, normed.
+
+    The linear part is the same for all that look at a point, so it is done once a point: the first half of `linear` is
+    W1 - W2, the second W2.
+    """
+
+    def __init__(self, before: int, after: int) -> None:
+        super().__init__()
+        self.linear = nn.Linear(before, 2 * after, bias=False)
+        self.norm = nn.BatchNorm1d(after)
+
+    def forward(self, features: Tensor, neighbors: Tensor) -> Tensor:
+        return leaky_relu(_normed(self.norm, edge_maximum(self.linear(features), neighbors)), SLOPE)
+
+
+class Vgg(nn.Module):
+    """Drawings float (n, 1, SIDE, SIDE) to embeddings (n, 2 embedding): VGG-11 with few features."""
+
+    POOLED = (0, 1, 3, 5, 7)
+    """The convolutions after which each two by two pixels become one."""
+
+    def __init__(self, entry: RecoveryEntry) -> None:
+        super().__init__()
+        layers: list[nn.Module] = []
+        for place, (before, after) in enumerate(pairwise((1, *entry.channels))):
+            layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after), nn.ReLU()]
+            if place in self.POOLED:
+                layers.append(nn.MaxPool2d(2))
+        # twice as fast with so few features
+        self.layers = convert_conv2d_weight_memory_format(nn.Sequential(*layers), torch.channels_last)
+        side = SIDE // 2 ** len(self.POOLED)
+        self.embedding = nn.Linear(entry.channels[-1] * side * side, 2 * entry.embedding)
+
+    def forward(self, drawings: Tensor) -> Tensor:
+        seen = self.layers(drawings.contiguous(memory_format=torch.channels_last))
+        embedded: Tensor = self.embedding(seen.flatten(1)).relu()
+        return embedded
+
+
+class Decoders(nn.Module):
+    """One perceptron of three layers for each parameter, all of them at once: embeddings (n, before) to logits (n,
+    parameters, most classes)."""
+
+    there: Tensor
+
+    def __init__(self, classes: Sequence[int], before: int, sizes: tuple[int, int], dropped: float) -> None:
+        super().__init__()
+        self.dropped = dropped
+        widths = (before, *sizes, max(classes))
+        self.weights = nn.ParameterList(_uniform(len(classes), a, b, a) for a, b in pairwise(widths))
+        self.biases = nn.ParameterList(_uniform(len(classes), 1, b, a) for a, b in pairwise(widths))
+        there = torch.arange(max(classes)) < torch.tensor(classes)[:, None]
+        self.register_buffer("there", there, persistent=False)
+
+    def forward(self, embeddings: Tensor, noise: Generator | None) -> Tensor:
+        features = embeddings.expand(len(self.weights[0]), *embeddings.shape)
+        last = len(self.weights) - 1
+        for place, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            features = torch.baddbmm(bias, features, weight)
+            if place < last:
+                features = leaky_relu(features, SLOPE)
+                if noise is not None and self.dropped:
+                    kept = torch.rand(features.shape, generator=noise, device=features.device) >= self.dropped
+                    features = features * kept / (1.0 - self.dropped)
+        logits = features.transpose(0, 1).float()
+        return logits.masked_fill(~self.there, -torch.inf)
+
+
+def _uniform(parameters: int, before: int, after: int, inputs: int) -> nn.Parameter:
+    """As a linear layer of torch begins."""
+    reach = 1.0 / math.sqrt(inputs)
+    return nn.Parameter(torch.empty(parameters, before, after).uniform_(-reach, reach))
+
+
+def _normed(norm: nn.Module, features: Tensor) -> Tensor:
+    """`norm` over clouds and points together."""
+    normed: Tensor = norm(features.flatten(0, 1)).view(features.shape)
+    return normed

@@ -1,0 +1,67 @@
+"""Shapes to learn from, made while a model learns: there is no end of them, and none comes from a dataset.
+
+Every shape of a program has a place in [0, 1) (`stages/programs/draws.py`). What is learnt from, what a training is
+judged by and what tables are made of lie in intervals that do not meet, so no shape stands in two of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.programs.curves.part import Part
+from stages.programs.draws import Interval, Share, draw
+from stages.programs.intersection import intersecting
+from stages.programs.parameters import Value
+from stages.programs.program import Program
+from stages.programs.repair import repaired
+from stages.programs.sampling import cells
+from stages.programs.schema import Values
+
+__all__ = ["TEST", "TRAIN", "VAL", "RandomShape", "random_shapes", "valid_values"]
+
+TRAIN: Interval = (0.0, 0.8)
+VAL: Interval = (0.8, 0.9)
+TEST: Interval = (0.9, 1.0)
+
+AT_ONCE = 64
+"""Draws at a time, of which the first that is valid is taken."""
+
+
+@dataclass(frozen=True)
+class RandomShape:
+    """values: settled; classes: int64 (parameters,), the hidden class where a parameter is hidden; parts: the shape."""
+
+    values: dict[str, Value]
+    classes: npt.NDArray[np.int64]
+    parts: tuple[Part, ...]
+
+
+def random_shapes(program: Program, interval: Interval, rng: np.random.Generator) -> Iterator[RandomShape]:
+    """Valid shapes without end, each with one value of one parameter that is visible, all others random: every value
+    of every parameter is fixed as often (geocode §4)."""
+    schema, every, share = program.schema, cells(program), Share(shapes=interval)
+    rows = {name: row for row, name in enumerate(schema.by_name)}
+    while True:
+        name, value = every[int(rng.integers(len(every)))]
+        fixed = (name, float(schema.by_name[name].values[value]))
+        draws = draw(schema, AT_ONCE, rng, between=False, fixed=fixed)
+        for column in draws.owned(share).tolist():
+            if not draws.visible[rows[name], column]:
+                continue
+            values = schema.from_vector(draws.columns[:, column])
+            if program.broken(values):
+                continue
+            parts = tuple(program.parts(values))
+            if intersecting(program, parts) is None:
+                yield RandomShape(values, schema.classes(values), parts)
+                break
+
+
+def valid_values(program: Program, values: Values) -> dict[str, Value]:
+    """The nearest values that keep the program's constraints, or, where there are none, its base."""
+    found = repaired(program, values)
+    return program.schema.settled(program.schema.base)[0] if found is None else found

@@ -1,0 +1,47 @@
+"""Training of recovery on the real mill."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import ConfigError
+from stages.training.stage import STAGE
+from tests.pipeline.conftest import made
+from tests.stages.training.recovery.toy import config, train
+
+FOLDER = "stools-models/small-tests_stages_programs_stool-0"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["points", "sketch"])
+def test_model_of_a_program_is_published_and_is_the_same_twice(kind: str, tmp_path: Path) -> None:
+    wanted = config(input=kind)
+    assert train(wanted, tmp_path / "one").made == 4
+    card = (tmp_path / "one" / FOLDER / "README.md").read_text()
+    assert "A `recovery` of program `tests.stages.programs.stool`" in card
+    rows = list(csv.DictReader((tmp_path / "one" / FOLDER / "curves.csv").read_text().splitlines()))
+    assert [int(row["step"]) for row in rows] == [6, 12]
+    assert train(wanted, tmp_path / "two", workers=2).made == 4
+    assert made(tmp_path / "one/stools-models") == made(tmp_path / "two/stools-models")
+
+
+@pytest.mark.slow
+def test_it_learns_what_a_stool_is(tmp_path: Path) -> None:
+    wanted = config(
+        learning_rate=0.01, points=128, widths=[16, 16], embedding=32, batch=16, steps=80, rounds=1, noise=0, dropout=0
+    )
+    train(wanted, tmp_path)
+    rows = list(csv.DictReader((tmp_path / FOLDER / "curves.csv").read_text().splitlines()))
+    # by chance it would be right in about a sixth
+    assert float(rows[-1]["val_right"]) > 0.3
+    assert float(rows[-1]["val_chamfer"]) < 0.02
+
+
+def test_a_program_that_is_not_there_is_told_before_anything_starts() -> None:
+    with pytest.raises(ConfigError, match="did you mean chair"):
+        STAGE.check(config(programs=["chari"]))
+    with pytest.raises(ConfigError, match="it learns from programs, and there are none"):
+        STAGE.check(config(program=""))
