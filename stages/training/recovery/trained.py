@@ -1,0 +1,88 @@
+"""A trained recovery model, read from its published weights alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stages.programs.program import Program, find_program
+from stages.shape.arrays import BoolArray, FloatArray
+from stages.sketches.settings import SketchesConfig
+from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.recovery.clouds import frame_of, taken
+from stages.training.recovery.model import RecoveryNet
+from stages.training.recovery.refinement import Guess
+from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.training import described_parameters
+
+__all__ = ["KIND", "TrainedRecovery", "load_recovery"]
+
+KIND = "recovery"
+"""What weights say of their kind."""
+
+LOOKS = 4
+"""A cloud is looked at so often, each time at other points of it."""
+
+
+@dataclass(frozen=True)
+class TrainedRecovery:
+    """header: what the weights say of themselves."""
+
+    module: RecoveryNet
+    program: Program
+    entry: RecoveryEntry
+    header: Mapping[str, Any]
+
+    @property
+    def usual(self) -> float:
+        """How far validation shapes come back at most, all but one in twenty: mean squared distance both ways, in
+        sides of their boxes."""
+        return float(self.header["figures"]["val_chamfer_high"])
+
+    @property
+    def sketches(self) -> SketchesConfig:
+        """How the drawings that it has learnt from were drawn."""
+        return SketchesConfig.model_validate_json(json.dumps(self.header["sketches"]))
+
+    def guess_cloud(self, points: FloatArray, rng: np.random.Generator) -> Guess:
+        """Of a cloud (n, 3) of any number of points, y up, anywhere and of any size."""
+        looks = [taken(points, self.entry.points, rng) for _ in range(LOOKS)]
+        return self._guess(torch.from_numpy(np.array([frame_of(each).normalized(each) for each in looks])).float())
+
+    def guess_drawing(self, ink: BoolArray) -> Guess:
+        """Of fitted ink (SIDE, SIDE)."""
+        return self._guess(torch.from_numpy(ink[None, None].astype(np.float32)))
+
+    @torch.no_grad()
+    def _guess(self, inputs: Tensor) -> Guess:
+        device = next(self.module.parameters()).device
+        chances = torch.softmax(self.module(inputs.to(device)), dim=-1).mean(dim=0).double().cpu().numpy()
+        probabilities, hidden = {}, {}
+        for parameter, row in zip(self.program.parameters, chances, strict=True):
+            shown = row[: len(parameter.values)]
+            probabilities[parameter.name] = shown / max(float(shown.sum()), 1e-300)
+            hidden[parameter.name] = float(1.0 - shown.sum())
+        return Guess(probabilities, hidden)
+
+
+def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedRecovery:
+    """The model in a file of weights, on the CPU.
+
+    Raises CheckpointError for whatever is not one, says something else of itself than `expected`, such as
+    `{"program": "chair"}`, or was trained when the program had other parameters.
+    """
+    tensors, header = load_checkpoint(path, {"kind": KIND, **(expected or {})})
+    program = find_program(header["program"])
+    if header["parameters"] != described_parameters(program):
+        raise CheckpointError(f"{path} is of a {program.name} with other parameters than it has now: train it anew")
+    entry = RecoveryEntry.model_validate({"name": "trained", **header["settings"]})
+    module = RecoveryNet(entry, [each.classes for each in program.parameters])
+    module.load_state_dict({name: each.float() if each.is_floating_point() else each for name, each in tensors.items()})
+    return TrainedRecovery(module.eval(), program, entry, header)
