@@ -28,8 +28,12 @@ WORKERS ?=
 SEED    ?=
 ## MESH     a model that `make inspect` looks at, or several of one kit
 MESH    ?=
-## PROGRAM  a shape program that `make inspect` looks at: a name, such as chair, or a module
+## PROGRAM  a shape program that `make inspect` and `recover` are about: a name, such as chair, or a module
 PROGRAM ?=
+## INPUT    what `make recover` looks at: a scan, a drawing, a folder of them, or a shard
+INPUT   ?=
+## UP       the axis of a scan that points up, x, y or z; unless you say, the one that fits
+UP      ?=
 ## MODEL    the model that `make train` trains, by its name, or <name>-<kit>; unless you say, all of CONFIG
 MODEL   ?=
 ## TABLE    the table that `make eval` prints, or all, for the report; without, it lists them
@@ -39,7 +43,7 @@ SAMPLES ?= 100
 
 # Their values are text, whatever stands in it: make expands none of it, and recipes read it from the environment, as
 # "$$CONFIG", so that no shell does. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM MODEL TABLE SAMPLES
+VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM INPUT UP MODEL TABLE SAMPLES
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -79,9 +83,13 @@ sketches: variations programs shapeassembly  ## Draw each shape as lines
 package: validity strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)
 
-.PHONY: train
+.PHONY: train recover
 train: exemplars strings  ## Train the models of CONFIG on the dataset's samples, from where they stand
 	@$(PYTHON) -m pipeline run training $(HOW) $${MODEL:+--only "$$MODEL"}
+
+recover: setup  ## Find the parameters of PROGRAM, or of the likeliest program, whose shape is like INPUT
+	@[ -n "$$INPUT" ] || { echo 'make recover needs INPUT=scan.ply or INPUT=drawing.png' >&2; exit 2; }
+	@$(PYTHON) -m stages.training.recovery --out "$$OUT" --program "$$PROGRAM" --up "$$UP" $(SEEDED) -- "$$INPUT"
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 

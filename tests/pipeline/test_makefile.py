@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-VARIABLES = ("CONFIG", "OUT", "WORKERS", "SEED", "MESH", "PROGRAM", "MODEL", "TABLE", "SAMPLES")
+VARIABLES = ("CONFIG", "OUT", "WORKERS", "SEED", "MESH", "PROGRAM", "INPUT", "UP", "MODEL", "TABLE", "SAMPLES")
 SAY_ARGUMENTS = "import json, sys; print(json.dumps(sys.argv[1:]))"
 
 
@@ -64,6 +64,14 @@ def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for
     assert "--only" not in calls("train")[-1]
 
 
+def test_recover_looks_at_the_input_that_was_given() -> None:
+    (run,) = calls("recover", "PROGRAM=chair", "INPUT=-odd name.ply", "OUT=/data")
+    assert run[1:] == [
+        "stages.training.recovery", "--out", "/data", "--program", "chair", "--up", "", "--", "-odd name.ply",
+    ]  # fmt: skip
+    assert make("recover").returncode != 0
+
+
 def test_without_a_seed_the_config_has_its_own() -> None:
     assert "--seed" not in calls("points")[0]
 
@@ -78,7 +86,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-",
-        "MODEL": "-", "TABLE": "-", "SAMPLES": "100",
+        "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-", "SAMPLES": "100",
     }  # fmt: skip
 
 

@@ -1,0 +1,230 @@
+"""Anything that looks like a shape of a program, back to its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from stages.programs.parameters import Value
+from stages.programs.program import Program, find_program, program_names
+from stages.shape.arrays import ByteArray, FloatArray
+from stages.sketches.settings import SketchesConfig
+from stages.training.checkpoint import CheckpointError, weights_of_kind
+from stages.training.recovery.clouds import Frame, frame_of
+from stages.training.recovery.reading import Input, checked_cloud, ink_of
+from stages.training.recovery.refinement import Guess, Refined, base_guess, refine
+from stages.training.recovery.targets import CloudTarget, Target, cloud_target, drawing_target
+from stages.training.recovery.trained import KIND, TrainedRecovery, load_recovery
+
+__all__ = ["Models", "Recovered", "find_models", "recover", "recover_input"]
+
+Up = Literal["x", "y", "z", ""]
+
+UNLIKE = {"points": 0.004, "sketch": 0.001}
+"""A shape that is farther from the input than this, and than chance would have it, is of another sort. Lines of a
+drawing are everywhere, so that no other lines are far from them."""
+NO_BETTER = 0.9
+"""A recovery that is not nearer than this share of the base shape's distance says nothing of the input."""
+GLANCE = 40
+"""Shapes that a program is given to show that it is the likeliest."""
+
+_UPRIGHT: Mapping[str, FloatArray] = {
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "x": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+}
+_QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""A quarter turn about the axis that points up."""
+
+Models = Mapping[tuple[str, str], TrainedRecovery]
+"""Trained models by program and kind of input, `points` or `sketch`."""
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """program and values: what makes the shape. distance: mean squared distance between input and shape, both ways
+    added, in longest sides of the box around the input (of a drawing: around its ink). base_distance: that of the
+    program's base shape. confidence: of each visible parameter the probability that the network gave to its value;
+    None without a network. placement: float64 (4, 4), from the program's coordinates to the input's; None of a
+    drawing. up: the axis of the input that points up. warnings: what speaks against the result, in words.
+    """
+
+    program: Program
+    values: Mapping[str, Value]
+    distance: float
+    base_distance: float
+    confidence: Mapping[str, float] | None
+    placement: FloatArray | None
+    up: str
+    tried: int
+    warnings: tuple[str, ...]
+
+    def described(self) -> dict[str, Any]:
+        """All of it as JSON; `parameters` is what `stages.programs make` reads."""
+        schema = self.program.schema
+        settled, visible = schema.settled(self.values)
+        return {
+            "program": self.program.name,
+            "parameters": {name: value for name, value in settled.items() if name in visible},
+            "chamfer": self.distance,
+            "chamfer_of_base": self.base_distance,
+            "confidence": None if self.confidence is None else dict(self.confidence),
+            "placement": None if self.placement is None else self.placement.tolist(),
+            "up": self.up,
+            "shapes_tried": self.tried,
+            "warnings": list(self.warnings),
+        }
+
+
+def recover(
+    source: FloatArray | ByteArray,
+    program: str = "",
+    models: Models | None = None,
+    up: Up = "",
+    budget: int = 600,
+    seed: int = 0,
+) -> Recovered:
+    """The shape of a program that is most like a cloud, float (n, 3), or a drawing, uint8 (h, w) or (h, w, 3).
+
+    A cloud may have any number of points, stand anywhere, be of any size and have any of its axes up (`up`; empty: the
+    best of the three); its front looks along an axis. A drawing may be of any size, dark on light or light on dark.
+    program: which; empty: the likeliest of those that `models` know, or of all where they know none. budget: shapes
+    that are made for it at most, besides those that up and program are found with.
+
+    Equal arguments have equal answers. Raises InputError for what is neither a cloud nor a drawing, ConfigError for a
+    program that is not there.
+    """
+    if np.asarray(source).dtype == np.uint8:
+        given = Input("drawing", ink=ink_of(np.asarray(source, np.uint8)))
+    else:
+        given = Input("cloud", points=checked_cloud(source))
+    return recover_input(given, program, models or {}, up, budget, seed)
+
+
+def recover_input(
+    given: Input, program: str, models: Models, up: Up, budget: int, seed: int, turned: bool = True
+) -> Recovered:
+    """`recover` of what `read_inputs` has read. turned: whether the front of a cloud may look along any axis, and not
+    only along the program's."""
+    kind = "points" if given.ink is None else "sketch"
+    names = [program] if program else [name for name, known in models if known == kind] or list(program_names())
+    looks = [_first_look(find_program(name), models.get((name, kind)), given, up, turned, seed) for name in names]
+    if len(looks) > 1:
+        rng = np.random.default_rng(seed)
+        glances = [refine(each.program, each.guess, each.target, GLANCE, rng).distance for each in looks]
+        looks = [looks[int(np.argmin(glances))]]
+    return _searched(looks[0], kind, budget, seed, guessed_program=not program)
+
+
+def find_models(folder: Path) -> tuple[dict[tuple[str, str], TrainedRecovery], list[str]]:
+    """The recovery models in a folder of published models, or, of a folder of datasets, in all of theirs; of several
+    for one program and input the one that validated best. And what is wrong with others, in words."""
+    found: dict[tuple[str, str], TrainedRecovery] = {}
+    wrong = []
+    for path in chain.from_iterable(weights_of_kind(each, KIND) for each in (folder, *sorted(folder.glob("*-models")))):
+        try:
+            model = load_recovery(path)
+        except CheckpointError as error:
+            wrong.append(str(error))
+            continue
+        key = (model.header["program"], model.entry.input)
+        if key not in found or _loss(model) < _loss(found[key]):
+            found[key] = model
+    return found, wrong
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A program, what is guessed of the input, and the input as it stands upright, turned by `rotation` (3, 3). frame:
+    the box around it then; none of a drawing."""
+
+    program: Program
+    model: TrainedRecovery | None
+    guess: Guess
+    target: Target
+    rotation: FloatArray
+    up: str
+    frame: Frame | None
+
+
+def _first_look(
+    program: Program, model: TrainedRecovery | None, given: Input, up: Up, turned: bool, seed: int
+) -> _Look:
+    """The best guess over the axes that may point up and the ways that a front may look."""
+    if given.points is None:
+        assert given.ink is not None
+        config = SketchesConfig() if model is None else model.sketches
+        guess = base_guess(program) if model is None else model.guess_drawing(given.ink)
+        return _Look(program, model, guess, drawing_target(program, config, given.ink), np.eye(3), "y", None)
+    looks = []
+    for axis, rotation in _rotations(up, 4 if turned else 1):
+        cloud = given.points @ rotation.T
+        rng = np.random.default_rng(seed)
+        guess = base_guess(program) if model is None else model.guess_cloud(cloud, rng)
+        look = _Look(program, model, guess, cloud_target(cloud, rng), rotation, axis, frame_of(cloud))
+        looks.append((refine(program, guess, look.target, 1, rng).distance, look))
+    return min(looks, key=lambda each: each[0])[1]
+
+
+def _rotations(up: Up, quarters: int) -> Iterator[tuple[str, FloatArray]]:
+    for axis in [up] if up else ["y", "z", "x"]:
+        rotation = _UPRIGHT[axis]
+        for _ in range(quarters):
+            yield axis, rotation
+            rotation = _QUARTER @ rotation
+
+
+def _searched(look: _Look, kind: str, budget: int, seed: int, guessed_program: bool) -> Recovered:
+    rng = np.random.default_rng(seed)
+    program = look.program
+    refined = refine(program, look.guess, look.target, budget, rng)
+    base = refine(program, base_guess(program), look.target, 1, rng).distance
+    warnings = []
+    if guessed_program:
+        warnings.append(f"no program was named: {program.name} fits best")
+    if look.model is None:
+        warnings.append(f"there is no trained model of {program.name} for {kind}: searched from its base shape alone")
+    limit = UNLIKE[kind] if look.model is None or kind == "sketch" else min(UNLIKE[kind], look.model.usual)
+    floor = refined.target.floor(program.parts(refined.values), rng)
+    if refined.distance - floor > limit:
+        warnings.append(
+            f"the input is unlike any {program.name}: the nearest that was found is {refined.distance:.2g} away, where "
+            f"{floor + limit:.2g} is much"
+        )
+    if refined.distance - floor > NO_BETTER * (base - floor):
+        warnings.append(f"the result is no better than the base shape of the program ({base:.2g})")
+    confidence = None if look.model is None else _confidence(program, look.guess, refined)
+    placement = _placement(look, refined)
+    return Recovered(
+        program, refined.values, refined.distance, base, confidence, placement, look.up, refined.tried, tuple(warnings)
+    )
+
+
+def _confidence(program: Program, guess: Guess, refined: Refined) -> dict[str, float]:
+    _, visible = program.schema.settled(refined.values)
+    return {
+        each.name: round(float(guess.probabilities[each.name][each.class_of(refined.values[each.name])]), 4)
+        for each in program.parameters
+        if each.name in visible
+    }
+
+
+def _placement(look: _Look, refined: Refined) -> FloatArray | None:
+    """From the program's coordinates to the box that targets are compared in, to the upright input, to the input."""
+    if look.frame is None or not isinstance(refined.target, CloudTarget):
+        return None
+    outer, inner = look.frame, refined.target.frame
+    scale = outer.size / inner.size
+    matrix = np.eye(4)
+    matrix[:3, :3] = look.rotation.T * scale
+    matrix[:3, 3] = look.rotation.T @ (outer.centre - inner.centre * scale)
+    return matrix
+
+
+def _loss(model: TrainedRecovery) -> float:
+    return float(model.header["figures"]["val_loss"])

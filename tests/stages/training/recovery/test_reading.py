@@ -1,0 +1,158 @@
+"""What is read as a cloud or a drawing, and what is told of anything else."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image, ImageDraw
+
+from pipeline.shards import ShardWriter, array_bytes
+from stages.training.recovery.drawings import SIDE, fitted
+from stages.training.recovery.reading import Input, InputError, checked_cloud, ink_of, read_inputs
+
+RNG = np.random.default_rng(0)
+CLOUD = RNG.normal(size=(200, 3))
+
+
+def drawing(size: int = 300) -> np.ndarray:
+    """A house, dark on white."""
+    image = Image.new("L", (size, size), 255)
+    pen = ImageDraw.Draw(image)
+    low, high = size // 4, 3 * size // 4
+    pen.rectangle((low, low, high, high), outline=0, width=max(size // 100, 1))
+    pen.line((low, low, size // 2, size // 10, high, low), fill=0, width=max(size // 100, 1))
+    return np.asarray(image)
+
+
+def only(path: Path) -> Input | InputError:
+    (found,) = read_inputs(path)
+    return found
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".xyz", ".csv", ".ply"])
+def test_clouds_come_back_from_files(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"scan{suffix}"
+    if suffix == ".npy":
+        np.save(path, np.hstack([CLOUD, CLOUD]))  # with normals
+    elif suffix == ".ply":
+        trimesh.PointCloud(CLOUD).export(path)
+    else:
+        np.savetxt(path, CLOUD, delimiter="," if suffix == ".csv" else " ")
+    found = only(path)
+    assert isinstance(found, Input)
+    assert found.name == "scan"
+    assert found.points is not None
+    assert np.allclose(found.points, CLOUD, atol=1e-6)
+
+
+def test_of_a_mesh_points_of_its_surface_are_taken(tmp_path: Path) -> None:
+    trimesh.creation.box((2, 2, 2)).export(tmp_path / "box.glb")
+    found = only(tmp_path / "box.glb")
+    assert isinstance(found, Input)
+    assert found.points is not None
+    assert np.allclose(np.abs(found.points).max(axis=1), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "told"),
+    [
+        (np.empty((0, 3)), "is empty"),
+        (np.zeros((1, 3)), "has 1 point: a cloud needs at least 32"),
+        (np.zeros((40, 3)), "all 40 points are at one place"),
+        (np.where(np.arange(120).reshape(40, 3) == 7, np.nan, CLOUD[:40]), "1 of 40 points are not finite"),
+        (np.where(np.arange(120).reshape(40, 3) == 7, np.inf, CLOUD[:40]), "1 of 40 points are not finite"),
+        (CLOUD[:, :2], r"a cloud is \(points, 3\)"),
+        (np.array([["a", "b", "c"]] * 40), "holds no numbers"),
+    ],
+)
+def test_what_is_no_cloud_is_told(points: np.ndarray, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        checked_cloud(points)
+
+
+@pytest.mark.parametrize("size", [40, 300, 1500])
+@pytest.mark.parametrize("inverted", [False, True])
+def test_drawings_of_any_size_and_polarity_are_nearly_the_same(size: int, inverted: bool) -> None:
+    picture = 255 - drawing(size) if inverted else drawing(size)
+    found, expected = ink_of(picture), ink_of(drawing())
+    assert found.shape == (SIDE, SIDE)
+    rows, columns = np.nonzero(found)
+    assert max(np.ptp(rows), np.ptp(columns)) >= SIDE - 2 * 8 - 3
+    far = 10 if size == 40 else 3  # a line of a pixel of forty is wide
+    for one, other in ((found, expected), (expected, found)):
+        near = np.zeros_like(other)
+        for row, column in np.argwhere(other):
+            near[max(row - far, 0) : row + far + 1, max(column - far, 0) : column + far + 1] = True
+        assert near[one].all()
+
+
+def test_fitted_ink_is_in_the_middle_whatever_was_around_it() -> None:
+    ink = drawing() < 128
+    larger = np.pad(ink, ((10, 200), (300, 0)))
+    assert np.array_equal(fitted(ink), fitted(larger))
+
+
+def test_what_is_no_drawing_is_told(tmp_path: Path) -> None:
+    photograph = RNG.integers(0, 255, (64, 64, 3)).astype(np.uint8)
+    with pytest.raises(InputError, match="in colour"):
+        ink_of(photograph)
+    with pytest.raises(InputError, match="a photograph, or shaded"):
+        ink_of(photograph[..., 0])
+    with pytest.raises(InputError, match="blank"):
+        ink_of(np.full((64, 64), 200, np.uint8))
+    Image.new("1", (20_000, 10), 1).save(tmp_path / "long.png")
+    assert "20,000 × 10 pixels: a drawing has at most 8,192" in str(only(tmp_path / "long.png"))
+    (tmp_path / "broken.png").write_bytes(b"no picture")
+    assert "is no picture" in str(only(tmp_path / "broken.png"))
+
+
+def test_transparent_drawings_lie_on_white(tmp_path: Path) -> None:
+    layers = np.zeros((300, 300, 4), np.uint8)
+    layers[..., 3] = 255 - drawing()
+    Image.fromarray(layers).save(tmp_path / "house.png")
+    found = only(tmp_path / "house.png")
+    assert isinstance(found, Input)
+    assert np.array_equal(found.ink, ink_of(drawing()))
+
+
+def test_folder_is_read_in_order_and_one_bad_file_keeps_none_back(tmp_path: Path) -> None:
+    np.save(tmp_path / "b.npy", CLOUD)
+    np.save(tmp_path / "a.npy", CLOUD[:3])
+    Image.fromarray(drawing()).save(tmp_path / "c.png")
+    (tmp_path / "notes.md").write_text("not an input")
+    first, second, third = read_inputs(tmp_path)
+    assert isinstance(first, InputError)
+    assert isinstance(second, Input)
+    assert second.points is not None
+    assert isinstance(third, Input)
+    assert third.ink is not None
+
+
+def test_shard_gives_the_cloud_of_each_sample(tmp_path: Path) -> None:
+    stream = io.BytesIO()
+    with ShardWriter(stream) as writer:
+        writer.write("chair-000000", {"points.npy": array_bytes(CLOUD.astype(np.float32))})
+        writer.write("chair-000001", {"txt": b"{}"})
+    (tmp_path / "chairs.tar").write_bytes(stream.getvalue())
+    first, second = read_inputs(tmp_path / "chairs.tar")
+    assert isinstance(first, Input)
+    assert first.name == "chair-000000"
+    assert isinstance(second, InputError)
+
+
+@pytest.mark.parametrize("name", ["nothing.ply", "text.md", "text.ply", "text.tar", "empty"])
+def test_files_that_are_nothing_of_it_are_told(name: str, tmp_path: Path) -> None:
+    if name == "empty":
+        (tmp_path / name).mkdir()
+    elif not name.startswith("nothing"):
+        (tmp_path / name).write_text("some text")
+    try:
+        found = only(tmp_path / name)
+    except InputError as error:
+        found = error
+    assert isinstance(found, InputError)
+    assert name.partition(".")[0] in str(found)

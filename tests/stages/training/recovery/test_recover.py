@@ -1,0 +1,151 @@
+"""Recovery of stools: the search alone, with a network, and as a command."""
+
+from __future__ import annotations
+
+import json
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from pipeline.errors import ConfigError
+from stages.points.area_sampling import sample_surface
+from stages.programs.curves.part import joined
+from stages.programs.program import find_program
+from stages.programs.schema import Values
+from stages.training.recovery.__main__ import main
+from stages.training.recovery.recover import find_models, recover
+from stages.training.recovery.refinement import base_guess, refine
+from stages.training.recovery.shapes import TEST, TRAIN, VAL, random_shapes
+from stages.training.recovery.surface import chamfer_distance, shape_points
+from stages.training.recovery.targets import cloud_target
+from tests.stages.training.recovery.toy import PROGRAM, config, train
+
+STOOL = find_program(PROGRAM)
+TALL: Values = {"height": 0.9, "scale x": 0.7, "has_rail": True, "rail_height": 0.2}
+
+
+def cloud_of(values: Values, n: int = 2000, seed: int = 0) -> np.ndarray:
+    mesh = joined(STOOL.parts(values)).mesh
+    return sample_surface(mesh.vertices, mesh.triangles, n, np.random.default_rng(seed))[0]
+
+
+def off_by(values: Values, truth: Values) -> float:
+    return max(abs(float(values[name]) - float(truth[name])) for name in truth)
+
+
+def test_intervals_share_no_shape() -> None:
+    texts = [
+        {STOOL.schema.text(each.values) for each in islice(random_shapes(STOOL, part, np.random.default_rng(0)), 60)}
+        for part in (TRAIN, VAL, TEST)
+    ]
+    assert not texts[0] & texts[1]
+    assert not texts[0] & texts[2]
+    assert not texts[1] & texts[2]
+
+
+def test_random_shapes_are_valid_and_know_what_is_hidden() -> None:
+    for each in islice(random_shapes(STOOL, TRAIN, np.random.default_rng(1)), 40):
+        assert not STOOL.broken(each.values)
+        assert (each.classes[3] == 6) == (not each.values["has_rail"])
+
+
+def test_search_alone_finds_a_stool() -> None:
+    rng = np.random.default_rng(0)
+    found = refine(STOOL, base_guess(STOOL), cloud_target(cloud_of(TALL), rng), 300, rng)
+    assert found.tried <= 302
+    assert off_by(found.values, TALL) < 0.03
+    first = refine(STOOL, base_guess(STOOL), cloud_target(cloud_of(TALL), rng), 1, rng)
+    assert found.distance < 0.25 * first.distance
+
+
+@pytest.mark.parametrize("budget", [1, 20, 60])
+def test_a_larger_budget_is_never_worse(budget: int) -> None:
+    def distance(shapes: int) -> float:
+        rng = np.random.default_rng(0)
+        return refine(STOOL, base_guess(STOOL), cloud_target(cloud_of(TALL), rng), shapes, rng).distance
+
+    assert distance(4 * budget) <= distance(budget)
+
+
+@pytest.mark.parametrize("up", ["y", "z", "x"])
+@pytest.mark.parametrize("asked", [True, False])
+def test_clouds_of_any_place_size_and_axis_come_back(up: str, asked: bool) -> None:
+    cloud = cloud_of(TALL, n=700) * 40 + [5, -300, 2]
+    turned = cloud[:, {"y": [0, 1, 2], "z": [2, 0, 1], "x": [1, 2, 0]}[up]]
+    found = recover(turned, PROGRAM, up=up if asked else "", budget=200)  # type: ignore[arg-type]
+    assert found.up == up
+    assert off_by(found.values, TALL) < 0.06
+    assert found.placement is not None
+    there = shape_points(STOOL.parts(found.values), 2000) @ found.placement[:3, :3].T + found.placement[:3, 3]
+    # the cloud is forty times as large as the stool
+    assert chamfer_distance(there, turned) < 0.004 * 40**2
+    assert np.linalg.det(found.placement[:3, :3]) > 0
+    assert any("no trained model" in each for each in found.warnings)
+
+
+def test_equal_questions_have_equal_answers() -> None:
+    cloud = cloud_of(TALL, n=300)
+    assert recover(cloud, PROGRAM, budget=80).described() == recover(cloud, PROGRAM, budget=80).described()
+
+
+def test_what_is_no_stool_is_told() -> None:
+    ball = np.random.default_rng(0).normal(size=(500, 3))
+    found = recover(ball / np.linalg.norm(ball, axis=1, keepdims=True), PROGRAM, budget=60)
+    assert any("unlike any stool" in each for each in found.warnings)
+
+
+def test_program_that_is_not_there_is_told() -> None:
+    with pytest.raises(ConfigError, match="did you mean chair"):
+        recover(cloud_of(TALL), "chari")
+
+
+def test_program_is_found_by_fit() -> None:
+    vase = find_program("vase")
+    cloud = shape_points(vase.parts(vase.schema.base), 1500)
+    found = recover(cloud, budget=1, up="y")
+    assert found.program.name == "vase"
+    assert any("no program was named" in each for each in found.warnings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["points", "sketch"])
+def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    train(config(input=kind, rounds=1), tmp_path)
+    models, wrong = find_models(tmp_path)
+    assert list(models) == [(PROGRAM, kind)]
+    assert not wrong
+    if kind == "points":
+        trimesh.PointCloud(cloud_of(TALL)).export(tmp_path / "mine.ply")
+        given = tmp_path / "mine.ply"
+    else:
+        from PIL import Image
+
+        from stages.training.recovery.drawings import drawn
+
+        model = models[PROGRAM, kind]
+        rng = np.random.default_rng(0)
+        ink = drawn(STOOL, tuple(STOOL.parts(TALL)), model.sketches.views[0], model.sketches, rng)
+        given = tmp_path / "mine.png"
+        Image.fromarray(np.where(ink, 0, 255).astype(np.uint8)).save(given)
+    assert main([str(given), "--program", PROGRAM, "--out", str(tmp_path), "--budget", "40"]) == 0
+    said = json.loads((tmp_path / "recovered/mine.json").read_text())
+    assert set(said["confidence"]) == set(said["parameters"])
+    assert all(0.0 <= each <= 1.0 for each in said["confidence"].values())
+    assert off_by(STOOL.schema.values(json.dumps(said["parameters"])), STOOL.schema.base) > 0.0
+    assert said["chamfer"] < said["chamfer_of_base"]
+    assert trimesh.load_scene(tmp_path / "recovered/mine.glb").geometry
+    assert (tmp_path / "recovered/mine.png").read_bytes().startswith(b"\x89PNG")
+    assert "distance" in capsys.readouterr().out
+
+
+def test_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path / "none.ply"), "--out", str(tmp_path)]) == 2
+    assert "there is no file" in capsys.readouterr().err
+    assert main([str(tmp_path), "--program", "chari", "--out", str(tmp_path)]) == 2
+    assert "did you mean chair" in capsys.readouterr().err
+    np.save(tmp_path / "one.npy", np.zeros((1, 3)))
+    assert main([str(tmp_path), "--program", PROGRAM, "--out", str(tmp_path)]) == 1
+    assert "has 1 point" in capsys.readouterr().err
