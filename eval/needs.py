@@ -7,7 +7,7 @@ from eval.subject import Subject
 from stages.shape.collection.declared import language_of, producers
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["EDGE_CATEGORIES", "FINISHED", "KITS", "SEARCH", "STRING_VAE"]
+__all__ = ["EDGE_CATEGORIES", "FINISHED", "KITS", "RECOVERY", "SEARCH", "STRING_VAE"]
 
 
 def _finished(subject: Subject) -> str:
@@ -52,3 +52,4 @@ def _trained(kind: str, what: str) -> Need:
 
 STRING_VAE = _trained("string_vae", "string VAE")
 EDGE_CATEGORIES = _trained("edge_categories", "model of edge categories")
+RECOVERY = _trained("recovery", "recovery model")
