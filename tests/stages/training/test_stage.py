@@ -113,12 +113,12 @@ def test_edit_of_one_model_trains_no_other_anew(tmp_path: Path) -> None:
 
 def test_training_ends_when_rounds_in_a_row_are_no_better(tmp_path: Path) -> None:
     # So large a rate makes it worse at once.
-    wanted = config({"rounds": 9, "patience": 2, "learning_rate": 0.9, "steps": 3})
+    wanted = config({"rounds": 9, "patience": 1, "learning_rate": 0.9, "steps": 3})
     result = train(wanted, tmp_path)
     assert not result.failed
     survey = Survey(wanted, STAGES, Places(tmp_path, "toys")).stage("training")
     losses = [survey.records[shard.name].summary["loss"] for shard in survey.shards if shard.params["job"] == "round"]
     best = losses.index(min(losses))
     assert len(losses) < 9
-    assert len(losses) == best + 3
+    assert len(losses) == best + 2
     assert survey.missing == []
