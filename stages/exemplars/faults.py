@@ -1,7 +1,7 @@
-"""Is a sample's geometry what its record says? Contacts, grammar and penetration, computed anew from its GLB.
+"""Is a sample's geometry what its record says? Contacts, grammar and penetration, computed anew from meshes.
 
-Nothing here uses the search's contact test or its tables: meshes and poses are read back from the sample's GLB with
-trimesh, and FCL answers for every pair of parts whose boxes overlap.
+Nothing here uses the search's contact test or its tables: of a finished sample meshes and poses are read back from its
+GLB with trimesh, and FCL answers for every pair of parts whose boxes overlap.
 """
 
 from __future__ import annotations
@@ -16,15 +16,17 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.geometry.contact import ContactTest, overlapping_boxes
-from stages.shape.geometry.docking import DockingTable
+from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
-from stages.shape.geometry.pose import invert
+from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
+from stages.shape.graphs.patterns import SAME_UP
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
+from stages.shape.physics.stability import components
 from stages.shape.shape import mesh_name
 
-__all__ = ["geometry_faults"]
+__all__ = ["assembly_faults", "geometry_faults"]
 
 BORDERLINE = 0.03
 """A distance that differs from the contact tolerance by less than this share of it is no evidence either way: poses
@@ -42,9 +44,62 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     places = {name: place for place, name in enumerate(kit.type_names())}
     types = np.array([places[mesh_name(name)] for name in names], dtype=np.int16)
     meshes, poses = _parts_of(members["glb"], names)
+    return _faults(kit, Assembly(types, poses, pairs_of(members[CONTACTS])), meshes, names)
+
+
+def assembly_faults(kit: Kit, assembly: Assembly, upright: bool = True) -> list[str]:
+    """What is wrong with an assembly that is in no file yet; an empty list where nothing is.
+
+    It is asked what `geometry_faults` asks, and besides: it is in one piece, each contact is a docking of the kit, and,
+    if it is to be `upright`, each part stands as one of its type stood in an exemplar.
+    """
+    names = [f"{kit.types[kind].name}.{part:03d}" for part, kind in enumerate(assembly.types.tolist())]
+    faults = _faults(kit, assembly, [kit.types[kind] for kind in assembly.types.tolist()], names)
+    if components(len(assembly), assembly.edges).any():
+        faults.append("it is not in one piece")
+    faults += [
+        f"{names[i]} and {names[j]} touch as no exemplar shows"
+        for i, j in assembly.edges.tolist()
+        if not _is_docked(kit, *assembly.types[[i, j]].tolist(), invert(assembly.poses[i]) @ assembly.poses[j])
+    ]
+    return [
+        *faults,
+        *(f"{names[part]} stands as no exemplar shows" for part in (_fallen(kit, assembly) if upright else ())),
+    ]
+
+
+def _is_docked(kit: Kit, a: int, b: int, pose: FloatArray) -> bool:
+    """Whether a part of type `b` at `pose` (4, 4) beside one of type `a` is in one of the kit's dockings."""
+    if a > b:
+        a, b, pose = b, a, invert(pose)
+    length = kit.types[b].diagonal / 2
+    wanted = [pose_vectors(each[None], length) for each in ((pose, invert(pose)) if a == b else (pose,))]
+    for docking in kit.grammar.dockings:
+        if (docking.a, docking.b) == (a, b):
+            images = pose_vectors(symmetric_images(kit.types[a], kit.types[b], docking.pose), length)
+            gap = min(np.linalg.norm(images - each, axis=1).min() for each in wanted)
+            if gap <= (1.0 + BORDERLINE) * (docking.slack or kit.pose_tolerance):
+                return True
+    return False
+
+
+def _fallen(kit: Kit, assembly: Assembly) -> list[int]:
+    """The parts that stand with other sides up than any part of their type in an exemplar."""
+    axis = {"y": 1, "z": 2}[kit.up]
+    fallen = []
+    for part, kind in enumerate(assembly.types.tolist()):
+        ups = np.concatenate([each.whole.poses[each.whole.types == kind, axis, :3] for each in kit.exemplars])
+        images = kit.types[kind].symmetries[:, :3, :3] @ assembly.poses[part, axis, :3]
+        if np.linalg.norm(images[:, None] - ups[None], axis=2).min() > SAME_UP:
+            fallen.append(part)
+    return fallen
+
+
+def _faults(kit: Kit, assembly: Assembly, meshes: Sequence[Any], names: Sequence[str]) -> list[str]:
+    types, poses = assembly.types, assembly.poses
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
-    stored = {(i, j) for i, j in pairs_of(members[CONTACTS]).tolist()}
+    stored = {(i, j) for i, j in assembly.edges.tolist()}
     found, doubtful = _contacts(meshes, poses, pairs, kit.contact_tolerance)
     contact = ContactTest(kit.types, kit.contact_tolerance)
     faults: list[str] = []
@@ -53,8 +108,7 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     for i, j in sorted(found - stored):
         if contact.kind(int(types[i]), int(types[j]), invert(poses[i]) @ poses[j]) in kit.contact_kinds:
             faults.append(f"{names[i]} and {names[j]} touch and are not recorded as neighbours")
-    edges = np.array(sorted(stored), dtype=np.int32).reshape(-1, 2)
-    faults.extend(_grammar_faults(kit, Assembly(types, poses, edges), names))
+    faults.extend(_grammar_faults(kit, assembly, names))
     faults.extend(_penetration_faults(kit, types, poses, boxes, pairs, names))
     return faults
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.graphs.patterns import SAME_UP
 from stages.shape.kit import Kit, PartType
@@ -27,8 +26,7 @@ class Candidates(NamedTuple):
     stance_starts int64 (labels + 1,): where the stances of a label begin; stance_types int64 (s,); rests float64
     (s, 3, 3): how one of them stood in an exemplar.
     starts int64 (s * labels + 1,): where the candidates of a stance and a label begin; stances int64 (c,); rotations
-    float64 (c, 3, 3), translations float64 (c, 3): in coordinates of the part that they stand beside; dockings int64
-    (c, 2): directed docking labels, seen from that part and from the candidate.
+    float64 (c, 3, 3), translations float64 (c, 3): in coordinates of the part that they stand beside.
     """
 
     stance_starts: np.ndarray
@@ -38,7 +36,6 @@ class Candidates(NamedTuple):
     stances: np.ndarray
     rotations: np.ndarray
     translations: np.ndarray
-    dockings: np.ndarray
 
 
 class _Stance(NamedTuple):
@@ -50,9 +47,9 @@ class _Stance(NamedTuple):
     turns: FloatArray
 
 
-def find_candidates(kit: Kit, dockings: DockingTable, upright: bool) -> Candidates:
-    """The stances and candidates of a kit; `dockings` are its own. With `upright` parts stand as they stood in the
-    exemplars, else however dockings turn them."""
+def find_candidates(kit: Kit, upright: bool) -> Candidates:
+    """The stances and candidates of a kit. With `upright` parts stand as they stood in the exemplars, else however
+    dockings turn them."""
     stances = [
         stance
         for label in range(len(kit.labels))
@@ -63,26 +60,24 @@ def find_candidates(kit: Kit, dockings: DockingTable, upright: bool) -> Candidat
     for number, stance in enumerate(stances):
         of_type.setdefault(stance.part_type, []).append(number)
     labels = np.array([kit.label_of[each.part_type] for each in stances], dtype=np.int64)
-    found: list[list[tuple[int, FloatArray, tuple[int, int]]]] = [[] for _ in range(len(stances) * len(kit.labels))]
+    found: list[list[tuple[int, FloatArray]]] = [[] for _ in range(len(stances) * len(kit.labels))]
     for number, stance in enumerate(stances):
         for other, poses in _beside(kit, stance.part_type):
             others = [(each, stances[each]) for each in of_type.get(other, [])]
             for place, pose in _standing(kit, stance, others, poses, upright):
-                seen = _docking(dockings, stance.part_type, other, pose)
                 row = found[number * len(kit.labels) + labels[place]]
-                if not any(at == place and _same_place(kit, stances[at], known, pose) for at, known, _ in row):
-                    row.append((place, pose, seen))
+                if not any(at == place and _same_place(kit, stances[at], known, pose) for at, known in row):
+                    row.append((place, pose))
     flat = [each for row in found for each in row]
-    poses = np.array([pose for _, pose, _ in flat]).reshape(-1, 4, 4)
+    poses = np.array([pose for _, pose in flat]).reshape(-1, 4, 4)
     return Candidates(
         stance_starts=np.searchsorted(labels, np.arange(len(kit.labels) + 1)),
         stance_types=np.array([each.part_type for each in stances], dtype=np.int64),
         rests=np.ascontiguousarray([each.rest for each in stances]),
         starts=np.cumsum([0, *map(len, found)]),
-        stances=np.array([place for place, _, _ in flat], dtype=np.int64),
+        stances=np.array([place for place, _ in flat], dtype=np.int64),
         rotations=np.ascontiguousarray(poses[:, :3, :3]),
         translations=np.ascontiguousarray(poses[:, :3, 3]),
-        dockings=np.array([seen for _, _, seen in flat], dtype=np.int64).reshape(-1, 2),
     )
 
 
@@ -142,11 +137,3 @@ def _same_place(kit: Kit, stance: _Stance, pose: FloatArray, other: FloatArray) 
     length = kit.types[stance.part_type].diagonal / 2
     gaps = pose_vectors(pose @ stance.turns, length) - pose_vectors(other[None], length)
     return bool(np.linalg.norm(gaps, axis=1).min() <= kit.pose_tolerance)
-
-
-def _docking(dockings: DockingTable, a: int, b: int, pose: FloatArray) -> tuple[int, int]:
-    """The directed labels of a docking at a pose of a part of type `b` beside one of type `a`, seen from both."""
-    seen = int(dockings.label(a, b, pose[None])[0]), int(dockings.label(b, a, invert(pose[None]))[0])
-    fit = dockings.fit(a, b, pose) if min(seen) < 0 else seen
-    assert fit is not None, "an image of a docking is one"
-    return fit

@@ -11,6 +11,7 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
+from stages.shape.physics.stability import components
 from stages.strings.rules import make_rules
 from stages.synthesis.instantiation.candidates import find_candidates
 from stages.synthesis.instantiation.layout import TRIES, Method, graph_tables, solving
@@ -52,7 +53,7 @@ class Instantiator:
     def __init__(self, answers: ContactAnswers, upright: bool = True) -> None:
         kit = answers.kit
         self.kit, self.answers, self.upright = kit, answers, upright
-        self.candidates = find_candidates(kit, answers.dockings, upright)
+        self.candidates = find_candidates(kit, upright)
         self._tables = kit_tables(kit, upright)
         self._rules = make_rules(kit.grammar, len(kit.labels), 0, partial=True)
         self._reach = new_reach(len(self.candidates.stance_types))
@@ -72,21 +73,19 @@ class Instantiator:
         edges: IntArray,
         rng: np.random.Generator,
         method: Method = Method(),
-        scores: FloatArray | None = None,
     ) -> Instantiation:
         """Parts of `labels` (n,) whose contacts are `edges` (m, 2), i < j.
 
         Where `method.whole` is false the graph tells of some contacts only, and others may be there if the grammar
-        admits them. scores: float64 (m, k), by directed docking label as seen from the lower node, the logarithm of how
-        likely each edge is such a docking; without, all are alike.
+        admits them.
         """
-        if not len(labels) or not _is_connected(len(labels), edges):
+        if not len(labels) or components(len(labels), np.asarray(edges)).any():
             return Instantiation(None, NOT_CONNECTED, 0)
         if method.whole and not self._admitted(labels, edges):
             return Instantiation(None, NOT_ADMITTED, 0)
         if len(labels) > len(self._s.at):
             self._room(2 * len(labels))
-        graph, tries = graph_tables(labels, edges, scores), 0
+        graph, tries = graph_tables(labels, edges), 0
         for _ in range(SLOT_ATTEMPTS):
             table = self.answers.table
             contacts = Contacts(table.keys, table.values, self._address)
@@ -107,7 +106,9 @@ class Instantiator:
     def _admitted(self, labels: np.ndarray, edges: IntArray) -> bool:
         graph = Assembly(labels, np.empty((len(labels), 4, 4)), edges)
         around = graph.neighbours()
-        return all(admits(self.kit.grammar, int(labels[part]), graph.multiset(near)) for part, near in enumerate(around))
+        return all(
+            admits(self.kit.grammar, int(labels[part]), graph.multiset(near)) for part, near in enumerate(around)
+        )
 
     def _assembly(self, count: int) -> Assembly:
         """What stands, with all contacts that there are."""
@@ -142,10 +143,3 @@ def _boxes_meet(boxes: FloatArray, box: FloatArray, slack: float) -> np.ndarray:
     """Which of some boxes (n, 2, 3) are at most `slack` from a box (2, 3), centres and half extents, bool (n,)."""
     near: np.ndarray = (np.abs(boxes[:, 0] - box[0]) <= boxes[:, 1] + box[1] + slack).all(axis=1)
     return near
-
-
-def _is_connected(nodes: int, edges: IntArray) -> bool:
-    leader = np.arange(nodes)
-    for i, j in np.asarray(edges).tolist():
-        leader[leader == leader[i]] = leader[j]
-    return bool((leader == leader[0]).all())

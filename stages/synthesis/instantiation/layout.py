@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import IntArray
 
 __all__ = ["FAILS", "PLACED", "TRAIL", "TRIES", "VALUES", "Graph", "Method", "Solving", "graph_tables", "solving"]
 
@@ -36,8 +36,7 @@ class Method(NamedTuple):
 
 class Graph(NamedTuple):
     """labels int64 (n,); starts int64 (n + 1,), ends int64 (2 m,): neighbours of each node; rows int32 (n, n): the edge
-    between two nodes, or -1; core bool (n,): nodes on cycles or between them; scores float64 (m, k): by directed
-    docking label, seen from the lower node, how likely an edge is that docking, as a logarithm; (0, 0) for none.
+    between two nodes, or -1; core bool (n,): nodes on cycles or between them.
     """
 
     labels: np.ndarray
@@ -45,7 +44,6 @@ class Graph(NamedTuple):
     ends: np.ndarray
     rows: np.ndarray
     core: np.ndarray
-    scores: np.ndarray
 
 
 class Solving(NamedTuple):
@@ -74,8 +72,8 @@ class Solving(NamedTuple):
     counts: np.ndarray  # int64 (5,)
 
 
-def graph_tables(labels: np.ndarray, edges: IntArray, scores: FloatArray | None) -> Graph:
-    """A graph of labels (n,) and edges (m, 2), i < j, for the solver; scores: (m, k) or None."""
+def graph_tables(labels: np.ndarray, edges: IntArray) -> Graph:
+    """A graph of labels (n,) and edges (m, 2), i < j, for the solver."""
     n, pairs = len(labels), np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((heads, tails))
@@ -87,7 +85,6 @@ def graph_tables(labels: np.ndarray, edges: IntArray, scores: FloatArray | None)
         ends=heads[order],
         rows=rows,
         core=_core(rows),
-        scores=np.empty((0, 0)) if scores is None else np.ascontiguousarray(scores, dtype=np.float64),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from stages.synthesis.instantiation.layout import FAILS, PLACED, TRAIL, TRIES, VALUES
 from stages.synthesis.instantiation.reach import LONGEST, can_reach
-from stages.variations.kernels.layout import LABELS, MISSING, NONE
+from stages.variations.kernels.layout import MISSING, NONE
 from stages.variations.kernels.lookup import ask, ask_python, hash_key, quantise
 
 __all__ = ["BUDGET", "IMPOSSIBLE", "NO_ROOM", "SOLVED", "solve"]
@@ -233,9 +233,6 @@ def _make_domain(kit, candidates, contacts, graph, method, s, node, parent):
                 if not _agrees(kit, contacts, graph, method, s, s.at[s.order[k]], value):
                     good = False
                     break
-        else:
-            seen = candidates.dockings[candidate]
-            s.scores[value] += _score(graph, parent, node, seen[0], seen[1])
         if good:
             s.left[node] += 1
         else:
@@ -246,35 +243,23 @@ def _make_domain(kit, candidates, contacts, graph, method, s, node, parent):
 
 @numba.njit(cache=True)
 def _agrees(kit, contacts, graph, method, s, placed, value):
-    """Whether a value goes with a part that stands; its score grows where they are neighbours."""
+    """Whether a value goes with a part that stands."""
     a, b = s.nodes[placed], s.nodes[value]
     is_edge = graph.rows[a, b] >= 0
     answer = _relation(kit, contacts, s, placed, value)
     if answer < 0:
         return answer == NONE and not is_edge
-    if is_edge:
-        s.scores[value] += _score(graph, a, b, answer // LABELS, answer % LABELS)
-        return True
-    return not method.whole
-
-
-@numba.njit(cache=True, inline="always")
-def _score(graph, a, b, first, second):
-    """How likely the edge of two nodes is a docking, seen from `a` as `first` and from `b` as `second`."""
-    if len(graph.scores) == 0:
-        return 0.0
-    return graph.scores[graph.rows[a, b], first if a < b else second]
+    return is_edge or not method.whole
 
 
 @numba.njit(cache=True)
 def _relation(kit, contacts, s, a, b):
-    """What two values are to each other: NONE, FORBIDDEN or a packed pair of docking labels, that of `a` first."""
+    """What two values are to each other: NONE, FORBIDDEN, or, where they dock, a number that is not negative."""
     slack = 1.1 * kit.limits[1]
     for i in range(3):
         if abs(s.boxes[a, 0, i] - s.boxes[b, 0, i]) > s.boxes[a, 1, i] + s.boxes[b, 1, i] + slack:
             return NONE
-    turned = s.types[a] > s.types[b]
-    if turned:
+    if s.types[a] > s.types[b]:
         a, b = b, a
     quanta = np.empty(12, dtype=np.int64)
     kind = s.types[b]
@@ -284,8 +269,6 @@ def _relation(kit, contacts, s, a, b):
     answer = ask(contacts.keys, contacts.values, hash_key(s.types[a], kind, quanta))
     if answer == MISSING:
         answer = ask_python(contacts.asker, a, b)
-    if turned and answer >= 0:
-        answer = (answer % LABELS) * LABELS + answer // LABELS
     return answer
 
 
