@@ -51,13 +51,22 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fai
     while True:
         if outcome == FINE:
             if s.counts[PLACED] == n:
-                return SOLVED
+                if method.whole or not method.checked or _all_complete(rules, graph, s):
+                    return SOLVED
+                outcome = CONFLICT
+                continue
             node = _next(rng, kit, candidates, contacts, graph, method, reach, s)
             if node == -1:
                 outcome = CONFLICT
                 continue
             if node == -2:
                 return NO_ROOM
+            if method.checked and not method.whole:
+                _weigh(kit, rules, contacts, graph, s, node)
+                if s.left[node] == 0:
+                    s.weights[node] += 1.0
+                    outcome = CONFLICT
+                    continue
             if s.counts[TRIES] == method.budget:
                 return BUDGET
             s.counts[TRIES] += 1
@@ -65,7 +74,7 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fai
             s.decisions[depth, 0] = s.counts[TRAIL]
             s.decisions[depth, 1] = value
             depth += 1
-            outcome = _place(kit, candidates, rules, contacts, graph, method, s, value)
+            outcome = _place(kit, candidates, contacts, graph, method, s, value)
             if outcome == NO_ROOM:
                 return NO_ROOM
         else:
@@ -273,7 +282,7 @@ def _relation(kit, contacts, s, a, b):
 
 
 @numba.njit(cache=True)
-def _place(kit, candidates, rules, contacts, graph, method, s, value):
+def _place(kit, candidates, contacts, graph, method, s, value):
     """Put a part down, hold what may come next against it, and find the domains of its neighbours."""
     node = s.nodes[value]
     s.trail[s.counts[TRAIL]] = -1 - node
@@ -282,8 +291,7 @@ def _place(kit, candidates, rules, contacts, graph, method, s, value):
     s.order[s.counts[PLACED]] = node
     s.counts[PLACED] += 1
     if method.checked and not method.whole:
-        if not _count_neighbours(kit, rules, contacts, graph, s, value):
-            return CONFLICT
+        _count_neighbours(kit, contacts, graph, s, value)
     if not method.constrained:
         return FINE
     for other in range(len(graph.labels)):
@@ -306,50 +314,83 @@ def _place(kit, candidates, rules, contacts, graph, method, s, value):
 
 
 @numba.njit(cache=True)
-def _count_neighbours(kit, rules, contacts, graph, s, value):
-    """Count what a part touches that was put down last; whether the grammar still admits what is around each part, with
-    the neighbours that are yet to come."""
-    node, good = s.nodes[value], True
+def _count_neighbours(kit, contacts, graph, s, value):
+    """Count what a part touches that was put down last."""
+    node = s.nodes[value]
     for k in range(s.counts[PLACED] - 1):
         other = s.order[k]
         if _relation(kit, contacts, s, s.at[other], value) >= 0:
             s.touch[node, other] = True
             s.near[node, graph.labels[other]] += 1
             s.near[other, graph.labels[node]] += 1
-            if not _may_be_complete(rules, graph, s, other):
-                good = False
-    return good and _may_be_complete(rules, graph, s, node)
 
 
 @numba.njit(cache=True)
-def _may_be_complete(rules, graph, s, node):
-    """Whether the neighbours that a node has and must have yet, and others besides while parts are missing, can be all
-    that the grammar asks for."""
-    labels = len(rules.counted)
-    counts = np.zeros(labels, dtype=np.int64)
-    for label in range(labels):
-        counts[label] = s.near[node, label]
+def _weigh(kit, rules, contacts, graph, s, node):
+    """Strike the values of a node that touch parts as the grammar cannot admit; of the others those that touch most are
+    the best."""
+    label, labels = graph.labels[node], len(rules.counted)
+    own, around = np.zeros(labels, dtype=np.int64), np.zeros(labels, dtype=np.int64)
+    for value in range(s.first[node], s.last[node]):
+        if not s.alive[value]:
+            continue
+        touched, good = 0, True
+        own[:] = 0
+        for k in range(s.counts[PLACED]):
+            other = s.order[k]
+            if _relation(kit, contacts, s, s.at[other], value) >= 0:
+                touched += 1
+                own[graph.labels[other]] += 1
+                for each in range(labels):
+                    around[each] = s.near[other, each]
+                around[label] += 1
+                if not _may_be_complete(rules, graph, s, other, node, around):
+                    good = False
+                    break
+        if good and _may_be_complete(rules, graph, s, node, node, own):
+            s.scores[value] = touched
+        else:
+            _strike(s, value)
+
+
+@numba.njit(cache=True)
+def _may_be_complete(rules, graph, s, node, fresh, counts):
+    """Whether the neighbours `counts` by label that a node has, those that it must have yet, but for `fresh`, and any
+    others can be what the grammar asks for. Adds to `counts`."""
     for k in range(graph.starts[node], graph.starts[node + 1]):
-        if s.at[graph.ends[k]] < 0:
-            counts[graph.labels[graph.ends[k]]] += 1
-    finished = s.counts[PLACED] == len(graph.labels)
-    total = 0
-    for label in range(labels):
-        if rules.counted[label]:
-            total += counts[label]
-    kind = graph.labels[node]
-    for pattern in range(rules.first[kind], rules.first[kind + 1]):
+        other = graph.ends[k]
+        if s.at[other] < 0 and other != fresh:
+            counts[graph.labels[other]] += 1
+    return _fits(rules, graph.labels[node], counts, False)
+
+
+@numba.njit(cache=True)
+def _all_complete(rules, graph, s):
+    """Whether every part has what the grammar asks for."""
+    for node in range(len(graph.labels)):
+        if not _fits(rules, graph.labels[node], s.near[node], True):
+            return False
+    return True
+
+
+@numba.njit(cache=True)
+def _fits(rules, label, counts, complete):
+    """Whether neighbours by label fit a pattern of the rules, or, unless they are `complete`, may with others besides."""
+    labels, total = len(rules.counted), 0
+    for each in range(labels):
+        if rules.counted[each]:
+            total += counts[each]
+    for pattern in range(rules.first[label], rules.first[label + 1]):
         lacking, good = 0, True
-        for label in range(labels):
-            if counts[label] > rules.high[pattern, label]:
+        for each in range(labels):
+            if counts[each] > rules.high[pattern, each]:
                 good = False
                 break
-            if counts[label] < rules.low[pattern, label]:
-                lacking += rules.low[pattern, label] - counts[label]
-        if not good or (finished and lacking > 0):
-            continue
+            lacking += max(rules.low[pattern, each] - counts[each], 0)
         size = rules.size[pattern]
-        if size < 0 or total + lacking == size or (not finished and total + lacking < size):
+        if not good or (complete and lacking > 0):
+            continue
+        if size < 0 or total + lacking == size or (not complete and total + lacking < size):
             return True
     return False
 
