@@ -59,7 +59,7 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset choices exemplars variations programs shapeassembly validity strings points sketches package
+.PHONY: dataset choices exemplars variations programs shapeassembly synthesis validity strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
 choices: setup  ## Choose what the config leaves at auto: up axis, contacts, grammar, hubs
@@ -72,13 +72,15 @@ programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
 shapeassembly: setup  ## Make shapes from ShapeAssembly programs, or from part hierarchies
 	$(RUN)
-validity: variations programs shapeassembly  ## Judge each shape: is it rooted, does it stand?
+synthesis: exemplars  ## Make new shapes from what trained models write
 	$(RUN)
-strings: variations programs shapeassembly  ## Write each shape as strings, and the text corpus
+validity: variations programs shapeassembly synthesis  ## Judge each shape: is it rooted, does it stand?
 	$(RUN)
-points: variations programs shapeassembly  ## Turn each shape into a labelled point cloud
+strings: variations programs shapeassembly synthesis  ## Write each shape as strings, and the text corpus
 	$(RUN)
-sketches: variations programs shapeassembly  ## Draw each shape as lines
+points: variations programs shapeassembly synthesis  ## Turn each shape into a labelled point cloud
+	$(RUN)
+sketches: variations programs shapeassembly synthesis  ## Draw each shape as lines
 	$(RUN)
 package: validity strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)

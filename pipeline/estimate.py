@@ -61,7 +61,7 @@ def plan_lines(config: Config, stages: Mapping[str, Stage], places: Places, work
         yield "a short trial first: some thirty samples through all stages"
         below = places.work / _TRIAL
         try:
-            costs = run_trial(short, stages, Places(below, config.name)) | costs
+            costs = run_trial(short, stages, Places(below, config.name, places.out)) | costs
         finally:
             shutil.rmtree(below, ignore_errors=True)
     forecasts = [_forecast(survey, stages, name, costs[name], producer, short) for name in stages]

@@ -83,10 +83,14 @@ class StagePlaces:
 
 @dataclass(frozen=True)
 class Places:
-    """The folders of one dataset under an output folder."""
+    """The folders of one dataset under an output folder.
+
+    shelf: where what other datasets have published is looked for, the output folder itself if not said.
+    """
 
     out: Path
     dataset: str
+    shelf: Path | None = None
 
     @property
     def work(self) -> Path:
@@ -102,6 +106,15 @@ class Places:
 
     def stage(self, name: str) -> StagePlaces:
         return StagePlaces(self.work / name)
+
+    def published(self, file: str) -> Path:
+        """Where a dataset publishes a file, `<folder>/<file>` below the output folder, whether it is there or not.
+
+        Raises ValueError for a name that leads elsewhere.
+        """
+        if not file or any(step in ("", ".", "..") for step in file.split("/")) or file.startswith("."):
+            raise ValueError(f"{file!r} is no file below the output folder")
+        return (self.shelf or self.out) / file
 
 
 def temporary(path: Path) -> Path:

@@ -81,6 +81,10 @@ class Plan(Protocol):
     def rejects(self, stage: str, shard: str) -> Mapping[str, int]:
         """How many items a shard has refused, by reason; empty while that shard has no matching record."""
 
+    def published(self, file: str) -> Path:
+        """Where another dataset publishes a file, as `<its folder>/<file>`, whether it is there or not. A shard that is
+        to read it has its sha256 in `params`. Raises ValueError for a name that leads out of the output folder."""
+
 
 class Task(Protocol):
     """What `run_shard` gets: its shard, the config, its inputs, its outputs, its randomness."""
@@ -97,6 +101,9 @@ class Task(Protocol):
     def input(self, stage: str, file: str) -> Path:
         """A file that an input shard has committed, with the bytes that it had then. Raises ShardFailed if no input
         record lists it; if it is damaged, the mill makes it again first."""
+
+    def published(self, file: str) -> Path:
+        """Where another dataset publishes a file, as `Plan.published` says it."""
 
     def output(self, file: str) -> BinaryIO:
         """A stream to a new file of this shard, named `<shard>.<anything>`; committed with it, or not at all."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from pipeline.code import code_digest, reached, starts_of
@@ -202,3 +203,6 @@ class _View:
     def rejects(self, stage: str, shard: str) -> Mapping[str, int]:
         record = self._stage(stage).records.get(shard)
         return {} if record is None else record.rejects
+
+    def published(self, file: str) -> Path:
+        return self._survey._places.published(file)

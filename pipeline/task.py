@@ -135,6 +135,9 @@ class _ShardTask:
             self._read[name] = self._job.inputs[name]
         return path
 
+    def published(self, file: str) -> Path:
+        return self._job.places.published(file)
+
     def _check(self, path: Path, name: str, source: str) -> None:
         """Raises ShardFailed, and notes the damage, where an input is not what its record says."""
         try:

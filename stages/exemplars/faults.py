@@ -60,7 +60,9 @@ def assembly_faults(kit: Kit, assembly: Assembly, upright: bool = True) -> list[
     faults += [
         f"{names[i]} and {names[j]} touch as no exemplar shows"
         for i, j in assembly.edges.tolist()
-        if not _is_docked(kit, *assembly.types[[i, j]].tolist(), invert(assembly.poses[i]) @ assembly.poses[j])
+        if not _is_docked(
+            kit, int(assembly.types[i]), int(assembly.types[j]), invert(assembly.poses[i]) @ assembly.poses[j]
+        )
     ]
     return [
         *faults,

@@ -12,6 +12,7 @@ from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
 from stages.variations.measures import measure_table
+from stages.variations.settings import VariationsConfig
 from stages.variations.split_report import splits_table
 
 __all__ = ["PRODUCER"]
@@ -129,7 +130,7 @@ def _lineage(_: Config) -> Mapping[str, Field]:
 PRODUCER = Producer(
     language="kit",
     keys="exemplars.kits",
-    asked=lambda config: bool(config.section(ExemplarsConfig).kits),
+    asked=lambda config: bool(config.section(ExemplarsConfig).kits and config.section(VariationsConfig).per_kit),
     sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
     "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's "
     "`lineage.parents` are samples of its own split, by their keys, and exemplars.",

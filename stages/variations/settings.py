@@ -175,7 +175,9 @@ class VariantRequirements(Requirements):
 class VariationsConfig(StrictModel):
     """The variations of each kit."""
 
-    per_kit: int = Field(500, ge=1, description="Variants wanted of each kit.")
+    per_kit: int = Field(
+        500, ge=0, description="Variants wanted of each kit; 0 for a dataset of these kits that is made otherwise."
+    )
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
     selection: SelectionConfig = Field(
         default_factory=SelectionConfig, description="How the dataset is chosen from what was found."

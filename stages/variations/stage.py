@@ -27,7 +27,7 @@ _JOBS = {"lane": run_lane, "pool": run_pool, "assignment": run_assignment, "coll
 
 def plan(plan: Plan) -> list[Shard]:
     """The rounds of every kit as far as they are known, then the assignment and the collection."""
-    if not plan.shards("exemplars"):
+    if not plan.shards("exemplars") or not plan.config.section(VariationsConfig).per_kit:
         return []
     search: list[Shard] = []
     ended = True

@@ -10,11 +10,11 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
-from stages.shape.kit import Assembly, Kit
+from stages.shape.kit import Assembly
 from stages.shape.physics.stability import components
 from stages.strings.rules import make_rules
 from stages.synthesis.instantiation.candidates import find_candidates
-from stages.synthesis.instantiation.layout import TRIES, Method, graph_tables, solving
+from stages.synthesis.instantiation.layout import STANDARD, TRIES, Method, graph_tables, solving
 from stages.synthesis.instantiation.reach import new_reach
 from stages.synthesis.instantiation.solve import BUDGET, IMPOSSIBLE, NO_ROOM, SOLVED, solve
 from stages.variations.growth.layout import Contacts
@@ -72,7 +72,7 @@ class Instantiator:
         labels: np.ndarray,
         edges: IntArray,
         rng: np.random.Generator,
-        method: Method = Method(),
+        method: Method = STANDARD,
     ) -> Instantiation:
         """Parts of `labels` (n,) whose contacts are `edges` (m, 2), i < j.
 

@@ -12,7 +12,19 @@ import numpy as np
 
 from stages.shape.arrays import IntArray
 
-__all__ = ["FAILS", "PLACED", "TRAIL", "TRIES", "VALUES", "Graph", "Method", "Solving", "graph_tables", "solving"]
+__all__ = [
+    "FAILS",
+    "PLACED",
+    "STANDARD",
+    "TRAIL",
+    "TRIES",
+    "VALUES",
+    "Graph",
+    "Method",
+    "Solving",
+    "graph_tables",
+    "solving",
+]
 
 VALUES, PLACED, TRAIL, TRIES, FAILS = range(5)
 """Places in `Solving.counts`: numbers of values, parts that stand, entries of the trail, parts that were put somewhere,
@@ -32,6 +44,9 @@ class Method(NamedTuple):
     closes: bool = True
     whole: bool = True
     budget: int = 4000
+
+
+STANDARD = Method()
 
 
 class Graph(NamedTuple):

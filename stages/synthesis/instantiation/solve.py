@@ -367,15 +367,15 @@ def _may_be_complete(rules, graph, s, node, fresh, counts):
 @numba.njit(cache=True)
 def _all_complete(rules, graph, s):
     """Whether every part has what the grammar asks for."""
+    wrong = 0
     for node in range(len(graph.labels)):
-        if not _fits(rules, graph.labels[node], s.near[node], True):
-            return False
-    return True
+        wrong += not _fits(rules, graph.labels[node], s.near[node], True)
+    return wrong == 0
 
 
 @numba.njit(cache=True)
 def _fits(rules, label, counts, complete):
-    """Whether neighbours by label fit a pattern of the rules, or, unless they are `complete`, may with others besides."""
+    """Whether neighbours by label fit a pattern of the rules; unless they are `complete`, with others besides."""
     labels, total = len(rules.counted), 0
     for each in range(labels):
         if rules.counted[each]:

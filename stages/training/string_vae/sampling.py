@@ -14,7 +14,7 @@ import numpy as np
 
 from stages.training.string_vae.trained import Points, TrainedStringVae
 
-__all__ = ["WAYS", "Found", "linear_points", "path_points", "perturb", "sample"]
+__all__ = ["WAYS", "Found", "linear_points", "path_points", "perturb", "prior", "sample"]
 
 LARGEST = 0.25
 """Largest offset of a perturbation in each dimension (strings §5.2)."""
@@ -108,11 +108,15 @@ def sample(
     return WAYS[way](model, strings, count, rng)
 
 
-def _prior(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> list[Found]:
-    """Points of the prior, decoded once: no search."""
-    points = rng.standard_normal((count, model.latent)).astype(np.float32)
+def prior(model: TrainedStringVae, count: int, temperature: float, rng: np.random.Generator) -> list[Found]:
+    """`count` points of the prior, decoded once: no search. temperature: how far they are spread, 1 as the prior."""
+    points = (temperature * rng.standard_normal((count, model.latent))).astype(np.float32)
     decoded = model.decode(points, rng)
     return [Found(each if model.is_valid(each) else None, 1, int(model.is_valid(each))) for each in decoded]
+
+
+def _prior(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> list[Found]:
+    return prior(model, count, 1.0, rng)
 
 
 def _perturbation(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> list[Found]:

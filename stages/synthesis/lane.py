@@ -1,0 +1,145 @@
+"""Drawing shapes from a model: strings, graphs, parts with poses, and all that is asked of a finished shape."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from pipeline.shards import ShardWriter, json_bytes
+from pipeline.stage import Outcome, Task
+from stages.exemplars.faults import assembly_faults
+from stages.shape.graphs.canonical import graph_digest
+from stages.shape.kit import Assembly, Kit
+from stages.shape.kit_input import input_kit
+from stages.shape.physics.judge import judge_of
+from stages.shape.sample import Sample, write_sample
+from stages.strings.alphabet import make_alphabet
+from stages.strings.decoder import decode
+from stages.synthesis.instantiation.instantiate import Instantiator
+from stages.synthesis.instantiation.layout import Method
+from stages.synthesis.settings import SourceConfig, SynthesisConfig
+from stages.synthesis.source import Source, read_source
+from stages.variations.kernels.answers import ContactAnswers
+
+__all__ = ["run_lane"]
+
+NO_STRING, DUPLICATE, FAULTY = "no valid string", "duplicate", "not valid by its meshes"
+NEW, TRAIN, EXEMPLAR = "new", "train", "exemplar"
+
+
+@dataclass(frozen=True)
+class _Dream:
+    """string: as it was drawn; graph: digest of the shape's graph; tries: parts that were put down."""
+
+    assembly: Assembly
+    string: str
+    graph: str
+    known: str
+    tries: int
+
+
+def run_lane(task: Task) -> Outcome:
+    """Files of the shard: `.tar`, the shapes that it found, as samples without a split, none twice, and none that a
+    round before had found. Whatever is refused is counted by its reason.
+    """
+    from stages.training.loop import same_arithmetic
+
+    same_arithmetic(1)
+    params, name = task.shard.params, task.shard.name
+    config = SynthesisConfig.model_validate_json(json_bytes(params["settings"]))
+    asked = config.sources[0]
+    kit = input_kit(task, asked.kit)
+    source = read_source(task, params["from"], kit)
+    seen = {each for pool in params["before"] for each in _digests(task, pool)}
+    with task.output(f"{name}.tar") as stream, ShardWriter(stream) as writer:
+        for dream in _dreams(task, config, asked, kit, source, seen):
+            lineage = {
+                "method": "synthesis",
+                "model": f"{asked.dataset}/{asked.model}-{asked.kit}-{asked.seed}",
+                "weights": source.weights,
+                "way": asked.way,
+                "string": dream.string,
+                "tries": dream.tries,
+                "known": dream.known,
+            }
+            key = f"{name}-{writer.samples:06d}"
+            write_sample(writer, Sample(key, "", "synthesis", kit.name, dream.graph, lineage, dream.assembly))
+    return Outcome(0, {"drawn": config.draws, "found": writer.samples})
+
+
+def _digests(task: Task, pool: str) -> list[str]:
+    return task.input("synthesis", f"{pool}.graphs.txt").read_text().split()
+
+
+def _dreams(
+    task: Task, config: SynthesisConfig, asked: SourceConfig, kit: Kit, source: Source, seen: set[str]
+) -> Iterator[_Dream]:
+    """The shapes of a lane; adds their graphs to `seen`."""
+    instantiator = _instantiator(task, kit, config.upright)
+    alphabet, exemplars = make_alphabet(kit.labels), _exemplar_graphs(kit)
+    judge = judge_of(kit.types, kit.up, config.require.physics)
+    method = Method(whole=source.whole, budget=config.tries)
+    for number, string in enumerate(_drawn(task, config, asked, source)):
+        task.progress(number + 1, config.draws)
+        item = f"{task.shard.name}/{number}"
+        if string is None:
+            task.reject(item, NO_STRING)
+            continue
+        decoded = decode(string, alphabet)
+        digest = graph_digest(decoded.types, decoded.edges)
+        known = TRAIN if bytes.fromhex(digest) in source.known else NEW
+        if source.whole and digest in seen:
+            task.reject(item, DUPLICATE)
+            continue
+        if known != NEW and config.known == "drop":
+            task.reject(item, f"known: {known}")
+            continue
+        found = instantiator.instantiate(decoded.types, decoded.edges, task.rng("instantiation", number), method)
+        if found.assembly is None:
+            task.reject(item, found.reason, string)
+            continue
+        labelled = kit.labelled(found.assembly)
+        graph = digest if source.whole else graph_digest(labelled.types, labelled.edges)
+        known = EXEMPLAR if graph in exemplars else known
+        if graph in seen or (known == EXEMPLAR and config.known == "drop"):
+            task.reject(item, DUPLICATE if graph in seen else f"known: {known}")
+            continue
+        faults = assembly_faults(kit, found.assembly, config.upright)
+        if faults:
+            task.reject(item, FAULTY, f"{string}: {'; '.join(faults)}")
+            continue
+        asks = config.require.rooted or config.require.stable
+        unmet = judge.unmet(found.assembly, config.require) if asks else None
+        if unmet is not None:
+            task.reject(item, unmet, string)
+            continue
+        seen.add(graph)
+        yield _Dream(found.assembly, string, graph, known, found.tries)
+
+
+def _drawn(task: Task, config: SynthesisConfig, asked: SourceConfig, source: Source) -> list[str | None]:
+    """What each draw of a lane answers: a string of the grammar, or None."""
+    from stages.training.string_vae.sampling import prior, sample
+
+    rng = task.rng("strings")
+    if asked.way == "prior":
+        found = prior(source.model, config.draws, asked.temperature, rng)
+    else:
+        found = sample(source.model, asked.way, source.strings, config.draws, rng)
+    return [each.string for each in found]
+
+
+def _exemplar_graphs(kit: Kit) -> frozenset[str]:
+    graphs = [kit.labelled(each.assembly) for each in kit.exemplars]
+    return frozenset(graph_digest(each.types, each.edges) for each in graphs)
+
+
+_known: dict[tuple[str, bool], Instantiator] = {}
+
+
+def _instantiator(task: Task, kit: Kit, upright: bool) -> Instantiator:
+    """That of a kit, kept from shard to shard of one worker: what it remembers changes no result."""
+    made_from = str(task.input("exemplars", f"{kit.name}.tar")), upright
+    if made_from not in _known:
+        _known[made_from] = Instantiator(ContactAnswers(kit), upright)
+    return _known[made_from]
