@@ -229,8 +229,8 @@ def arrangements(kit: Kit, kinds: list[int], edges: IntArray) -> Iterator[Assemb
         places.append(poses)
     for chosen in product(*places):
         poses = np.tile(np.eye(4), (len(kinds), 1, 1))
-        for child, (parent, pose) in enumerate(chosen, start=1):
-            poses[child] = poses[parent] @ pose
+        for child, (parent, at) in enumerate(chosen, start=1):
+            poses[child] = poses[parent] @ at
         yield Assembly(np.array(kinds, dtype=np.int16), poses, edges)
 
 
