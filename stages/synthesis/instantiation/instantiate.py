@@ -14,6 +14,7 @@ from stages.shape.kit import Assembly
 from stages.shape.physics.stability import components
 from stages.strings.rules import make_rules
 from stages.synthesis.instantiation.candidates import find_candidates
+from stages.synthesis.instantiation.guidance import NO_GUIDE, Guide
 from stages.synthesis.instantiation.layout import STANDARD, TRIES, Method, graph_tables, solving
 from stages.synthesis.instantiation.reach import new_reach
 from stages.synthesis.instantiation.solve import BUDGET, IMPOSSIBLE, NO_ROOM, SOLVED, solve
@@ -73,11 +74,12 @@ class Instantiator:
         edges: IntArray,
         rng: np.random.Generator,
         method: Method = STANDARD,
+        guide: Guide = NO_GUIDE,
     ) -> Instantiation:
         """Parts of `labels` (n,) whose contacts are `edges` (m, 2), i < j.
 
         Where `method.whole` is false the graph tells of some contacts only, and others may be there if the grammar
-        admits them.
+        admits them. A `guide` says which places are tried first.
         """
         if not len(labels) or components(len(labels), np.asarray(edges)).any():
             return Instantiation(None, NOT_CONNECTED, 0)
@@ -91,7 +93,7 @@ class Instantiator:
             contacts = Contacts(table.keys, table.values, self._address)
             left = method._replace(budget=method.budget - tries)
             outcome = solve(
-                rng, self._tables, self.candidates, self._rules, contacts, graph, left, self._reach, self._s
+                rng, self._tables, self.candidates, self._rules, contacts, graph, guide, left, self._reach, self._s
             )
             self.answers.complain()
             tries += int(self._s.counts[TRIES])

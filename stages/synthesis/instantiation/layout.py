@@ -82,6 +82,9 @@ class Solving(NamedTuple):
     decisions: np.ndarray  # int64 (d, 2): length of the trail before, and the value chosen
     near: np.ndarray  # int64 (n, labels): of the parts that stand, neighbours by label
     touch: np.ndarray  # bool (n, n): a part that stands touches one that stood before
+    framed: np.ndarray  # bool (n,): it has a frame
+    frame_rotations: np.ndarray  # float64 (n, 3, 3)
+    frame_translations: np.ndarray  # float64 (n, 3)
     queue: np.ndarray  # int64 (n,) scratch
     before: np.ndarray  # int64 (n,) scratch
     counts: np.ndarray  # int64 (5,)
@@ -135,6 +138,9 @@ def solving(nodes: int, labels: int, values: int) -> Solving:
         decisions=np.zeros((nodes, 2), dtype=np.int64),
         near=np.zeros((nodes, labels), dtype=np.int64),
         touch=np.zeros((nodes, nodes), dtype=np.bool_),
+        framed=np.zeros(nodes, dtype=np.bool_),
+        frame_rotations=np.zeros((nodes, 3, 3)),
+        frame_translations=np.zeros((nodes, 3)),
         queue=np.zeros(nodes, dtype=np.int64),
         before=np.zeros(nodes, dtype=np.int64),
         counts=np.zeros(5, dtype=np.int64),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from stages.synthesis.instantiation.guidance import carry_frames, drop_frames, prefer
 from stages.synthesis.instantiation.layout import FAILS, PLACED, TRAIL, TRIES, VALUES
 from stages.synthesis.instantiation.reach import LONGEST, can_reach
 from stages.variations.kernels.layout import MISSING, NONE
@@ -20,20 +21,20 @@ FAILS_A_NODE, MORE_FAILS = 4.0, 1.5
 
 
 @numba.njit(cache=True)
-def solve(rng, kit, candidates, rules, contacts, graph, method, reach, s):
+def solve(rng, kit, candidates, rules, contacts, graph, guide, method, reach, s):
     """Find a place for every node so that edges are contacts and nothing else touches. Where it stands is in `s`."""
     s.counts[TRIES] = 0
     s.weights[: len(graph.labels)] = 1.0
     fails = FAILS_A_NODE * len(graph.labels)
     while True:
-        outcome = _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, np.int64(fails))
+        outcome = _attempt(rng, kit, candidates, rules, contacts, graph, guide, method, reach, s, np.int64(fails))
         if outcome != CONFLICT:
             return outcome
         fails *= MORE_FAILS
 
 
 @numba.njit(cache=True)
-def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fails):
+def _attempt(rng, kit, candidates, rules, contacts, graph, guide, method, reach, s, fails):
     """One beginning. CONFLICT where it is given up."""
     n = len(graph.labels)
     s.counts[VALUES] = 0
@@ -44,8 +45,9 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fai
     s.at[:n] = -1
     s.near[:n] = 0
     s.touch[:n] = False
+    s.framed[:n] = False
     depth = 0
-    if not _seed(candidates, kit, graph, s, _root(rng, graph, method, s)):
+    if not _seed(candidates, kit, graph, s, _root(rng, graph, guide, method, s)):
         return NO_ROOM
     outcome = FINE
     while True:
@@ -67,6 +69,8 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fai
                     s.weights[node] += 1.0
                     outcome = CONFLICT
                     continue
+            if len(guide.parents) > 0:
+                prefer(kit, guide, graph, s, node)
             if s.counts[TRIES] == method.budget:
                 return BUDGET
             s.counts[TRIES] += 1
@@ -75,6 +79,8 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fai
             s.decisions[depth, 1] = value
             depth += 1
             outcome = _place(kit, candidates, contacts, graph, method, s, value)
+            if len(guide.parents) > 0:
+                carry_frames(kit, guide, graph, s, value)
             if outcome == NO_ROOM:
                 return NO_ROOM
         else:
@@ -85,6 +91,7 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fai
                 return CONFLICT
             depth -= 1
             _undo(graph, s, s.decisions[depth, 0])
+            drop_frames(guide, s)
             value = s.decisions[depth, 1]
             _strike(s, value)
             outcome = FINE
@@ -94,9 +101,12 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, method, reach, s, fai
 
 
 @numba.njit(cache=True)
-def _root(rng, graph, method, s):
-    """Where to begin: at random, or where it went wrong most often, on a cycle if there is one."""
+def _root(rng, graph, guide, method, s):
+    """Where to begin: with a guide at the first node, else at random, or where it went wrong most often, on a cycle if
+    there is one."""
     n = len(graph.labels)
+    if len(guide.parents) > 0:
+        return 0
     if not method.constrained:
         return min(np.int64(rng.random() * n), n - 1)
     cyclic = graph.core.any()
