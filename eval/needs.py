@@ -7,7 +7,7 @@ from eval.subject import Subject
 from stages.shape.collection.declared import language_of, producers
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["EDGE_CATEGORIES", "FINISHED", "KITS", "RECOVERY", "SEARCH", "STRING_VAE"]
+__all__ = ["CORPUS", "EDGE_CATEGORIES", "FINISHED", "KITS", "RECOVERY", "SEARCH", "STRING_VAE"]
 
 
 def _finished(subject: Subject) -> str:
@@ -53,3 +53,11 @@ def _trained(kind: str, what: str) -> Need:
 STRING_VAE = _trained("string_vae", "string VAE")
 EDGE_CATEGORIES = _trained("edge_categories", "model of edge categories")
 RECOVERY = _trained("recovery", "recovery model")
+
+
+def _corpus(subject: Subject) -> str:
+    return "" if subject.corpus.is_dir() else f"no corpus in {subject.corpus}; make strings"
+
+
+CORPUS = Need("the corpus of its strings", _corpus)
+"""`Subject.corpus` holds the strings of all samples."""

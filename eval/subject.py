@@ -35,6 +35,11 @@ class Subject:
         return self.out / f"{self.config.name}-models"
 
     @property
+    def corpus(self) -> Path:
+        """The strings of its samples, a file for each kit and split."""
+        return self.out / f"{self.config.name}-corpus"
+
+    @property
     def results(self) -> Path:
         """Where tables about the dataset are kept."""
         return self.out / f"{self.config.name}-eval"

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
-from eval.evaluation import Answer, Curve, Evaluation, Need
-from eval.needs import STRING_VAE
+from eval.evaluation import Answer, Curve, Evaluation
+from eval.needs import CORPUS, STRING_VAE
 from eval.subject import Subject
 from stages.training.checkpoint import weights_of_kind
 
 __all__ = ["TABLE"]
-
-
-def _no_corpus(subject: Subject) -> str:
-    return "" if _corpus(subject).is_dir() else f"no corpus in {_corpus(subject)}; make strings"
-
-
-def _corpus(subject: Subject) -> Path:
-    return subject.out / f"{subject.config.name}-corpus"
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
@@ -38,7 +29,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 
     rebuilt, sampled, joined, lines, seed = [], [], [], {}, subject.config.seed
     for each in string_vaes(subject.models):
-        train, test = (corpus_strings(_corpus(subject), each.kit, split, each.model) for split in ("train", "test"))
+        train, test = (corpus_strings(subject.corpus, each.kit, split, each.model) for split in ("train", "test"))
         if test:
             rebuilt.append((each, reconstruction(each.model, test)))
         for way in WAYS:
@@ -58,7 +49,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="Do strings come back from a string VAE, and how many new shapes does each way of sampling find?",
-    needs=(STRING_VAE, Need("the corpus of its dataset", _no_corpus)),
+    needs=(STRING_VAE, CORPUS),
     seconds=lambda subject: 150.0 * len(weights_of_kind(subject.models, "string_vae")),
     answer=_answer,
     options=_options,

@@ -49,12 +49,12 @@ NO_GUIDE = Guide(
 
 def guide_of(space: CategorySpace, decoded: Decoded, scores: FloatArray) -> Guide:
     """The guide to a decoded string; scores: float (tokens, categories), logarithms of how likely they are."""
-    nodes = [(each.index, token, each.edge) for token, each in enumerate(decoded.tokens) if each.kind == "node"]
+    nodes = [(token, each.edge) for token, each in enumerate(decoded.tokens) if each.kind == "node"]
     types, labels = len(space.kit.types), len(space.kit.labels)
     ranges = [[space.beside(each, label) for label in range(labels)] for each in range(types)]
     return Guide(
-        parents=np.array([decoded.edges[edge][0] if edge >= 0 else -1 for _, _, edge in nodes], dtype=np.int64),
-        scores=np.ascontiguousarray(scores[[token for _, token, _ in nodes]], dtype=np.float64),
+        parents=np.array([decoded.edges[edge][0] if edge >= 0 else -1 for _, edge in nodes], dtype=np.int64),
+        scores=np.maximum(scores[[token for token, _ in nodes]], UNLIKELY).astype(np.float64),
         begins=np.array([[each.start for each in row] for row in ranges], dtype=np.int64),
         ends=np.array([[each.stop for each in row] for row in ranges], dtype=np.int64),
         types=space.types[:, 1].astype(np.int64),

@@ -1,0 +1,106 @@
+"""`make eval TABLE=instantiation`: how many graphs become shapes? (strings §6, figures 8 and 9)"""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+
+from eval.evaluation import Answer, Evaluation, Strip
+from eval.needs import CORPUS, KITS
+from eval.subject import Subject
+
+__all__ = ["TABLE"]
+
+SHOWN = 4
+"""Pictures of what each model dreamt."""
+WARMING = 8
+"""Graphs that are put together before anybody looks at a clock: contacts are learnt first."""
+
+
+def _answer(subject: Subject, asked: Namespace) -> Answer:
+    from eval.instantiation import (
+        DRAWS,
+        METHODS,
+        Attempt,
+        attempts,
+        distinct_graphs,
+        dream_rng,
+        edge_categories,
+        guides_of,
+        methods_table,
+        outcome_table,
+    )
+    from eval.pictures import shape_picture
+    from eval.strings import string_vaes
+    from stages.exemplars.language import made_kits
+    from stages.shape.graphs.canonical import graph_digest
+    from stages.shape.shape import kit_shape
+    from stages.strings.alphabet import make_alphabet
+    from stages.strings.decoder import decode
+    from stages.synthesis.instantiation.instantiate import Instantiator
+    from stages.training.string_vae.sampling import prior
+    from stages.variations.kernels.answers import ContactAnswers
+
+    outcomes: list[tuple[str, Sequence[Attempt]]] = []
+    compared: list[tuple[str, str, Sequence[Attempt]]] = []
+    strips: list[Strip] = []
+    models, seed = [each for each in string_vaes(subject.models) if each.seed == 0], subject.config.seed
+    for name, kit in made_kits(subject.places).items():
+        train, test = (_lines(subject, name, split) for split in ("train", "test"))
+        if not test:
+            continue
+        maker, alphabet = Instantiator(ContactAnswers(kit)), make_alphabet(kit.labels)
+        limits = {"budget": asked.budget, "whole": _tells_all(subject, name)}
+        standard = METHODS["all steps"]._replace(**limits)
+        unseen = distinct_graphs(test, alphabet, asked.graphs)
+        attempts(maker, unseen[:WARMING], standard, seed)
+        for title, method in METHODS.items():
+            compared.append((name, title, attempts(maker, unseen, method._replace(**limits), seed)))
+        outcomes.append((f"{name}, unseen variations", compared[-len(METHODS)][2]))
+        for learnt in edge_categories(subject.models, kit):
+            found = attempts(maker, unseen, standard, seed, guides_of(learnt.model, unseen))
+            compared.append((name, f"all steps, guided by {learnt.name}", found))
+        known = {graph_digest(each.types, each.edges) for each in (decode(line, alphabet) for line in train)}
+        for trained in [each for each in models if each.kit == name]:
+            drawn = prior(trained.model, DRAWS * asked.graphs, 1.0, dream_rng(seed, trained.folder))
+            written = [each.string for each in drawn if each.string is not None]
+            dreamt = distinct_graphs(written, alphabet, asked.graphs, known)
+            if not dreamt:
+                continue
+            found = attempts(maker, dreamt, standard, seed)
+            outcomes.append((f"{name}, new graphs of {trained.name}", found))
+            good = [each.assembly for each in found if each.good and each.assembly is not None]
+            pictures = [(f"{len(each)} parts", shape_picture(kit_shape(kit, each))) for each in good[:SHOWN]]
+            strips.append(Strip(f"What {trained.folder} dreamt", pictures))
+    return Answer([outcome_table(outcomes), methods_table(compared)], strips=strips)
+
+
+def _lines(subject: Subject, kit: str, split: str) -> list[str]:
+    path = subject.corpus / f"{kit}-{split}.txt"
+    return path.read_text().splitlines() if path.is_file() else []
+
+
+def _tells_all(subject: Subject, kit: str) -> bool:
+    """Whether the strings of a kit tell of all contacts."""
+    vocabulary = json.loads((subject.corpus / "vocabulary.json").read_bytes())
+    return bool(vocabulary[kit]["edges"] == "all")
+
+
+def _seconds(subject: Subject) -> float:
+    kits, models = (len(list(folder)) for folder in (subject.corpus.glob("*-test.txt"), subject.models.glob("*")))
+    return 30.0 + 90.0 * kits + 25.0 * models
+
+
+def _options(parser: ArgumentParser) -> None:
+    parser.add_argument("--graphs", type=int, default=100, help="graphs of each kit and of each model")
+    parser.add_argument("--budget", type=int, default=4000, help="parts put down at most for a graph")
+
+
+TABLE = Evaluation(
+    question="How many graphs become shapes, and what is each step on the way worth?",
+    needs=(KITS, CORPUS),
+    seconds=_seconds,
+    answer=_answer,
+    options=_options,
+)
