@@ -18,18 +18,10 @@ from stages.shape.sample import read_samples
 from stages.shape.splits import SPLITS, share_out
 from stages.variations.shared_surface import PackedShapes
 from tests.mill import mill
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring
+from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring, write_model
 from tests.stated import stated
 
 pytestmark = pytest.mark.slow
-
-
-def write_model(path: Path, meshes: dict[str, trimesh.Trimesh], shape: list[Placed]) -> str:
-    scene = trimesh.Scene()
-    for number, (name, at) in enumerate(shape):
-        scene.add_geometry(meshes[name], node_name=f"{name}.{number:03d}", geom_name=name, transform=at)
-    path.write_bytes(scene.export(file_type="glb"))
-    return str(path)
 
 
 def make(folder: Path, out: str, workers: int, **variations: object) -> str:

@@ -75,6 +75,15 @@ def kit_of(
     return kit
 
 
+def write_model(path: Path, meshes: dict[str, trimesh.Trimesh], shape: Sequence[Placed]) -> str:
+    """A GLB with a node for each part of a shape made of named meshes; its path."""
+    scene = trimesh.Scene()
+    for number, (name, at) in enumerate(shape):
+        scene.add_geometry(meshes[name], node_name=f"{name}.{number:03d}", geom_name=name, transform=at)
+    path.write_bytes(scene.export(file_type="glb"))
+    return str(path)
+
+
 CHAIN = {"cap": box(0.5, 1.0, 1.0), "link": with_arrow(box(1.0, 0.2, 0.6))}
 
 

@@ -1,0 +1,55 @@
+"""A string VAE with random weights that knows the grammar of a kit: what it writes is valid, and seldom the same."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from stages.shape.kit import Kit
+from stages.strings.alphabet import make_alphabet
+from stages.strings.rules import make_rules, patterns_of
+from stages.training.checkpoint import checkpoint_bytes
+from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.training import new_model
+from stages.training.string_vae.vocabulary import Vocabulary
+
+__all__ = ["publish_model"]
+
+MOST = 40
+
+
+def publish_model(
+    out: Path, dataset: str, kit: Kit, strings: Sequence[str], changed: Mapping[str, Any] | None = None
+) -> Path:
+    """Put a model called `tiny`, its header `changed`, and the training strings of a dataset below `out`; the path of
+    the weights."""
+    vocabulary = Vocabulary(make_alphabet(kit.labels), 1)
+    sizes = {"latent": 4, "embedding": 4, "hidden": 16, "rounds": 1, "decoder": "masked"}
+    entry = StringVaeEntry.model_validate({"name": "tiny", "kind": "string_vae", **sizes})
+    module = new_model(entry, vocabulary, MOST, 7)
+    header = {
+        "kind": "string_vae",
+        "name": f"tiny-{kit.name}-0",
+        "kit": kit.name,
+        "settings": entry.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
+        "names": list(kit.labels),
+        "cycles": vocabulary.cycles,
+        "most": MOST,
+        "patterns": patterns_of(make_rules(kit.grammar, len(kit.labels), vocabulary.cycles)),
+        **(changed or {}),
+    }
+    with torch.no_grad():
+        for parameter in module.parameters():
+            parameter.mul_(3.0)
+    path = out / f"{dataset}-models" / f"tiny-{kit.name}-0" / "weights.safetensors"
+    corpus = out / f"{dataset}-corpus" / f"{kit.name}-train.txt"
+    for file, content in (
+        (path, checkpoint_bytes(module.state_dict(), header)),
+        (corpus, "".join(f"{each}\n" for each in strings).encode()),
+    ):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+    return path
