@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from stages.exemplars.faults import geometry_faults
+from stages.exemplars.faults import assembly_faults, geometry_faults
 from stages.package.glb import glb_bytes
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.kit import Assembly, Kit
@@ -68,3 +68,40 @@ def test_a_part_inside_another_is_named(kit: Kit) -> None:
     poses = np.concatenate([whole.poses, whole.poses[3:4]])
     found = faults(kit, Assembly(types, poses, whole.edges))
     assert any("touch and are not recorded" in each for each in found)
+
+
+def test_an_assembly_in_memory_is_looked_at_in_the_same_way(kit: Kit) -> None:
+    for exemplar in kit.exemplars:
+        assert assembly_faults(kit, exemplar.assembly) == []
+    whole = kit.exemplars[0].assembly
+    fewer = assembly_faults(kit, Assembly(whole.types, whole.poses, whole.edges[1:]))
+    assert any("touch and are not recorded" in each for each in fewer)
+
+
+def test_an_assembly_upside_down_stands_as_no_exemplar_does(kit: Kit) -> None:
+    whole = kit.exemplars[0].assembly
+    over = np.diag([1.0, -1.0, -1.0, 1.0])
+    turned = Assembly(whole.types, over @ whole.poses, whole.edges)
+    found = assembly_faults(kit, turned)
+    assert len(found) == len(whole)
+    assert all("stands as no exemplar shows" in each for each in found)
+    assert assembly_faults(kit, turned, upright=False) == []
+
+
+def test_two_assemblies_side_by_side_are_not_one_piece(kit: Kit) -> None:
+    one = kit.exemplars[0].assembly
+    aside = one.poses.copy()
+    aside[:, 0, 3] += 100.0
+    edges = np.concatenate([one.edges, one.edges + len(one)])
+    both = Assembly(np.tile(one.types, 2), np.concatenate([one.poses, aside]), edges)
+    assert assembly_faults(kit, both) == ["it is not in one piece"]
+
+
+def test_a_contact_that_is_no_docking_is_named(kit: Kit) -> None:
+    """Two straights in a row, the second moved to the side: they touch, and as no two straights of the exemplars do."""
+    whole = kit.exemplars[1].assembly
+    straight = kit.type_names().index("straight")
+    i, j = next((i, j) for i, j in whole.edges.tolist() if whole.types[i] == whole.types[j] == straight)
+    pair = whole.select(np.array([i, j]))
+    pair.poses[1, :3, 3] += 0.1 * pair.poses[0, :3, 2]
+    assert any("touch as no exemplar shows" in each for each in assembly_faults(kit, pair))
