@@ -53,7 +53,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         maker, alphabet = Instantiator(ContactAnswers(kit)), make_alphabet(kit.labels)
         limits = {"budget": asked.budget, "whole": _tells_all(subject, name)}
         standard = METHODS["all steps"]._replace(**limits)
-        unseen = distinct_graphs(test, alphabet, asked.graphs)
+        unseen = distinct_graphs(test, alphabet, asked.instantiated)
         attempts(maker, unseen[:WARMING], standard, seed)
         for title, method in METHODS.items():
             compared.append((name, title, attempts(maker, unseen, method._replace(**limits), seed)))
@@ -63,9 +63,9 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             compared.append((name, f"all steps, guided by {learnt.name}", found))
         known = {graph_digest(each.types, each.edges) for each in (decode(line, alphabet) for line in train)}
         for trained in [each for each in models if each.kit == name]:
-            drawn = prior(trained.model, DRAWS * asked.graphs, 1.0, dream_rng(seed, trained.folder))
+            drawn = prior(trained.model, DRAWS * asked.instantiated, 1.0, dream_rng(seed, trained.folder))
             written = [each.string for each in drawn if each.string is not None]
-            dreamt = distinct_graphs(written, alphabet, asked.graphs, known)
+            dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
             if not dreamt:
                 continue
             found = attempts(maker, dreamt, standard, seed)
@@ -93,7 +93,7 @@ def _seconds(subject: Subject) -> float:
 
 
 def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--graphs", type=int, default=100, help="graphs of each kit and of each model")
+    parser.add_argument("--instantiated", type=int, default=100, help="graphs of each kit and each model")
     parser.add_argument("--budget", type=int, default=4000, help="parts put down at most for a graph")
 
 

@@ -48,8 +48,8 @@ def nasty(folder: Path) -> str:
 def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
     runs = calls("dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
     assert [run[3] for run in runs] == [
-        "choices", "exemplars", "variations", "programs", "shapeassembly", "validity", "strings", "points", "sketches",
-        "package",
+        "choices", "exemplars", "variations", "programs", "shapeassembly", "synthesis", "validity", "strings", "points",
+        "sketches", "package",
     ]  # fmt: skip
     asked = ["--config", "c.yaml", "--out", "/data", "--seed", "7", "--workers", "3"]
     assert all(run == ["-m", "pipeline", "run", run[3], *asked] for run in runs)
@@ -58,7 +58,7 @@ def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
 def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for() -> None:
     runs = calls("train", "MODEL=masked-castle")
     assert [run[3] for run in runs] == [
-        "choices", "exemplars", "variations", "programs", "shapeassembly", "strings", "training",
+        "choices", "exemplars", "variations", "programs", "shapeassembly", "synthesis", "strings", "training",
     ]  # fmt: skip
     assert runs[-1][-2:] == ["--only", "masked-castle"]
     assert "--only" not in calls("train")[-1]
@@ -95,9 +95,9 @@ def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
     targets = ("dataset", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert len(reached) == 10 + len(targets[1:]) + 1  # dataset is ten stages; inspect looks at a program and a model
+    assert len(reached) == 11 + len(targets[1:]) + 1  # dataset is eleven stages; inspect looks at a program and a model
     assert all(any(said in each for each in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 10 * 4
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 11 * 4
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 
