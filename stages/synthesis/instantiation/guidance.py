@@ -14,6 +14,8 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import Decoded
+from stages.synthesis.instantiation.motions import compose
+from stages.variations.kernels.poses import squared_distance
 
 __all__ = ["NO_GUIDE", "Guide", "carry_frames", "drop_frames", "guide_of", "prefer"]
 
@@ -90,10 +92,11 @@ def carry_frames(kit, guide, graph, s, value):
         elif s.framed[parent]:
             category = _category(kit, guide, graph, s, parent, s.at[each])
             if category >= 0:
-                s.frame_rotations[each] = s.frame_rotations[parent] @ guide.rotations[category]
-                s.frame_translations[each] = (
-                    s.frame_rotations[parent] @ guide.translations[category] + s.frame_translations[parent]
-                )
+                compose(
+                    s.frame_rotations[parent], s.frame_translations[parent],
+                    guide.rotations[category], guide.translations[category],
+                    s.frame_rotations[each], s.frame_translations[each],
+                )  # fmt: skip
                 s.framed[each] = True
 
 
@@ -113,24 +116,17 @@ def _category(kit, guide, graph, s, parent, value):
     on = s.types[s.at[parent]]
     reach = kit.reach[kind]
     best, least = -1, (REACH * kit.limits[0]) ** 2
-    rotation, gap = np.empty((3, 3)), np.empty(3)
+    rotation, translation = np.empty((3, 3)), np.empty(3)
     for category in range(guide.begins[on, label], guide.ends[on, label]):
         if guide.types[category] != kind:
             continue
-        squared = 0.0
-        for i in range(3):
-            gap[i] = s.frame_translations[parent, i] - s.translations[value, i]
-            for k in range(3):
-                gap[i] += s.frame_rotations[parent, i, k] * guide.translations[category, k]
-            squared += gap[i] * gap[i]
+        compose(
+            s.frame_rotations[parent], s.frame_translations[parent],
+            guide.rotations[category], guide.translations[category], rotation, translation,
+        )  # fmt: skip
+        squared = squared_distance(translation, s.translations[value])
         if squared > least:
             continue
-        for i in range(3):
-            for j in range(3):
-                x = 0.0
-                for k in range(3):
-                    x += s.frame_rotations[parent, i, k] * guide.rotations[category, k, j]
-                rotation[i, j] = x
         turn = np.inf
         for symmetry in range(kit.symmetry_starts[kind], kit.symmetry_starts[kind + 1]):
             x = 0.0

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from stages.synthesis.instantiation.motions import compose
 from stages.variations.kernels.lookup import mix
 from stages.variations.kernels.poses import same_rotation, squared_distance
 
@@ -133,15 +134,10 @@ def _child(kit, candidates, reach, node, label):
     for pose in range(first, first + reach.sizes[node]):
         row = reach.stances[pose] * labels + label
         for candidate in range(candidates.starts[row], candidates.starts[row + 1]):
-            for i in range(3):
-                translation[i] = reach.translations[pose, i]
-                for k in range(3):
-                    translation[i] += reach.rotations[pose, i, k] * candidates.translations[candidate, k]
-                for j in range(3):
-                    x = 0.0
-                    for k in range(3):
-                        x += reach.rotations[pose, i, k] * candidates.rotations[candidate, k, j]
-                    rotation[i, j] = x
+            compose(
+                reach.rotations[pose], reach.translations[pose],
+                candidates.rotations[candidate], candidates.translations[candidate], rotation, translation,
+            )  # fmt: skip
             stance = candidates.stances[candidate]
             new = reach.counts[POSES]
             if _find(kit, candidates, reach, child, new, stance, rotation, translation, DRIFT * kit.limits[0]) >= 0:

@@ -7,6 +7,7 @@ import numpy as np
 
 from stages.synthesis.instantiation.guidance import carry_frames, drop_frames, prefer
 from stages.synthesis.instantiation.layout import FAILS, PLACED, TRAIL, TRIES, VALUES
+from stages.synthesis.instantiation.motions import compose, seen_from
 from stages.synthesis.instantiation.reach import LONGEST, can_reach
 from stages.variations.kernels.layout import MISSING, NONE
 from stages.variations.kernels.lookup import ask, ask_python, hash_key, quantise
@@ -234,15 +235,10 @@ def _make_domain(kit, candidates, contacts, graph, method, s, node, parent):
     row = s.stances[base] * labels + graph.labels[node]
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for candidate in range(candidates.starts[row], candidates.starts[row + 1]):
-        for i in range(3):
-            translation[i] = s.translations[base, i]
-            for k in range(3):
-                translation[i] += s.rotations[base, i, k] * candidates.translations[candidate, k]
-            for j in range(3):
-                x = 0.0
-                for k in range(3):
-                    x += s.rotations[base, i, k] * candidates.rotations[candidate, k, j]
-                rotation[i, j] = x
+        compose(
+            s.rotations[base], s.translations[base],
+            candidates.rotations[candidate], candidates.translations[candidate], rotation, translation,
+        )  # fmt: skip
         if not _add_value(kit, candidates, s, node, candidates.stances[candidate], rotation, translation):
             return False
         value = s.counts[VALUES] - 1
@@ -443,16 +439,9 @@ def _close(kit, candidates, graph, reach, s, node):
     for value in range(s.first[node], s.last[node]):
         if not s.alive[value]:
             continue
-        for i in range(3):
-            x = 0.0
-            for k in range(3):
-                x += s.rotations[base, k, i] * (s.translations[value, k] - s.translations[base, k])
-            translation[i] = x
-            for j in range(3):
-                x = 0.0
-                for k in range(3):
-                    x += s.rotations[base, k, i] * s.rotations[value, k, j]
-                rotation[i, j] = x
+        seen_from(
+            s.rotations[base], s.translations[base], s.rotations[value], s.translations[value], rotation, translation
+        )
         if not can_reach(
             kit, candidates, reach, s.stances[base], sequence, length, s.stances[value], rotation, translation
         ):

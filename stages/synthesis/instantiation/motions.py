@@ -1,0 +1,35 @@
+"""Rigid motions in kernels: one after another, and one seen from another."""
+
+from __future__ import annotations
+
+import numba
+
+__all__ = ["compose", "seen_from"]
+
+
+@numba.njit(cache=True)
+def compose(rotation, translation, then_rotation, then_translation, out_rotation, out_translation):
+    """Put the pose of what stands at a second pose in the coordinates of a first into the last two arguments."""
+    for i in range(3):
+        out_translation[i] = translation[i]
+        for k in range(3):
+            out_translation[i] += rotation[i, k] * then_translation[k]
+        for j in range(3):
+            x = 0.0
+            for k in range(3):
+                x += rotation[i, k] * then_rotation[k, j]
+            out_rotation[i, j] = x
+
+
+@numba.njit(cache=True)
+def seen_from(rotation, translation, other_rotation, other_translation, out_rotation, out_translation):
+    """Put a second pose in the coordinates of a first into the last two arguments."""
+    for i in range(3):
+        out_translation[i] = 0.0
+        for k in range(3):
+            out_translation[i] += rotation[k, i] * (other_translation[k] - translation[k])
+        for j in range(3):
+            x = 0.0
+            for k in range(3):
+                x += rotation[k, i] * other_rotation[k, j]
+            out_rotation[i, j] = x
