@@ -51,7 +51,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         if not test:
             continue
         maker, alphabet = Instantiator(ContactAnswers(kit)), make_alphabet(kit.labels)
-        limits = {"budget": asked.budget, "whole": _tells_all(subject, name)}
+        limits = {"budget": asked.parts, "whole": _tells_all(subject, name)}
         standard = METHODS["all steps"]._replace(**limits)
         unseen = distinct_graphs(test, alphabet, asked.instantiated)
         attempts(maker, unseen[:WARMING], standard, seed)
@@ -94,7 +94,7 @@ def _seconds(subject: Subject) -> float:
 
 def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--instantiated", type=int, default=100, help="graphs of each kit and each model")
-    parser.add_argument("--budget", type=int, default=4000, help="parts put down at most for a graph")
+    parser.add_argument("--parts", type=int, default=4000, help="parts put down at most for a graph")
 
 
 TABLE = Evaluation(
