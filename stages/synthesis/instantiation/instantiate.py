@@ -25,6 +25,8 @@ from stages.variations.kernels.tables import kit_tables
 
 __all__ = ["Instantiation", "Instantiator"]
 
+FEWEST = 64
+"""There is always room for graphs of so many nodes."""
 VALUES_A_NODE = 256
 """Room for values in the mean; a node has as many as there are places beside one part."""
 SLOT_ATTEMPTS = 16
@@ -60,7 +62,7 @@ class Instantiator:
         self._reach = new_reach(len(self.candidates.stance_types))
         slotted = kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(kit, answers.dockings, upright) if slotted else None
-        self._room(64)
+        self._room(FEWEST)
 
     def _room(self, nodes: int) -> None:
         """Make room for graphs of so many nodes."""
@@ -87,13 +89,15 @@ class Instantiator:
             return Instantiation(None, NOT_ADMITTED, 0)
         if len(labels) > len(self._s.at):
             self._room(2 * len(labels))
+        # So many places whatever came before: what is answered must not hang on which graphs a worker has had.
+        within = self._s._replace(types=self._s.types[: VALUES_A_NODE * max(len(labels), FEWEST)])
         graph, tries = graph_tables(labels, edges), 0
         for _ in range(SLOT_ATTEMPTS):
             table = self.answers.table
             contacts = Contacts(table.keys, table.values, self._address)
             left = method._replace(budget=method.budget - tries)
             outcome = solve(
-                rng, self._tables, self.candidates, self._rules, contacts, graph, guide, left, self._reach, self._s
+                rng, self._tables, self.candidates, self._rules, contacts, graph, guide, left, self._reach, within
             )
             self.answers.complain()
             tries += int(self._s.counts[TRIES])

@@ -20,6 +20,7 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
+from stages.synthesis.instantiation import instantiate
 from stages.synthesis.instantiation.instantiate import Instantiation, Instantiator
 from stages.synthesis.instantiation.layout import STANDARD, Method
 from stages.variations.kernels.answers import ContactAnswers
@@ -150,6 +151,16 @@ def test_what_was_asked_before_changes_no_answer(roads: Instantiator) -> None:
     assert one.assembly is not None
     assert other.assembly is not None
     assert one.assembly.poses.tobytes() == other.assembly.poses.tobytes()
+
+
+def test_room_for_a_large_graph_is_none_for_a_small_one(roads: Instantiator, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(instantiate, "VALUES_A_NODE", 1)
+    monkeypatch.setattr(instantiate, "FEWEST", 1)
+    fresh, used = (Instantiator(ContactAnswers(roads.kit)) for _ in range(2))
+    used._room(400)
+    names = loop(3, 2)
+    reasons = {put_together(each, names, cycle(len(names)), seed=3).reason for each in (fresh, used)}
+    assert reasons == {"too many places for parts"}
 
 
 @pytest.mark.parametrize("switch", ["constrained", "backtracks", "closes"])
