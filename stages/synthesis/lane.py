@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Task
 from stages.exemplars.faults import assembly_faults
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_input import input_kit
-from stages.shape.physics.judge import judge_of
+from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
+from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
+from stages.strings.kit_strings import KitStrings
 from stages.synthesis.instantiation.instantiate import Instantiator
 from stages.synthesis.instantiation.layout import Method
 from stages.synthesis.settings import SourceConfig, SynthesisConfig
@@ -77,7 +81,7 @@ def _dreams(
     """The shapes of a lane; adds their graphs to `seen`."""
     instantiator = _instantiator(task, kit, config.upright)
     alphabet, exemplars = make_alphabet(kit.labels), _exemplar_graphs(kit)
-    judge = judge_of(kit.types, kit.up, config.require.physics)
+    writer = KitStrings(kit, source.edges)
     method = Method(whole=source.whole, budget=config.tries)
     for number, string in enumerate(_drawn(task, config, asked, source)):
         task.progress(number + 1, config.draws)
@@ -100,18 +104,17 @@ def _dreams(
             continue
         labelled = kit.labelled(found.assembly)
         graph = digest if source.whole else graph_digest(labelled.types, labelled.edges)
-        known = EXEMPLAR if graph in exemplars else known
-        if graph in seen or (known == EXEMPLAR and config.known == "drop"):
+        known = EXEMPLAR if graph in exemplars else TRAIN if _is_told(writer, found.assembly, source) else known
+        if graph in seen or (known != NEW and config.known == "drop"):
             task.reject(item, DUPLICATE if graph in seen else f"known: {known}")
             continue
         faults = assembly_faults(kit, found.assembly, config.upright)
         if faults:
             task.reject(item, FAULTY, f"{string}: {'; '.join(faults)}")
             continue
-        asks = config.require.rooted or config.require.stable
-        unmet = judge.unmet(found.assembly, config.require) if asks else None
-        if unmet is not None:
-            task.reject(item, unmet, string)
+        weak = unmet(config.require, kit_shape(kit, found.assembly))
+        if weak is not None:
+            task.reject(item, weak, string)
             continue
         seen.add(graph)
         yield _Dream(found.assembly, string, graph, known, found.tries)
@@ -127,6 +130,16 @@ def _drawn(task: Task, config: SynthesisConfig, asked: SourceConfig, source: Sou
     else:
         found = sample(source.model, asked.way, source.strings, config.draws, rng)
     return [each.string for each in found]
+
+
+def _is_told(writer: KitStrings, assembly: Assembly, source: Source) -> bool:
+    """Whether training has a shape by its canonical string, where its strings tell of some contacts only: a shape has
+    other such strings besides those in training, and is no new one for it."""
+    if source.whole:
+        return False
+    (canonical,) = writer.strings(writer.graph(assembly), 0, np.random.default_rng(0))
+    decoded = decode(canonical.string, writer.alphabet)
+    return bytes.fromhex(graph_digest(decoded.types, decoded.edges)) in source.known
 
 
 def _exemplar_graphs(kit: Kit) -> frozenset[str]:

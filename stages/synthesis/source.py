@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from pipeline.errors import ConfigError, Rejected, ShardFailed
 from pipeline.places import file_digest
-from pipeline.shards import array_bytes
+from pipeline.shards import array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
@@ -19,6 +20,7 @@ from stages.shape.kit_input import input_kit
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.rules import make_rules, patterns_of
+from stages.strings.settings import Edges
 from stages.synthesis.settings import SourceConfig
 
 if TYPE_CHECKING:
@@ -30,13 +32,18 @@ __all__ = ["Source", "read_source", "run_source", "source_shard"]
 @dataclass(frozen=True)
 class Source:
     """A model with what it has learnt from. strings: those of training that it can read; known: graphs of training,
-    digests of their strings' graphs; whole: whether its strings tell of all contacts; weights: their sha256."""
+    digests of their strings' graphs; edges: which contacts its strings tell of; weights: their sha256."""
 
     model: TrainedStringVae
     strings: list[str]
     known: frozenset[bytes]
-    whole: bool
+    edges: Edges
     weights: str
+
+    @property
+    def whole(self) -> bool:
+        """Whether its strings tell of all contacts."""
+        return self.edges == "all"
 
 
 def source_shard(plan: Plan, number: int, source: SourceConfig) -> Shard:
@@ -45,6 +52,7 @@ def source_shard(plan: Plan, number: int, source: SourceConfig) -> Shard:
     files = {
         "weights": f"{source.dataset}-models/{name}/weights.safetensors",
         "corpus": f"{source.dataset}-corpus/{source.kit}-train.txt",
+        "vocabulary": f"{source.dataset}-corpus/vocabulary.json",
     }
     digests = {}
     for what, file in files.items():
@@ -61,8 +69,9 @@ def source_shard(plan: Plan, number: int, source: SourceConfig) -> Shard:
 
 
 def run_source(task: Task) -> Outcome:
-    """Files of the shard: `.weights.safetensors`; `.strings.txt`, the training strings that the model can read; and
-    `.known.npy`, uint8 (k, 32), digests of their graphs, each once, ascending.
+    """Files of the shard: `.weights.safetensors`; `.strings.txt`, the training strings that the model can read;
+    `.json`, which contacts these tell of; and `.known.npy`, uint8 (k, 32), digests of their graphs, each once,
+    ascending.
 
     Raises Rejected for weights that are not of this kit, or not to be read.
     """
@@ -95,6 +104,9 @@ def run_source(task: Task) -> Outcome:
         stream.write("".join(f"{each}\n" for each in strings).encode())
     with task.output(f"{name}.known.npy") as stream:
         stream.write(array_bytes(np.frombuffer(b"".join(sorted(known)), dtype=np.uint8).reshape(-1, 32)))
+    edges = json.loads(contents["vocabulary"])[kit.name]["edges"]
+    with task.output(f"{name}.json") as stream:
+        stream.write(json_bytes({"edges": edges}))
     return Outcome(0, {"strings": len(strings), "graphs": len(known), "weights": params["digests"]["weights"]})
 
 
@@ -107,7 +119,8 @@ def read_source(task: Task, shard: str, kit: Kit) -> Source:
     strings = task.input("synthesis", f"{shard}.strings.txt").read_text().splitlines()
     known = np.load(task.input("synthesis", f"{shard}.known.npy"), allow_pickle=False)
     digests = frozenset(bytes(each) for each in known)
-    return Source(model, strings, digests, not model.header["patterns"]["partial"], file_digest(path))
+    edges = json.loads(task.input("synthesis", f"{shard}.json").read_bytes())["edges"]
+    return Source(model, strings, digests, edges, file_digest(path))
 
 
 def _expected(kit: Kit) -> dict[str, Any]:
