@@ -102,10 +102,12 @@ def run_collection(task: Task) -> Outcome:
         for row in map(json.loads, assignment)
         if (row["split"], row["shard"]) == (params["split"], params["number"])
     ]
+    wanted = {(row["lane"], row["found"]) for row in mine}
     found = {
-        (row["lane"], sample.key): sample
-        for row in {row["lane"]: row for row in mine}.values()
-        for sample in read_samples(task.input("synthesis", f"{row['lane']}.tar"))
+        (lane, sample.key): sample
+        for lane in sorted({lane for lane, _ in wanted})
+        for sample in read_samples(task.input("synthesis", f"{lane}.tar"))
+        if (lane, sample.key) in wanted
     }
     counts: Counter[str] = Counter()
     with task.output(f"{name}.tar") as stream, ShardWriter(stream) as writer:
