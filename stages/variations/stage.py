@@ -90,6 +90,8 @@ def asked(config: Config) -> Sequence[int]:
 def trial(config: Config) -> VariationsConfig:
     """A search for few variants of each kit."""
     section, kits = config.section(VariationsConfig), len(config.section(ExemplarsConfig).kits)
+    if not section.per_kit:
+        return section
     few = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
     return section.model_copy(update={"per_kit": max(32 // max(kits, 1), 4), "splits": few})
 
