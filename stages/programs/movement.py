@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ __all__ = ["FAINT", "STEP", "Movement", "movement_table", "movements"]
 FAINT, STEP = 0.005, 0.0025
 """What is moved less by its whole range, and by one class, as shares of the diagonal, is hard to read."""
 
+MOST_BASES = 50
+"""So many times as many shapes are drawn as shall show a parameter, and no more."""
 SAMPLES = 4000
 """Points of each surface whose distance from the other is looked up, beside its vertices."""
 
@@ -59,7 +62,7 @@ def movements(program: Program, count: int, seed: int) -> Iterator[Movement]:
     known: list[_Base] = []
     for parameter in program.parameters:
         found: list[tuple[float, float]] = []
-        for base in _bases(known, sampler, rng):
+        for base in islice(_bases(known, sampler, rng), MOST_BASES * count):
             found += base.moved_by(parameter)
             if len(found) == count:
                 break
