@@ -8,6 +8,11 @@ from torch.nn.functional import scaled_dot_product_attention
 __all__ = ["Block"]
 
 
+def _heads(width: int, head: int) -> int:
+    """About as many heads as `head` goes into the width, so that they share it evenly."""
+    return next(number for number in range(max(width // head, 1), 0, -1) if width % number == 0)
+
+
 class Block(nn.Module):
     """Attention to what stands before, then two layers; normed first."""
 
@@ -15,7 +20,7 @@ class Block(nn.Module):
 
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.heads = max(width // self.HEAD, 1)
+        self.heads = _heads(width, self.HEAD)
         self.attention_norm, self.feed_norm = nn.LayerNorm(width), nn.LayerNorm(width)
         self.projections, self.joined = nn.Linear(width, 3 * width), nn.Linear(width, width)
         self.feed = nn.Sequential(nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width))

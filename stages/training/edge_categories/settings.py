@@ -33,5 +33,7 @@ class EdgeCategoriesEntry(KitModelEntry):
     rounds: int = Field(9, ge=1, le=10_000, description="rounds at most; unit: rounds")
     mask: bool = Field(True, description="whether only categories of a token's pair of labels have a probability")
     embedding: int = Field(32, ge=1, le=4096, description="numbers that stand for a token")
-    hidden: int = Field(128, ge=2, le=8192, description="size of the LSTM, both ways together, and of the walker; even")
+    hidden: int = Field(
+        128, ge=2, le=8192, multiple_of=2, description="size of the LSTM, both ways together, and of the walker; even"
+    )
     layers: int = Field(1, ge=1, le=24, description="layers of the LSTM, and of the walker")

@@ -22,7 +22,9 @@ class StringVaeEntry(KitModelEntry):
     )
     latent: int = Field(64, ge=1, le=4096, description="dimensions of the latent space")
     embedding: int = Field(32, ge=1, le=4096, description="numbers that stand for a token")
-    hidden: int = Field(256, ge=2, le=8192, description="size of the GRUs, or width of the transformer; even")
+    hidden: int = Field(
+        256, ge=2, le=8192, multiple_of=2, description="size of the GRUs, or width of the transformer; even"
+    )
     layers: int = Field(1, ge=1, le=24, description="layers of the decoder")
     kl_weight: float = Field(
         0.01, ge=0, le=10, description="weight of the divergence from the prior, in nats, beside that of a whole string"
