@@ -67,7 +67,7 @@ def category_models(folder: Path, kits: dict[str, Kit]) -> list[Trained[TrainedE
     """The models of edge categories of some kits in a folder of published models. Raises ConfigError for weights that
     are not what they should be."""
     return trained_models(
-        folder, "edge_categories", lambda path, header: load_edge_categories(path, kits[header["kit"]])
+        folder, "edge_categories", lambda path, header: load_edge_categories(path, kits[header["kit"]]), kits
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -40,13 +40,21 @@ class Trained(Generic[Model]):
         return f"{self.group}-{self.seed}"
 
 
-def trained_models(folder: Path, kind: str, load: Callable[[Path, Mapping[str, Any]], Model]) -> list[Trained[Model]]:
-    """The models of a kind in a folder of published models, by kit, name and seed; `load` reads one, of its weights and
-    what they say of themselves. Raises ConfigError for weights that are not what they should be."""
+def trained_models(
+    folder: Path,
+    kind: str,
+    load: Callable[[Path, Mapping[str, Any]], Model],
+    kits: Container[str] | None = None,
+) -> list[Trained[Model]]:
+    """The models of a kind in a folder of published models, by kit, name and seed, those of other kits than `kits` left
+    out; `load` reads one, of its weights and what they say of themselves. Raises ConfigError for weights that are not
+    what they should be."""
     found = []
     for path in weights_of_kind(folder, kind):
         try:
             header = weights_header(path)
+            if kits is not None and header.get("kit") not in kits:
+                continue
             model = load(path, header)
         except CheckpointError as error:
             raise ConfigError(f"{error}; make train") from error
