@@ -78,11 +78,16 @@ class ShardWriter:
 
 
 def read_shard(path: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """The samples of a shard in order, `(key, {member: bytes})`, one in memory at a time."""
+    """The samples of a shard in order, `(key, {member: bytes})`, one in memory at a time.
+
+    Entries that are no files, such as the folders and links in a tar of somebody else, are passed over.
+    """
     key: str | None = None
     members: dict[str, bytes] = {}
     with tarfile.open(path, mode="r:") as tar:
         for entry in tar:
+            if not entry.isfile():
+                continue
             entry_key, _, member = entry.name.partition(".")
             if key is not None and entry_key != key:
                 yield key, members

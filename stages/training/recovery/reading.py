@@ -131,6 +131,9 @@ def _of_shard(path: Path) -> Iterator[Input | InputError]:
     try:
         for key, members in read_shard(path):
             name = f"{path}, sample {key}"
+            if key in ("", ".", "..") or set(key) & set("/\\\0"):
+                yield InputError(f"{path}, sample {key!r}: its key is no file name, and results are filed under it")
+                continue
             try:
                 if "points.npy" in members:
                     yield Input(key, points=checked_cloud(_array(members["points.npy"], name), name))

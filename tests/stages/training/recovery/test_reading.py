@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +143,23 @@ def test_shard_gives_the_cloud_of_each_sample(tmp_path: Path) -> None:
     assert isinstance(first, Input)
     assert first.name == "chair-000000"
     assert isinstance(second, InputError)
+
+
+def test_samples_whose_key_is_a_path_are_refused_and_folders_passed_over(tmp_path: Path) -> None:
+    content = array_bytes(CLOUD)
+    with tarfile.open(tmp_path / "foreign.tar", "w") as tar:
+        folder = tarfile.TarInfo("clouds")
+        folder.type = tarfile.DIRTYPE
+        tar.addfile(folder)
+        for key in ("/tmp/evil", "../evil", "clouds/evil", "clouds\\evil", "", "good"):
+            entry = tarfile.TarInfo(f"{key}.points.npy")
+            entry.size = len(content)
+            tar.addfile(entry, io.BytesIO(content))
+    *refused, good = read_inputs(tmp_path / "foreign.tar")
+    assert len(refused) == 5
+    assert all(isinstance(each, InputError) and "no file name" in str(each) for each in refused)
+    assert isinstance(good, Input)
+    assert good.name == "good"
 
 
 @pytest.mark.parametrize("name", ["nothing.ply", "text.md", "text.ply", "text.tar", "empty"])
