@@ -63,12 +63,15 @@ def load_checkpoint(path: Path, expected: Mapping[str, Any]) -> tuple[dict[str, 
 
 
 def weights_header(path: Path) -> dict[str, Any]:
-    """What a file of weights says of itself. Raises CheckpointError for a pickle and for a file that is cut off or
-    damaged, or that Shapemill did not write."""
+    """What a file of weights says of itself. Raises CheckpointError for a pickle and for a file that cannot be read, is
+    cut off or damaged, that Shapemill did not write, or whose header is no JSON mapping."""
     from safetensors import SafetensorError, safe_open
 
-    with open(path, "rb") as stream:
-        beginning = stream.read(8)
+    try:
+        with open(path, "rb") as stream:
+            beginning = stream.read(8)
+    except OSError as error:
+        raise CheckpointError(f"{path} cannot be read: {error.strerror}") from error
     try:
         with safe_open(path, framework="np") as stored:
             metadata = stored.metadata() or {}
@@ -80,7 +83,12 @@ def weights_header(path: Path) -> dict[str, Any]:
         raise CheckpointError(f"{path} is cut off or damaged: {error}") from error
     if _KEY not in metadata:
         raise CheckpointError(f"{path} holds tensors, but Shapemill did not write it: its header does not say what of")
-    header: dict[str, Any] = json.loads(metadata[_KEY])
+    try:
+        header = json.loads(metadata[_KEY])
+    except (ValueError, RecursionError) as error:
+        raise CheckpointError(f"{path} is damaged: what its header says of itself is no JSON: {error}") from error
+    if not isinstance(header, dict):
+        raise CheckpointError(f"{path} is damaged: what its header says of itself is no mapping")
     return header
 
 

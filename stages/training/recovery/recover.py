@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pipeline.errors import ConfigError
 from stages.programs.parameters import Value
 from stages.programs.program import Program, find_program, program_names
 from stages.shape.arrays import ByteArray, FloatArray
@@ -125,16 +126,19 @@ def find_models(folder: Path) -> tuple[dict[tuple[str, str], TrainedRecovery], l
     """The recovery models in a folder of published models, or, of a folder of datasets, in all of theirs; of several
     for one program and input the one that validated best. And what is wrong with others, in words."""
     found: dict[tuple[str, str], TrainedRecovery] = {}
+    losses: dict[tuple[str, str], float] = {}
     wrong = []
     for path in chain.from_iterable(weights_of_kind(each, KIND) for each in (folder, *sorted(folder.glob("*-models")))):
         try:
             model = load_recovery(path)
+            key, loss = (model.header["program"], model.entry.input), float(model.header["figures"]["val_loss"])
         except CheckpointError as error:
             wrong.append(str(error))
-            continue
-        key = (model.header["program"], model.entry.input)
-        if key not in found or _loss(model) < _loss(found[key]):
-            found[key] = model
+        except (ConfigError, ImportError, LookupError, TypeError, ValueError, RuntimeError) as error:
+            wrong.append(f"{path} cannot be used: {type(error).__name__}: {error}")
+        else:
+            if key not in found or loss < losses[key]:
+                found[key], losses[key] = model, loss
     return found, wrong
 
 
@@ -224,7 +228,3 @@ def _placement(look: _Look, refined: Refined) -> FloatArray | None:
     matrix[:3, :3] = look.rotation.T * scale
     matrix[:3, 3] = look.rotation.T @ (outer.centre - inner.centre * scale)
     return matrix
-
-
-def _loss(model: TrainedRecovery) -> float:
-    return float(model.header["figures"]["val_loss"])
