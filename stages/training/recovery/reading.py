@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from stages.training.recovery.drawings import fitted
 
 __all__ = ["Input", "InputError", "checked_cloud", "ink_of", "read_inputs"]
 
-CLOUDS = (".npy", ".txt", ".xyz", ".csv", ".ply", ".obj", ".glb", ".gltf", ".stl", ".off", ".pcd")
+CLOUDS = (".npy", ".txt", ".xyz", ".csv", ".ply", ".obj", ".glb", ".gltf", ".stl", ".off")
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
 FEWEST_POINTS = 32
 SURFACE_POINTS = 8192
@@ -49,11 +50,14 @@ def read_inputs(path: Path) -> Iterator[Input | InputError]:
     Raises InputError where there is nothing to read at all.
     """
     if path.is_dir():
-        files = [each for each in sorted(path.iterdir()) if each.suffix.lower() in CLOUDS + IMAGES]
+        files = [each for each in sorted(path.iterdir()) if each.is_file() and each.suffix.lower() in CLOUDS + IMAGES]
         if not files:
             raise InputError(f"{path} holds no cloud and no drawing; known are {', '.join(CLOUDS + IMAGES)}")
+        stems = Counter(each.stem for each in files)
         for each in files:
-            yield from read_inputs(each)
+            for given in read_inputs(each):
+                shares = isinstance(given, Input) and stems[each.stem] > 1
+                yield replace(given, name=each.name) if shares else given
     elif not path.is_file():
         raise InputError(f"there is no file {path}")
     elif path.suffix.lower() == ".tar":
@@ -155,8 +159,8 @@ def _points(path: Path) -> Any:
         if suffix in (".txt", ".xyz", ".csv"):
             return np.loadtxt(path, delimiter="," if suffix == ".csv" else None, ndmin=2)
         return _scene_points(path)
-    except (ValueError, TypeError, KeyError, IndexError, OSError, NotImplementedError) as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
+    except Exception as error:  # readers of many formats, not ours: whatever they raise, the file is to blame
+        raise InputError(f"{path} cannot be read: {type(error).__name__}: {error}") from error
 
 
 def _scene_points(path: Path) -> FloatArray:
@@ -179,8 +183,8 @@ def _scene_points(path: Path) -> FloatArray:
 def _array(content: bytes, name: str) -> Any:
     try:
         return np.load(io.BytesIO(content), allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise InputError(f"{name} is no array: {error}") from error
+    except Exception as error:  # a header that claims too much memory, or is no Python literal, among others
+        raise InputError(f"{name} is no array: {type(error).__name__}: {error}") from error
 
 
 def _picture(source: Path | io.BytesIO, name: str) -> ByteArray:

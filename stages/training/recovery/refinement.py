@@ -30,6 +30,8 @@ SURE = 0.8
 """A choice that the network gives such a probability is not made otherwise."""
 WEAK = 0.01
 """A parameter that has not changed the distance by such a share is left until the end."""
+TINY = 1e-12
+"""Nearer than this nothing is: a drawing of the shape itself has distance 0."""
 HOPELESS = 3.0
 """What is so many times farther at first is not fitted."""
 MUTATED = 3
@@ -218,7 +220,7 @@ class _Search:
         self.tried += 1
         distance, target = self.target.compared(self.program.parts(settled))
         for name in change if len(change) == 1 else ():
-            effect = abs(distance - self.distance) / self.distance
+            effect = abs(distance - self.distance) / max(self.distance, TINY)
             self._effects[name] = max(self._effects.get(name, 0.0), effect)
         if distance >= self.distance:
             return False

@@ -9,19 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from safetensors.torch import save
 
 from pipeline.errors import ConfigError
 from stages.points.area_sampling import sample_surface
 from stages.programs.curves.part import joined
 from stages.programs.program import find_program
 from stages.programs.schema import Values
+from stages.training.checkpoint import checkpoint_bytes
 from stages.training.recovery.__main__ import main
+from stages.training.recovery.reading import Input, InputError, read_inputs
 from stages.training.recovery.recover import find_models, recover
 from stages.training.recovery.refinement import base_guess, refine
+from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TEST, TRAIN, VAL, random_shapes
 from stages.training.recovery.surface import chamfer_distance, shape_points
 from stages.training.recovery.targets import cloud_target
-from tests.stages.training.recovery.toy import PROGRAM, config, train
+from stages.training.recovery.training import described_parameters, new_model
+from tests.stages.training.recovery.toy import PROGRAM, SMALL, config, train
 
 STOOL = find_program(PROGRAM)
 TALL: Values = {"height": 0.9, "scale x": 0.7, "has_rail": True, "rail_height": 0.2}
@@ -141,6 +146,41 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
     assert "distance" in capsys.readouterr().out
 
 
+def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) -> None:
+    entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
+    tensors = new_model(entry, STOOL, 0).state_dict()
+    settings = {name: value for name, value in SMALL.items() if name != "name"}
+    good = {
+        "kind": "recovery",
+        "program": PROGRAM,
+        "parameters": described_parameters(STOOL),
+        "settings": settings,
+        "figures": {"val_loss": 2.0, "val_chamfer_high": 0.1},
+    }
+    without = {name: value for name, value in good.items() if name != "program"}
+    headers = {
+        "good": good,
+        "worse": {**good, "figures": {"val_loss": 3.0}},
+        "moved": {**good, "program": "nowhere.at.all"},
+        "nameless": without,
+        "settings": {**good, "settings": {**settings, "points": -1}},
+        "tensors": {**good, "settings": {**settings, "widths": [8, 9]}},
+        "figures": {**good, "figures": {}},
+    }
+    for name, header in headers.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "weights.safetensors").write_bytes(checkpoint_bytes(tensors, header))
+    (tmp_path / "list").mkdir()
+    (tmp_path / "list/weights.safetensors").write_bytes(save({}, {"shapemill": "[]"}))
+    models, wrong = find_models(tmp_path)
+    assert list(models) == [(PROGRAM, "points")]
+    assert models[PROGRAM, "points"].header["figures"]["val_loss"] == 2.0
+    assert [Path(text.split("/weights.safetensors")[0]).name for text in wrong] == [
+        "figures", "list", "moved", "nameless", "settings", "tensors",
+    ]  # fmt: skip
+    assert all(text.count("weights.safetensors") == 1 for text in wrong)
+
+
 def test_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path / "none.ply"), "--out", str(tmp_path)]) == 2
     assert "there is no file" in capsys.readouterr().err
@@ -149,3 +189,15 @@ def test_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixtur
     np.save(tmp_path / "one.npy", np.zeros((1, 3)))
     assert main([str(tmp_path), "--program", PROGRAM, "--out", str(tmp_path)]) == 1
     assert "has 1 point" in capsys.readouterr().err
+
+
+def test_what_readers_cannot_read_keeps_no_other_file_back(tmp_path: Path) -> None:
+    (tmp_path / "list.gltf").write_text("[]")
+    (tmp_path / "garbled.npy").write_bytes(b"\x93NUMPY\x01\x00\x08\x00{'descr'")
+    (tmp_path / "gone.ply").symlink_to(tmp_path / "nowhere.ply")
+    (tmp_path / "folder.obj").mkdir()
+    np.save(tmp_path / "good.npy", np.random.default_rng(0).random((100, 3)))
+    np.savetxt(tmp_path / "good.xyz", np.random.default_rng(0).random((100, 3)))
+    given = list(read_inputs(tmp_path))
+    assert [each.name for each in given if isinstance(each, Input)] == ["good.npy", "good.xyz"]
+    assert len([each for each in given if isinstance(each, InputError)]) == 2
