@@ -56,8 +56,10 @@ def read_inputs(path: Path) -> Iterator[Input | InputError]:
         stems = Counter(each.stem for each in files)
         for each in files:
             for given in read_inputs(each):
-                shares = isinstance(given, Input) and stems[each.stem] > 1
-                yield replace(given, name=each.name) if shares else given
+                if isinstance(given, Input) and stems[each.stem] > 1:
+                    yield replace(given, name=each.name)
+                else:
+                    yield given
     elif not path.is_file():
         raise InputError(f"there is no file {path}")
     elif path.suffix.lower() == ".tar":
