@@ -52,8 +52,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--up", default="", choices=["", "x", "y", "z"], help="the axis of clouds that points up")
     parser.add_argument("--out", type=Path, default=Path("datasets"), help="where models are, and results go")
     parser.add_argument("--budget", type=_count, default=600, help="shapes that are made for an input at most")
-    parser.add_argument("--seed", type=int, default=0, help="where chance starts")
+    parser.add_argument("--seed", type=_seed, default=0, help="where chance starts")
     return parser
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text} is no seed: a whole number from 0 on")
+    return int(text)
 
 
 def _count(text: str) -> int:

@@ -43,13 +43,15 @@ SMALLEST_STEP = 0.1
 @dataclass(frozen=True)
 class Guess:
     """What is known before anything is tried. probabilities: of the values of each parameter, float64 (values,), by
-    name, were it visible; hidden: the probability that it is hidden."""
+    name, were it visible; start: the values where the search begins, the likeliest if there are none."""
 
     probabilities: dict[str, FloatArray]
-    hidden: dict[str, float]
+    start: Values | None = None
 
     def values(self, program: Program) -> dict[str, Value]:
-        """The likeliest value of each parameter, whether it is visible or not."""
+        """The value of each parameter where the search begins, whether it is visible or not."""
+        if self.start is not None:
+            return dict(self.start)
         likeliest = {name: int(each.argmax()) for name, each in self.probabilities.items()}
         return {each.name: each.values[likeliest[each.name]] for each in program.parameters}
 
@@ -75,7 +77,7 @@ def base_guess(program: Program) -> Guess:
         chances = np.full(len(each.values), 1.0 / (len(each.values) + 1))
         chances[each.class_of(each.base)] *= 2.0
         probabilities[each.name] = chances
-    return Guess(probabilities, dict.fromkeys(probabilities, 0.0))
+    return Guess(probabilities, program.schema.base)  # which need not be among the values of classes
 
 
 def refine(program: Program, guess: Guess, target: Target, budget: int, rng: np.random.Generator) -> Refined:

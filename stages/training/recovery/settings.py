@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from stages.training.entry import ModelEntry, Subject
 
 __all__ = ["RecoveryEntry"]
+
+Size = Annotated[int, Field(ge=1, le=4096)]
 
 
 class RecoveryEntry(ModelEntry):
@@ -34,10 +36,10 @@ class RecoveryEntry(ModelEntry):
     neighbors: int = Field(
         20, ge=1, le=256, description="nearest neighbours that an edge convolution looks at; unit: points"
     )
-    widths: tuple[int, ...] = Field(
+    widths: tuple[Size, ...] = Field(
         (16, 16, 32, 64), min_length=1, strict=False, description="features of each edge convolution"
     )
-    channels: tuple[int, ...] = Field(
+    channels: tuple[Size, ...] = Field(
         (8, 16, 32, 32, 64, 64, 64, 64),
         min_length=8,
         max_length=8,
@@ -47,7 +49,7 @@ class RecoveryEntry(ModelEntry):
     embedding: int = Field(
         64, ge=1, le=4096, description="features that are pooled over the points: their greatest and their mean"
     )
-    decoder: tuple[int, int] = Field((128, 64), strict=False, description="sizes of the two layers in each decoder")
+    decoder: tuple[Size, Size] = Field((128, 64), strict=False, description="sizes of the two layers in each decoder")
     dropout: float = Field(0.1, ge=0, lt=1, description="share of a decoder's features that are left out in a step")
     noise: float = Field(
         0.5,

@@ -64,12 +64,11 @@ class TrainedRecovery:
     def _guess(self, inputs: Tensor) -> Guess:
         device = next(self.module.parameters()).device
         chances = torch.softmax(self.module(inputs.to(device)), dim=-1).mean(dim=0).double().cpu().numpy()
-        probabilities, hidden = {}, {}
+        probabilities = {}
         for parameter, row in zip(self.program.parameters, chances, strict=True):
             shown = row[: len(parameter.values)]
             probabilities[parameter.name] = shown / max(float(shown.sum()), 1e-300)
-            hidden[parameter.name] = float(1.0 - shown.sum())
-        return Guess(probabilities, hidden)
+        return Guess(probabilities)
 
 
 def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedRecovery:

@@ -201,3 +201,8 @@ def test_what_readers_cannot_read_keeps_no_other_file_back(tmp_path: Path) -> No
     given = list(read_inputs(tmp_path))
     assert [each.name for each in given if isinstance(each, Input)] == ["good.npy", "good.xyz"]
     assert len([each for each in given if isinstance(each, InputError)]) == 2
+
+
+def test_base_guess_begins_at_the_base_shape() -> None:
+    lamp = find_program("ceiling_lamp")
+    assert base_guess(lamp).values(lamp) == lamp.schema.base
