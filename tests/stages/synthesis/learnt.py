@@ -8,6 +8,7 @@ from typing import Any
 
 import torch
 
+from pipeline.shards import json_bytes
 from stages.shape.kit import Kit
 from stages.strings.alphabet import make_alphabet
 from stages.strings.rules import make_rules, patterns_of
@@ -49,6 +50,7 @@ def publish_model(
     for file, content in (
         (path, checkpoint_bytes(module.state_dict(), header)),
         (corpus, "".join(f"{each}\n" for each in strings).encode()),
+        (corpus.with_name("vocabulary.json"), json_bytes({kit.name: {"edges": "all"}})),
     ):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(content)
