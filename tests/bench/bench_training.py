@@ -50,7 +50,7 @@ def bench() -> Iterator[Measure]:
     }
     for name, settings in arms.items():
         arm = StringVaeEntry.model_validate({"name": "bench", **settings})
-        learner = StringVaeLearner(new_model(arm, vocabulary, most, 0), {}, arm, vocabulary, strings, strings)
+        learner = StringVaeLearner(new_model(arm, vocabulary, most, 0), {}, arm, vocabulary, True, strings, strings)
         ours = rate(our_steps(learner), 4.0, 2)
         yield Measure(f"string VAE learns, {name}", "strings", ours, "as in MOSES", peer, note)
 

@@ -47,12 +47,20 @@ class Strings:
         """Tokens of each string, its end among them, int64 (strings,)."""
         return np.diff(self.first)
 
+    @property
+    def canonical(self) -> npt.NDArray[np.int64]:
+        """For each string the first one of its graph, which stage `strings` writes canonical, int64 (strings,)."""
+        return np.searchsorted(self.graph, self.graph)
+
 
 @dataclass(frozen=True)
 class Batch:
-    """codes: int64 (n, longest), END behind the end of a string; lengths: int64 (n,), with the end; allowed: bool
-    (n, longest, vocabulary); histograms: float (n, types)."""
+    """read: int64 (n, longest read), the strings that the encoder reads, END behind their ends; codes: int64 (n,
+    longest), those that the decoder is to write; read_lengths, lengths: int64 (n,), with their ends; allowed: bool (n,
+    longest, vocabulary), of `codes`; histograms: float (n, types)."""
 
+    read: Tensor
+    read_lengths: Tensor
     codes: Tensor
     lengths: Tensor
     allowed: Tensor
@@ -60,28 +68,46 @@ class Batch:
 
     def to(self, device: torch.device) -> Batch:
         """The batch on another device; lengths stay."""
-        move = {name: tensor.to(device) for name, tensor in vars(self).items() if name != "lengths"}
-        return Batch(**move, lengths=self.lengths)
+        return Batch(
+            **{name: tensor if name.endswith("lengths") else tensor.to(device) for name, tensor in vars(self).items()}
+        )
 
 
-def batches(strings: Strings, size: int, vocabulary: int, rng: np.random.Generator | None) -> Iterator[Batch]:
-    """All strings once, in random order and in batches of strings of like length; with no `rng`, in their order."""
+def batches(
+    strings: Strings, size: int, vocabulary: int, canonical: bool, rng: np.random.Generator | None
+) -> Iterator[Batch]:
+    """All strings once, in random order and in batches of strings of like length; with no `rng`, in their order.
+
+    canonical: whether the canonical string of the graph is to be written, or the one that was read.
+    """
+    written = strings.canonical if canonical else np.arange(len(strings))
     for rows in pooled(strings.lengths, size, rng):
-        yield batch_of(strings, rows, vocabulary)
+        yield _batch(strings, rows, written[rows], vocabulary)
 
 
-def batch_of(strings: Strings, rows: npt.NDArray[np.int64], vocabulary: int) -> Batch:
-    """The batch of some strings, int64 (n,)."""
-    lengths = strings.lengths[rows]
-    place = np.arange(lengths.max())
-    there = place < lengths[:, None]
-    at = np.where(there, strings.first[rows][:, None] + place, 0)
-    codes = np.where(there, strings.tokens[at], 0).astype(np.int64)
+def _batch(strings: Strings, read: npt.NDArray[np.int64], written: npt.NDArray[np.int64], vocabulary: int) -> Batch:
+    """The batch of the strings that are read and of those that are to be written, int64 (n,) each."""
+    there, at = _padded(strings, written)
     allowed = np.unpackbits(strings.masks[at], axis=-1, count=vocabulary, bitorder="little").astype(np.bool_)
     allowed[~there] = True
     return Batch(
-        codes=torch.from_numpy(codes),
-        lengths=torch.from_numpy(lengths),
+        read=_codes(strings, *_padded(strings, read)),
+        read_lengths=torch.from_numpy(strings.lengths[read]),
+        codes=_codes(strings, there, at),
+        lengths=torch.from_numpy(strings.lengths[written]),
         allowed=torch.from_numpy(allowed),
-        histograms=torch.from_numpy(strings.histograms[strings.graph[rows]].astype(np.float32)),
+        histograms=torch.from_numpy(strings.histograms[strings.graph[read]].astype(np.float32)),
     )
+
+
+def _padded(strings: Strings, rows: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
+    """Which places of some strings, padded to the longest, are theirs, bool (n, longest), and which token stands there,
+    int64, 0 where none does."""
+    lengths = strings.lengths[rows]
+    place = np.arange(lengths.max())
+    there = place < lengths[:, None]
+    return there, np.where(there, strings.first[rows][:, None] + place, 0)
+
+
+def _codes(strings: Strings, there: npt.NDArray[np.bool_], at: npt.NDArray[np.int64]) -> Tensor:
+    return torch.from_numpy(np.where(there, strings.tokens[at], 0).astype(np.int64))

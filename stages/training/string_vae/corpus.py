@@ -46,8 +46,8 @@ def prepare_corpus(task: Task) -> Outcome:
             shapes.setdefault(split, []).append(kept)
         task.progress(done + 1, len(splits))
     vocabulary = Vocabulary(alphabet, _cycles(shapes.get("train", [])))
-    partial = task.config.section(StringsConfig).edges != "all"
-    rules = make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, partial)
+    edges = task.config.section(StringsConfig).edges
+    rules = make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, edges != "all")
     learnt = {each for strings in shapes.get("train", []) for each in strings}
     counts, most = {}, 0
     for split, of_split in sorted(shapes.items()):
@@ -61,6 +61,7 @@ def prepare_corpus(task: Task) -> Outcome:
     described = {
         "kit": name,
         "names": list(alphabet.names),
+        "edges": edges,
         "cycles": vocabulary.cycles,
         "most": most,
         "patterns": patterns_of(rules),

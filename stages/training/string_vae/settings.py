@@ -20,6 +20,12 @@ class StringVaeEntry(KitModelEntry):
         description="`plain`: a GRU, as published; `masked`: the same, which never takes a token that can no longer "
         "lead to a string of the grammar; `transformer`: a small transformer, masked too",
     )
+    target: Literal["same", "canonical"] = Field(
+        "canonical",
+        description="what the decoder learns to write: the `same` string that was read, as published, or the "
+        "`canonical` one of its graph, so that the latent space need not keep in which order a graph was walked; "
+        "strings of `strings.edges: tree` are learnt as they are",
+    )
     latent: int = Field(64, ge=1, le=4096, description="dimensions of the latent space")
     embedding: int = Field(32, ge=1, le=4096, description="numbers that stand for a token")
     hidden: int = Field(

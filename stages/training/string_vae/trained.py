@@ -12,6 +12,8 @@ import numpy.typing as npt
 import torch
 
 from stages.strings.alphabet import make_alphabet
+from stages.strings.decoder import decode
+from stages.strings.encoder import canonical_string
 from stages.strings.rules import Rules, rules_of
 from stages.strings.tokens import StringError
 from stages.training.checkpoint import load_checkpoint
@@ -46,6 +48,14 @@ class TrainedStringVae:
     def is_masked(self) -> bool:
         """Whether its decoder takes only tokens that can lead to a string of the grammar."""
         return bool(self.header["settings"]["decoder"] != "plain")
+
+    def written_for(self, string: str) -> str:
+        """What the decoder is to write for a string: the string itself, or the canonical one of its graph."""
+        if not self.header["canonical"]:
+            return string
+        alphabet = self.vocabulary.alphabet
+        graph = decode(string, alphabet)
+        return canonical_string(graph.types, graph.edges, alphabet).string
 
     @torch.no_grad()
     def encode(self, strings: Sequence[str]) -> Points:

@@ -46,13 +46,15 @@ def learner(task: Task, entry: StringVaeEntry, seed: int) -> StringVaeLearner:
     sources: dict[str, Path] = {
         split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
     }
+    canonical = entry.target == "canonical" and described["edges"] != "tree"  # of a tree's graph there are many trees
     header = {
-        **{key: described[key] for key in ("names", "cycles", "most", "patterns", "counts")},
+        **{key: described[key] for key in ("names", "edges", "cycles", "most", "patterns", "counts")},
+        "canonical": canonical,
         "tokens": list(vocabulary.texts),
         "data": {split: file_digest(path) for split, path in sources.items()},
     }
     module = new_model(entry, vocabulary, described["most"], seed).to(device)
-    return StringVaeLearner(module, header, entry, vocabulary, strings["train"], strings["val"])
+    return StringVaeLearner(module, header, entry, vocabulary, canonical, strings["train"], strings["val"])
 
 
 def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, most: int, seed: int) -> StringVae:
@@ -64,12 +66,16 @@ def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, most: int, seed: in
 
 @dataclass(frozen=True)
 class StringVaeLearner:
-    """The `Learner` of a string VAE."""
+    """The `Learner` of a string VAE.
+
+    canonical: whether the decoder learns the canonical string of the graph instead of the one that was read.
+    """
 
     module: StringVae
     header: Mapping[str, Any]
     entry: StringVaeEntry
     vocabulary: Vocabulary
+    canonical: bool
     train: Strings
     val: Strings
 
@@ -77,12 +83,12 @@ class StringVaeLearner:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
-            for batch in batches(self.train, self.entry.batch, len(self.vocabulary), rng):
+            for batch in self._batches(self.train, rng):
                 yield batch.to(device)
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
         """Nats of a string, the divergence from the prior, and the triplet loss where it is asked for."""
-        mean, log_variance = self.module.encode(batch.codes, batch.lengths)
+        mean, log_variance = self.module.encode(batch.read, batch.read_lengths)
         points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
         shown = shifted(batch.codes)
         hidden = torch.rand(shown.shape, generator=noise, device=shown.device) < self.entry.word_dropout
@@ -101,8 +107,8 @@ class StringVaeLearner:
         likeliest where all before them are right."""
         sums = {"loss": 0.0, "nats": 0.0, "divergence": 0.0, "accuracy": 0.0}
         device = next(self.module.parameters()).device
-        for batch in (each.to(device) for each in batches(self.val, self.entry.batch, len(self.vocabulary), None)):
-            mean, log_variance = self.module.encode(batch.codes, batch.lengths)
+        for batch in (each.to(device) for each in self._batches(self.val, None)):
+            mean, log_variance = self.module.encode(batch.read, batch.read_lengths)
             points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
             logits = self.module.decode(shifted(batch.codes), points)
             nats, accuracy = self._reconstruction(logits, batch)
@@ -112,6 +118,9 @@ class StringVaeLearner:
             for name, value in found.items():
                 sums[name] += float(value) * len(batch.codes) / len(self.val)
         return sums
+
+    def _batches(self, strings: Strings, rng: np.random.Generator | None) -> Iterator[Batch]:
+        return batches(strings, self.entry.batch, len(self.vocabulary), self.canonical, rng)
 
     def _reconstruction(self, logits: Tensor, batch: Batch) -> tuple[Tensor, Tensor]:
         """Nats of a string, mean over the batch, and the share of the tokens that are the likeliest."""

@@ -38,6 +38,7 @@ def publish_model(
         "settings": entry.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "names": list(kit.labels),
         "cycles": vocabulary.cycles,
+        "canonical": True,
         "most": MOST,
         "patterns": patterns_of(make_rules(kit.grammar, len(kit.labels), vocabulary.cycles)),
         **(changed or {}),

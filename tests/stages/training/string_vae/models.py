@@ -38,15 +38,18 @@ def toy_strings() -> tuple[str, ...]:
 
 
 def numbered() -> Strings:
-    """The strings as a learner takes them, each a graph of its own."""
+    """The strings as a learner takes them."""
+    shapes = [strings for shard in toy.SPLITS for _, strings in toy.strings(shard)]
     codes = [np.append(VOCABULARY.codes(each), np.int16(END)) for each in toy_strings()]
     masks = [follow(RULES, 2, each.astype(np.int64))[0] for each in codes]
     return Strings(
         tokens=np.concatenate(codes),
         first=np.cumsum([0, *map(len, codes)]),
         masks=np.packbits(np.concatenate(masks), axis=-1, bitorder="little"),
-        graph=np.arange(len(codes), dtype=np.int32),
-        histograms=np.array([np.bincount(each, minlength=4)[1:4] for each in codes], dtype=np.int32),
+        graph=np.repeat(np.arange(len(shapes), dtype=np.int32), [len(strings) for strings in shapes]),
+        histograms=np.array(
+            [np.bincount(VOCABULARY.codes(strings[0]), minlength=4)[1:4] for strings in shapes], dtype=np.int32
+        ),
     )
 
 
@@ -57,6 +60,7 @@ def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringV
         "patterns": patterns_of(RULES),
         "names": list(toy.LABELS),
         "cycles": 2,
+        "canonical": True,
     }
     return TrainedStringVae(module.eval(), VOCABULARY, RULES, header)
 
@@ -76,6 +80,8 @@ def trained_vae(decoder: str = "masked", **changes: Any) -> TrainedStringVae:
     """A model that has learnt the strings of the toy, some hundred steps."""
     settings = entry(decoder=decoder, learning_rate=0.01, **changes)
     strings = numbered()
-    learner = StringVaeLearner(new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, strings, strings)
+    learner = StringVaeLearner(
+        new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, True, strings, strings
+    )
     train(Trainee.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
     return wrapped(learner.module, settings)
