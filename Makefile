@@ -55,6 +55,7 @@ READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.
 ASKED   := --config "$$CONFIG" --out "$$OUT"
 SEEDED  := $${SEED:+--seed "$$SEED"}
 HOW     := $(ASKED) $(SEEDED) --workers "$$WORKERS"
+MODELS  := $${MODEL:+--only "$$MODEL"}
 RUN      = @$(PYTHON) -m pipeline run $@ $(HOW)
 
 # The way of the data ------------------------------------------------------------------------------------------------
@@ -86,8 +87,9 @@ package: validity strings points sketches  ## Put the dataset's folder together:
 	$(RUN)
 
 .PHONY: train recover
-train: exemplars strings  ## Train the models of CONFIG on the dataset's samples, from where they stand
-	@$(PYTHON) -m pipeline run training $(HOW) $${MODEL:+--only "$$MODEL"}
+train: setup  ## Train the models of CONFIG, on the dataset's samples where they learn from these, from where they stand
+	@if $(PYTHON) -m stages.training --config "$$CONFIG" $(MODELS); then $(MAKE) --no-print-directory exemplars strings; fi
+	@$(PYTHON) -m pipeline run training $(HOW) $(MODELS)
 
 recover: setup  ## Find the parameters of PROGRAM, or of the likeliest program, whose shape is like INPUT
 	@[ -n "$$INPUT" ] || { echo 'make recover needs INPUT=scan.ply or INPUT=drawing.png' >&2; exit 2; }

@@ -54,7 +54,7 @@ def run_stage(
     waits: bool = False,
     only: str = "",
 ) -> RunResult:
-    """Make all shards of stage `name` that have no matching record; the stages that it reads must be finished.
+    """Make all shards of stage `name` that have no matching record; the stages that these read must be finished.
 
     `only`: make no more than the shards called so, or `<only>-<anything>`, and those of the stage that they read.
 
@@ -135,6 +135,8 @@ class _Run:
         return self._result
 
     def _check_upstream(self) -> None:
+        if not self._stages[self._name].reads_inputs(self._survey.config, self._only):
+            return
         for each in upstream(self._stages, self._name):
             missing = [] if each == self._name else self._survey.stage(each).missing
             if missing:

@@ -127,6 +127,10 @@ def _nothing_asked(_: Config) -> Sequence[int]:
     return ()
 
 
+def _always(_: Config, __: str) -> bool:
+    return True
+
+
 def _nothing_published(_: Plan) -> Mapping[str, str]:
     return {}
 
@@ -152,7 +156,8 @@ class Stage:
     `whole_section`: whether the bytes of each shard may depend on all of the stage's section. Where its entries are
     apart, and an edit of one must not make the shards of another anew, say False: tasks then do not see the section,
     and each shard has in its `params` what it needs of it. `publishes_parts`: `publish` is asked while shards are
-    missing, too, and names what is there of whole results.
+    missing, too, and names what is there of whole results. `reads_inputs`: whether shards called so (a name, or the
+    beginning of one; empty: all) read anything of other stages, which then must be finished before.
     """
 
     name: str
@@ -171,3 +176,4 @@ class Stage:
     trial: Callable[[Config], StrictModel] | None = None
     whole_section: bool = True
     publishes_parts: bool = False
+    reads_inputs: Callable[[Config, str], bool] = _always

@@ -106,6 +106,13 @@ def check(config: Config) -> None:
             raise ConfigError(f"{where}: {error}") from error
 
 
+def reads_samples(config: Config, only: str) -> bool:
+    """Whether a model called so, or `<name>-<subject>`, or any where `only` is empty, learns from samples."""
+    asked = config.section(TrainingConfig).models
+    chosen = [each for each in asked if not only or f"{only}-".startswith(f"{each.name}-")]
+    return any(isinstance(each, KitModelEntry) for each in chosen)
+
+
 def estimate_bytes(plan: Plan) -> int:
     """All rounds of all models."""
     return sum(entry.rounds * BYTES_A_ROUND for entry, _, _ in _models(plan))
@@ -198,4 +205,5 @@ STAGE = Stage(
     trial=trial,
     whole_section=False,
     publishes_parts=True,
+    reads_inputs=reads_samples,
 )

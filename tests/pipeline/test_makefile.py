@@ -56,12 +56,21 @@ def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
 
 
 def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for() -> None:
-    runs = calls("train", "MODEL=masked-castle")
+    first, *runs = calls("train", "MODEL=masked-castle", "CONFIG=c.yaml")
+    assert first == ["-m", "stages.training", "--config", "c.yaml", "--only", "masked-castle"]
     assert [run[3] for run in runs] == [
         "choices", "exemplars", "variations", "programs", "shapeassembly", "synthesis", "strings", "training",
     ]  # fmt: skip
+    assert all(run[4:6] == ["--config", "c.yaml"] for run in runs)
     assert runs[-1][-2:] == ["--only", "masked-castle"]
-    assert "--only" not in calls("train")[-1]
+    assert not any("--only" in run for run in calls("train"))
+
+
+def test_train_makes_no_samples_for_models_that_make_their_own_shapes() -> None:
+    say_no = f"{SAY_ARGUMENTS}; sys.exit('stages.training' in sys.argv)"
+    done = make(f"PYTHON={shlex.join([sys.executable, '-c', say_no])}", "train")
+    assert done.returncode == 0, done.stderr
+    assert [json.loads(line)[1] for line in done.stdout.splitlines()] == ["stages.training", "pipeline"]
 
 
 def test_recover_looks_at_the_input_that_was_given() -> None:

@@ -148,6 +148,29 @@ def test_stage_does_not_start_before_the_stages_it_reads_are_done(tmp_path: Path
         turn(config, tmp_path / "out", "bread")
 
 
+def test_shards_that_read_nothing_of_other_stages_do_not_wait_for_them(tmp_path: Path) -> None:
+    def make(task: Task) -> Outcome:
+        return Outcome(1)
+
+    dough = Stage("dough", __name__, LoomsConfig, (), lambda _: [Shard("rye")], make, lambda _: 0)
+    shards = [Shard("loaf", inputs=("dough/rye",)), Shard("stone")]
+    oven = Stage(
+        "oven",
+        __name__,
+        LoomsConfig,
+        ("dough",),
+        lambda _: shards,
+        make,
+        lambda _: 0,
+        reads_inputs=lambda _, only: only != "stone",
+    )
+    stages, places = {"dough": dough, "oven": oven}, Places(tmp_path, "mill")
+    config = Config("mill", "1.0.0", 3, {"dough": LoomsConfig(), "oven": LoomsConfig()}, tmp_path / "mill.yaml")
+    with pytest.raises(ConfigError, match="run stage dough first"):
+        run_stage("oven", stages, config, places, 1)
+    assert run_stage("oven", stages, config, places, 1, only="stone").made == 1
+
+
 def test_disk_too_small_is_told_before_the_start(tmp_path: Path, write_config: WriteConfig) -> None:
     with pytest.raises(ConfigError, match=r"salt needs about 900\.0 TB .* a sample.*are free"):
         turn(write_config(salt={"spoons": 900_000}), tmp_path / "out", "salt")
