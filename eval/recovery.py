@@ -11,8 +11,6 @@ from itertools import islice
 import numpy as np
 
 from eval.table import Cell, Published, Table
-from stages.points.area_sampling import sample_surface
-from stages.programs.curves.part import Part, joined
 from stages.programs.program import Program
 from stages.programs.schema import Values
 from stages.shape.arrays import BoolArray, FloatArray
@@ -21,7 +19,7 @@ from stages.training.recovery.drawings import drawn
 from stages.training.recovery.reading import Input
 from stages.training.recovery.recover import Models, recover_input
 from stages.training.recovery.shapes import TEST, TRAIN, RandomShape, random_shapes
-from stages.training.recovery.surface import chamfer_distance, shape_points
+from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
 from stages.training.recovery.trained import TrainedRecovery
 
 __all__ = [
@@ -96,7 +94,7 @@ def held_out(
     shapes = list(islice(random_shapes(model.program, TEST, rng), count))
     names = [f"{number:03}" for number in range(count)]
     if model.entry.input == "points":
-        clouds = [_sampled(each.parts, GIVEN, rng) for each in shapes]
+        clouds = [sampled_points(each.parts, GIVEN, rng) for each in shapes]
         yield "points", shapes, [Input(name, points=each) for name, each in zip(names, clouds, strict=True)]
         return
     for view in model.sketches.views:
@@ -137,7 +135,7 @@ def tried(
         values = method(given)
         seconds += time.perf_counter() - began
         clouds = [
-            _sampled(parts, MEASURED, np.random.default_rng(side))
+            sampled_points(parts, MEASURED, np.random.default_rng(side))
             for side, parts in enumerate((shape.parts, program.parts(values)))
         ]
         distances.append(published_chamfer(*clouds))
@@ -149,7 +147,7 @@ def tried(
 
 def floor(program: Program, shapes: Sequence[RandomShape]) -> FloatArray:
     """How far true shapes are from themselves, by chance, float64 (n,)."""
-    pairs = ([_sampled(each.parts, MEASURED, np.random.default_rng(side)) for side in (0, 1)] for each in shapes)
+    pairs = ([sampled_points(each.parts, MEASURED, np.random.default_rng(side)) for side in (0, 1)] for each in shapes)
     return np.array([published_chamfer(*pair) for pair in pairs])
 
 
@@ -229,11 +227,6 @@ def _nearest(program: Program, rng: np.random.Generator) -> Method:
         return min(known, key=lambda each: chamfer_distance(points, each[1]))[0]
 
     return method
-
-
-def _sampled(parts: Sequence[Part], n: int, rng: np.random.Generator) -> FloatArray:
-    mesh = joined(parts).mesh
-    return sample_surface(mesh.vertices, mesh.triangles, n, rng)[0]
 
 
 def _in_sphere(points: FloatArray) -> FloatArray:

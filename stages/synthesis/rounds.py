@@ -24,7 +24,6 @@ class Dreaming:
     shards: tuple[Shard, ...]
     lanes: tuple[str, ...]
     pools: tuple[Mapping[str, Any], ...]
-    last: str
     ended: str
 
 
@@ -33,7 +32,7 @@ def dreaming(plan: Plan, number: int, source: SourceConfig) -> Dreaming:
     in vain, or there were `rounds`. Raises ConfigError where the model is not there."""
     config = plan.config.section(SynthesisConfig)
     begun = source_shard(plan, number, source)
-    shards, last = [begun], ""
+    shards = [begun]
     lanes: list[str] = []
     pools: list[Mapping[str, Any]] = []
     how = config.model_dump(mode="json", include={"known", "tries", "upright", "require", "draws"})
@@ -51,12 +50,12 @@ def dreaming(plan: Plan, number: int, source: SourceConfig) -> Dreaming:
         shards.append(Shard(last, pooled, tuple(f"synthesis/{each}" for each in (*names, *before))))
         summary = plan.summary("synthesis", last)
         if summary is None:
-            return Dreaming(tuple(shards), tuple(lanes), tuple(pools), last, "")
+            return Dreaming(tuple(shards), tuple(lanes), tuple(pools), "")
         pools.append(summary)
         ended = _ended(source.samples, config.patience, pools)
         if ended:
-            return Dreaming(tuple(shards), tuple(lanes), tuple(pools), last, ended)
-    return Dreaming(tuple(shards), tuple(lanes), tuple(pools), last, f"{config.rounds} rounds are over")
+            return Dreaming(tuple(shards), tuple(lanes), tuple(pools), ended)
+    return Dreaming(tuple(shards), tuple(lanes), tuple(pools), f"{config.rounds} rounds are over")
 
 
 def _ended(wanted: int, patience: int, pools: Sequence[Mapping[str, Any]]) -> str:

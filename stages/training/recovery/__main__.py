@@ -13,7 +13,7 @@ from pipeline.errors import ConfigError
 from stages.programs.program import find_program
 from stages.training.recovery.files import write_recovery
 from stages.training.recovery.reading import InputError, read_inputs
-from stages.training.recovery.recover import find_models, recover_input
+from stages.training.recovery.recover import SHIPPED, find_models, recover_input
 
 __all__ = ["main"]
 
@@ -25,7 +25,7 @@ def main(arguments: list[str]) -> int:
     try:
         if asked.program:
             find_program(asked.program)
-        models, wrong = find_models(asked.out)
+        models, wrong = find_models(asked.out, SHIPPED)
         for text in wrong:
             print(f"left out: {text}", file=sys.stderr)
         for given in read_inputs(asked.input):

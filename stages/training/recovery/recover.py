@@ -22,9 +22,12 @@ from stages.training.recovery.refinement import Guess, Refined, base_guess, refi
 from stages.training.recovery.targets import CloudTarget, Target, cloud_target, drawing_target
 from stages.training.recovery.trained import KIND, TrainedRecovery, load_recovery
 
-__all__ = ["Models", "Recovered", "find_models", "recover", "recover_input"]
+__all__ = ["SHIPPED", "Models", "Recovered", "find_models", "recover", "recover_input"]
 
 Up = Literal["x", "y", "z", ""]
+
+SHIPPED = Path(__file__).with_name("weights")
+"""Models that come with Shapemill; `ship.py` puts them there."""
 
 UNLIKE = {"points": 0.004, "sketch": 0.001}
 """A shape that is farther from the input than this, and than chance would have it, is of another sort. Lines of a
@@ -94,7 +97,7 @@ def recover(
 
     A cloud may have any number of points, stand anywhere, be of any size and have any of its axes up (`up`; empty: the
     best of the three); its front looks along an axis. A drawing may be of any size, dark on light or light on dark.
-    program: which; empty: the likeliest of those that `models` know, or of all where they know none. budget: shapes
+    program: which; empty: the likeliest of those that come with Shapemill and those that `models` know. budget: shapes
     that are made for it at most, besides those that up and program are found with.
 
     Equal arguments have equal answers. Raises InputError for what is neither a cloud nor a drawing, ConfigError for a
@@ -113,7 +116,7 @@ def recover_input(
     """`recover` of what `read_inputs` has read. turned: whether the front of a cloud may look along any axis, and not
     only along the program's."""
     kind = "points" if given.ink is None else "sketch"
-    names = [program] if program else [name for name, known in models if known == kind] or list(program_names())
+    names = [program] if program else sorted({*program_names(), *(name for name, known in models if known == kind)})
     looks = [_first_look(find_program(name), models.get((name, kind)), given, up, turned, seed) for name in names]
     if len(looks) > 1:
         rng = np.random.default_rng(seed)
@@ -122,12 +125,25 @@ def recover_input(
     return _searched(looks[0], kind, budget, seed, guessed_program=not program)
 
 
-def find_models(folder: Path) -> tuple[dict[tuple[str, str], TrainedRecovery], list[str]]:
-    """The recovery models in a folder of published models, or, of a folder of datasets, in all of theirs; of several
-    for one program and input the one that validated best. And what is wrong with others, in words."""
+def find_models(*folders: Path) -> tuple[dict[tuple[str, str], TrainedRecovery], list[str]]:
+    """The recovery models in folders of published models, or, of a folder of datasets, in all of theirs. And what is
+    wrong with others, in words.
+
+    Of several for one program and input those of the folder that was named first, and of these the one that validated
+    best: with SHIPPED last, weights that come with Shapemill serve where a user has trained none.
+    """
+    found: dict[tuple[str, str], TrainedRecovery] = {}
+    wrong: list[str] = []
+    for folder in folders:
+        here = _models_in(folder, wrong)
+        found = {**here, **found}
+    return found, wrong
+
+
+def _models_in(folder: Path, wrong: list[str]) -> dict[tuple[str, str], TrainedRecovery]:
+    """The best models in one folder; adds to `wrong`."""
     found: dict[tuple[str, str], TrainedRecovery] = {}
     losses: dict[tuple[str, str], float] = {}
-    wrong = []
     for path in chain.from_iterable(weights_of_kind(each, KIND) for each in (folder, *sorted(folder.glob("*-models")))):
         try:
             model = load_recovery(path)
@@ -139,7 +155,7 @@ def find_models(folder: Path) -> tuple[dict[tuple[str, str], TrainedRecovery], l
         else:
             if key not in found or loss < losses[key]:
                 found[key], losses[key] = model, loss
-    return found, wrong
+    return found
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stages.points.area_sampling import sample_surface
 from stages.programs.curves.part import Part, joined
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["chamfer_distance", "even_points", "shape_points"]
+__all__ = ["chamfer_distance", "even_points", "sampled_points", "shape_points"]
 
 PLASTIC = 1.32471795724474602596
 """Multiples of its inverse powers fill a square evenly (Roberts 2018)."""
@@ -36,6 +37,12 @@ def shape_points(parts: Sequence[Part], n: int) -> FloatArray:
     """`even_points` of all parts of a shape together."""
     mesh = joined(parts).mesh
     return even_points(mesh.vertices, mesh.triangles, n)
+
+
+def sampled_points(parts: Sequence[Part], n: int, rng: np.random.Generator) -> FloatArray:
+    """`n` points on all parts of a shape together by chance, float64 (n, 3)."""
+    mesh = joined(parts).mesh
+    return sample_surface(mesh.vertices, mesh.triangles, n, rng)[0]
 
 
 def chamfer_distance(first: FloatArray, second: FloatArray) -> float:

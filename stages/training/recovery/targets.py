@@ -9,14 +9,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from stages.points.area_sampling import sample_surface
-from stages.programs.curves.part import Part, joined
+from stages.programs.curves.part import Part
 from stages.programs.program import Program
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.drawings import SIDE, drawn
-from stages.training.recovery.surface import shape_points
+from stages.training.recovery.surface import sampled_points, shape_points
 
 __all__ = ["CloudTarget", "DrawingTarget", "Target", "cloud_target", "drawing_target"]
 
@@ -85,9 +84,7 @@ class CloudTarget:
 
     def floor(self, parts: Sequence[Part], rng: np.random.Generator) -> float:
         """Of as many random points: the fewer a cloud has, the farther is every shape from it."""
-        mesh = joined(parts).mesh
-        cloud, _, _ = sample_surface(mesh.vertices, mesh.triangles, len(self.points), rng)
-        return cloud_target(cloud, rng).compared(parts)[0]
+        return cloud_target(sampled_points(parts, len(self.points), rng), rng).compared(parts)[0]
 
     def _distance(self, surface: FloatArray, frame: Frame) -> float:
         from scipy.spatial import cKDTree

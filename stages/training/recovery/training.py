@@ -17,8 +17,6 @@ from torch.nn.functional import cross_entropy, max_pool2d
 from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
-from stages.points.area_sampling import sample_surface
-from stages.programs.curves.part import Part, joined
 from stages.programs.program import Program, find_program
 from stages.shape.arrays import Float32Array
 from stages.sketches.settings import SketchesConfig
@@ -28,7 +26,7 @@ from stages.training.recovery.drawings import SIDE, drawn
 from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TRAIN, VAL, random_shapes, valid_values
-from stages.training.recovery.surface import chamfer_distance, shape_points
+from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
 
 __all__ = ["RecoveryLearner", "described_parameters", "entry", "learner", "prepare"]
 
@@ -72,7 +70,7 @@ def prepare(task: Task) -> Outcome:
         for number, shape in enumerate(islice(random_shapes(program, interval, task.rng(split)), count)):
             rng = task.rng(split, "input", number)
             if settings["input"] == "points":
-                cloud = _sampled(shape.parts, settings["points"], rng)
+                cloud = sampled_points(shape.parts, settings["points"], rng)
                 inputs.append(frame_of(cloud).normalized(cloud).astype(np.float32))
             else:
                 view = views[number % len(views)]
@@ -187,7 +185,7 @@ class RecoveryLearner:
         owed, oldest = float(BEGINNING), 0
         while True:
             for shape in islice(shapes, int(owed)):
-                cloud = _sampled(shape.parts, DENSE, made).astype(np.float32)
+                cloud = sampled_points(shape.parts, DENSE, made).astype(np.float32)
                 if len(dense) < HELD:
                     dense.append(cloud)
                     classes.append(shape.classes)
@@ -234,8 +232,3 @@ def _input_tensor(inputs: npt.NDArray[Any], kind: str) -> Tensor:
         return torch.from_numpy(inputs)
     ink = np.unpackbits(inputs, axis=1, count=SIDE * SIDE).reshape(-1, 1, SIDE, SIDE)
     return torch.from_numpy(ink.astype(np.float32))
-
-
-def _sampled(parts: Sequence[Part], n: int, rng: np.random.Generator) -> npt.NDArray[np.float64]:
-    mesh = joined(parts).mesh
-    return sample_surface(mesh.vertices, mesh.triangles, n, rng)[0]

@@ -18,13 +18,16 @@ from stages.programs.program import find_program
 from stages.programs.schema import Values
 from stages.training.checkpoint import checkpoint_bytes
 from stages.training.recovery.__main__ import main
+from stages.training.recovery.drawings import drawn
 from stages.training.recovery.reading import Input, InputError, read_inputs
-from stages.training.recovery.recover import find_models, recover
+from stages.training.recovery.recover import SHIPPED, find_models, recover
 from stages.training.recovery.refinement import base_guess, refine
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TEST, TRAIN, VAL, random_shapes
+from stages.training.recovery.ship import slim_bytes
 from stages.training.recovery.surface import chamfer_distance, shape_points
 from stages.training.recovery.targets import cloud_target
+from stages.training.recovery.trained import load_recovery
 from stages.training.recovery.training import described_parameters, new_model
 from tests.stages.training.recovery.toy import PROGRAM, SMALL, config, train
 
@@ -128,8 +131,6 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
     else:
         from PIL import Image
 
-        from stages.training.recovery.drawings import drawn
-
         model = models[PROGRAM, kind]
         rng = np.random.default_rng(0)
         ink = drawn(STOOL, tuple(STOOL.parts(TALL)), model.sketches.views[0], model.sketches, rng)
@@ -179,6 +180,51 @@ def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) ->
         "figures", "list", "moved", "nameless", "settings", "tensors",
     ]  # fmt: skip
     assert all(text.count("weights.safetensors") == 1 for text in wrong)
+
+
+def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_path: Path) -> None:
+    entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
+    tensors = new_model(entry, STOOL, 0).state_dict()
+    settings = {name: value for name, value in SMALL.items() if name != "name"}
+    for folder, loss in (("own/mill-models/a", 3.0), ("own/mill-models/b", 2.5), ("shipped/a", 1.0)):
+        header = {
+            "kind": "recovery",
+            "program": PROGRAM,
+            "parameters": described_parameters(STOOL),
+            "settings": settings,
+            "figures": {"val_loss": loss, "val_chamfer_high": 0.1},
+        }
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "weights.safetensors").write_bytes(checkpoint_bytes(tensors, header))
+    for folders, best in ((("own", "shipped"), 2.5), (("nothing", "shipped"), 1.0)):
+        models, wrong = find_models(*(tmp_path / each for each in folders))
+        assert not wrong
+        assert models[PROGRAM, "points"].header["figures"]["val_loss"] == best
+    halved = tmp_path / "half.safetensors"
+    halved.write_bytes(slim_bytes(tmp_path / "shipped/a/weights.safetensors"))
+    assert halved.stat().st_size < 0.7 * (tmp_path / "shipped/a/weights.safetensors").stat().st_size
+    for one, other in zip(
+        load_recovery(halved).module.parameters(), new_model(entry, STOOL, 0).parameters(), strict=True
+    ):
+        np.testing.assert_allclose(one.detach(), other.detach(), atol=1e-3)
+
+
+SHIPPED_MODELS, _ = find_models(SHIPPED)
+
+
+@pytest.mark.parametrize(("program", "kind"), sorted(SHIPPED_MODELS))
+def test_models_that_ship_see_more_than_the_base_shape(program: str, kind: str) -> None:
+    model = SHIPPED_MODELS[program, kind]
+    made = find_program(program)
+    shapes = list(islice(random_shapes(made, TEST, np.random.default_rng(11)), 3))
+    for shape in shapes:
+        if kind == "points":
+            source = shape_points(shape.parts, 2000)
+        else:
+            ink = drawn(made, shape.parts, model.sketches.views[0], model.sketches, np.random.default_rng(0))
+            source = np.where(ink, 0, 255).astype(np.uint8)
+        found = recover(source, program, SHIPPED_MODELS, up="y", budget=60)
+        assert found.distance < 0.5 * found.base_distance
 
 
 def test_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

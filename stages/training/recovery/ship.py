@@ -1,0 +1,55 @@
+"""Make trained models come with Shapemill: `python -m stages.training.recovery.ship OUT/chairs-models/clouds-chair-0`.
+
+For maintainers: what is put below `weights/` is committed, so that `make recover` works at once from a fresh clone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from pipeline.places import write_file
+from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
+from stages.training.recovery.recover import SHIPPED
+from stages.training.recovery.trained import KIND, load_recovery
+
+__all__ = ["MOST", "main", "slim_bytes"]
+
+MOST = 4_000_000
+"""Bytes of a model that comes with a clone."""
+
+
+def slim_bytes(path: Path) -> bytes:
+    """The file of weights `path` with numbers of half precision, which answers nearly the same.
+
+    Raises CheckpointError for weights that are not of a recovery model that can be used now, or too large still.
+    """
+    load_recovery(path)
+    tensors, header = load_checkpoint(path, {"kind": KIND})
+    halves = {name: each.half() if each.is_floating_point() else each for name, each in tensors.items()}
+    content = checkpoint_bytes(halves, header)
+    if len(content) > MOST:
+        raise CheckpointError(f"{path} takes {len(content):,} bytes in half precision, more than {MOST:,}: train less")
+    return content
+
+
+def main(arguments: list[str]) -> int:
+    """Put models where they are committed. Returns the exit code: 0, or 2 where one cannot be used."""
+    parser = argparse.ArgumentParser(prog="stages.training.recovery.ship", description=__doc__.splitlines()[0])
+    parser.add_argument("models", nargs="+", type=Path, metavar="MODEL", help="the folder of a published model")
+    asked = parser.parse_args(arguments)
+    try:
+        for folder in asked.models:
+            weights = slim_bytes(folder / "weights.safetensors")
+            card = (folder / "README.md").read_bytes()
+            for name, content in (("weights.safetensors", weights), ("README.md", card)):
+                print(write_file(SHIPPED / folder.name.rpartition("-")[0] / name, content))
+    except (CheckpointError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
