@@ -1,0 +1,77 @@
+"""`make eval TABLE=recovery_spoilt`: recovery out of the distribution (geocode §4.4)."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from eval.evaluation import Answer, Evaluation, Strip
+from eval.needs import RECOVERY
+from eval.subject import Subject
+from pipeline.errors import ConfigError
+from stages.training.checkpoint import weights_of_kind
+
+__all__ = ["TABLE"]
+
+SHOWN = 8
+"""Recoveries of each kind that the report shows."""
+
+
+def _answer(subject: Subject, asked: Namespace) -> Answer:
+    from eval.recovery import held_out, methods, tried
+    from eval.spoilt import WAYS, foreign_inputs, foreign_rows, foreign_table, spoilt_inputs, spoilt_table
+    from pipeline.randomness import decision_rng
+    from stages.shape.views.sheet import picture_png
+    from stages.training.recovery.files import recovery_picture
+    from stages.training.recovery.recover import find_models, recover_input
+
+    models, wrong = find_models(subject.models)
+    if not models:
+        raise ConfigError(f"{wrong[0]}; make train")
+    rows, foreign, strips, seed = [], [], [], subject.config.seed
+    for (program, kind), model in sorted(models.items()):
+        ways = methods(model, asked.tries, seed)
+        for name, shapes, inputs in held_out(model, asked.spoilt, decision_rng(seed, "recovery", program)):
+            for how, spoilt in spoilt_inputs(kind, inputs, seed).items():
+                label = f"{model.program.name}, {name}, {how}"
+                rows += [tried(f"{label}: {way}", model.program, ways[way], shapes, spoilt) for way in WAYS]
+                pictures = []
+                for given in spoilt[:SHOWN]:
+                    found = recover_input(given, program, {(program, kind): model}, "y", asked.tries, seed, False)
+                    pictures.append((given.name, picture_png(recovery_picture(given, found))))
+                strips.append(Strip(f"Input and result, {label}", pictures))
+        for folder in asked.foreign:
+            strangers = foreign_inputs(folder, kind)
+            if not strangers:
+                continue
+            label = f"{model.program.name}, {folder.name}"
+            found_there = foreign_rows(model, strangers, asked.tries, seed)
+            foreign += [(f"{label}: {way}", distances, results) for way, distances, results in found_there]
+            _, _, last = found_there[-1]
+            pairs = list(zip(strangers, last, strict=True))[:SHOWN]
+            pictures = [(each.name, picture_png(recovery_picture(each, result))) for each, result in pairs]
+            strips.append(Strip(f"Input and result, {label}", pictures))
+    tables = [spoilt_table(rows), *([foreign_table(foreign)] if foreign else [])]
+    return Answer(tables, strips=strips)
+
+
+def _options(parser: ArgumentParser) -> None:
+    parser.add_argument("--spoilt", type=int, default=12, help="shapes that are recovered, of each kind of input")
+    parser.add_argument("--tries", type=int, default=600, help="shapes that a refinement of them makes at most")
+    parser.add_argument(
+        "--foreign",
+        type=Path,
+        nargs="*",
+        default=[],
+        metavar="FOLDER",
+        help="clouds, meshes and drawings from elsewhere",
+    )
+
+
+TABLE = Evaluation(
+    question="How near does recovery come where inputs are noisy, torn, drawn otherwise, or of no program at all?",
+    needs=(RECOVERY,),
+    seconds=lambda subject: 900.0 * len(weights_of_kind(subject.models, "recovery")),
+    answer=_answer,
+    options=_options,
+)
