@@ -49,8 +49,10 @@ class ModelEntry(StrictModel):
         "order: other weights; unit: threads",
     )
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where it trains; `auto`: a GPU if there is one")
-    precision: Literal["float32", "bfloat16"] = Field(
-        "float32", description="numbers of the forward pass; `bfloat16` is faster where the processor knows it"
+    precision: Literal["auto", "float32", "bfloat16"] = Field(
+        "auto",
+        description="numbers of the forward pass; `auto`: bfloat16 where the processor or the GPU reckons with it, "
+        "else float32, which is faster there",
     )
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -13,13 +15,14 @@ from stages.training.checkpoint import tensors_of
 from stages.training.entry import ModelEntry
 from stages.training.learner import Learner
 
-__all__ = ["Trainee", "device_of", "same_arithmetic", "train"]
+__all__ = ["Trainee", "device_of", "precision_of", "same_arithmetic", "train"]
 
 LAST_RATE = 0.05
 """Share of the learning rate that is left at the last step."""
 LARGEST_GRADIENT = 1.0
 """Longer gradients are shortened to this norm: recurrent nets have rare ones that undo hours."""
 
+_BFLOAT16 = frozenset({"amx_bf16", "avx512_bf16", "bf16"})
 _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
@@ -33,6 +36,27 @@ def same_arithmetic(threads: int) -> None:
 def device_of(asked: str) -> torch.device:
     """The device that a config asks for."""
     return torch.device("cuda" if asked == "cuda" or (asked == "auto" and torch.cuda.is_available()) else "cpu")
+
+
+def precision_of(asked: str, device: torch.device) -> str:
+    """The numbers that a config asks for on a device: `auto` is bfloat16 where it is reckoned with as it stands, and
+    not by way of float32, which takes several times as long."""
+    if asked != "auto":
+        return asked
+    if device.type == "cuda":
+        return "bfloat16" if torch.cuda.is_bf16_supported(including_emulation=False) else "float32"
+    return "bfloat16" if _BFLOAT16 & _processor_flags() else "float32"
+
+
+@cache
+def _processor_flags() -> frozenset[str]:
+    """What the processor says that it can do, as Linux names it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return frozenset()
+    told = (line.partition(":")[2] for line in lines if line.startswith(("flags", "Features")))
+    return frozenset(next(told, "").split())
 
 
 @dataclass
@@ -82,7 +106,7 @@ def train(
     for done in range(entry.steps):
         for group in optimizer.param_groups:
             group["lr"] = entry.learning_rate * _rate(trainee.step, entry.steps * entry.rounds)
-        with torch.autocast(device.type, torch.bfloat16, enabled=entry.precision == "bfloat16"):
+        with torch.autocast(device.type, torch.bfloat16, enabled=precision_of(entry.precision, device) == "bfloat16"):
             losses = learner.losses(next(stream), trainee.step, noise)
         optimizer.zero_grad()
         losses["loss"].backward()  # type: ignore[no-untyped-call]

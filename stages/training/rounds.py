@@ -99,7 +99,7 @@ def rounds(plan: Plan, entry: ModelEntry, kind: str, subject: str, seed: int, da
 def run_round(task: Task) -> Outcome:
     """Files of the shard: `.safetensors`, weights and moments of the optimiser; `.json`, the figures of the round."""
     from stages.training.checkpoint import checkpoint_bytes, load_checkpoint
-    from stages.training.loop import Trainee, same_arithmetic, train
+    from stages.training.loop import Trainee, precision_of, same_arithmetic, train
 
     params, name = task.shard.params, task.shard.name
     kind = kind_of(params["kind"])
@@ -115,6 +115,7 @@ def run_round(task: Task) -> Outcome:
     import torch
 
     device = next(learner.module.parameters()).device
+    precision = precision_of(entry.precision, device)
     learner.module.eval()
     with torch.no_grad():
         found = learner.validate(torch.Generator(device).manual_seed(_seed(task, "validation")))
@@ -128,6 +129,7 @@ def run_round(task: Task) -> Outcome:
         "step": trainee.step,
         "code": code_digest(reached(_modules(params))),
         "device": device.type,
+        "precision": precision,
         "figures": figures,
     }
     with task.output(f"{name}.safetensors") as stream:

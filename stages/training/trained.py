@@ -93,7 +93,8 @@ def model_card(header: Mapping[str, Any], figures: Mapping[str, Any], parameters
         f"# {header['name']}",
         "",
         f"A `{header['kind']}` of {subject}, trained on dataset {header['dataset']}: {parameters:,} "
-        f"parameters, the best of {figures['rounds']} rounds, after {best['step']:,} steps on {header['device']}.",
+        f"parameters, the best of {figures['rounds']} rounds, after {best['step']:,} steps on {header['device']} in "
+        f"{header['precision']}.",
         "",
         "`weights.safetensors` says in its header all that is needed to read it again: kind, settings, vocabulary, and "
         "the sha256 of the samples and of the code that made it. `curves.csv` and `curves.png` show the training.",

@@ -44,7 +44,7 @@ def bench() -> Iterator[Measure]:
     peer = rate(moses_steps(strings, len(vocabulary), entry), 4.0, 2)
     arms: dict[str, dict[str, Any]] = {
         "plain": {"decoder": "plain"},
-        "masked": {},
+        "masked": {"precision": "float32"},
         "masked, bfloat16": {"precision": "bfloat16"},
         "transformer": {"decoder": "transformer", "hidden": 128, "layers": 3},
     }
