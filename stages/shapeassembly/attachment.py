@@ -10,11 +10,29 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["GROW", "HINGE", "MOVE", "STAY", "SWING", "across", "grow", "hinge", "hold", "local", "point", "swing"]
+__all__ = [
+    "ADD",
+    "GROW",
+    "HINGE",
+    "MOVE",
+    "SCALE",
+    "STAY",
+    "SWING",
+    "across",
+    "grow",
+    "hinge",
+    "hold",
+    "local",
+    "point",
+    "swing",
+]
 
 MOVE, STAY, GROW, HINGE, SWING = range(5)
 """What an attachment did: nothing was attached before; an aligned cuboid was near enough; it grew; one prior
 attachment; two or more."""
+
+ADD, SCALE = 3, 4
+"""In place of an axis: all sizes are changed by one amount, or by one factor."""
 
 _GRID = 10
 _NEAR = 0.05  # a gap below this share of the largest size of both cuboids is none
@@ -179,7 +197,8 @@ def across(a, u):
 
 @numba.njit(cache=True)
 def hinge(box, prior, p, goal, decision):
-    """A second attachment: one size is changed so that the distance is right, then the cuboid turns."""
+    """A second attachment: one size, or all where none can, is changed so that the distance is right; then the cuboid
+    turns."""
     decision[0], decision[1] = HINGE, -1
     pivot, source = np.empty(3), np.empty(3)
     point(box, prior, pivot)
@@ -196,14 +215,30 @@ def hinge(box, prior, p, goal, decision):
             best = abs(np.sqrt(square) - 1) * box[3 + k]
             decision[1] = k
     if decision[1] < 0:
-        decision[1] = 3
-        box[3:6] *= np.sqrt(wanted / has)
+        _change_all(box, p - prior, wanted, has, decision)
     else:
         k = int(decision[1])
         box[3 + k] *= np.sqrt(1 + (wanted - has) / arm[k] ** 2)
     hold(box, prior, pivot)
     point(box, p, source)
     decision[2] = _rotate_onto(box, pivot, source, goal)
+
+
+@numba.njit(cache=True)
+def _change_all(box, reach, wanted, has, decision):
+    """Bring the squared length of the arm from `has` to `wanted` by adding one amount to all sizes, the smaller of two.
+
+    Where no amount leaves a box, by a common factor.
+    """
+    square, linear = _dot(reach, reach), _dot(reach * reach, box[3:6])
+    under = linear * linear - square * (has - wanted)
+    amount = (np.sqrt(max(under, 0.0)) - linear) / square
+    if under >= 0 and min(box[3], box[4], box[5]) + amount > _TINY:
+        decision[1] = ADD
+        box[3:6] += amount
+    else:
+        decision[1] = SCALE
+        box[3:6] *= np.sqrt(wanted / has)
 
 
 @numba.njit(cache=True)

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.attachment import GROW, HINGE, MOVE, STAY, across
+from stages.shapeassembly.attachment import ADD, GROW, HINGE, MOVE, SCALE, STAY, across
 from stages.shapeassembly.flat import ATTACH, DECLARE, REFLECT, SQUEEZE, flatten
 from stages.shapeassembly.interpreter import check
 from stages.shapeassembly.kernels import Executed, run
@@ -156,16 +156,21 @@ def _attach(box: _Box, target: _Box, p: Tensor, q: Tensor, priors: list[Tensor],
 
 
 def _scale(box: _Box, axis: int, sizes: Tensor) -> None:
-    """Take the size along `axis` from `sizes`, along all if `axis` is 3."""
-    box.sizes = sizes if axis == 3 else torch.where(torch.arange(3) == axis, sizes, box.sizes)
+    """Take the size along `axis` from `sizes`."""
+    box.sizes = torch.where(torch.arange(3) == axis, sizes, box.sizes)
 
 
 def _hinge(box: _Box, prior: Tensor, p: Tensor, goal: Tensor, axis: int, half_turn: bool) -> None:
     pivot = box.point(prior)
     way, arm = goal - pivot, (p - prior) * box.sizes
     wanted, has = way @ way, arm @ arm
-    factor = wanted / has if axis == 3 else 1 + (wanted - has) / arm[axis] ** 2
-    _scale(box, axis, box.sizes * factor.sqrt())
+    if axis == ADD:
+        square, linear = (p - prior) @ (p - prior), (p - prior) @ arm
+        box.sizes = box.sizes + ((linear**2 - square * (has - wanted)).sqrt() - linear) / square
+    elif axis == SCALE:
+        box.sizes = box.sizes * (wanted / has).sqrt()
+    else:
+        _scale(box, axis, box.sizes * (1 + (wanted - has) / arm[axis] ** 2).sqrt())
     box.centre = pivot - box.arm(prior)
     a = box.point(p) - pivot
     if half_turn:

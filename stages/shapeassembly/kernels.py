@@ -114,7 +114,8 @@ def _execute(rows, boxes, child, mirrored, decisions):
 
     boxes (parts, 15), child (parts,): the assembly that expands each cuboid, or -1; mirrored (parts,): a bit for each
     axis that it is mirrored along; decisions (events, 8): what each attachment did, the axis whose size changed
-    (3: all), then GROW: the near points of both cuboids; HINGE: whether it was half a turn; SWING: whether it turned.
+    (ADD, SCALE: all), then GROW: the near points of both cuboids; HINGE: whether it was half a turn; SWING: whether it
+    turned.
     """
     events = _Events(np.empty((len(decisions), 2), np.int64), np.empty((len(decisions), 2, 3)))
     aligned = np.empty(len(boxes), np.bool_)

@@ -1,7 +1,8 @@
 """The text of a ShapeAssembly program (shapeassembly table 1) to its tree.
 
 Blanks, tabs and line ends may stand anywhere between words. What the grammar does not know is an error that says where
-and what would be right. Whether the lines make sense together is asked in `checks`.
+and what would be right. A cuboid without its flag is not aligned, as for the programs' authors. Whether
+the lines make sense together is asked in `checks`.
 """
 
 from __future__ import annotations
@@ -123,7 +124,8 @@ class _Reader:
         length = self.number()
         height = self.comma_number()
         dims = (length, height, self.comma_number())
-        aligned = self.one_of(("True", "False"), "the aligned flag") == "True"
+        flagged = self.words[self.place] != ")"
+        aligned = flagged and self.one_of(("True", "False"), "the aligned flag") == "True"
         self.expect(")")
         return Cuboid(name, dims, aligned)
 

@@ -61,6 +61,8 @@ TWO = FREE + "attach(b, a, 0.5, 1.0, 0.6, 0.9, 0.8, 0.7) "
         "attach(b, bbox, 1.0, 0.5, 0.5, 0.9, 0.5, 0.7) ",
         FREE + "c = Cuboid(1.0, 1.1, 0.9, False) attach(c, bbox, 0.1, 0.0, 0.0, 0.1, 0.0, 0.1) "
         "attach(c, bbox, 1.0, 0.9, 1.0, 0.2, 0.02, 0.12) ",
+        FREE + "c = Cuboid(1.0, 0.1, 0.12, False) attach(c, bbox, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) "
+        "attach(c, bbox, 1.0, 1.0, 1.0, 0.01, 0.0, 0.0) ",
         HEAD + "squeeze(b, bbox, a, top, 0.31, 0.42) ",
         TWO + "reflect(b, X) reflect(a, Z) ",
         TWO + "translate(a, X, 2, 0.41) translate(b, Z, 1, 0.23) ",

@@ -91,13 +91,51 @@ def test_the_smallest_change_of_size_wins() -> None:
     same(done.corners[0, 0], [-2 + 3.1, -2.0, -2.0])
 
 
-def test_all_sizes_shrink_where_no_single_one_can() -> None:
+def test_a_cube_shrinks_as_a_whole_where_no_side_alone_can() -> None:
     done = run(
         "c = Cuboid(1.0, 1.0, 1.0, False)",
         "attach(c, bbox, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)",
         "attach(c, bbox, 1.0, 1.0, 1.0, 0.1, 0.0, 0.0)",
     )
     same(done.sizes, np.full((1, 3), 0.2 / math.sqrt(3)))
+
+
+def test_all_sizes_change_by_the_same_amount_where_no_single_one_can() -> None:
+    # From corner to corner the box measures 3, and the root of 3 is wanted: (1 + t)^2 + 2 (2 + t)^2 = 3.
+    done = run(
+        "c = Cuboid(1.0, 2.0, 2.0, False)",
+        "attach(c, bbox, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)",
+        "attach(c, bbox, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5)",
+    )
+    amount = (-10 + math.sqrt(100 - 12 * 6)) / 6
+    same(done.sizes, [[1 + amount, 2 + amount, 2 + amount]])
+    same(done.corners[0, 0], [0.0, 0.0, 0.0])
+
+
+def test_all_sizes_shrink_by_a_factor_where_no_amount_leaves_a_box() -> None:
+    done = run(
+        "c = Cuboid(1.0, 0.1, 0.1, False)",
+        "attach(c, bbox, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)",
+        "attach(c, bbox, 1.0, 1.0, 1.0, 0.01, 0.0, 0.0)",
+    )
+    same(done.sizes, np.array([[1.0, 0.1, 0.1]]) * 0.02 / math.sqrt(1.02))
+
+
+FOUR = (
+    "c = Cuboid(0.22, 1.0, 0.2, False)",
+    "attach(c, bbox, 0.5, 0.0, 0.5, 0.5, 0.25, 0.5)",
+    "attach(c, bbox, 0.5, 0.1, 0.5, 0.5, 0.3, 0.5)",
+    "attach(c, bbox, {}, 0.1, 0.5, {}, 0.3, 0.5)",
+    "attach(c, bbox, 0.5, 0.5, 1.0, 0.9, 0.5, 0.5)",
+)
+
+
+@pytest.mark.parametrize(("aside", "turned"), [(0.9, True), (1.0, False)])
+def test_attachments_are_in_line_by_a_cross_product_that_is_not_normalised(aside: float, turned: bool) -> None:
+    """The third lies at 41 or 48 degrees beside the first two; 0.1 times 0.088 is under 0.01, 0.1 times 0.11 is not."""
+    away = 0.5 + (aside - 0.5) * 0.11
+    done = run(*(line.format(aside, away) for line in FOUR))
+    assert np.allclose(done.frames[0], np.eye(3)) != turned
 
 
 def test_half_a_turn_is_about_an_axis_across() -> None:

@@ -58,6 +58,13 @@ def test_every_number_survives_printing() -> None:
     assert rounded(program).root.bbox.dims == (0.3, 0.0, 123456.789)
 
 
+def test_a_cuboid_without_its_flag_is_not_aligned() -> None:
+    text = "Assembly P { bbox = Cuboid(2, 2, 2) c = Cuboid(1, 1, 1) }"
+    program = parse(text)
+    assert (program.root.bbox.aligned, program.root.cuboids[0].aligned) == (False, False)
+    assert parse(print_program(program)) == program
+
+
 def test_blanks_and_line_ends_do_not_matter() -> None:
     assert parse(" ".join(TABLE.split())) == TREE
     assert parse(TABLE.replace("\n", "\r\n").replace("\t", "    ")) == TREE
