@@ -47,12 +47,12 @@ def test_table_has_a_row_for_each_name_with_its_shares() -> None:
     assert list(rows) == ["b", "a", "c"]
     assert (rows["b"]["shapes"], rows["b"]["parts"]) == (2, 2)
     assert (rows["b"]["rooted %"], rows["b"]["stable %"], rows["b"]["dry stable %"]) == (50, 50, 50)
-    assert [(rows[name]["stable %"], rows[name]["firm %"]) for name in "bc"] == [(50, 50), (100, 0)]
+    assert [(rows[name]["stable %"], rows[name]["dropped %"]) for name in "bc"] == [(50, 50), (100, 0)]
     assert (rows["a"]["floating"], rows["a"]["pieces"]) == (1, 2)
     ((_, ours),) = table.published_by_source().items()
     published = dict(zip(table.columns, ours[0], strict=True))
     assert published["shapes of"] == "chair, ground truth"
-    assert (published["rooted %"], published["stable %"]) == (100.0, 88.0)
+    assert (published["rooted %"], published["dropped %"]) == (100.0, 88.0)
 
 
 def test_table_reads_the_same_in_every_format() -> None:

@@ -9,10 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.physics.contacts import Patches, Touch
 from stages.shape.physics.settings import PhysicsConfig, Requirements
+from stages.shape.physics.settling import Body, tilt_to_fall
 from stages.shape.physics.solids import Placed, Solids
 from stages.shape.physics.stability import Stability, components, stability, standing_points, tipping_angle
 from stages.shape.physics.structure import ground_share, mirror_score
@@ -80,6 +81,18 @@ class Judge:
         dry = self.config.joints == "dry"
         depths = self._touch.overlaps(placed, connected)[1] if dry else np.zeros(len(connected))
         return None if self._stability(placed, connected, depths, standing).stable else "not stable"
+
+    def tilt_to_fall(self, assembly: Assembly) -> float:
+        """The least tilt, in degrees, by which a component that is let go comes to rest at another height
+        (`stages.shape.physics.settling`): 0 where one falls by itself, or where a part is not rooted, for what is
+        stable is rooted (shapeassembly App. E). Connected parts are one rigid body, whatever `config.joints` says.
+        Raises ValueError as `validity` does."""
+        placed = self._placed(assembly)
+        connected = self._connected(placed, assembly)
+        if _floating(placed, connected, self.config).any():
+            return 0.0
+        pieces = components(len(placed), connected)
+        return min(tilt_to_fall(_body(placed, pieces == piece), placed.diagonal) for piece in range(pieces.max() + 1))
 
     def contacts(self, assembly: Assembly) -> IntArray:
         """The pairs of parts that touch or overlap, int32 (m, 2), i < j in lexicographic order: those that the
@@ -161,6 +174,13 @@ def unmet(requirements: Requirements, shape: Shape) -> str | None:
         return judge_of(shape.meshes, shape.up, requirements.physics).unmet(shape.assembly, requirements)
     except ValueError:
         return "no body to judge"
+
+
+def _body(placed: Placed, own: BoolArray) -> Body:
+    """The parts `own`, bool (n,), as one body."""
+    weights = placed.weights[own]
+    points = np.concatenate([placed.points[part] for part in np.flatnonzero(own).tolist()])
+    return Body(points, weights @ placed.centroids[own] / max(weights.sum(), np.finfo(float).tiny))
 
 
 def _floating(placed: Placed, connected: np.ndarray, config: PhysicsConfig) -> np.ndarray:

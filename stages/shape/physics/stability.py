@@ -4,7 +4,7 @@ The paper drops every connected component, as a rigid body, into a physics engin
 shape unstable when a component's height changes. Here statics answers: a shape is stable if its bodies are in
 equilibrium under gravity alone, and under gravity with each of a fixed set of pushes. Nothing moves, so nothing
 settles: a chair that rocks on legs of unequal length within the ground tolerance stands here, and a shape that falls
-over onto another side and rests there at the same height does not.
+over onto another side and rests there at the same height does not. What the paper measures is in `settling`.
 """
 
 from __future__ import annotations

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
-from eval.physical import FIRM, PUBLISHED, judge_all
+from eval.physical import judge_all, stays_up
 from eval.shapes import box_shapes, model_shapes
 from stages.shape.physics.judge import Validity
 from stages.shape.physics.settings import PhysicsConfig
+from stages.shapeassembly.shape import shape_of_text
+from tests.stages.shapeassembly.shared_programs import shared_texts
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
 MASONRY = PhysicsConfig(joints="dry", friction=0.7)
@@ -46,6 +49,18 @@ def test_furniture_is_rooted_and_as_often_stable_as_in_simulation(category: str)
     found = judge_all(shapes, PhysicsConfig())
     assert len(found) == 60
     assert all(each.rooted for each in found)
-    assert 100 * sum(each.stable for each in found) / 60 == pytest.approx(SIMULATED[category], abs=5)
-    published = next(each.figures for each in PUBLISHED if each.name == f"{category}, ground truth")
-    assert 100 * sum(each.margin >= FIRM for each in found) / 60 == pytest.approx(published["stable %"], abs=5)
+    assert 100 * sum(stays_up(shapes, PhysicsConfig())) / 60 == pytest.approx(SIMULATED[category], abs=5)
+
+
+def test_dropped_furniture_falls_where_it_falls_in_simulation() -> None:
+    """The five that are missed stand squarely on the ground: what throws them over is no slow push."""
+    verdicts = json.loads((SHARED / "shapeassembly" / "verdicts.json").read_text())
+    caught, false = [], 0
+    for category, listed in verdicts.items():
+        texts = shared_texts(category)
+        shapes = [shape_of_text(texts[f"data/{category}/{name}.txt"]) for name in listed]
+        for (name, (_, stable)), stays in zip(listed.items(), stays_up(shapes, PhysicsConfig()), strict=True):
+            caught += [name] if not stable and not stays else []
+            false += stable and not stays
+    assert caught == ["2370", "46858", "47424", "21134", "27842"]
+    assert false <= 3

@@ -1,0 +1,119 @@
+"""Does a dropped shape stay as high as it was let go? (shapeassembly App. E, without time steps)
+
+The paper lets every connected component of a shape go on the ground as one rigid body, pushes it a little, and calls
+the shape unstable when a component's resting height has changed. Between pushes a slow body does nothing but tip over
+edges of its convex hull: it rests where the vertical through its centre of mass meets the face it lies on, and from
+there a push takes it over an edge if it tilts it far enough. So the answer is a walk over rests: the least tilt after
+which the centre of mass lies at another height. Nothing slides, and nothing bounces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from heapq import heappop, heappush
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shape.physics.polygons import convex_hull, inside_margin
+
+__all__ = ["FALL", "Body", "come_to_rest", "tilt_to_fall"]
+
+FALL = 0.025
+"""Change of the height of the centre of mass, as a share of it, by which a component has fallen: that of the programs'
+authors, whose figures are published; their text says 0.1."""
+SAME = 1e-4
+"""Points this near, as a share of the diagonal of the shape, lie on the ground together."""
+MOST_RESTS = 40
+"""A body that has been on so many faces without falling rolls."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body above the ground at height 0: its points, float64 (q, 3), and its centre of mass, float64 (3,)."""
+
+    points: FloatArray
+    centre: FloatArray
+
+    @property
+    def height(self) -> float:
+        return float(self.centre[2])
+
+    def lowered(self) -> Body:
+        """The body brought down until it touches the ground."""
+        drop = np.array([0.0, 0.0, self.points[:, 2].min()])
+        return Body(self.points - drop, self.centre - drop)
+
+    def support(self, near: float) -> FloatArray:
+        """The corners, float64 (k, 2), of the outline of what is at most `near` above the ground."""
+        low = self.points[self.points[:, 2] <= near, :2]
+        outline: FloatArray = low[convex_hull(low)]
+        return outline
+
+    def tipped(self, pivot: FloatArray, way: FloatArray, near: float) -> Body:
+        """The body turned in direction `way` (2,) about the level axis across it through `pivot` (2,) on the ground,
+        until the next of its points touches the ground."""
+        arms = self.points - [*pivot, 0.0]
+        along, up = arms[:, :2] @ way, arms[:, 2]
+        angle = np.arctan2(up, along)[up > near].min(initial=np.pi)
+        cosine, sine = np.cos(angle) - 1.0, np.sin(angle)
+        # Along the way and up turn into each other, what is across stays.
+        turn = np.eye(3)
+        turn[:2, :2] += cosine * np.outer(way, way)
+        turn[:2, 2], turn[2, :2], turn[2, 2] = sine * way, -sine * way, 1.0 + cosine
+        return Body(arms @ turn.T, turn @ (self.centre - [*pivot, 0.0])).lowered()
+
+
+def come_to_rest(body: Body, diagonal: float) -> Body:
+    """The body as it lies when it has been let go: tipped over points and edges, its centre sinking, until the
+    vertical through the centre meets the face below it."""
+    near = SAME * diagonal
+    body = body.lowered()
+    for _ in range(len(body.points)):
+        support = body.support(near)
+        if len(support) > 2 and inside_margin(support, body.centre[:2]) >= -near:
+            return body
+        pivot, way = _downhill(support, body.centre[:2], near)
+        body = body.tipped(pivot, way, near)
+    return body
+
+
+def tilt_to_fall(body: Body, diagonal: float) -> float:
+    """The least tilt, in degrees, by which pushes make the body come to rest with its centre FALL higher or lower than
+    it was let go; 0 where it falls by itself, infinite where it never does: a ball, a cube."""
+    start = body.lowered().height
+    near = SAME * diagonal
+    ahead: list[tuple[float, int, Body]] = [(0.0, 0, come_to_rest(body, diagonal))]
+    rests: list[Body] = []
+    tried = 0
+    while ahead and len(rests) < MOST_RESTS:
+        tilt, _, rest = heappop(ahead)
+        if abs(rest.height - start) > FALL * start:
+            return tilt
+        if any(np.abs(rest.points - other.points).max() <= 10 * near for other in rests):
+            continue
+        rests.append(rest)
+        support = rest.support(near)
+        for corner, following in zip(support, np.roll(support, -1, axis=0), strict=True):
+            edge = following - corner
+            outward = np.array([edge[1], -edge[0]]) / np.linalg.norm(edge)
+            distance = max(0.0, float((corner - rest.centre[:2]) @ outward))
+            needed = float(np.degrees(np.arctan2(distance, rest.height)))
+            tried += 1
+            over = come_to_rest(rest.tipped(corner, outward, near), diagonal)
+            heappush(ahead, (max(tilt, needed), tried, over))
+    return float("inf")
+
+
+def _downhill(support: FloatArray, centre: FloatArray, near: float) -> tuple[FloatArray, FloatArray]:
+    """The point of the outline of the support that is nearest to the centre, and the way, a unit vector (2,), from it
+    to the centre: across the edge where the centre is above it."""
+    edges = np.roll(support, -1, axis=0) - support
+    lengths = np.maximum((edges**2).sum(axis=1), np.finfo(float).tiny)
+    along = np.clip(((centre - support) * edges).sum(axis=1) / lengths, 0.0, 1.0)
+    places = support + along[:, None] * edges
+    nearest = int(np.linalg.norm(places - centre, axis=1).argmin())
+    way = centre - places[nearest]
+    if np.linalg.norm(way) <= near:
+        way = np.array([edges[nearest, 1], -edges[nearest, 0]]) if len(support) > 1 else np.array([1.0, 0.0])
+    return places[nearest], way / np.linalg.norm(way)
