@@ -53,7 +53,7 @@ simulations find."""
 
 NOTES = (
     "Stable: connected parts are one rigid body that stands and bears a push of each part sideways and a twist. "
-    "Dropped: it is rooted, and after it has been let go and tilted as by a tenth of its weight, its components rest as "
+    "Dropped: it is rooted, and after it has been let go and tilted as by a tenth of its weight its components rest as "
     "high as before, within 2.5 %, which is what the simulations of shapeassembly ask. "
     "Dry stable: as stable, with parts that only press and rub on each other where they touch. "
     "Margin: median push, in weights, that rigid shapes bear (-1: does not stand). Tipping: median angle. "

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
-from stages.shapeassembly.extraction.settings import Gates, HierarchyFiles, NamedFiles
+from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles, NamedFiles
 from stages.shapeassembly.sources import existing_programs
 
 __all__ = ["ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig"]
@@ -45,6 +45,7 @@ class ShapeAssemblyConfig(StrictModel):
         (), description="Where the part hierarchies are from which programs are extracted."
     )
     extraction: Gates = Field(default_factory=Gates, description="What an extracted program must pass.")
+    cleaning: Cleaning = Field(default_factory=Cleaning, description="How hierarchies are made tidier before.")
     accept: Literal["executable", "valid"] = Field(
         "executable",
         description="Which programs become samples: all that can be executed, or those that keep every rule.",

@@ -72,7 +72,7 @@ def run_shard(task: Task) -> Outcome:
     """A shard of the extraction, the assignment, or a shard of the collection."""
     if task.shard.params["job"] == "extraction":
         config = task.config.section(ShapeAssemblyConfig)
-        return run_extraction(task, config.hierarchies, config.extraction)
+        return run_extraction(task, config.hierarchies, config.extraction, config.cleaning)
     return run_assignment(task) if task.shard.params["job"] == "assignment" else run_collection(task)
 
 

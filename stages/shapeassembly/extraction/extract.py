@@ -13,10 +13,10 @@ from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_par
 from stages.shapeassembly.extraction.boxes import around
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
 from stages.shapeassembly.extraction.rules import Rules
-from stages.shapeassembly.extraction.settings import Gates
+from stages.shapeassembly.extraction.settings import EVERY_STEP, Cleaning, Gates
 from stages.shapeassembly.extraction.shortening import shorten_parts
 from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted
-from stages.shapeassembly.extraction.writing import Order, write_program
+from stages.shapeassembly.extraction.writing import Groups, Order, write_program
 from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.printer import rounded
 from stages.shapeassembly.program import Program
@@ -49,7 +49,7 @@ class Extraction:
     made: tuple[Box, ...]
 
 
-def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
+def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates, cleaning: Cleaning = EVERY_STEP) -> Extraction:
     """The canonical program of a part hierarchy.
 
     Raises Rejected with one of these reasons: "too few parts", "too many parts", "flat shape", "parts not connected",
@@ -63,33 +63,35 @@ def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates) -> Extraction:
     root = _rescaled(hierarchy.root, whole.center, scale)
     shape = _Shape(hierarchy.name, tuple(leaf.box for leaf in root.leaves()), whole.center, scale)
     first: Rejected | None = None
-    for regularised in (_REGULARISED, *_LESS):
+    for steps in _attempts(cleaning):
         try:
-            return _attempt(shape, root, rules, gates, regularised)
+            return _attempt(shape, root, rules, gates, steps)
         except Rejected as reason:
             first = first or reason
-            if reason.reason in _FINAL:
+            if reason.reason == "too few parts" or (reason.reason == "too many parts" and steps.groups == "common"):
                 break
     assert first is not None
     raise first
 
 
 @dataclass(frozen=True)
-class _Regularised:
-    """Which steps that make a program tidier are taken."""
+class _Steps:
+    """Which steps an attempt takes."""
 
-    shortened: bool
-    grouped: bool
+    shorten: bool
+    arrange: bool
+    groups: Groups
 
 
-_REGULARISED = _Regularised(shortened=True, grouped=True)
-
-_LESS = (_Regularised(shortened=False, grouped=True), _Regularised(shortened=True, grouped=False))
-"""What is tried on a shape whose tidiest program fails: sunk ends may be what holds it together, and a part between
-two that a group makes of one may have nothing to stand on."""
-
-_FINAL = frozenset({"too few parts", "too many parts"})
-"""Reasons that no other attempt mends."""
+def _attempts(cleaning: Cleaning) -> list[_Steps]:
+    """The steps that are wanted, then what is tried on a shape whose program fails by them: groups of parts attached to
+    a common part, for more are made by macros; without shortening, for sunk ends may be what holds a shape together;
+    without groups, for a part between two that a group makes of one may have nothing to stand on."""
+    asked = _Steps(cleaning.shorten, cleaning.arrange, "alike" if cleaning.group else "none")
+    if not cleaning.group:
+        return [asked]
+    fewer = [replace(asked, groups="common"), replace(asked, groups="none")]
+    return [asked, fewer[0], *([replace(fewer[0], shorten=False)] if cleaning.shorten else []), fewer[1]]
 
 
 @dataclass(frozen=True)
@@ -102,13 +104,13 @@ class _Shape:
     scale: float
 
 
-def _attempt(shape: _Shape, root: Part, rules: Rules, gates: Gates, regularised: _Regularised) -> Extraction:
-    if regularised.shortened:
+def _attempt(shape: _Shape, root: Part, rules: Rules, gates: Gates, steps: _Steps) -> Extraction:
+    if steps.shorten:
         root = shorten_parts(root)
-    root = frame_parts(arrange_parts(root, rules))
+    root = frame_parts(arrange_parts(root, rules) if steps.arrange else root)
     if not root.children:
         raise Rejected("too few parts", f"{shape.name} is one box")
-    program = rounded(write_program(root, order_of(rules), grouped=regularised.grouped))
+    program = rounded(write_program(root, order_of(rules), steps.groups))
     named = set(program.named)
     leaves = sum(cuboid.name not in named for block in program.blocks for cuboid in block.cuboids)
     if leaves < gates.fewest_leaves:

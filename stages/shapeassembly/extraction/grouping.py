@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -42,20 +42,21 @@ class _Formed:
     ends: frozenset[int]
 
 
-def form_groups(layout: Layout, order: Callable[[Part], Any]) -> tuple[Layout, list[Symmetry | None]]:
+def form_groups(layout: Layout, order: Callable[[Part], Any], *, strict: bool) -> tuple[Layout, list[Symmetry | None]]:
     """The layout of the parts that remain when groups are formed, and for each the macro that makes the others.
 
     Connected components that repeat become one sub-part each, before groups of single parts are formed. `order` is
-    the key of the canonical order of parts. A part with a macro is anchored where its copies are attached too.
+    the key of the canonical order of parts; `strict`: the members of a group must be attached alike. A part with a
+    macro is anchored where its copies are attached too.
     """
     formed: list[_Formed] = []
-    while (pooled := _pool_components(layout, {id(each.part) for each in formed})) is not None:
+    while (pooled := _pool_components(layout, {id(each.part) for each in formed}, strict)) is not None:
         parts, each = pooled
         formed.append(each)
         layout = lay_out(sorted(parts, key=order), layout.bbox.size)
     fixed = {id(each.part) for each in formed}
     bodies = _bodies(layout, [(i,) for i, part in enumerate(layout.parts) if id(part) not in fixed])
-    groups = _single_groups(bodies, layout.diagonal)
+    groups = _single_groups(bodies, layout.diagonal, strict)
     while True:
         members = [tuple(bodies[i].members[0] for i in group.bodies) for group in groups]
         gone = {part for _, *copies in members for part in copies}
@@ -78,20 +79,20 @@ def _at_fault(layout: Layout, members: Sequence[tuple[int, ...]], loose: set[int
     return len(members) - 1
 
 
-def _searches(diagonal: float, rows_of: int) -> list[Callable[[Sequence[Body]], list[Group]]]:
+def _searches(diagonal: float, rows_of: int, strict: bool) -> list[Callable[[Sequence[Body]], list[Group]]]:
     """Searches for groups: mirrored pairs, then rows of at least `rows_of`, along each axis."""
     return [
-        *(partial(reflections, axis=axis, diagonal=diagonal) for axis in REFLECTION_AXES),
-        *(partial(translations, axis=axis, diagonal=diagonal, fewest=rows_of) for axis in range(3)),
+        *(partial(reflections, axis=axis, diagonal=diagonal, strict=strict) for axis in REFLECTION_AXES),
+        *(partial(translations, axis=axis, diagonal=diagonal, fewest=rows_of, strict=strict) for axis in range(3)),
     ]
 
 
-def _single_groups(bodies: Sequence[Body], diagonal: float) -> list[Group]:
+def _single_groups(bodies: Sequence[Body], diagonal: float, strict: bool) -> list[Group]:
     """Groups of single parts: rows of three or more, then mirrored pairs, then rows of two."""
-    long_rows = _searches(diagonal, rows_of=3)[len(REFLECTION_AXES) :]
+    long_rows = _searches(diagonal, 3, strict)[len(REFLECTION_AXES) :]
     groups: list[Group] = []
     taken: set[int] = set()
-    for search in (*long_rows, *_searches(diagonal, rows_of=2)):
+    for search in (*long_rows, *_searches(diagonal, 2, strict)):
         free = [i for i in range(len(bodies)) if i not in taken]
         for group in search([bodies[i] for i in free]):
             members = tuple(free[i] for i in group.bodies)
@@ -100,14 +101,15 @@ def _single_groups(bodies: Sequence[Body], diagonal: float) -> list[Group]:
     return groups
 
 
-def _pool_components(layout: Layout, fixed: set[int]) -> tuple[list[Part], _Formed] | None:
+def _pool_components(layout: Layout, fixed: set[int], strict: bool) -> tuple[list[Part], _Formed] | None:
     """The parts after one group of connected components has become one sub-part, and that group.
 
     fixed: identities of the parts that are already groups.
     """
     free = [i for i, part in enumerate(layout.parts) if id(part) not in fixed]
-    unattached = [replace(body, touches=frozenset({BOTTOM, TOP})) for body in _bodies(layout, [(i,) for i in free])]
-    for find in _searches(layout.diagonal, rows_of=2):
+    bodies = _bodies(layout, [(i,) for i in free])
+    unattached = [replace(body, joints=((BOTTOM, body.center), (TOP, body.center))) for body in bodies]
+    for find in _searches(layout.diagonal, 2, strict):
         moving = sorted({free[i] for group in find(unattached) for i in group.bodies})
         bodies = _bodies(layout, [each for each in _components(layout, moving) if len(each) > 1])
         groups = find(bodies)
@@ -138,12 +140,20 @@ def _bodies(layout: Layout, members: Sequence[Sequence[int]]) -> list[Body]:
     """The given sets of parts as bodies."""
     bodies = []
     for each in members:
-        touches = {j for i in each for j in layout.neighbours(i)} - set(each)
-        touches |= {BOTTOM for i in each if layout.bottoms[i] is not None}
-        touches |= {TOP for i in each if layout.tops[i] is not None}
         boxes: tuple[FloatArray, ...] = tuple(box_corners(leaf.box) for i in each for leaf in layout.parts[i].leaves())
-        bodies.append(Body(tuple(each), boxes, frozenset(touches)))
+        bodies.append(Body(tuple(each), boxes, tuple(_joints(layout, each))))
     return bodies
+
+
+def _joints(layout: Layout, members: Sequence[int]) -> Iterator[tuple[int, FloatArray]]:
+    """What a set of parts is attached to beside each other, and where."""
+    for i in members:
+        for j in layout.neighbours(i):
+            if j not in members:
+                yield j, layout.points(i, j)[0]
+        for end, point in ((BOTTOM, layout.bottoms[i]), (TOP, layout.tops[i])):
+            if point is not None:
+                yield end, point
 
 
 def _components(layout: Layout, parts: Sequence[int]) -> list[list[int]]:

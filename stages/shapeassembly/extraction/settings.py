@@ -12,7 +12,7 @@ from stages.shape.collection.origin import Credit
 from stages.shapeassembly.extraction.files import HierarchyKind, HierarchySource
 from stages.shapeassembly.extraction.rules import RULES, Rules
 
-__all__ = ["Category", "Gates", "HierarchyFiles", "NamedFiles"]
+__all__ = ["EVERY_STEP", "Category", "Cleaning", "Gates", "HierarchyFiles", "NamedFiles"]
 
 Category = Literal["any", "chair", "table", "storage"]
 
@@ -76,3 +76,16 @@ class Gates(StrictModel):
     overflow: float = Field(
         0.05, gt=0, description="How far parts may reach out of the bounding box, as a share of its size; less passes."
     )
+
+
+class Cleaning(StrictModel):
+    """Which steps make hierarchies tidier before a program is written (shapeassembly §5.1, App. C)."""
+
+    shorten: bool = Field(True, description="Leaves sunk into others are cut back to where they can be seen.")
+    arrange: bool = Field(
+        True, description="Nodes are flattened, collapsed and gathered by the rules of their category."
+    )
+    group: bool = Field(True, description="Parts that repeat are made by reflect and translate.")
+
+
+EVERY_STEP = Cleaning()

@@ -12,7 +12,7 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
 from stages.shapeassembly.extraction.extract import extract
-from stages.shapeassembly.extraction.settings import Gates, HierarchyFiles
+from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles
 from stages.shapeassembly.printer import print_program
 
 __all__ = ["Extracted", "extraction_shards", "read_extracted", "run_extraction"]
@@ -43,7 +43,7 @@ def extraction_shards(dataset: str, hierarchies: Sequence[HierarchyFiles]) -> li
     return shards
 
 
-def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gates) -> Outcome:
+def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gates, cleaning: Cleaning) -> Outcome:
     """Extract the programs of one shard into `.jsonl`, one a line; the others are refused, by reason."""
     params = task.shard.params
     files = hierarchies[params["source"]]
@@ -53,7 +53,7 @@ def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gat
         try:
             if isinstance(hierarchy, Rejected):
                 raise hierarchy
-            extraction = extract(hierarchy, files.rules, gates)
+            extraction = extract(hierarchy, files.rules, gates, cleaning)
         except Rejected as error:
             task.reject(f"{files.name}/{name}", error.reason, error.detail)
             continue

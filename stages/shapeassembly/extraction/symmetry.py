@@ -27,13 +27,13 @@ class Body:
     """What symmetry moves: one part, or several that are connected.
 
     members: indices of its parts; boxes: corners (8, 3) of each leaf in the node's frame, whose origin is the centre
-    of the bounding box; touches: the parts outside itself that it is attached to, with BOTTOM and TOP for
-    the ends of the bounding box.
+    of the bounding box; joints: its attachments, the part outside itself that each is to, BOTTOM and TOP
+    being the ends of the bounding box, and its point (3,) on the body.
     """
 
     members: tuple[int, ...]
     boxes: tuple[FloatArray, ...]
-    touches: frozenset[int]
+    joints: tuple[tuple[int, FloatArray], ...]
 
     @cached_property
     def center(self) -> FloatArray:
@@ -46,7 +46,7 @@ class Body:
 @dataclass(frozen=True)
 class Group:
     """Bodies that one macro makes of the first. bodies: indices, the first at the low end of the axis.
-    anchors: what all of them touch, as the first touches it. distance: from the first to the last, in the node's
+    anchors: what all of them are attached to, as the first is. distance: from the first to the last, in the node's
     units (translate alone)."""
 
     kind: Literal["reflect", "translate"]
@@ -56,8 +56,9 @@ class Group:
     distance: float = 0.0
 
 
-def reflections(bodies: Sequence[Body], axis: int, diagonal: float) -> list[Group]:
-    """Pairs of bodies that are mirror images across the middle of the bounding box and touch a common part.
+def reflections(bodies: Sequence[Body], axis: int, diagonal: float, *, strict: bool) -> list[Group]:
+    """Pairs of bodies that are mirror images across the middle of the bounding box, and so are their attachments, which
+    are to the same parts; if not `strict`, it is enough that some are to one part.
 
     diagonal: of the bounding box. A body that is its own image is in no pair.
     """
@@ -69,36 +70,84 @@ def reflections(bodies: Sequence[Body], axis: int, diagonal: float) -> list[Grou
         if i in taken or body.center[axis] > -1e-3 * diagonal:
             continue
         image = tuple(mirrored(corners, origin, axis) for corners in body.boxes)
-        swapped = _swapped(body.touches) if axis == 1 else body.touches
         for j, other in enumerate(bodies):
             if i == j or j in taken or other.center[axis] < 0 or not _alike(image, other.boxes, tolerance):
                 continue
-            common = _common([swapped, other.touches], [body, other])
-            if common and not _alike(body.boxes, other.boxes, tolerance):
-                groups.append(Group("reflect", axis, (i, j), _swapped(common) if axis == 1 else common))
+            if _alike(body.boxes, other.boxes, tolerance):
+                continue
+            own = frozenset((*body.members, *other.members))
+            seen, there = _mirrored_joints(_seen(body, own), axis), _seen(other, own)
+            common = _parts(seen) & _parts(there)
+            if common and (not strict or _attached_alike(seen, there, tolerance)):
+                groups.append(Group("reflect", axis, (i, j), frozenset(_opposite(each, axis) for each in common)))
                 taken |= {i, j}
                 break
     return groups
 
 
-def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int) -> list[Group]:
-    """Rows of at least `fewest` equal bodies at equal distances along `axis` that touch a common part."""
+def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int, *, strict: bool) -> list[Group]:
+    """Rows of at least `fewest` equal bodies at equal distances along `axis` that are attached alike to the same
+    parts; if not `strict`, it is enough that all are attached to one part."""
     tolerance = CLOSENESS * diagonal
     left = sorted(range(len(bodies)), key=lambda i: (bodies[i].center[axis], i))
     groups: list[Group] = []
     while left:
         first = bodies[left[0]]
         row = [i for i in left if _alike_translated(first, bodies[i], axis, tolerance)]
+        if strict:
+            own = frozenset(member for i in row for member in bodies[i].members)
+            row = [i for i in row if _attached_in_row(first, bodies[i], axis, own, tolerance)]
         row = _evenly_spaced([i for i in row if i != left[0]], left[0], bodies, axis, tolerance)
-        members = [bodies[i] for i in row]
-        common = _common([body.touches for body in members], members)
-        if len(row) >= fewest and common:
-            span = float(members[-1].center[axis] - first.center[axis])
-            groups.append(Group("translate", axis, tuple(row), common, span))
+        own = frozenset(member for i in row for member in bodies[i].members)
+        anchors = frozenset.intersection(*(_parts(_seen(bodies[i], own)) for i in row))
+        if len(row) >= fewest and anchors:
+            span = float(bodies[row[-1]].center[axis] - first.center[axis])
+            groups.append(Group("translate", axis, tuple(row), anchors, span))
             left = [i for i in left if i not in row]
         else:
             left = left[1:]
     return groups
+
+
+_Joints = list[tuple[int, FloatArray]]
+
+
+def _seen(body: Body, own: frozenset[int]) -> _Joints:
+    """The attachments of a body to what is not in its group."""
+    return [each for each in body.joints if each[0] not in own]
+
+
+def _parts(joints: _Joints) -> frozenset[int]:
+    return frozenset(part for part, _ in joints)
+
+
+def _opposite(part: int, axis: int) -> int:
+    """What the mirror image of a body is attached to: across the level plane the ends of the bounding box change
+    places."""
+    return {BOTTOM: TOP, TOP: BOTTOM}.get(part, part) if axis == 1 else part
+
+
+def _mirrored_joints(joints: _Joints, axis: int) -> _Joints:
+    return [(_opposite(part, axis), mirrored(point, np.zeros(3), axis)) for part, point in joints]
+
+
+def _attached_in_row(first: Body, other: Body, axis: int, own: frozenset[int], tolerance: float) -> bool:
+    way = np.zeros(3)
+    way[axis] = other.center[axis] - first.center[axis]
+    return _attached_alike([(part, point + way) for part, point in _seen(first, own)], _seen(other, own), tolerance)
+
+
+def _attached_alike(wanted: _Joints, found: _Joints, tolerance: float) -> bool:
+    """Whether attachments are to the same parts at the same points (shapeassembly App. C)."""
+    left = list(found)
+    for part, point in wanted:
+        for place, (other, there) in enumerate(left):
+            if part == other and np.abs(point - there).max() <= tolerance:
+                del left[place]
+                break
+        else:
+            return False
+    return not left
 
 
 def _alike(first: Sequence[FloatArray], second: Sequence[FloatArray], tolerance: float) -> bool:
@@ -148,14 +197,3 @@ def _evenly_spaced(row: list[int], first: int, bodies: Sequence[Body], axis: int
         if len(found) > len(best):
             best = found
     return best
-
-
-def _swapped(touches: frozenset[int]) -> frozenset[int]:
-    """The same parts with the bottom and the top of the bounding box exchanged."""
-    return frozenset({BOTTOM: TOP, TOP: BOTTOM}.get(part, part) for part in touches)
-
-
-def _common(touches: Sequence[frozenset[int]], members: Sequence[Body]) -> frozenset[int]:
-    """What all members of a group touch outside the group."""
-    own = {member for body in members for member in body.members}
-    return frozenset.intersection(*touches) - own

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,13 +20,18 @@ from stages.shapeassembly.extraction.tilted import cuboid_of, tilted_placer
 from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.program import AXES, BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
 
-__all__ = ["Order", "write_program"]
+__all__ = ["Groups", "Order", "write_program"]
 
 MOST_CHILDREN = 100
 """Parts of one node before groups are formed: all pairs of them are looked at, and a program declares ten at most."""
 
 Order = Callable[[Part], tuple[Any, ...]]
 """The key of the canonical order of the parts of one node, in the node's frame."""
+
+
+Groups = Literal["alike", "common", "none"]
+"""Which parts that repeat make a group: those attached alike to the same parts (shapeassembly App. C), those attached
+to a common part, or none."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +42,10 @@ class _Node:
     expanded: dict[str, Part]
 
 
-def write_program(root: Part, order: Order, *, grouped: bool) -> Program:
+def write_program(root: Part, order: Order, groups: Groups) -> Program:
     """The program of an arranged hierarchy, root first, assemblies numbered in breadth-first order.
 
-    grouped: whether parts that repeat are made by macros.
+    groups: which parts that repeat are made by macros.
 
     Raises Rejected where the parts of a node do not hang together, or are too many.
     """
@@ -48,7 +53,7 @@ def write_program(root: Part, order: Order, *, grouped: bool) -> Program:
     waiting = deque([root])
     count = 0
     while waiting:
-        node = _write_node(waiting.popleft(), order, grouped)
+        node = _write_node(waiting.popleft(), order, groups)
         names = {}
         for name, part in node.expanded.items():
             count += 1
@@ -59,12 +64,14 @@ def write_program(root: Part, order: Order, *, grouped: bool) -> Program:
     return Program(tuple(blocks))
 
 
-def _write_node(part: Part, order: Order, grouped: bool) -> _Node:
+def _write_node(part: Part, order: Order, groups: Groups) -> _Node:
     children = sorted((localised(child, part.box) for child in part.children), key=order)
     if len(children) > MOST_CHILDREN:
         raise Rejected("too many parts", f"{len(children)} below {part.label!r}, at most {MOST_CHILDREN} are looked at")
     whole = lay_out(children, part.box.size)
-    layout, symmetries = form_groups(whole, order) if grouped else (whole, [None] * len(children))
+    layout, symmetries = (
+        (whole, [None] * len(children)) if groups == "none" else form_groups(whole, order, strict=groups == "alike")
+    )
     if len(layout.parts) > MOST_CUBOIDS:
         raise Rejected("too many parts", f"{len(layout.parts)} below {part.label!r}, at most {MOST_CUBOIDS} are wanted")
     joints = ground(layout, tilted_placer(layout))
