@@ -9,12 +9,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from stages.shapeassembly.flat import copy_name
-from stages.shapeassembly.interpreter import Execution
+from stages.shapeassembly.interpreter import Execution, parts_of
 from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.printer import print_line
 from stages.shapeassembly.program import BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
 
-__all__ = ["RULES", "Rule", "Violation", "overflow", "violations"]
+__all__ = ["RULES", "SIDE", "Rule", "Violation", "overflow", "reaching_out", "violations"]
 
 Rule = Literal[
     "name taken",
@@ -74,6 +74,17 @@ def overflow(program: Program, execution: Execution) -> float:
         return 0.0
     reach = np.abs(execution.corners).max(axis=(0, 1)) / program.root.bbox.dims
     return max(0.0, float(reach.max()) - 0.5)
+
+
+def reaching_out(block: Block) -> list[str]:
+    """The cuboids and copies of one assembly that reach out of its bounding box by more than LARGER of its size along
+    an axis (shapeassembly App. D), by name, in the order of the lines. Raises ProgramError where the assembly by itself
+    cannot be executed."""
+    names, boxes = parts_of(block)
+    frames = boxes[:, 6:].reshape(-1, 3, 3)
+    reach = np.abs(boxes[:, :3]) + np.einsum("nk,nkc->nc", boxes[:, 3:6] / 2, np.abs(frames))
+    beyond = (reach > (0.5 + LARGER) * np.array(block.bbox.dims) + 1e-9).any(axis=1)
+    return [names[place] for place in np.flatnonzero(beyond).tolist()]
 
 
 def _tree_violations(program: Program) -> Iterator[Violation]:

@@ -11,12 +11,12 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.flat import Flat, Indices, flatten
 from stages.shapeassembly.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS, MAX_REACH
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.program import Block, Program
 
 if TYPE_CHECKING:
     from stages.shapeassembly.kernels import Executed
 
-__all__ = ["Execution", "check", "execute", "execute_all", "execute_flat"]
+__all__ = ["Execution", "check", "execute", "execute_all", "execute_flat", "parts_of"]
 
 _REFUSALS = {
     1: ("too many cuboids", f"expanded it has more than {MAX_PARTS}"),
@@ -118,6 +118,18 @@ def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
             )
         )
     return executions
+
+
+def parts_of(block: Block) -> tuple[tuple[str, ...], FloatArray]:
+    """The names of the cuboids and copies of one assembly, whatever expands them, without the bounding box, and what
+    they are in its coordinates, float64 (n, 15): centre, sizes, axes. Raises ProgramError like `execute`."""
+    from stages.shapeassembly.kernels import run
+
+    flat = flatten([Program((block,))])
+    done: Executed
+    done, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+    check(done)
+    return flat.names[0][1:], done.boxes[1:]
 
 
 def check(done: Executed) -> None:

@@ -13,8 +13,9 @@ __all__ = ["KitModelEntry", "ModelEntry", "Source", "Subject"]
 Subject = Literal["kit", "program"]
 """What a model learns from: the samples of a kit, or a program."""
 
-Source = Literal["strings", "shapes"]
-"""What models of a kit learn from: the strings that stage `strings` has written, or the shapes themselves."""
+Source = Literal["strings", "shapes", "programs"]
+"""What models of a kit learn from: the strings that stage `strings` has written, the shapes themselves, or, where the
+kit is a category of ShapeAssembly programs, their texts."""
 
 
 class ModelEntry(StrictModel):

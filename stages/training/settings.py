@@ -8,12 +8,15 @@ from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
+from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.string_vae.settings import StringVaeEntry
 
 __all__ = ["AnyEntry", "TrainingConfig"]
 
-AnyEntry = Annotated[StringVaeEntry | EdgeCategoriesEntry | RecoveryEntry, Field(discriminator="kind")]
+AnyEntry = Annotated[
+    StringVaeEntry | EdgeCategoriesEntry | RecoveryEntry | ProgramVaeEntry, Field(discriminator="kind")
+]
 """An entry of any kind, which its key `kind` tells."""
 
 

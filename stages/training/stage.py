@@ -17,6 +17,7 @@ from stages.exemplars.settings import ExemplarsConfig
 from stages.programs.program import program_module
 from stages.programs.settings import ProgramsConfig
 from stages.shape.collection.shards import PRODUCERS, collection_shards, planned_producer
+from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
 from stages.training.entry import KitModelEntry
@@ -87,10 +88,11 @@ def check(config: Config) -> None:
     for entry in config.section(TrainingConfig).models:
         where = f"{config.path}: training.models: {entry.name}"
         if isinstance(entry, KitModelEntry):
-            unknown = [kit for kit in entry.kits if kit not in kits]
-            if unknown or not kits:
+            known = _categories(config, entry) if entry.learns_from == "programs" else kits
+            unknown = [kit for kit in entry.kits if kit not in known]
+            if unknown or not known:
                 which = f"there is no kit {unknown[0]}" if unknown else "it learns from kits, and there are none"
-                raise ConfigError(f"{where}: {which}; kits are {', '.join(kits)}")
+                raise ConfigError(f"{where}: {which}; kits are {', '.join(known)}")
             continue
         programs = _programs(config, entry)
         if not programs:
@@ -127,11 +129,19 @@ def _models(plan: Plan) -> Iterator[tuple[AnyEntry, str, int]]:
     """Each model of the config: its entry, its kit or program, its seed."""
     for entry in plan.config.section(TrainingConfig).models:
         if isinstance(entry, KitModelEntry):
-            subjects: Sequence[str] = entry.kits or plan.shards("exemplars")
+            subjects: Sequence[str] = entry.kits or _categories(plan.config, entry) or plan.shards("exemplars")
         else:
             subjects = _programs(plan.config, entry)
         for subject, seed in product(subjects, range(entry.seeds)):
             yield entry, subject, seed
+
+
+def _categories(config: Config, entry: KitModelEntry) -> tuple[str, ...]:
+    """The categories of ShapeAssembly programs that a model of such programs learns from by default."""
+    if entry.learns_from != "programs":
+        return ()
+    section = config.section(ShapeAssemblyConfig)
+    return tuple(each.name for each in (*section.programs, *section.hierarchies))
 
 
 def _programs(config: Config, entry: RecoveryEntry) -> tuple[str, ...]:
@@ -155,9 +165,12 @@ def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
     else:
         stage = planned_producer(plan) or ""
         splits = {each.name: each.params["split"] for each in collection_shards(plan) if each.params["split"] in LEARNT}
-        strings = plan.config.section(StringsConfig)
-        params |= {"producer": stage, "edges": strings.edges, "strings": strings.strings_per_shape}
-    inputs = (f"exemplars/{kit}", *(f"{stage}/{name}" for name in splits))
+        params["producer"] = stage
+        if entry.learns_from == "shapes":
+            strings = plan.config.section(StringsConfig)
+            params |= {"edges": strings.edges, "strings": strings.strings_per_shape}
+    exemplars = () if entry.learns_from == "programs" else (f"exemplars/{kit}",)
+    inputs = (*exemplars, *(f"{stage}/{name}" for name in splits))
     return Shard(f"{kit}-{kind}", {**params, "splits": splits}, inputs, (module_of(kind),))
 
 

@@ -1,0 +1,1 @@
+"""Models that write ShapeAssembly programs: the hierarchical sequence VAE (shapeassembly §6)."""

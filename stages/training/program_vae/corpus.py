@@ -1,0 +1,71 @@
+"""The programs of a category, made ready: read once from the collection, as numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from pipeline.errors import Rejected
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Task
+from stages.shape.sample import Sample, read_samples
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.parser import parse
+from stages.training.program_vae.batches import Programs
+from stages.training.program_vae.lines import NodeLines, node_lines
+
+__all__ = ["prepare_corpus", "read_corpus"]
+
+
+def prepare_corpus(task: Task) -> Outcome:
+    """Files of the shard: `.<split>.safetensors`, the `Programs` of train and val; `.json`, how many there are.
+
+    Programs that 63 numbers a line cannot say, and those of more than `longest` lines, are refused. Raises Rejected
+    where train or val keeps no program.
+    """
+    from safetensors.numpy import save
+
+    params, name = task.shard.params, task.shard.name
+    counts: dict[str, dict[str, int]] = {}
+    for split in ("train", "val"):
+        kept: list[list[NodeLines]] = []
+        for sample in _samples(task, split):
+            try:
+                nodes = node_lines(parse(sample.text))
+            except ProgramError as error:
+                task.reject(sample.key, error.reason, str(error))
+                continue
+            if sum(len(node.numbers) for node in nodes) > params["longest"]:
+                task.reject(sample.key, "longer than training.longest")
+                continue
+            kept.append(nodes)
+        if not kept:
+            raise Rejected(f"{params['kit']} has no programs of at most {params['longest']} lines in split {split}")
+        programs = Programs.of(kept)
+        counts[split] = {"programs": len(programs), "assemblies": len(programs.boxes), "lines": len(programs.lines)}
+        with task.output(f"{name}.{split}.safetensors") as stream:
+            stream.write(save(programs.arrays()))
+    with task.output(f"{name}.json") as stream:
+        stream.write(json_bytes({"counts": counts}))
+    return Outcome(samples=0, summary=counts)
+
+
+def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], dict[str, Programs]]:
+    """What `prepare_corpus` wrote in shard `data`: the counts, and the programs of train and val."""
+    from safetensors.numpy import load_file
+
+    described = json.loads(task.input("training", f"{data}.json").read_bytes())
+    paths = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
+    return described, {split: Programs.of_arrays(load_file(path)) for split, path in paths.items()}
+
+
+def _samples(task: Task, split: str) -> Iterator[Sample]:
+    """The samples of the category in a split."""
+    params = task.shard.params
+    shards = [shard for shard, of in params["splits"].items() if of == split]
+    for done, shard in enumerate(shards):
+        for sample in read_samples(task.input(params["producer"], f"{shard}.tar")):
+            if sample.kit == params["kit"]:
+                yield sample
+        task.progress(done + 1, len(shards))

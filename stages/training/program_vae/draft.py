@@ -1,0 +1,199 @@
+"""An assembly while it is written: which lines may follow, by the rules of decoding (shapeassembly App. D).
+
+Coordinates are clamped to 0 to 1, sizes to 0.01 and those of the bounding box; the bounding box is attached to at its
+top and bottom alone; a cuboid is attached to another once, to the bounding box at its top and at its bottom; the
+bounding box is never moved, has no sub-program, and bears others as what is grounded does; only grounded cuboids are
+attached to or copied; cuboids are declared first, then attached, then copied; and no cuboid reaches further out of the
+bounding box than by a tenth of its size. What is not grounded in the end is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.checks import SIDE, reaching_out
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.limits import MIN_SIZE
+from stages.shapeassembly.parameters import SMALLEST
+from stages.shapeassembly.program import (
+    AXES,
+    BBOX,
+    FACES,
+    Attach,
+    Block,
+    Cuboid,
+    Line,
+    Point,
+    Reflect,
+    Squeeze,
+    Translate,
+)
+from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOTS, SQUEEZE, STOP, TRANSLATE
+
+__all__ = ["MOST_LINES", "Choice", "Draft", "Numbers"]
+
+MOST_LINES = 60
+"""Lines after which an assembly ends; those of the real programs end before."""
+
+MOST_COPIES = 40
+"""Copies of one translate; the real programs have 29 at most."""
+
+UNLIKELY = 4.6
+"""Commands a hundred times less likely than the likeliest that may follow are no way out, in nats."""
+
+_PHASES = {CUBOID: 0, ATTACH: 1, SQUEEZE: 1, TRANSLATE: 2, REFLECT: 2}
+
+Choice = tuple[int, ...]
+"""A command, and the slots of the cuboids that it names."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What else a line needs: points (6,), face, u and v (2,), axis, copies and distance."""
+
+    points: FloatArray
+    face: int
+    uv: FloatArray
+    axis: int
+    copies: int
+    distance: float
+
+
+@dataclass
+class Draft:
+    """An assembly in a bounding box of sizes `box`. sizes, aligned: of each cuboid declared; below: for each, what
+    expands it, if anything; lines: those after the declarations, cuboids called by their slots."""
+
+    box: Point
+    sizes: list[Point] = field(default_factory=list)
+    aligned: list[bool] = field(default_factory=list)
+    below: list[Draft | None] = field(default_factory=list)
+    lines: list[Line] = field(default_factory=list)
+    written: int = 0
+    _phase: int = 0
+    _grounded: set[int] = field(default_factory=lambda: {0})
+    _joined: set[tuple[int, ...]] = field(default_factory=set)
+
+    def commands(self) -> np.ndarray:
+        """Which commands may follow, bool (7,)."""
+        allowed = np.zeros(7, bool)
+        grounded = len(self._grounded) > 1
+        allowed[STOP] = grounded
+        if self.written < MOST_LINES:
+            allowed[CUBOID] = self._phase == 0 and len(self.sizes) < SLOTS - 1
+            allowed[[ATTACH, SQUEEZE]] = self._phase <= 1 and bool(self.sizes)
+            allowed[[TRANSLATE, REFLECT]] = grounded
+        return allowed
+
+    def choices(self, logits: FloatArray, indices: FloatArray, most: int) -> list[Choice]:
+        """The likeliest lines that may follow, at most `most` of each command, by the logits (7,) of commands and, for
+        each command, (7, 3, 11) of slots: the likeliest command first, as the paper goes back from what cannot be."""
+        allowed = self.commands()
+        least = logits[allowed].max(initial=-np.inf) - UNLIKELY
+        found: list[Choice] = []
+        for command in np.argsort(-logits, kind="stable").tolist():
+            if allowed[command] and logits[command] >= least:
+                found += self._named(command, indices[command])[:most]
+        return found
+
+    def _named(self, command: int, logits: FloatArray) -> list[Choice]:
+        """The lines of one command, the likeliest first."""
+        if command in (STOP, CUBOID):
+            return [(command,)]
+        declared, grounded = range(1, len(self.sizes) + 1), sorted(self._grounded)
+        named: list[tuple[int, ...]]
+        if command == ATTACH:
+            named = [(a, b) for a in declared for b in grounded if a != b and ((a, b) not in self._joined or b == 0)]
+        elif command == SQUEEZE:
+            free = {a: [b for b in grounded if a != b and (b == 0 or (a, b) not in self._joined)] for a in declared}
+            named = [(a, b, c) for a in declared for b in free[a] for c in free[a] if b != c or b == 0]
+        else:
+            named = [(a,) for a in grounded if a]
+        score = {each: sum(float(logits[place, slot]) for place, slot in enumerate(each)) for each in named}
+        return [(command, *each) for each in sorted(named, key=lambda each: (-score[each], each))]
+
+    def declare(self, sizes: FloatArray, aligned: bool, below: Draft | None) -> None:
+        """A cuboid, its sizes clamped."""
+        clamped = np.clip(sizes.astype(float), SMALLEST, np.maximum(self.box, SMALLEST))
+        x, y, z = np.round(np.maximum(clamped, MIN_SIZE), 3).tolist()
+        self.sizes.append((x, y, z))
+        self.aligned.append(aligned)
+        self.below.append(below)
+        self.written += 1
+
+    def add(self, choice: Choice, numbers: Numbers) -> bool:
+        """Writes a line, if it keeps the rules; whether it does."""
+        command, moved, *others = choice
+        joints: list[tuple[int, ...]] = []
+        if command == ATTACH:
+            points = np.round(np.clip(numbers.points.astype(float), 0, 1), 3).tolist()
+            if others[0] == 0 and SIDE < points[4] < 1 - SIDE:
+                return False
+            joints = [_joint(moved, others[0], points[4] > 0.5)]
+            source, goal = points[:3], points[3:]
+            line: Line = Attach(_name(moved), _name(others[0]), (*source,), (*goal,))
+        elif command == SQUEEZE:
+            face = FACES[numbers.face]
+            if 0 in others and face not in ("top", "bot"):
+                return False
+            u, v = np.round(np.clip(numbers.uv.astype(float), 0, 1), 3).tolist()
+            first, second = others
+            joints = [_joint(moved, first, face == "top"), _joint(moved, second, face == "bot")]
+            line = Squeeze(_name(moved), _name(first), _name(second), face, u, v)
+        elif command == REFLECT:
+            joints = [(moved, -1, numbers.axis)]
+            line = Reflect(_name(moved), AXES[numbers.axis])
+        else:
+            joints = [(moved, -2, numbers.axis)]
+            copies = min(max(numbers.copies, 1), MOST_COPIES)
+            line = Translate(_name(moved), AXES[numbers.axis], copies, round(min(max(numbers.distance, 0.0), 1.0), 3))
+        if any(each in self._joined for each in joints) or not self._fits(line, moved):
+            return False
+        self._joined.update(joints)
+        self._grounded.add(moved)
+        self._phase = max(self._phase, _PHASES[command])
+        self.lines.append(line)
+        self.written += 1
+        return True
+
+    def _fits(self, line: Line, moved: int) -> bool:
+        """Whether what is grounded with the line stays within the bounding box."""
+        drafted = replace(self, lines=[*self.lines, line], _grounded={*self._grounded, moved})
+        try:
+            return not reaching_out(drafted.block("Program_0", {}))
+        except ProgramError:
+            return False
+
+    def block(self, name: str, names: dict[int, str]) -> Block:
+        """The assembly, what is not grounded left out; `names` of expanded cuboids by slot."""
+        kept = [slot for slot in range(1, len(self.sizes) + 1) if slot in self._grounded]
+        called = {_name(0): BBOX}
+        called |= {_name(slot): names.get(slot, f"cube{place}") for place, slot in enumerate(kept)}
+        cuboids = tuple(Cuboid(called[_name(slot)], self.sizes[slot - 1], self.aligned[slot - 1]) for slot in kept)
+        return Block(name, Cuboid(BBOX, self.box, True), (*cuboids, *(_renamed(line, called) for line in self.lines)))
+
+    @property
+    def grounded(self) -> list[int]:
+        """The slots of the cuboids that are grounded."""
+        return sorted(self._grounded - {0})
+
+
+def _joint(moved: int, target: int, top: bool) -> tuple[int, ...]:
+    return (moved, 0, int(top)) if target == 0 else (moved, target)
+
+
+def _name(slot: int) -> str:
+    return f"slot{slot}"
+
+
+def _renamed(line: Line, called: dict[str, str]) -> Line:
+    if isinstance(line, Attach):
+        return replace(line, moved=called[line.moved], target=called[line.target])
+    if isinstance(line, Squeeze):
+        first, second = called[line.first], called[line.second]
+        return replace(line, moved=called[line.moved], first=first, second=second)
+    assert not isinstance(line, Cuboid)
+    return replace(line, moved=called[line.moved])

@@ -1,0 +1,131 @@
+"""Lines of ShapeAssembly programs as 63 numbers each, and back to what they choose (shapeassembly §6.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.program import AXES, BBOX, FACES, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
+
+__all__ = [
+    "ALIGNED",
+    "ATTACH",
+    "AXIS",
+    "COMMAND",
+    "COPIES",
+    "COPIES_UNIT",
+    "CUBOID",
+    "DIMS",
+    "FACE",
+    "INDICES",
+    "POINTS",
+    "REFLECT",
+    "SLOTS",
+    "SQUEEZE",
+    "START",
+    "STOP",
+    "TRANSLATE",
+    "UV",
+    "WIDTH",
+    "NodeLines",
+    "node_lines",
+]
+
+START, STOP, CUBOID, ATTACH, SQUEEZE, TRANSLATE, REFLECT = range(7)
+Rows = npt.NDArray[np.float32]
+
+SLOTS = 11
+"""The cuboids that a line may name: the bounding box, and ten in the order of their declarations."""
+
+COMMAND, INDICES = slice(0, 7), slice(7, 40)
+DIMS, POINTS, AXIS, COPIES, FACE, UV, ALIGNED = (
+    slice(40, 43), slice(43, 49), slice(49, 52), slice(52, 54), slice(54, 60), slice(60, 62), slice(62, 63),
+)  # fmt: skip
+WIDTH = 63
+COPIES_UNIT = 10.0
+"""Copies are counted in tens, so that they weigh like the other numbers."""
+
+
+@dataclass(frozen=True)
+class NodeLines:
+    """One assembly, without the line of its bounding box.
+
+    numbers: float32 (lines + 1, 63), the last line being STOP; children: int64 (lines + 1,), the number of the
+    assembly that expands the cuboid of the line, counted within the program, root first, breadth first; or -1;
+    box: float64 (3,), the sizes of the bounding box; parent, line: of the assembly and the line that it expands, -1
+    for the root.
+    """
+
+    numbers: Rows
+    children: np.ndarray
+    box: FloatArray
+    parent: int
+    line: int
+
+
+def node_lines(program: Program) -> list[NodeLines]:
+    """The assemblies of a program, root first, breadth first.
+
+    Raises ProgramError where an assembly has more than ten cuboids, names cuboids that no line declares (copies among
+    them), or is expanded twice.
+    """
+    found: list[NodeLines] = []
+    ahead = [(program.root, -1, -1)]
+    seen = {program.root.name}
+    for number, (block, parent, line) in enumerate(ahead):
+        children = np.full(len(block.lines) + 1, -1)
+        for place, each in enumerate(block.lines):
+            below = program.named.get(each.name) if isinstance(each, Cuboid) else None
+            if below is not None:
+                if below.name in seen:
+                    raise ProgramError("expanded twice", f"{below.name} stands for two cuboids; give each its own")
+                seen.add(below.name)
+                children[place] = len(ahead)
+                ahead.append((below, number, place))
+        found.append(NodeLines(_numbers(block), children, np.array(block.bbox.dims), parent, line))
+    return found
+
+
+def _numbers(block: Block) -> Rows:
+    slots = {name: slot for slot, name in enumerate([BBOX, *(each.name for each in block.cuboids)])}
+    if len(slots) > SLOTS:
+        raise ProgramError("too many cuboids", f"{block.name} has {len(slots) - 1}, at most {SLOTS - 1} are learnt")
+    numbers = np.zeros((len(block.lines) + 1, WIDTH), np.float32)
+    for row, line in zip(numbers, block.lines, strict=False):
+        for place, name in enumerate(_named(line)):
+            if name not in slots:
+                raise ProgramError("names a copy", f"{block.name}: {name!r} is made by no Cuboid line")
+            row[INDICES.start + SLOTS * place + slots[name]] = 1
+        _fill(row, line)
+    numbers[-1, STOP] = 1
+    return numbers
+
+
+def _named(line: Line) -> Iterator[str]:
+    if isinstance(line, Cuboid):
+        return
+    yield line.moved
+    if isinstance(line, Attach):
+        yield line.target
+    elif isinstance(line, Squeeze):
+        yield from (line.first, line.second)
+
+
+def _fill(row: Rows, line: Line) -> None:
+    if isinstance(line, Cuboid):
+        row[CUBOID], row[DIMS], row[ALIGNED] = 1, line.dims, line.aligned
+    elif isinstance(line, Attach):
+        row[ATTACH], row[POINTS] = 1, (*line.source, *line.goal)
+    elif isinstance(line, Squeeze):
+        row[SQUEEZE], row[UV] = 1, (line.u, line.v)
+        row[FACE.start + FACES.index(line.face)] = 1
+    elif isinstance(line, Reflect):
+        row[REFLECT] = row[AXIS.start + AXES.index(line.axis)] = 1
+    else:
+        row[TRANSLATE] = row[AXIS.start + AXES.index(line.axis)] = 1
+        row[COPIES] = (line.copies / COPIES_UNIT, line.distance)

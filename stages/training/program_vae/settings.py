@@ -1,0 +1,26 @@
+"""What the config says of a model that writes ShapeAssembly programs."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from stages.training.entry import KitModelEntry, Source
+
+__all__ = ["ProgramVaeEntry"]
+
+
+class ProgramVaeEntry(KitModelEntry):
+    """A hierarchical sequence VAE of ShapeAssembly programs (shapeassembly §6). Its kits are the names of
+    `shapeassembly.programs` and `shapeassembly.hierarchies`."""
+
+    learns_from: ClassVar[Source] = "programs"
+
+    kind: Literal["program_vae"] = Field(description="a variational autoencoder of ShapeAssembly programs")
+    latent: int = Field(256, ge=1, le=4096, description="dimensions of the latent space, and of the code of a node")
+    hidden: int = Field(256, ge=2, le=8192, description="size of the GRUs and of the layers of the line decoder")
+    number_weight: float = Field(
+        50.0, ge=0, le=10_000, description="weight of the absolute error of numbers, beside the nats of choices"
+    )
+    kl_weight: float = Field(0.1, ge=0, le=10, description="weight of the divergence from the prior, in nats")

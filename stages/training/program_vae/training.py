@@ -1,0 +1,167 @@
+"""How a model of ShapeAssembly programs learns: teacher forcing; only what a line has counts (shapeassembly §6.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Generator, Tensor
+from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
+
+from pipeline.places import file_digest
+from pipeline.stage import Outcome, Task
+from stages.training.loop import device_of
+from stages.training.program_vae.batches import Level, Programs, batches
+from stages.training.program_vae.corpus import prepare_corpus, read_corpus
+from stages.training.program_vae.lines import (
+    ALIGNED,
+    ATTACH,
+    AXIS,
+    COMMAND,
+    COPIES,
+    CUBOID,
+    DIMS,
+    FACE,
+    INDICES,
+    POINTS,
+    REFLECT,
+    SLOTS,
+    SQUEEZE,
+    TRANSLATE,
+    UV,
+)
+from stages.training.program_vae.model import ProgramVae, sizes_of
+from stages.training.program_vae.settings import ProgramVaeEntry
+
+__all__ = ["ProgramVaeLearner", "entry", "learner", "new_model", "prepare"]
+
+NAMED = {ATTACH: 2, SQUEEZE: 3, TRANSLATE: 1, REFLECT: 1}
+"""How many cuboids a line of each command names."""
+
+
+def prepare(task: Task) -> Outcome:
+    """The programs of a category, as numbers."""
+    return prepare_corpus(task)
+
+
+def entry(settings: Mapping[str, Any]) -> ProgramVaeEntry:
+    """The entry whose JSON is `settings`."""
+    return ProgramVaeEntry.model_validate(settings)
+
+
+def learner(task: Task, entry: ProgramVaeEntry, seed: int) -> ProgramVaeLearner:
+    """A model with fresh weights beside the programs of its category."""
+    data = task.shard.params["data"]
+    described, programs = read_corpus(task, data)
+    sources: dict[str, Path] = {
+        split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
+    }
+    header = {"counts": described["counts"], "data": {split: file_digest(path) for split, path in sources.items()}}
+    module = new_model(entry, seed).to(device_of(entry.device))
+    return ProgramVaeLearner(module, header, entry, programs["train"], programs["val"])
+
+
+def new_model(entry: ProgramVaeEntry, seed: int) -> ProgramVae:
+    """A model with random weights, by its seed alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return ProgramVae(entry)
+
+
+@dataclass(frozen=True)
+class ProgramVaeLearner:
+    """The `Learner` of a model of programs."""
+
+    module: ProgramVae
+    header: Mapping[str, Any]
+    entry: ProgramVaeEntry
+    train: Programs
+    val: Programs
+
+    def batches(self, rng: np.random.Generator) -> Iterator[list[Level]]:
+        """Random batches of train, one pass after another."""
+        device = next(self.module.parameters()).device
+        while True:
+            for levels in batches(self.train, self.entry.batch, rng):
+                yield [level.to(device) for level in levels]
+
+    def losses(self, batch: Sequence[Level], step: int, noise: Generator) -> dict[str, Tensor]:
+        """Means over programs: nats of what lines choose, absolute errors of their numbers, and the divergence from
+        the prior."""
+        mean, log_variance = self.module.encode(batch)
+        spread = torch.randn(mean.shape, generator=noise, device=mean.device)
+        codes = mean + torch.exp(0.5 * log_variance) * spread
+        divergence = 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum() / len(mean)
+        nats, errors = (each / len(mean) for each in reconstruction(self.module, batch, codes))
+        loss = nats + self.entry.number_weight * errors + self.entry.kl_weight * divergence
+        return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
+
+    def validate(self, noise: Generator) -> dict[str, float]:
+        """The same on val."""
+        sums: dict[str, float] = {}
+        device = next(self.module.parameters()).device
+        for levels in batches(self.val, self.entry.batch, None):
+            found = self.losses([level.to(device) for level in levels], 0, noise)
+            for name, value in found.items():
+                sums[name] = sums.get(name, 0.0) + float(value) * len(levels[0].lines) / len(self.val)
+        return sums
+
+
+def reconstruction(module: ProgramVae, levels: Sequence[Level], codes: Tensor) -> tuple[Tensor, Tensor]:
+    """Sums over all programs, whose roots have `codes`: nats of choices, and absolute errors of numbers."""
+    nats = codes.new_zeros(())
+    errors = (module.root_box(codes) - levels[0].boxes).abs().sum()
+    for depth, level in enumerate(levels):
+        states, _ = module.write(level.shown, module.start(codes))
+        more = _line_losses(module, level, states)
+        nats, errors = nats + more[0], errors + more[1]
+        row, line = (level.lines[..., CUBOID] > 0).nonzero(as_tuple=True)
+        flags, below = module.lines.child(states[row, line], level.lines[row, line, DIMS], codes[row])
+        expanded = level.expanded[row, line]
+        nats = nats + binary_cross_entropy_with_logits(flags.float(), expanded.float(), reduction="sum")
+        if depth + 1 < len(levels):
+            # Rows and lines are in one order here and in the level below.
+            codes = below[expanded]
+    return nats, errors
+
+
+def _line_losses(module: ProgramVae, level: Level, states: Tensor) -> tuple[Tensor, Tensor]:
+    """Nats and errors of all lines of a level, summed."""
+    heads = module.lines
+    row, line = level.there.nonzero(as_tuple=True)
+    lines, boxes, sizes, state = level.lines[row, line], level.boxes[row], level.sizes[row], states[row, line]
+    commands = lines[:, COMMAND]
+    kind = commands.argmax(dim=-1)
+    nats = _nats(heads.command(state, boxes), kind)
+    errors = nats.new_zeros(())
+    slots = lines[:, INDICES].view(-1, 3, SLOTS)
+    named = torch.tensor([NAMED.get(each, 0) for each in range(7)], device=kind.device)[kind]
+    logits = heads.indices(state[named > 0], commands[named > 0])
+    for place in range(3):
+        at = named > place
+        nats = nats + _nats(logits[at[named > 0], place], slots[at, place].argmax(dim=-1))
+    at = kind == CUBOID
+    dims, aligned = heads.cuboid(state[at], boxes[at])
+    nats = nats + binary_cross_entropy_with_logits(aligned.float(), lines[at, ALIGNED][:, 0], reduction="sum")
+    errors = errors + (dims - lines[at, DIMS]).abs().sum()
+    at = kind == ATTACH
+    two = slots[at, :2]
+    errors = errors + (heads.attach(state[at], two, sizes_of(two, sizes[at])) - lines[at, POINTS]).abs().sum()
+    at = kind == SQUEEZE
+    faces, place_on = heads.squeeze(state[at], slots[at], sizes_of(slots[at], sizes[at]))
+    nats = nats + _nats(faces, lines[at, FACE].argmax(dim=-1))
+    errors = errors + (place_on - lines[at, UV]).abs().sum()
+    at = (kind == TRANSLATE) | (kind == REFLECT)
+    one = slots[at, 0]
+    axes, copies = heads.symmetry(state[at], one, sizes_of(one[:, None], sizes[at])[:, 0], boxes[at])
+    nats = nats + _nats(axes, lines[at, AXIS].argmax(dim=-1))
+    translated = kind[at] == TRANSLATE
+    return nats, errors + (copies[translated] - lines[at, COPIES][translated]).abs().sum()
+
+
+def _nats(logits: Tensor, chosen: Tensor) -> Tensor:
+    return cross_entropy(logits.float(), chosen, reduction="sum")
