@@ -7,7 +7,17 @@ from eval.subject import Subject
 from stages.shape.collection.declared import language_of, producers
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["CORPUS", "EDGE_CATEGORIES", "FINISHED", "KITS", "RECOVERY", "SEARCH", "STRING_VAE"]
+__all__ = [
+    "CORPUS",
+    "EDGE_CATEGORIES",
+    "FINISHED",
+    "KITS",
+    "PROGRAMS",
+    "PROGRAM_VAE",
+    "RECOVERY",
+    "SEARCH",
+    "STRING_VAE",
+]
 
 
 def _finished(subject: Subject) -> str:
@@ -53,6 +63,16 @@ def _trained(kind: str, what: str) -> Need:
 STRING_VAE = _trained("string_vae", "string VAE")
 EDGE_CATEGORIES = _trained("edge_categories", "model of edge categories")
 RECOVERY = _trained("recovery", "recovery model")
+PROGRAM_VAE = _trained("program_vae", "model of ShapeAssembly programs")
+
+
+def _programs(subject: Subject) -> str:
+    root = subject.places.stage("shapeassembly").root
+    return "" if any(root.glob("*-train-*.tar")) else f"the programs are not in {root}; make shapeassembly"
+
+
+PROGRAMS = Need("ShapeAssembly programs", _programs)
+"""The mill's folder holds the programs that models have learnt from."""
 
 
 def _corpus(subject: Subject) -> str:

@@ -1,0 +1,80 @@
+"""Metrics of programs on cases whose figures are known, and the table of a dataset."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from eval.nearest import nearest
+from eval.programs import (
+    POINTS,
+    clouds_of,
+    editability_table,
+    novelty,
+    physics_of,
+    quality_table,
+    smoothness,
+    smoothness_table,
+    variability,
+    variability_table,
+)
+from stages.shapeassembly import parse
+from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.program_vae.trained import TrainedProgramVae
+from stages.training.program_vae.training import new_model
+from tests.stages.training.program_vae.test_lines import BOX, STOOL
+
+FALLS = """Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) foot = Cuboid(0.1, 0.5, 0.1, True)
+top = Cuboid(1.0, 0.1, 0.1, True) attach(foot, bbox, 0.5, 0.0, 0.5, 0.05, 0.0, 0.5)
+attach(top, foot, 0.05, 0.0, 0.5, 0.5, 1.0, 0.5) }"""
+FLOATS = (
+    BOX[:-1].replace("c =", "d = Cuboid(0.2, 0.2, 0.2, True) c =") + "attach(d, bbox, 0.5, 1.0, 0.5, 0.5, 1.0, 0.5) }"
+)
+PROGRAMS = [parse(text) for text in (BOX, STOOL)]
+
+
+def test_nearest_is_the_nearest_by_trees() -> None:
+    rng = np.random.default_rng(0)
+    clouds, others = rng.normal(size=(6, 40, 3)), rng.normal(size=(9, 30, 3)) * 1.5
+
+    def chamfer(one: np.ndarray, other: np.ndarray) -> float:
+        return float(cKDTree(one).query(other)[0].mean() + cKDTree(other).query(one)[0].mean()) / 2
+
+    table = np.array([[chamfer(one, other) for other in others] for one in clouds])
+    np.testing.assert_allclose(nearest(clouds, others, False), table.min(axis=1))
+    own = np.array([[chamfer(one, other) for other in clouds] for one in clouds]) + np.diag([1e9] * 6)
+    np.testing.assert_allclose(nearest(clouds, clouds, True), own.min(axis=1))
+
+
+def test_physics_counts_what_is_rooted_and_what_of_it_stays_up() -> None:
+    """The stool has two legs in a line."""
+    found = physics_of([*PROGRAMS, parse(FALLS), parse(FLOATS)])
+    assert (found.rooted, found.stable) == (75, 25)
+
+
+def test_a_cloud_lies_on_the_surface_and_what_train_has_is_not_new() -> None:
+    (cloud,) = clouds_of(PROGRAMS[:1])
+    assert cloud.shape == (POINTS, 3)
+    np.testing.assert_allclose(np.abs(cloud - [0, -0.25, 0]).max(axis=1), 0.25)
+    assert novelty(PROGRAMS, PROGRAMS[:1]) == 50
+    clouds = clouds_of(PROGRAMS)
+    found = variability(PROGRAMS, clouds, clouds[:1])
+    assert (found.generalization, found.coverage, found.leaf_parts) == (0, 0, 4)
+    assert found.variety > 0.05
+    assert variability(PROGRAMS, clouds, None).coverage == ""
+
+
+def test_steps_between_points_are_measured_and_tables_hold_the_published_rows() -> None:
+    entry = ProgramVaeEntry(name="tiny", kind="program_vae", latent=8, hidden=16)
+    module = new_model(entry, 0)
+    model = TrainedProgramVae(module.eval(), {"settings": entry.model_dump()})
+    smooth = smoothness(model, 2, 5, np.random.default_rng(0))
+    assert smooth[0] >= 0
+    tables = [
+        quality_table({"a": physics_of(PROGRAMS)}, {"a": 12.5}),
+        editability_table({"a": PROGRAMS}),
+        variability_table({"a": variability(PROGRAMS, clouds_of(PROGRAMS), None)}, {"a": 50.0}),
+        smoothness_table({"a": smooth}),
+    ]
+    assert [len(each.published) for each in tables] == [12, 12, 12, 6]
+    assert all("chair, ShapeAssembly" in each.markdown() for each in tables)
