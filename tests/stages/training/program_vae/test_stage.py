@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from eval.__main__ import main as evaluate
 from stages.shapeassembly import parse
 from stages.training.program_vae.trained import load_program_vae
 from tests.mill import mill
@@ -23,7 +24,7 @@ def test_a_model_of_programs_is_trained_and_read_again(tmp_path: Path) -> None:
         for number in range(2):
             text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
             (tmp_path / "programs" / f"{path.stem}-{number}.txt").write_text(text)
-    model = {"name": "tiny", "kind": "program_vae", "latent": 8, "hidden": 16, "batch": 4, "steps": 3, "rounds": 2}
+    model = {"name": "tiny", "kind": "program_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 30, "rounds": 2}
     sections = {
         "shapeassembly": {
             "programs": [{"name": "furniture", "path": str(tmp_path / "programs")}],
@@ -45,3 +46,7 @@ def test_a_model_of_programs_is_trained_and_read_again(tmp_path: Path) -> None:
     again = [trained.decode(points, reject=False) for _ in range(2)]
     assert again[0] == again[1]
     assert np.isfinite(points).all()
+    asked = ["--config", str(config), "--out", str(out), "--samples", "2", "--sequences", "1", "--steps", "4"]
+    assert evaluate(["shapeassembly", *asked]) == 0
+    table = (out / "toy-eval/shapeassembly.md").read_text()
+    assert all(row in table for row in ("tiny-furniture-0", "furniture, val", "storage, ShapeAssembly"))
