@@ -23,7 +23,7 @@ from stages.shape.collection.origin import unstated
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
-from stages.shapeassembly.checks import overflow, violations
+from stages.shapeassembly.checks import overflow, reaching_out, violations
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
 from stages.shapeassembly.interpreter import execute
@@ -156,6 +156,9 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
         broken = violations(program)
         if broken:
             raise Rejected(broken[0].rule, str(broken[0]))
+        for block in program.blocks:
+            for name in reaching_out(block):
+                raise Rejected("reaches out of its assembly", f"{name} of {block.name}")
     weak = unmet(config.require, shape_of_execution(execution))
     if weak is not None:
         raise Rejected(weak)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.checks import RULES, overflow, violations
+from stages.shapeassembly.checks import RULES, overflow, reaching_out, violations
 from stages.shapeassembly.program import Program
 from tests.stages.shapeassembly.strategies import programs
 
@@ -78,3 +78,11 @@ def test_overflow_is_a_share_of_the_bounding_box() -> None:
     assert overflow(inside, execute(inside)) == 0
     outside = parse(ONE + "attach(a, bbox, 0.5, 0.0, 0.5, 1.0, 0.0, 0.5) }")
     assert overflow(outside, execute(outside)) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(("x", "beyond"), [(0.83, []), (0.87, ["c", "cube1"])])
+def test_cuboids_and_copies_may_reach_out_of_their_assembly_by_a_tenth(x: float, beyond: list[str]) -> None:
+    """The box is 1 wide, the cuboid 0.5: its side comes to x + 0.25."""
+    text = f"""Assembly P {{ bbox = Cuboid(1.0, 1.0, 1.0, True) c = Cuboid(0.5, 0.5, 0.5, True)
+    attach(c, bbox, 0.5, 0.0, 0.5, {x}, 0.0, 0.5) reflect(c, X) }}"""
+    assert reaching_out(parse(text).root) == beyond
