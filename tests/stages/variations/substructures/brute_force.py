@@ -1,0 +1,158 @@
+"""Every replacement in a small graph by trying all: an oracle that shares no idea with the code that it judges.
+
+A piece is a connected set of nodes whose cut edges follow each other in one cycle, walking round its border. Two can
+take each other's place if, walking round both outsides at once, from cut edge to cut edge, the same is met: nodes of
+the same types with as many docking sites. Less is asked where only the nodes at the cut must be the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
+from tests.stages.variations.substructures.graphs import code
+
+Orders = list[list[int]]
+Cut = tuple[int, int]
+"""A cut edge: the node inside and that outside."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """inside: its nodes; cuts: its cut edges in the order of the walk; outsides: for each cut edge what is met outside
+    from there to the next cut edge, and at which place of the walk that one is."""
+
+    inside: frozenset[int]
+    cuts: tuple[Cut, ...]
+    outsides: tuple[tuple[tuple[int, ...], int], ...]
+
+
+def orders_of(graph: OrderedGraph) -> Orders:
+    return [graph.neighbours(node) for node in range(len(graph.types))]
+
+
+def results(graph: OrderedGraph, giver: OrderedGraph, *, same_outside: bool) -> set[tuple[tuple[int, ...], ...]]:
+    """The codes of all that comes of replacing a piece of the graph by one of the giver, where that is simple."""
+    found = set()
+    theirs = list(pieces(giver))
+    for piece in pieces(graph):
+        for other in theirs:
+            if len(other.cuts) == len(piece.cuts):
+                for turn in range(len(piece.cuts)):
+                    if matches(graph, giver, piece, other, turn, same_outside=same_outside):
+                        made = replaced(graph, giver, piece, other, turn)
+                        if made is not None:
+                            found.add(code(made))
+    return found
+
+
+def is_piece(graph: OrderedGraph, inside: np.ndarray) -> bool:
+    """Whether some nodes, bool (n,), are a piece."""
+    chosen = frozenset(np.flatnonzero(inside).tolist())
+    return any(each.inside == chosen for each in pieces(graph))
+
+
+def pieces(graph: OrderedGraph) -> Iterator[Piece]:
+    """All pieces of a graph but the whole."""
+    orders = orders_of(graph)
+    types = graph.types.tolist()
+    n = len(types)
+    for mask in range(1, (1 << n) - 1):
+        inside = frozenset(node for node in range(n) if mask >> node & 1)
+        if _is_connected(orders, inside):
+            cuts = _round(orders, inside)
+            if len(cuts) == sum(other not in inside for node in inside for other in orders[node]):
+                yield Piece(inside, cuts, tuple(_outside(types, orders, inside, cuts, cut) for cut in cuts))
+
+
+def _is_connected(orders: Orders, nodes: frozenset[int]) -> bool:
+    seen, waiting = set(), [min(nodes)]
+    while waiting:
+        node = waiting.pop()
+        if node not in seen:
+            seen.add(node)
+            waiting.extend(other for other in orders[node] if other in nodes)
+    return seen == nodes
+
+
+def _after(orders: Orders, node: int, other: int) -> int:
+    around = orders[node]
+    return around[(around.index(other) + 1) % len(around)]
+
+
+def _round(orders: Orders, inside: frozenset[int]) -> tuple[Cut, ...]:
+    """One cycle of cut edges, from the first there is."""
+    first = next((node, other) for node in sorted(inside) for other in orders[node] if other not in inside)
+    cuts, at = [first], first
+    while True:
+        node, other = at[0], _after(orders, *at)
+        while other in inside:
+            node, other = other, _after(orders, other, node)
+        at = node, other
+        if at == first:
+            return tuple(cuts)
+        cuts.append(at)
+
+
+def _outside(
+    types: list[int], orders: Orders, inside: frozenset[int], cuts: tuple[Cut, ...], cut: Cut
+) -> tuple[tuple[int, ...], int]:
+    back, node = cut
+    met = [types[node], len(orders[node])]
+    while True:
+        ahead = _after(orders, node, back)
+        if ahead in inside:
+            return tuple(met), cuts.index((ahead, node))
+        back, node = node, ahead
+        met += [types[node], len(orders[node])]
+
+
+def matches(
+    graph: OrderedGraph, giver: OrderedGraph, piece: Piece, other: Piece, turn: int, *, same_outside: bool
+) -> bool:
+    """Whether the same is met outside both, or at least at the cuts; a node there always stands for the same one."""
+    count = len(piece.cuts)
+    stands_for: dict[int, tuple[int, int]] = {}
+    for place in range(count):
+        met, ahead = piece.outsides[place]
+        met_there, ahead_there = other.outsides[(place + turn) % count]
+        if met[:2] != met_there[:2]:
+            return False
+        if same_outside and (met != met_there or (ahead + turn) % count != ahead_there):
+            return False
+        (inner, node), (inner_there, node_there) = piece.cuts[place], other.cuts[(place + turn) % count]
+        around, around_there = graph.neighbours(node), giver.neighbours(node_there)
+        shift = (around_there.index(inner_there) - around.index(inner)) % len(around)
+        if stands_for.setdefault(node, (node_there, shift)) != (node_there, shift):
+            return False
+    return len({there for there, _ in stands_for.values()}) == len(stands_for)
+
+
+def replaced(graph: OrderedGraph, giver: OrderedGraph, piece: Piece, other: Piece, turn: int) -> OrderedGraph | None:
+    """The graph with the other piece for the first, or None where that is no simple graph."""
+    count = len(piece.cuts)
+    place_of = {node: place for place, node in enumerate(sorted(set(range(len(graph.types))) - piece.inside))}
+    place_there = {node: len(place_of) + place for place, node in enumerate(sorted(other.inside))}
+    there = {cut: other.cuts[(place + turn) % count] for place, cut in enumerate(piece.cuts)}
+    here = {cut: own for own, cut in there.items()}
+    types = [int(graph.types[node]) for node in place_of] + [int(giver.types[node]) for node in place_there]
+    orders = [
+        [
+            place_there[there[each, node][0]] if each in piece.inside else place_of[each]
+            for each in graph.neighbours(node)
+        ]
+        for node in place_of
+    ]
+    orders += [
+        [
+            place_there[each] if each in other.inside else place_of[here[node, each][1]]
+            for each in giver.neighbours(node)
+        ]
+        for node in place_there
+    ]
+    if any(len(set(each)) < len(each) for each in orders):
+        return None
+    return ordered_graph(types, orders)

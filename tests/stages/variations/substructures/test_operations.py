@@ -1,0 +1,151 @@
+"""All replacements, and nothing but replacements, against brute force on small graphs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.variations.substructures.operations import find_operations
+from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
+from stages.variations.substructures.replacement import piece_of, repeated_boundary, replace_piece
+from tests.stages.variations.substructures import brute_force
+from tests.stages.variations.substructures.graphs import code, grid, is_connected, path, random_graph, ring
+
+Code = tuple[tuple[int, ...], ...]
+
+
+def made(base: OrderedGraph, giver: OrderedGraph, violations: int = 0) -> dict[Code, OrderedGraph]:
+    """The connected results of all operations, both ways within one graph, by their codes; without the base."""
+    operations = find_operations(base, giver, violations)
+    found: dict[Code, OrderedGraph] = {}
+    for number in range(len(operations)):
+        boundary = operations.boundary(number)
+        for turned in (boundary, boundary[:, ::-1]) if base is giver else (boundary,):
+            result = replace_piece(base, giver, turned)
+            if result is not None and is_connected(result.graph):
+                found.setdefault(code(result.graph), result.graph)
+    found.pop(code(base), None)
+    return found
+
+
+def composed(base: OrderedGraph, giver: OrderedGraph, wanted: set[Code], steps: int) -> set[Code]:
+    """Those of the wanted codes that no sequence of so many operations makes."""
+    known = made(base, giver)
+    fresh, left = list(known.values()), wanted - set(known)
+    for _ in range(steps - 1):
+        if not left:
+            break
+        later: list[OrderedGraph] = []
+        for graph in fresh:
+            for other in {id(giver): giver, id(base): base}.values():
+                later += [each for key, each in made(graph, other).items() if key not in known]
+                known.update({code(each): each for each in later})
+        fresh, left = later, left - set(known)
+    return left
+
+
+def pair_of(seed: int, most: int) -> tuple[OrderedGraph, OrderedGraph]:
+    rng = np.random.default_rng(seed)
+    base = random_graph(rng, most)
+    return base, base if rng.random() < 0.6 else random_graph(rng, most)
+
+
+def check(base: OrderedGraph, giver: OrderedGraph) -> int:
+    """Hold all operations of two graphs against brute force; how many results brute force has."""
+    wanted = brute_force.results(base, giver, same_outside=True) - {code(base)}
+    assert not composed(base, giver, wanted, 2)
+    plain = brute_force.results(base, giver, same_outside=False)
+    operations = find_operations(base, giver)
+    degree = max(int(np.diff(each.starts).max()) for each in (base, giver))
+    assert len(operations) <= degree * len(base.types) * len(giver.types)
+    seen = edge_types(base) | edge_types(giver)
+    for number in range(len(operations)):
+        boundary = operations.boundary(number)
+        result = replace_piece(base, giver, boundary)
+        if result is None or not is_connected(result.graph):
+            continue
+        assert edge_types(result.graph) <= seen
+        taken, piece = piece_of(base, boundary[:, 0]), piece_of(giver, boundary[:, 1])
+        if brute_force.is_piece(base, taken) and brute_force.is_piece(giver, piece):
+            assert code(result.graph) in plain
+    return len(wanted)
+
+
+def edge_types(graph: OrderedGraph) -> set[tuple[int, ...]]:
+    return {tuple(sorted(pair)) for pair in graph.types[graph.edges()].tolist()}
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_operations_of_small_graphs_are_those_of_brute_force(seed: int) -> None:
+    check(*pair_of(seed, 6))
+
+
+@pytest.mark.slow
+def test_operations_of_five_hundred_graphs_are_those_of_brute_force() -> None:
+    assert sum(check(*pair_of(seed, 7 if seed % 10 else 9)) for seed in range(1000, 1500)) > 300
+
+
+def test_a_chain_grows_and_shrinks_by_its_links() -> None:
+    lengths = {len(each.types) for each in made(path(0, 1, 1, 1, 0), path(0, 1, 1, 1, 0)).values()}
+    assert lengths >= {3, 4, 6, 7}
+
+
+def test_a_ring_of_one_type_takes_parts_of_a_longer_one() -> None:
+    assert code(ring(*[0] * 7)) in made(ring(*[0] * 5), ring(*[0] * 7))
+
+
+def test_a_dummy_edge_passes_over_an_arc_of_another_length() -> None:
+    short, long = ring(0, 1, 2, 3, 4, 5), ring(0, 1, 9, 8, 3, 4, 6)
+    wanted = code(ring(0, 1, 9, 8, 3, 4, 5))
+    assert wanted not in made(short, long)
+    assert wanted in made(short, long, 1)
+
+
+def test_a_dummy_edge_passes_over_a_missing_docking_site() -> None:
+    """Two rows of cells that differ at their ends, of which one lacks a stud in the middle."""
+
+    def row(*, stud: bool, end: int) -> OrderedGraph:
+        orders = [[1], [0, 2, 4] if stud else [0, 2], [1, 3], [2], *([[1]] if stud else [])]
+        return ordered_graph([0, 1, 2, end, *([5] if stud else [])], orders)
+
+    wanted = code(row(stud=True, end=4))
+    base, giver = row(stud=True, end=3), row(stud=False, end=4)
+    seeds = find_operations(base, giver, 1)
+    results = [replace_piece(base, giver, seeds.boundary(number)) for number in range(len(seeds))]
+    assert wanted in {code(each.graph) for each in results if each is not None and is_connected(each.graph)}
+
+
+@pytest.mark.parametrize("violations", [0, 1])
+def test_the_same_operation_is_listed_once(violations: int) -> None:
+    operations = find_operations(graph := grid(4, 3), graph, violations)
+    boundaries = [frozenset(map(tuple, operations.boundary(number).tolist())) for number in range(len(operations))]
+    assert len(set(boundaries)) == len(boundaries) > 10
+    turned = [frozenset((e, d) for d, e in each) for each in boundaries]
+    assert all(back not in boundaries or back == each for each, back in zip(boundaries, turned, strict=True))
+
+
+def test_a_recursive_rule_is_repeated() -> None:
+    chain = path(0, 1, 2, 1, 2, 1, 0)
+    operations = find_operations(chain, chain)
+    grown = set()
+    for number in range(len(operations)):
+        for boundary in (operations.boundary(number), operations.boundary(number)[:, ::-1]):
+            result = replace_piece(chain, chain, boundary)
+            types = []
+            for _ in range(3):
+                assert result is not None
+                types.append(tuple(result.graph.types.tolist()))
+                again = repeated_boundary(result, chain, boundary)
+                if again is None:
+                    break
+                result = replace_piece(result.graph, chain, again)
+            grown.add(tuple(types))
+    longer = tuple((0, *[1, 2] * count, 1, 0) for count in (3, 4, 5))
+    assert longer in {tuple(tuple(each) for each in row) for row in grown}
+
+
+def test_a_graph_that_is_no_graph_is_refused() -> None:
+    with pytest.raises(ValueError, match="node 0 has node 1 around it, but not the other way round"):
+        ordered_graph([0, 0], [[1], []])
+    with pytest.raises(ValueError, match="stands there twice"):
+        ordered_graph([0, 0], [[1, 1], [0]])
