@@ -26,6 +26,7 @@ __all__ = [
     "PARTS",
     "PIECE",
     "PLANES",
+    "REPLACED",
     "TRY",
     "UNKNOWNS",
     "UPRIGHT",
@@ -157,8 +158,9 @@ Outcome = _Outcomes()
 EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY, PIECE = 0, 1, 2, 3, 4, 5
 """Places in `Workspace.counts`: numbers of edges, unknown pairs, parts of the variant, boundary parts, tries so far
 and parts of the piece."""
-GROWN, PLANES, JOINTS, MEANINGS, NOTHING = 0, 1, 2, 3, 4
-"""Ways of cutting; by meanings is substitution, no cut of the exchange, and nothing is cut where shapes are grown."""
+GROWN, PLANES, JOINTS, MEANINGS, NOTHING, REPLACED = 0, 1, 2, 3, 4, 5
+"""Ways of cutting; by meanings is substitution, no cut of the exchange, and nothing is cut where shapes are grown; what
+is replaced is listed, not cut."""
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 """Contact answers that are no pair of labels: apart, never to be, not asked yet."""
 LABELS = 1 << 20

@@ -25,13 +25,14 @@ from stages.variations.growth.grower import Grower
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.checks import validate
 from stages.variations.kernels.graph_key import graph_key
-from stages.variations.kernels.layout import BOUNDARY, EDGES, MEANINGS, NOTHING, PARTS, UNKNOWNS, Outcome
+from stages.variations.kernels.layout import BOUNDARY, EDGES, MEANINGS, NOTHING, PARTS, REPLACED, UNKNOWNS, Outcome
 from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.search.steering import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.ground import GroundTest
 from stages.variations.substitution.substitute import substitute
+from stages.variations.substructures.replacer import Replacer
 
 __all__ = ["SPARE", "Search", "Variant"]
 
@@ -51,6 +52,11 @@ REASONS = {
 GROWN_REASONS = {
     Outcome.NO_MATCH: "growth given up",
     **{each: f"grown: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
+}
+REPLACED_REASONS = {
+    Outcome.NO_MATCH: "replaced: no rigid embedding",
+    Outcome.NOTHING_ATTACHED: "replaced: nothing but a gap to close",
+    **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
 }
 
 DUPLICATE = "duplicate"
@@ -103,7 +109,8 @@ class Search:
         self._ws = workspace(max(self.largest, *sizes))
         slotted = kit.grammar.strictness in SLOT_LEVELS
         self._slots = (slots or SlotGrammar(kit, answers.dockings, config.upright)) if slotted else None
-        self._grower = self._made_grower() if config.method != "exchange" else None
+        self._grower = self._made_grower() if config.method in ("both", "growth", "all") else None
+        self._replacer = self._made_replacer() if config.method in ("substructures", "all") else None
         self.archive = Archive(config.novelty.quota)
         by_meaning = len(kit.labels) < len(kit.types)
         self.steering = Steering(config, by_meaning)
@@ -162,6 +169,9 @@ class Search:
                     break
                 if choice.way == NOTHING:
                     variant, work = self._grow(rng)
+                    number += max(round(work / TRY_WORK), 1)
+                elif choice.way == REPLACED:
+                    variant, work = self._replace(rng, choice)
                     number += max(round(work / TRY_WORK), 1)
                 else:
                     number += 1
@@ -222,18 +232,47 @@ class Search:
                 if not correct_orientations(self.answers.dockings, ws):
                     return "orientation cannot be corrected"
                 outcome, key = complete(kit, known, ws, with_labels)
-        while outcome == Outcome.UNKNOWN:
-            if not self.answers.answer_unknown(ws, int(ws.counts[UNKNOWNS])):
-                outcome = Outcome.CLASH
-            else:
-                outcome, key = complete(kit, self.answers.table, ws, with_labels)
+        outcome, key = self._answered(outcome, key)
         if outcome != Outcome.OK:
             return REASONS[outcome]
         if choice.way == MEANINGS and not self._is_connected():
             return APART
+        method = "substitution" if choice.way == MEANINGS else "exchange"
+        return self._finished(int(key), *self._descent(method, a, b))
+
+    def _answered(self, outcome: int, key: int) -> tuple[int, int]:
+        """The outcome and key of a try that was completed, once all contacts are known that were not."""
+        while outcome == Outcome.UNKNOWN:
+            if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):
+                return Outcome.CLASH, 0
+            with_labels = self.config.duplicates == "docking"
+            outcome, key = complete(self.tables, self.answers.table, self._ws, with_labels)
+        return outcome, key
+
+    def _replace(self, rng: np.random.Generator, choice: Choice) -> tuple[Variant | str, float]:
+        """One replacement: a new variant, or the reason why there is none; and what it cost."""
+        assert self._replacer is not None, "no choice is to replace where the method forbids it"
+        ws = self._ws
+        outcome, work = self._replacer.replace(rng, choice.a, choice.b, ws)
+        if outcome != Outcome.OK:
+            return REPLACED_REASONS[outcome], work
+        with_labels = self.config.duplicates == "docking"
+        outcome, key = self._answered(*complete(self.tables, self.answers.table, ws, with_labels))
+        if outcome != Outcome.OK:
+            return f"replaced: {REASONS[outcome]}", work
+        if not self._replacer.is_joined(ws):
+            return "replaced: boundary contact lost", work
+        if not self._is_connected():
+            return APART, work
+        return self._finished(int(key), *self._descent("substructures", *self._replacer.parents)), work
+
+    def _descent(self, method: str, a: Parent, b: Parent) -> tuple[np.ndarray, dict[str, Any]]:
+        """The exemplar that each part of the variant in hand came from, int8 (n,), and its lineage, where a piece of A
+        was put into B."""
+        ws = self._ws
         from_b = int((ws.origin[: ws.counts[PARTS]] == 1).sum())
         lineage = {
-            "method": "substitution" if choice.way == MEANINGS else "exchange",
+            "method": method,
             "parents": [a.name, b.name],
             "parts_from": [int(ws.counts[PARTS]) - from_b, from_b],
             "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
@@ -244,7 +283,12 @@ class Search:
         for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
             at = placed[: len(parent.assembly)]
             origins[at[at >= 0]] = parent.origins[at >= 0]
-        return self._finished(int(key), origins, lineage)
+        return origins, lineage
+
+    def _made_replacer(self) -> Replacer:
+        by_docking = self.config.matching == "pose"
+        limits = self.smallest, self.largest
+        return Replacer(self.answers, self.tables, *limits, self.config.dummies, by_docking)
 
     def _made_grower(self) -> Grower:
         grown, limits = self.config.grown, (self.smallest, self.largest)

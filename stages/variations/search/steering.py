@@ -14,7 +14,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.variations.archive import Archive
-from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, NOTHING, PLANES
+from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, NOTHING, PLANES, REPLACED
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.settings import SearchConfig
 
@@ -28,6 +28,8 @@ of most other ancestry."""
 CHOICES = tuple((draw, *cut) for draw, cut in product(range(4), CUTS))
 SUBSTITUTIONS = tuple((draw, MEANINGS, False) for draw in range(4))
 """Choices beside these for kits whose types are told by meaning: no cut, but parts of some meanings."""
+REPLACEMENTS = tuple((draw, REPLACED, False) for draw in range(4))
+"""Choices for replacement: no cut either, but one of all pieces that can take each other's place."""
 GROWTH = (PLAIN, NOTHING, False)
 """The last choice: no parents, but a shape grown from nothing."""
 BATCH = 64
@@ -61,7 +63,12 @@ class Steering:
     def __init__(self, config: SearchConfig, by_meaning: bool = False) -> None:
         self.config = config
         exchanged = (*CHOICES, *SUBSTITUTIONS) if by_meaning else CHOICES
-        self.choices = exchanged if config.method == "exchange" else (*exchanged, GROWTH)
+        if config.method == "substructures":
+            exchanged = REPLACEMENTS
+        elif config.method == "all":
+            exchanged = (*exchanged, *REPLACEMENTS)
+        self._grows = config.method in ("both", "growth", "all")
+        self.choices = (*exchanged, GROWTH) if self._grows else exchanged
         self._exchanged = len(exchanged)
         self._gains = np.zeros(len(self.choices))
         self._work = np.zeros(len(self.choices))
@@ -106,7 +113,7 @@ class Steering:
         rates = np.where(possible, (self._gains[:end] + 1.0) / (self._work[:end] + 50.0), 0.0) ** 2
         explored: FloatArray = self.config.novelty.explore * possible / possible.sum()
         chances: FloatArray = explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()
-        if self.config.method == "exchange":
+        if not self._grows:
             return chances
         share = self._grown_share()
         return np.append(chances * (1.0 - share), share / self._cost())
@@ -122,11 +129,16 @@ class Steering:
         return max(self._grown_work / self._grown / TRY_WORK, 1.0)
 
     def _plain(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Choices by no experience: both methods get half of the work where both may be used."""
+        """Choices by no experience: growth gets half of the work where it is not the only method, and replacement a
+        tenth of the other tries."""
         if self.config.method == "growth":
             return np.full(count, self._exchanged)
+        if self.config.method == "substructures":
+            return np.zeros(count, dtype=np.int64)
         numbers = np.where(rng.random(count) < self.config.growth_share, 0, 1)
-        if self.config.method == "both":
+        if self.config.method == "all":
+            numbers[rng.random(count) < 0.1] = self._exchanged - len(REPLACEMENTS)
+        if self._grows:
             numbers[rng.random(count) < 1.0 / (1.0 + self._cost())] = self._exchanged
         return numbers
 

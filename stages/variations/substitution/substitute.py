@@ -28,7 +28,7 @@ from stages.variations.kernels.variant import inherit_edges, place_boxes
 from stages.variations.search.parents import Parent
 from stages.variations.substitution.pieces import Exchanged, draw_pieces
 
-__all__ = ["substitute"]
+__all__ = ["Docked", "find_motion", "put_together", "substitute"]
 
 AS_IT_STOOD = 0.5
 """How likely the piece is turned as little as may be; else as one of the dockings at the place turns it."""
@@ -53,14 +53,14 @@ def substitute(
         return Outcome.TOO_SMALL
     if parts > largest:
         return Outcome.TOO_LARGE
-    found = _motion(rng, kit.label_of, dockings, giver.assembly, base.assembly, exchanged)
+    found = find_motion(rng, kit.label_of, dockings, giver.assembly, base.assembly, exchanged)
     if found is None or (tables.up >= 0 and found[0][tables.up, tables.up] < UPRIGHT):
         return Outcome.NO_MATCH
-    _put_together(tables, giver, base, exchanged, *found, ws)
+    put_together(tables, giver, base, exchanged, *found, ws)
     return Outcome.OK
 
 
-def _motion(
+def find_motion(
     rng: np.random.Generator, label_of: TypeArray, dockings: DockingTable, giver: Assembly, base: Assembly,
     exchanged: Exchanged,
 ) -> tuple[FloatArray, Docked] | None:  # fmt: skip
@@ -139,7 +139,7 @@ def _fitted(dockings: DockingTable, giver: Assembly, docked: Docked) -> FloatArr
     return rigid_fit(np.concatenate(source), np.concatenate(target))
 
 
-def _put_together(
+def put_together(
     tables: KitTables, giver: Parent, base: Parent, exchanged: Exchanged, motion: FloatArray, docked: Docked,
     ws: Workspace,
 ) -> None:  # fmt: skip

@@ -15,6 +15,8 @@ __all__ = ["Operations", "find_operations"]
 
 MOST_DEFECTS = 64
 """Defects of one partial symmetry that dummy edges are tried on."""
+DUMMY_WORK = 10_000_000
+"""Darts looked at for symmetries with dummy edges, which are for sparse outliers: in dense graphs the rest is left."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +25,13 @@ class Operations:
 
     pairs: int64 (p, 2), darts of the first and of the second graph, each pointing from what stays into what is
     replaced; the rows of an operation are its boundary. A row (d, -1) or (-1, e) is a dart that a dummy edge passes
-    over: it loses what it points to. starts: int64 (k + 1,), the rows of each of k operations.
+    over: it loses what it points to. starts: int64 (k + 1,), the rows of each of k operations. whole: whether all dummy
+    edges that were allowed were tried, and not only as many as DUMMY_WORK is enough for.
     """
 
     pairs: np.ndarray
     starts: np.ndarray
+    whole: bool
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -48,8 +52,8 @@ def find_operations(a: OrderedGraph, b: OrderedGraph, violations: int = 0, by_do
     Without violations each is found from a pair of darts, so there are at most as many as pairs: O(k² n²), and in
     practice far below k n². A symmetry that meets no part twice is the same from all its pairs and is found once.
     """
-    pairs, starts = _enumerate(a, b, a is b, by_docking, violations)
-    return Operations(pairs, starts)
+    pairs, starts, work = _enumerate(a, b, a is b, by_docking, violations)
+    return Operations(pairs, starts, bool(work < DUMMY_WORK))
 
 
 @numba.njit(cache=True)
@@ -109,6 +113,7 @@ def _enumerate(a, b, same, by_docking, violations):
     filled = np.zeros(2, dtype=np.int64)
     stack = np.empty((256, violations, 4), dtype=np.int64)
     depths = np.empty(256, dtype=np.int64)
+    work = 0
     for trivial in range(2):
         for d in range(darts):
             for e in range(d + 1 if same else 0, other):
@@ -122,13 +127,17 @@ def _enumerate(a, b, same, by_docking, violations):
                     waiting -= 1
                     depth = depths[waiting]
                     dummies = stack[waiting, :depth].copy()
+                    if depth > 0:
+                        if work >= DUMMY_WORK:
+                            continue
+                        work += darts + other
                     _lay(a, b, d, e, by_docking, dummies, room, visited)
                     pairs, starts, table = _emit(a, b, same, by_docking, room, pairs, starts, table, filled)
-                    if depth < violations:
+                    if depth < violations and work < DUMMY_WORK:
                         for k in range(room[6][DEFECTS]):
                             stack, depths, waiting = _pass_over(a, b, room[5][k], dummies, stack, depths, waiting)
                         stack, depths, waiting = _jump(a, b, room, dummies, stack, depths, waiting)
-    return pairs[: filled[0]].copy(), starts[: filled[1] + 1, 0].copy()
+    return pairs[: filled[0]].copy(), starts[: filled[1] + 1, 0].copy(), work
 
 
 @numba.njit(cache=True)

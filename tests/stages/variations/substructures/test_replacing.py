@@ -1,0 +1,91 @@
+"""Replacement as a method of the search: all of small languages, and nothing that the others would refuse."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.kit import Kit
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.search.search import Search, Variant
+from stages.variations.settings import SearchConfig
+from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
+
+
+def replaced(kit: Kit, tries: int, **settings: object) -> tuple[Search, list[Variant]]:
+    line = Search(ContactAnswers(kit), SearchConfig.model_validate({"method": "substructures", **settings}))
+    found, _ = line.run(np.random.default_rng(0), tries, 10**9, "test", lambda count: None)
+    return line, found
+
+
+LINKS = {**CHAIN, "plate": with_arrow(box(0.7, 0.2, 0.8)), "block": with_arrow(box(1.6, 0.2, 0.8))}
+
+
+def row(*names: str) -> list[Placed]:
+    """Parts in a row along x, each against the one before."""
+    placed, end = [], 0.0
+    for name in names:
+        length = float(np.ptp(LINKS[name].vertices[:, 0]))
+        placed.append((name, pose(end + length / 2, 0, 0)))
+        end += length
+    return placed
+
+
+def test_replacement_finds_chains_that_are_shorter_and_longer_up_to_the_limits() -> None:
+    line, found = replaced(kit_of(CHAIN, [chain(3), chain(5)]), 3000, dummies=0)
+    assert (line.smallest, line.largest) == (2, 14)
+    assert {each.lineage["method"] for each in found} == {"substructures"}
+    assert {2, 4, 6, 8, 10, 12} <= {len(each.assembly) - 2 for each in found}
+
+
+def test_what_a_piece_held_together_makes_room_for_a_longer_one() -> None:
+    shapes = [row("cap", "link", "plate", "link", "link", "cap"), row("cap", "link", "link", "block", "link", "cap")]
+    kit = kit_of(LINKS, shapes)
+    _, found = replaced(kit, 1500, dummies=1)
+    names = [[kit.types[index].name for index in each.assembly.types] for each in found]
+    whole = [each for each, parts in zip(found, names, strict=True) if parts.count("link") == 3 and len(parts) == 6]
+    assert any(each.lineage["parts_from"] == [1, 5] for each in whole)
+
+
+def test_a_ring_that_no_rigid_piece_closes_is_not_made() -> None:
+    line, found = replaced(kit_of(ROAD, [ring(1, 1), ring(2, 3)]), 1000, largest=1.6)
+    assert found == []
+    assert line.rejects["replaced: no rigid embedding"] > 10
+
+
+def test_the_graphs_and_neighbourhoods_of_results_are_those_that_geometry_has() -> None:
+    kit = kit_of(
+        LINKS, [row("cap", "link", "plate", "link", "cap"), row("cap", "link", "block", "link", "link", "cap")]
+    )
+    contact = ContactTest(kit.types, kit.contact_tolerance)
+    _, found = replaced(kit, 1500)
+    assert len(found) >= 3
+    for variant in found:
+        assembly = variant.assembly
+        edges = contact.contacts(assembly.types, assembly.poses)
+        kinds = [contact.kind(*assembly.types[[i, j]].tolist(), _relative(assembly.poses, i, j)) for i, j in edges]
+        counted = edges[[kind in kit.contact_kinds for kind in kinds]]
+        np.testing.assert_array_equal(counted, assembly.edges)
+        for part, neighbours in enumerate(assembly.neighbours()):
+            assert assembly.multiset(neighbours) in kit.grammar.neighbourhoods[int(assembly.types[part])]
+
+
+def _relative(poses: np.ndarray, i: int, j: int) -> np.ndarray:
+    pose: np.ndarray = np.linalg.inv(poses[i]) @ poses[j]
+    return pose
+
+
+def test_replacement_is_the_same_every_time() -> None:
+    kit = kit_of(CHAIN, [chain(3), chain(5)])
+    runs = [replaced(kit, 800)[1] for _ in range(2)]
+    first, second = ([each.lineage for each in run] for run in runs)
+    assert first == second
+
+
+def test_replacement_feeds_one_pool_with_the_other_methods() -> None:
+    _, found = replaced(kit_of(CHAIN, [chain(3), chain(5)]), 4000, method="all", largest=3.0)
+    methods = Counter(each.lineage["method"] for each in found)
+    assert methods["substructures"]
+    assert len(methods) > 1
