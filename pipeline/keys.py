@@ -100,6 +100,8 @@ def _words(annotation: Any) -> str:
         return " or ".join(f"`{each}`" for each in arguments)
     if origin in (tuple, list):
         return f"list of {_words(arguments[0])}"
+    if origin is dict:
+        return f"names, each with {_words(arguments[1])}"
     if origin in (Union, types.UnionType):
         return " or ".join(dict.fromkeys(map(_words, arguments)))
     if annotation is type(None):

@@ -24,6 +24,7 @@ from stages.shape.shape import kit_shape
 from stages.variations.advice import what_keeps
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import backdrop_of
+from stages.variations.constraint import made_test, module_of
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
@@ -59,6 +60,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
                 f"{name}-lane{lane:02d}",
                 {"job": "lane", "kit": kit, "wanted": wanted},
                 (f"exemplars/{kit}", *found),
+                code=tuple(module_of(each) for each in config.require.constraints),
             )
             for lane in range(config.search.lanes)
         ]
@@ -127,6 +129,7 @@ def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequ
     telling = [each for each in variants if each.lineage["copied"]["largest"] <= require.copied]
     if len(telling) < len(variants):
         task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
+    telling = _constrained(task, kit, require, telling)
     fewest = _fewest_hubs(task.config, kit)
     if not (require.rooted or require.stable or fewest):
         return telling
@@ -139,6 +142,20 @@ def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequ
             kept.append(variant)
         else:
             task.reject(task.shard.name, weak)
+    return kept
+
+
+def _constrained(task: Task, kit: Kit, require: VariantRequirements, variants: list[Variant]) -> list[Variant]:
+    """The variants that meet the global constraints; the others are refused."""
+    if not require.constraints:
+        return variants
+    test, kept = made_test(kit, require.constraints), []
+    for variant in variants:
+        reason = test(variant.assembly)
+        if reason is None:
+            kept.append(variant)
+        else:
+            task.reject(task.shard.name, reason)
     return kept
 
 

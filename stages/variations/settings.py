@@ -171,6 +171,11 @@ class VariantRequirements(Requirements):
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
         "no bridge. `auto`: one, of a kit whose hubs were chosen and not stated.",
     )
+    constraints: dict[str, dict[str, tuple[str, ...]]] = Field(
+        default_factory=dict,
+        description="Global constraints, by name, with the labels of parts that each speaks of: `support: {}`, "
+        "`path: {entries: [...], exits: [...], through: [...]}`, or one in a file of your own.",
+    )
     copied: float = Field(
         1.0,
         gt=0,

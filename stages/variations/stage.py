@@ -14,6 +14,7 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.splits import shard_sizes
 from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
+from stages.variations.constraint import unknown_in
 from stages.variations.measures import described, growth
 from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
 from stages.variations.settings import VariationsConfig
@@ -68,7 +69,11 @@ def report(plan: Plan) -> Sequence[str]:
 
 
 def check(config: Config) -> None:
-    """Raises ConfigError where hubs are required that a kit does not put back: nothing would ever be kept."""
+    """Raises ConfigError for constraints that nobody knows, and where hubs are required that a kit does not put back:
+    nothing would ever be kept."""
+    wrong = unknown_in(config.section(VariationsConfig).require.constraints)
+    if wrong:
+        raise ConfigError(f"{config.path}: variations.require.constraints: {wrong}")
     if config.section(VariationsConfig).require.hubs in ("auto", 0):
         return
     for kit in config.section(ExemplarsConfig).kits:
