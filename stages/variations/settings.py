@@ -87,14 +87,14 @@ class SearchConfig(StrictModel):
         description="How variants are made: pieces of two shapes are exchanged (with `types: meaning` also parts that "
         "mean the same), shapes are grown part by part from what was seen around parts, or both, each given its share "
         "by what it finds; by replaceable substructures, where all pieces that can take each other's place are listed, "
-        "none missed; or all three.",
+        "not drawn by chance; or all three.",
     )
     dummies: int = Field(
         1,
         ge=0,
         le=3,
         description="Dummy edges of replaceable substructures: places where the boundaries of two pieces may differ by "
-        "a docking site or by a part. What is looked at grows exponentially with it.",
+        "a docking site or by a part. What is looked at grows exponentially with it, up to a limit in dense graphs.",
     )
     grown: GrownConfig = Field(default_factory=GrownConfig, description="What grown shapes are to be like.")
     growth_share: float = Field(

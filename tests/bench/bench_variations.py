@@ -23,6 +23,8 @@ from stages.variations.kernels.variant import place_boxes
 from stages.variations.search.search import Search
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from stages.variations.shared_surface import PackedShapes
+from stages.variations.substructures.operations import find_operations
+from stages.variations.substructures.sites import docking_graph
 from tests.bench.measure import Measure, rate
 
 SHIPPED = Path("datasets/exemplars")
@@ -54,10 +56,27 @@ def bench() -> Iterator[Measure]:
             tries = len(found) + sum(line.rejects.values())
             led = "led by the archive" if guided else "plain"
             yield Measure(f"new variants, {name}, {led}", "variants", ours, note=f"{len(found) / tries:.0%} of tries")
+        yield from _operations(name, kit, line)
         if "castle" in name or "dungeon" in name:
             yield _validation(name, kit, line, found[-20:])
             yield _relatives(name, kit, found[-200:])
             yield _copied(name, line, found[-20:])
+
+
+def _operations(name: str, kit: Kit, line: Search) -> Iterator[Measure]:
+    """Graphs of which all that can be replaced in them is listed, without dummy edges and with one."""
+    largest = max(kit.exemplars, key=lambda each: len(each.assembly)).assembly
+    labels = line.answers.dockings.label_edges(largest.types, largest.poses, largest.edges)
+    graph = docking_graph(kit, largest, labels)
+    for dummies in (0, 1):
+        count = len(find_operations(graph, graph, dummies, by_docking=True))
+
+        def graphs(dummies: int = dummies) -> int:
+            find_operations(graph, graph, dummies, by_docking=True)
+            return 1
+
+        note = f"{count} in {len(largest)} parts, {len(largest.edges)} contacts"
+        yield Measure(f"all replacements, {name}, dummies {dummies}", "graphs", rate(graphs, 1.0, 2), note=note)
 
 
 def _some(line: Search, rng: np.random.Generator, found: list[Assembly]) -> int:
