@@ -1,0 +1,121 @@
+"""Corners of feature lines with coordinate frames: what candidates for symmetries are aligned by (symmetry §4.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray
+
+__all__ = ["CornerFrames", "corner_frames"]
+
+CREASE = 0.4
+"""Radians between the normals at an edge from which on it is a feature line."""
+STRAIGHT = 0.2
+"""Sine of the angle of two feature lines from which on they make a corner."""
+MOST_LINES = 8
+"""Corners of more feature lines are no corners but tips of cones."""
+
+
+@dataclass(frozen=True)
+class CornerFrames:
+    """Right-handed frames in corners of feature lines, float64 (m, 4, 4): the first axis runs along a line, the second
+    lies in the plane of it and another.
+
+    kinds: float64 (m, 4): of a frame the angle of its lines, the turn of the surface at each, and the bend of the
+    corner; frames that a symmetry can align agree in them. lengths: float64 (m, 2), of the two edges.
+    """
+
+    frames: FloatArray
+    kinds: FloatArray
+    lengths: FloatArray
+
+
+def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
+    """The frames of triangles `corners` (f, 3, 3); points closer than about `tolerance` are one.
+
+    Of each corner those frames are taken whose kind is the first in order, all of them where several are equal.
+    """
+    places, vertices = _welded(corners, tolerance)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    edges, turns, outwards = _creases(places, normals)
+    ends = np.concatenate([edges, edges[:, ::-1]])
+    turns, outwards = np.concatenate([turns, turns]), np.concatenate([outwards, outwards])
+    ways = vertices[ends[:, 1]] - vertices[ends[:, 0]]
+    lengths = np.linalg.norm(ways, axis=1)
+    real = lengths > tolerance
+    ends, turns, outwards, ways, lengths = ends[real], turns[real], outwards[real], ways[real], lengths[real]
+    ways = ways / lengths[:, None]
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    first, second = _pairs(ends[order, 0])
+    first, second = order[first], order[second]
+    across = ways[second] - (ways[first] * ways[second]).sum(axis=1)[:, None] * ways[first]
+    sine = np.linalg.norm(across, axis=1)
+    bent = sine > STRAIGHT
+    first, second, across = first[bent], second[bent], across[bent] / sine[bent, None]
+    frames = np.zeros((len(first), 4, 4))
+    frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = ways[first], across, np.cross(ways[first], across)
+    frames[:, :3, 3], frames[:, 3, 3] = vertices[ends[first, 0]], 1.0
+    outward = outwards[first] + outwards[second]
+    kinds = np.column_stack(
+        [
+            (ways[first] * ways[second]).sum(axis=1),
+            turns[first],
+            turns[second],
+            (outward * frames[:, :3, 2]).sum(axis=1),
+        ]
+    )
+    kinds = np.round(kinds, 2) + 0.0
+    chosen = _first_of_corner(ends[first, 0], kinds)
+    return CornerFrames(frames[chosen], kinds[chosen], np.column_stack([lengths[first], lengths[second]])[chosen])
+
+
+def _welded(corners: FloatArray, tolerance: float) -> tuple[np.ndarray, FloatArray]:
+    """The vertex of each corner of each triangle, int64 (f, 3), and the vertices, float64 (v, 3)."""
+    points = corners.reshape(-1, 3)
+    _, first, place = np.unique(np.round(points / tolerance), axis=0, return_index=True, return_inverse=True)
+    return place.reshape(-1, 3), points[first]
+
+
+def _creases(places: np.ndarray, normals: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
+    """Edges at which the surface turns or ends, int64 (e, 2), how far it turns, in radians, -1 where it ends or more
+    than two triangles meet, and the sum of the normals there, float64 (e, 3)."""
+    sides = np.concatenate([places[:, [k, (k + 1) % 3]] for k in range(3)])
+    face = np.tile(np.arange(len(places)), 3)
+    low, high = sides.min(axis=1), sides.max(axis=1)
+    order = np.lexsort((face, high, low))
+    order = order[low[order] != high[order]]
+    low, high, face = low[order], high[order], face[order]
+    first = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])][: len(low)])
+    count = np.diff(np.r_[first, len(low)])
+    one, two = face[first], face[first + count - 1]
+    turn = np.arccos(np.clip((normals[one] * normals[two]).sum(axis=1), -1.0, 1.0))
+    turn[count != 2] = -1.0
+    crease = (turn > CREASE) | (count != 2)
+    edges = np.column_stack([low[first], high[first]])
+    return edges[crease], turn[crease], (normals[one] + normals[two])[crease]
+
+
+def _pairs(corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All ordered pairs of different places with one value in the sorted int64 (n,) `corner`, of values that occur at
+    most MOST_LINES times."""
+    first = np.flatnonzero(np.r_[True, corner[1:] != corner[:-1]][: len(corner)])
+    count = np.diff(np.r_[first, len(corner)])
+    count[count > MOST_LINES] = 0
+    start = np.repeat(first, count**2)
+    width = np.repeat(count, count**2)
+    number = np.arange(len(start)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
+    one, two = start + number // width, start + number % width
+    return one[one != two], two[one != two]
+
+
+def _first_of_corner(corner: np.ndarray, kinds: FloatArray) -> np.ndarray:
+    """The places of the frames of each corner with its first kind, ascending by corner."""
+    order = np.lexsort((*kinds.T[::-1], corner))
+    ordered = corner[order]
+    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]][: len(ordered)])
+    leader = np.repeat(order[starts], np.diff(np.r_[starts, len(order)]))
+    chosen: np.ndarray = order[(kinds[order] == kinds[leader]).all(axis=1)]
+    return chosen

@@ -1,0 +1,147 @@
+"""Which cells of a surface are symmetric under a motion, and which r-symmetric (symmetry §3.1, §4.1)."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.exemplars.symmetry.clip import cell_of
+from stages.exemplars.symmetry.surface import SAME_ANGLE, SurfaceGrid, cell_index
+from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.geometry.pose import invert
+
+__all__ = ["eroded", "matched_items", "symmetric_cells"]
+
+TINY = 1e-9
+
+
+def symmetric_cells(grid: SurfaceGrid, motion: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """The cells that a rigid motion (4, 4) maps onto the surface, and those that its inverse does, bool (n,) each.
+
+    A cell is symmetric if each plane and each boundary line in it has its equal where the motion takes it, and nothing
+    else lies there.
+    """
+    back = invert(motion)
+    forth_found, back_found = matched_items(grid, motion), matched_items(grid, back)
+    forth, backward = np.ones(len(grid), dtype=bool), np.ones(len(grid), dtype=bool)
+    forth[grid.item_cell[~forth_found]] = False
+    backward[grid.item_cell[~back_found]] = False
+    _mark(forth, grid.points[~back_found], back, grid.origin, grid.size, grid.keys, grid.tolerance)
+    _mark(backward, grid.points[~forth_found], motion, grid.origin, grid.size, grid.keys, grid.tolerance)
+    return forth, backward
+
+
+def matched_items(grid: SurfaceGrid, motion: FloatArray, items: np.ndarray | None = None) -> BoolArray:
+    """For each item of the grid (or of those with indices `items`) whether it lies on its equal once moved."""
+    asked = np.arange(len(grid.points)) if items is None else items
+    found: BoolArray = _matched(
+        asked, motion, grid.origin, grid.size, grid.keys, grid.starts, grid.points, grid.directions, grid.is_line,
+        grid.tolerance,
+    )  # fmt: skip
+    return found
+
+
+def eroded(grid: SurfaceGrid, symmetric: BoolArray) -> BoolArray:
+    """The r-symmetric cells: farther than the radius, along the surface, from every cell that is not symmetric."""
+    reach: BoolArray = _distances(symmetric, grid.cells, grid.neighbours, grid.radius / grid.size) > (
+        grid.radius / grid.size + TINY
+    )
+    return reach
+
+
+@numba.njit(cache=True)
+def _matched(asked, motion, origin, size, keys, starts, points, directions, is_line, tolerance):
+    found = np.zeros(len(asked), dtype=np.bool_)
+    at, along = np.empty(3), np.empty(3)
+    low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    for place in range(len(asked)):
+        item = asked[place]
+        for d in range(3):
+            at[d] = motion[d, 3]
+            along[d] = 0.0
+            for e in range(3):
+                at[d] += motion[d, e] * points[item, e]
+                along[d] += motion[d, e] * directions[item, e]
+        cell_of(at - tolerance, origin, size, low)
+        cell_of(at + tolerance, origin, size, high)
+        for i in range(low[0], high[0] + 1):
+            for j in range(low[1], high[1] + 1):
+                for k in range(low[2], high[2] + 1):
+                    n = cell_index(keys, i, j, k)
+                    if n < 0 or found[place]:
+                        continue
+                    for other in range(starts[n], starts[n + 1]):
+                        if is_line[other] != is_line[item]:
+                            continue
+                        d0 = at[0] - points[other, 0]
+                        d1 = at[1] - points[other, 1]
+                        d2 = at[2] - points[other, 2]
+                        u, v, w = directions[other, 0], directions[other, 1], directions[other, 2]
+                        c0 = along[1] * w - along[2] * v
+                        c1 = along[2] * u - along[0] * w
+                        c2 = along[0] * v - along[1] * u
+                        if c0 * c0 + c1 * c1 + c2 * c2 > SAME_ANGLE**2:
+                            continue
+                        if is_line[item]:
+                            c0, c1, c2 = d1 * w - d2 * v, d2 * u - d0 * w, d0 * v - d1 * u
+                            if c0 * c0 + c1 * c1 + c2 * c2 < tolerance**2:
+                                found[place] = True
+                                break
+                        elif (
+                            along[0] * u + along[1] * v + along[2] * w > 0 and abs(d0 * u + d1 * v + d2 * w) < tolerance
+                        ):
+                            found[place] = True
+                            break
+    return found
+
+
+@numba.njit(cache=True)
+def _mark(symmetric, points, motion, origin, size, keys, tolerance):
+    """Set the cells to which a motion takes points to False."""
+    at, low, high = np.empty(3), np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    for place in range(len(points)):
+        for d in range(3):
+            at[d] = motion[d, 3]
+            for e in range(3):
+                at[d] += motion[d, e] * points[place, e]
+        cell_of(at - tolerance, origin, size, low)
+        cell_of(at + tolerance, origin, size, high)
+        for i in range(low[0], high[0] + 1):
+            for j in range(low[1], high[1] + 1):
+                for k in range(low[2], high[2] + 1):
+                    n = cell_index(keys, i, j, k)
+                    if n >= 0:
+                        symmetric[n] = False
+
+
+@numba.njit(cache=True)
+def _distances(symmetric, cells, neighbours, most):
+    """Way along occupied cells to the next cell that is not symmetric, in cells; infinite beyond `most`."""
+    distance = np.full(len(cells), np.inf)
+    queue = np.empty(len(cells) + 1, dtype=np.int64)
+    waiting = np.zeros(len(cells), dtype=np.bool_)
+    head, tail, room = 0, 0, len(queue)
+    for n in range(len(cells)):
+        if not symmetric[n]:
+            distance[n], waiting[n] = 0.0, True
+            queue[tail] = n
+            tail += 1
+    while head != tail:
+        n = queue[head]
+        head = (head + 1) % room
+        waiting[n] = False
+        for place in range(26):
+            other = neighbours[n, place]
+            if other < 0:
+                continue
+            squared = 0
+            for d in range(3):
+                squared += (cells[n, d] - cells[other, d]) ** 2
+            way = distance[n] + np.sqrt(squared)
+            if way <= most + TINY and way < distance[other] - TINY:
+                distance[other] = way
+                if not waiting[other]:
+                    waiting[other] = True
+                    queue[tail] = other
+                    tail = (tail + 1) % room
+    return distance

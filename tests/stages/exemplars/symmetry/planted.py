@@ -1,0 +1,74 @@
+"""Surfaces whose symmetries are known: boundaries of sets of boxes, and what is put together from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+Ticks = list[float]
+
+
+def blocks(x: Ticks, y: Ticks, z: Ticks, solid: Callable[[float, float, float], bool]) -> np.ndarray:
+    """Triangles (f, 3, 3) around the boxes between the ticks whose middle is solid, outward."""
+    axes = [np.array(each, dtype=float) for each in (x, y, z)]
+    middles = [(each[1:] + each[:-1]) / 2 for each in axes]
+    full = np.zeros([len(each) + 1 for each in axes], dtype=bool)
+    for place in np.ndindex(*(len(each) for each in middles)):
+        full[tuple(np.add(place, 1))] = solid(*(float(middles[d][place[d]]) for d in range(3)))
+    triangles = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for place in np.ndindex(*(len(each) for each in middles)):
+            here = tuple(np.add(place, 1))
+            if not full[here]:
+                continue
+            for side in (0, 1):
+                beside = list(here)
+                beside[axis] += 2 * side - 1
+                if full[tuple(beside)]:
+                    continue
+                quad = np.zeros((4, 3))
+                quad[:, axis] = axes[axis][place[axis] + side]
+                quad[:, u] = axes[u][[place[u], place[u] + 1, place[u] + 1, place[u]]]
+                quad[:, v] = axes[v][[place[v], place[v], place[v] + 1, place[v] + 1]]
+                quad = quad if side else quad[::-1]
+                triangles += [quad[[0, 1, 2]], quad[[0, 2, 3]]]
+    return np.array(triangles)
+
+
+def wall(windows: int, storeys: int = 1) -> np.ndarray:
+    """A wall with `windows` by `storeys` holes, one by two apart, along x and z, with margins of its own."""
+    x = [0.0, *(0.6 + k + o for k in range(windows) for o in (0.25, 0.75)), windows + 1.2]
+    z = [0.0, *(2 * k + o for k in range(storeys) for o in (0.5, 1.5)), 2.0 * storeys + 0.4]
+    return blocks(x, [0.0, 0.3], z, lambda a, _, c: not (_in(a - 0.6, windows, 1, 0.25) and _in(c, storeys, 2, 0.5)))
+
+
+def _in(at: float, count: int, period: float, margin: float) -> bool:
+    return 0 <= at < count * period and margin < at % period < period - margin
+
+
+def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
+    """A box as triangles (12, 3, 3)."""
+    return blocks(*([a, b] for a, b in zip(low, high, strict=True)), lambda *_: True)  # type: ignore[misc]
+
+
+def moved(triangles: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Triangles under a rigid motion (4, 4)."""
+    return triangles @ pose[:3, :3].T + pose[:3, 3]
+
+
+def screw(angle: float, rise: float) -> np.ndarray:
+    """A turn about z by `angle` radians with a rise along it."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, rise], [0, 0, 0, 1]])
+
+
+def spiral_stair(steps: int, angle: float = 0.5, rise: float = 0.35) -> np.ndarray:
+    """Steps that overlap around an axis: each is the one before it under a screw motion."""
+    step = box((0.4, -0.35, 0.0), (2.0, 0.35, 0.4))
+    pose, parts = np.eye(4), []
+    for _ in range(steps):
+        parts.append(moved(step, pose))
+        pose = screw(angle, rise) @ pose
+    return np.concatenate(parts)

@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from stages.exemplars.symmetry.docking import docking_sites, slippable_motions
+from stages.exemplars.symmetry.matching import eroded, matched_items, symmetric_cells
+from stages.exemplars.symmetry.motions import candidate_motions
+from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
+from tests.stages.exemplars.symmetry.planted import blocks, box, moved, screw, spiral_stair, wall
+
+SHARE = 0.03
+
+
+def shift(*by: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, 3] = by
+    return pose
+
+
+def has_motion(motions: np.ndarray, wanted: np.ndarray) -> bool:
+    both = np.concatenate([motions, np.linalg.inv(motions)])
+    return bool(np.abs(both - wanted).max(axis=(1, 2)).min() < 1e-6)
+
+
+@pytest.fixture(scope="module")
+def four_windows() -> SurfaceGrid:
+    return surface_grid(wall(4), SHARE)
+
+
+class TestSurface:
+    def test_boundary_lines_are_the_edges_of_the_solid_whatever_its_triangles(self) -> None:
+        grid = surface_grid(blocks([0, 0.3, 1], [0, 0.6, 1], [0, 1], lambda *_: True), 0.2)
+        lines = grid.points[grid.is_line]
+        assert ((np.isclose(lines, 0) | np.isclose(lines, 1)).sum(axis=1) == 2).all()
+        assert np.isclose(grid.area.sum(), 6.0)
+
+    def test_slivers_and_doublets_change_nothing(self) -> None:
+        plain = box((0, 0, 0), (1, 1, 1))
+        sliver = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
+        one, other = surface_grid(plain, 0.2), surface_grid(np.concatenate([plain, plain[:4], sliver]), 0.2)
+        assert np.array_equal(one.keys, other.keys)
+        assert np.array_equal(one.points, other.points)
+
+
+class TestSymmetricCells:
+    def test_all_of_a_wall_is_symmetric_but_what_lies_a_period_before_its_end(self, four_windows: SurfaceGrid) -> None:
+        forth, back = symmetric_cells(four_windows, shift(1, 0, 0))
+        x = four_windows.origin[0] + four_windows.size * (four_windows.cells[:, 0] + 0.5)
+        slack = 1.01 * four_windows.size
+        # the left margin ends at 0.35, where a period later the first window ends; the last window begins at 3.85
+        assert not forth[(x < slack) | (x > 4.2 + slack)].any()
+        assert forth[(x > 0.35 + slack) & (x < 3.85 - slack)].all()
+        assert not back[(x > 5.2 - slack) | (x < 1 - slack)].any()
+
+    def test_erosion_leaves_what_is_a_radius_away(self, four_windows: SurfaceGrid) -> None:
+        symmetric = np.ones(len(four_windows), dtype=bool)
+        symmetric[100] = False
+        kept = eroded(four_windows, symmetric)
+        away = np.linalg.norm(four_windows.cells - four_windows.cells[100], axis=1)
+        assert not kept[away <= 3].any()
+        assert kept[away > 4].all()
+
+    def test_a_turn_that_maps_a_box_onto_itself_leaves_nothing(self) -> None:
+        grid = surface_grid(box((-1, -1, -1), (1, 1, 1)), 0.1)
+        assert matched_items(grid, screw(np.pi / 2, 0.0)).all()
+        assert docking_sites(grid, screw(np.pi / 2, 0.0)) == []
+
+
+class TestMotions:
+    def test_the_period_of_a_wall_is_found(self, four_windows: SurfaceGrid) -> None:
+        motions = candidate_motions(four_windows, 64)
+        for count in (1, 2, 3):
+            assert has_motion(motions, shift(count, 0, 0))
+
+    def test_the_screw_of_a_spiral_stair_is_found(self) -> None:
+        assert has_motion(candidate_motions(surface_grid(spiral_stair(6), SHARE), 32), screw(0.5, 0.35))
+
+    def test_a_turned_wall_has_turned_motions(self) -> None:
+        turn = screw(0.7, 0.0)
+        motions = candidate_motions(surface_grid(moved(wall(3), turn), SHARE), 64)
+        assert has_motion(motions, turn @ shift(1, 0, 0) @ np.linalg.inv(turn))
+
+
+class TestDockingSites:
+    @pytest.mark.parametrize("windows", [3, 4, 6])
+    def test_a_wall_can_gain_and_lose_a_window(self, windows: int) -> None:
+        grid = surface_grid(wall(windows), SHARE)
+        sites = docking_sites(grid, shift(1, 0, 0))
+        assert [each.kind for each in sites] == ["delete", "insert"]
+        delete, insert = sites
+        for more, less in ((delete.secondary, delete.primary), (insert.primary, insert.secondary)):
+            assert grid.area[np.setdiff1d(more, less)].sum() == pytest.approx(period_area(), rel=0.05)
+        for each in sites:
+            assert np.isin(each.border, np.r_[each.primary]).sum() == 0
+
+    def test_dockers_under_one_motion_are_disjoint(self, four_windows: SurfaceGrid) -> None:
+        sites = docking_sites(four_windows, shift(1, 0, 0))
+        for one, other in itertools.combinations(sites, 2):
+            assert not np.intersect1d(one.primary, other.primary).size
+            assert not np.intersect1d(one.secondary, other.secondary).size
+
+    def test_dockers_whose_images_are_one_region_are_taken_together(self) -> None:
+        """Symmetry figure 5: two prongs of one side stand on a bridge of the other, which the motion makes one."""
+        solid = blocks(
+            [0, 1, 2, 5, 6, 7, 9, 10, 11, 14, 15, 16], [0, 1], [0, 1, 3, 4],
+            lambda x, _, z: z < 1 or (x in (1.5, 5.5)) or (x in (10.5, 14.5)) or (z > 3 and 10 < x < 15),
+        )  # fmt: skip
+        sites = docking_sites(surface_grid(solid, 0.02), shift(9, 0, 0))
+        prongs = [each for each in sites if each.kind == "replace"]
+        assert len(prongs) == 1
+        grid = surface_grid(solid, 0.02)
+        x = grid.origin[0] + grid.size * grid.cells[prongs[0].primary, 0]
+        assert ((x < 2.5).any(), ((x > 2.5) & (x < 4.5)).any(), (x > 4.5).any()) == (True, False, True)
+
+    def test_a_straight_prism_slips_one_way_and_a_plane_three(self) -> None:
+        grid = surface_grid(box((0, 0, 0), (6, 1, 1)), 0.03)
+        x, z = (grid.origin[d] + grid.size * (grid.cells[:, d] + 0.5) for d in (0, 2))
+        around = np.flatnonzero(np.abs(x - 3) < 0.3).astype(np.int32)
+        top = around[z[around] > 1 - grid.size]
+        inner = top[np.abs(grid.cells[top, 1] - np.median(grid.cells[top, 1])) < 5]
+        assert (slippable_motions(grid, around), slippable_motions(grid, inner)) == (1, 3)
+
+
+def period_area() -> float:
+    """Of one bay of the wall: two sides without the hole, the hole's own four sides, top and bottom."""
+    return 2 * (1 * 2.4 - 0.5 * 1.0) + 0.3 * (2 * 0.5 + 2 * 1.0) + 2 * 0.3 * 1
