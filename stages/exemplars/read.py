@@ -92,7 +92,7 @@ def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
         source, why = pick(scene)
     else:
         source, why = segmentation, "as the config says"
-        if source != scene.kind and source not in (counts := count_parts(scene)):
+        if source not in (scene.kind, "symmetry") and source not in (counts := count_parts(scene)):
             offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
             raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
     parted = segment(scene, source)

@@ -1,4 +1,4 @@
-"""What is a part: scene nodes, named objects, or the pieces of a mesh by material, colour or connection."""
+"""What is a part: scene nodes, named objects, or the pieces of a mesh by material, colour, connection or symmetry."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ import numpy as np
 
 from stages.exemplars.components import connected_faces
 from stages.exemplars.formats.scene import Placement, Scene, Surface, unique_name
+from stages.exemplars.symmetry.parts import by_symmetry
 
 __all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
 
-Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components"]
+Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry"]
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")
 
 PALETTE = 64
 """More colours than this are shading, not labels."""
+ENOUGH = 3
+"""A mesh in one piece is cut by its symmetries if that makes so many parts."""
 
 _WORDS = {
     "nodes": "scene nodes",
@@ -28,7 +31,8 @@ _WORDS = {
 
 
 def count_parts(scene: Scene) -> dict[Segmentation, int]:
-    """How many parts each source of parts would make of a scene; a source that the scene does not have is left out."""
+    """How many parts each source of parts would make of a scene; a source that the scene does not have is left out, and
+    so is symmetry, which takes long."""
     counts: dict[Segmentation, int] = {scene.kind: len(scene.placements)}
     for source in SOURCES[2:]:
         pieces = [_pieces(each, source) for each in scene.surfaces]
@@ -42,7 +46,7 @@ def pick(scene: Scene) -> tuple[Segmentation, str]:
     """The source that `auto` takes, and one sentence that says why.
 
     Scene nodes or named objects if there are at least two, for they are their author's parts; then materials, then
-    colours, unless they are too many to be labels; then connected components.
+    colours, unless they are too many to be labels; then connected components; and of a mesh in one piece what repeats.
     """
     if len(scene.placements) > 1:
         return scene.kind, f"{len(scene.placements)} {_WORDS[scene.kind]}"
@@ -61,6 +65,9 @@ def pick(scene: Scene) -> tuple[Segmentation, str]:
             return source, f"{', '.join(passed)}; {pieces}"
         else:
             passed.append("one connected component")
+    parts = len(by_symmetry(scene).placements)
+    if parts >= ENOUGH:
+        return "symmetry", f"{', '.join(passed)}; {parts} pieces between copies of what repeats"
     return scene.kind, f"{', '.join(passed)}: nothing tells parts apart"
 
 
@@ -68,10 +75,13 @@ def segment(scene: Scene, source: Segmentation) -> Scene:
     """The scene with one placement for each part.
 
     Nodes and objects are what the scene already has. The pieces of one material or of one colour are the connected
-    regions of its faces, named and labelled by it; pieces of a surface that several nodes place stay shared.
+    regions of its faces, named and labelled by it; pieces of a surface that several nodes place stay shared. Pieces by
+    symmetry are those of the whole scene, and those that are equal share a surface.
     """
     if source == scene.kind:
         return scene
+    if source == "symmetry":
+        return by_symmetry(scene)
     alone = len(scene.placements) == 1
     surfaces: list[Surface] = []
     cut: list[list[tuple[str, str | None, int]]] = []

@@ -37,7 +37,7 @@ STRICTEST: Mapping[str, Any] = {
 }
 """Where every choice of these keys begins."""
 
-Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components"]
+Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry"]
 
 
 class ContactConfig(StrictModel):
@@ -99,7 +99,11 @@ class KitConfig(StrictModel):
     credit: Credit = Field(
         default_factory=Credit, exclude=True, description="Whose the models are; card and manifest say it."
     )
-    parts: Segmentation = Field("auto", description="What makes a part; `auto` picks and says what it picked.")
+    parts: Segmentation = Field(
+        "auto",
+        description="What makes a part; `auto` picks and says what it picked. `symmetry` cuts one mesh between copies "
+        "of what it repeats.",
+    )
     types: Literal["congruence", "labels", "meaning"] = Field(
         "congruence",
         description="What makes a part type: congruent geometry; congruent geometry with the model's own label; or "

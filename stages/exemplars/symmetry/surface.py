@@ -8,9 +8,9 @@ import numba
 import numpy as np
 
 from stages.exemplars.symmetry.clip import cell_of, fragments
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["SAME_ANGLE", "SurfaceGrid", "cell_index", "pack", "surface_grid"]
+__all__ = ["SAME_ANGLE", "SurfaceGrid", "cell_index", "pack", "surface_grid", "with_area"]
 
 CELLS_A_RADIUS = 4
 """Cells have a quarter of the radius of similarity (symmetry §4)."""
@@ -72,9 +72,7 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     boundary where the triangle's plane does not go on beyond it, whatever the mesh's connectivity: so T-junctions and
     doublets make none.
     """
-    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    faces = np.flatnonzero(doubled > THIN * sides**2)
+    faces = np.flatnonzero(with_area(corners))
     corners = np.ascontiguousarray(corners[faces])
     low = corners.min(axis=(0, 1))
     radius = share * float((corners.max(axis=(0, 1)) - low).max())
@@ -109,6 +107,14 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
         is_line=is_line,
         starts=np.searchsorted(item_cell, np.arange(len(keys) + 1)),
     )
+
+
+def with_area(corners: FloatArray) -> BoolArray:
+    """Which of triangles (f, 3, 3) have area, bool (f,)."""
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    found: BoolArray = doubled > THIN * sides**2
+    return found
 
 
 def pack(cells: np.ndarray) -> np.ndarray:

@@ -1,0 +1,99 @@
+"""The original triangles, cut along the borders of cells (symmetry §4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.exemplars.symmetry.clip import cut_triangles, fragments
+from stages.exemplars.symmetry.surface import SurfaceGrid, pack
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.pose import invert, transform_points
+
+__all__ = ["Soup", "carve", "cell_keys", "connected_soups", "joined"]
+
+
+@dataclass(frozen=True)
+class Soup:
+    """Triangles of a mesh or pieces of them: corners float64 (t, 3, 3), and of which face each is, int32 (t,)."""
+
+    corners: FloatArray
+    faces: IntArray
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def select(self, chosen: np.ndarray) -> Soup:
+        """The triangles that are `chosen`, bool (t,) or indices."""
+        return Soup(self.corners[chosen], self.faces[chosen])
+
+    @property
+    def area(self) -> float:
+        """Area of all triangles."""
+        ways = self.corners[:, 1:] - self.corners[:, :1]
+        return float(np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1).sum() / 2)
+
+
+def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> tuple[Soup, Soup]:
+    """What of `soup` lies in the cells of `grid` with places `cells`, moved by `pose` (4, 4), and what does not.
+
+    Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border.
+    """
+    local = transform_points(invert(pose), soup.corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    box = grid.origin + grid.size * np.array([grid.cells[cells].min(axis=0), grid.cells[cells].max(axis=0) + 1])
+    near = ((local.max(axis=1) > box[0]) & (local.min(axis=1) < box[1])).all(axis=1)
+    asked = np.flatnonzero(near)
+    where, owner, _ = fragments(local[asked], grid.origin, grid.size)
+    inside = np.isin(cell_keys(where), grid.keys[cells])
+    held, total = np.bincount(owner[inside], minlength=len(asked)), np.bincount(owner, minlength=len(asked))
+    whole, crossing = asked[(held == total) & (held > 0)], (held > 0) & (held < total)
+    within = np.zeros(len(soup), dtype=bool)
+    within[whole] = True
+    cut = asked[crossing]
+    mine = crossing[owner]
+    corners, side, of = cut_triangles(
+        local[cut],
+        grid.origin,
+        grid.size,
+        where[mine],
+        np.searchsorted(np.flatnonzero(crossing), owner[mine]),
+        inside[mine],
+    )
+    corners = transform_points(pose, corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    untouched = ~within
+    untouched[cut] = False
+    pieces = Soup(corners, soup.faces[cut][of])
+    return joined(soup.select(within), pieces.select(side)), joined(soup.select(untouched), pieces.select(~side))
+
+
+def cell_keys(cells: np.ndarray) -> np.ndarray:
+    """Packed keys of cells int64 (n, 3) anywhere; -1 for those below the lattice's lowest."""
+    keys = np.full(len(cells), -1, dtype=np.int64)
+    above: BoolArray = cells.min(axis=1, initial=0) >= 0
+    keys[above] = pack(cells[above])
+    return keys
+
+
+def connected_soups(soup: Soup, grid: SurfaceGrid) -> list[Soup]:
+    """The pieces of a soup that occupy no neighbouring cells, in the order of their first triangles."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    if not len(soup):
+        return []
+    where, owner, _ = fragments(soup.corners, grid.origin, grid.size)
+    cells, place = np.unique(where, axis=0, return_inverse=True)
+    beside = KDTree(cells).query_pairs(1.8, output_type="ndarray")
+    graph = coo_array((np.ones(len(beside), dtype=bool), beside.T), shape=(len(cells), len(cells)))
+    _, component = connected_components(graph, directed=False)
+    piece = np.full(len(soup), -1)
+    piece[owner] = component[place.reshape(-1)]
+    order = list(dict.fromkeys(piece[piece >= 0].tolist()))
+    return [soup.select(piece == each) for each in order]
+
+
+def joined(one: Soup, other: Soup) -> Soup:
+    """The triangles of two soups."""
+    return Soup(np.concatenate([one.corners, other.corners]), np.concatenate([one.faces, other.faces]))

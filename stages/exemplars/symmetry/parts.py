@@ -1,0 +1,50 @@
+"""A scene whose placements are the pieces that its symmetries cut it into."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stages.exemplars.formats.scene import Placement, Scene, Surface
+from stages.exemplars.symmetry.pieces import Piece, repeated_pieces
+from stages.exemplars.symmetry.surface import with_area
+from stages.shape.arrays import ByteArray
+from stages.shape.geometry.pose import transform_points
+
+__all__ = ["by_symmetry"]
+
+
+def by_symmetry(scene: Scene) -> Scene:
+    """The scene as one mesh in the world, cut into `repeated_pieces`: a surface for each of them, `piece-00` and so on,
+    with a placement for each of its poses. Triangles without area are left out, with a warning that counts them."""
+    moved = [
+        transform_points(placement.pose, scene.surfaces[placement.surface].vertices) for placement in scene.placements
+    ]
+    shifts = np.cumsum([0, *map(len, moved[:-1])])
+    own = [scene.surfaces[placement.surface] for placement in scene.placements]
+    turned = [np.linalg.det(placement.pose[:3, :3]) < 0 for placement in scene.placements]
+    faces = [
+        (each.faces[:, ::-1] if mirrored else each.faces) + shift
+        for each, shift, mirrored in zip(own, shifts, turned, strict=True)
+    ]
+    colors = np.concatenate([each.face_colors for each in own])
+    vertices, joined = np.concatenate(moved), np.concatenate(faces).astype(np.int32)
+    pieces = repeated_pieces(vertices, joined)
+    width = max(2, len(str(len(pieces))))
+    surfaces: list[Surface] = []
+    placements: list[Placement] = []
+    for number, piece in enumerate(pieces):
+        name = f"piece-{number:0{width}d}"
+        surfaces.append(_surface(name, piece, colors))
+        placements += [Placement(f"{name}.{copy}", None, number, pose) for copy, pose in enumerate(piece.poses)]
+    flat = len(joined) - int(with_area(vertices[joined]).sum())
+    warnings = (*scene.warnings, f"{flat} triangles without area are left out") if flat else scene.warnings
+    return replace(scene, kind="nodes", surfaces=tuple(surfaces), placements=tuple(placements), warnings=warnings)
+
+
+def _surface(name: str, piece: Piece, colors: ByteArray) -> Surface:
+    """The surface of a piece, corners at one position one vertex."""
+    corners = piece.triangles.corners.reshape(-1, 3)
+    vertices, place = np.unique(corners, axis=0, return_inverse=True)
+    return Surface(name, vertices, place.reshape(-1, 3).astype(np.int32), colors[piece.triangles.faces])

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.exemplars.formats.scene import Placement, Scene, Surface
+from stages.exemplars.segment import pick, segment
+from stages.exemplars.symmetry.carve import Soup, carve
+from stages.exemplars.symmetry.pieces import repeated_pieces
+from stages.exemplars.symmetry.surface import surface_grid
+from tests.stages.exemplars.symmetry.planted import box, screw, spiral_stair, wall
+
+
+def mesh(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    vertices, place = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return vertices, place.reshape(-1, 3).astype(np.int32)
+
+
+def one_object(triangles: np.ndarray) -> Scene:
+    vertices, faces = mesh(triangles)
+    grey = np.full((len(faces), 3), 160, dtype=np.uint8)
+    return Scene("objects", (Surface("all", vertices, faces, grey),), (Placement("all", None, 0, np.eye(4)),))
+
+
+def counts(triangles: np.ndarray) -> list[int]:
+    return sorted(len(each.poses) for each in repeated_pieces(*mesh(triangles)))
+
+
+class TestCarve:
+    def test_both_sides_of_a_seam_make_the_whole_with_one_border(self) -> None:
+        corners = wall(3)
+        grid = surface_grid(corners, 0.03)
+        left = np.flatnonzero(grid.cells[:, 0] < np.median(grid.cells[:, 0])).astype(np.int32)
+        pose = screw(0.3, 0.1)
+        inside, outside = carve(Soup(grid.corners, grid.faces), grid, left, pose)
+        assert inside.area + outside.area == pytest.approx(2 * (4.2 * 2.4 - 1.5) + 0.3 * (2 * 6.6 + 9), rel=1e-9)
+        local = (inside.corners.mean(axis=1) - pose[:3, 3]) @ pose[:3, :3]
+        cells = np.floor((local - grid.origin) / grid.size)
+        assert (cells[:, 0] < np.median(grid.cells[:, 0])).all()
+
+    def test_triangles_that_stay_on_one_side_are_not_cut(self) -> None:
+        corners = np.concatenate([box((0, 0, 0), (1, 1, 1)), box((5, 0, 0), (6, 1, 1))])
+        grid = surface_grid(corners, 0.03)
+        first = np.flatnonzero(grid.cells[:, 0] < np.median(grid.cells[:, 0])).astype(np.int32)
+        inside, outside = carve(Soup(grid.corners, grid.faces), grid, first, np.eye(4))
+        assert np.array_equal(inside.corners, corners[:12])
+        assert np.array_equal(outside.corners, corners[12:])
+
+
+class TestRepeatedPieces:
+    def test_a_wall_is_its_two_ends_and_a_bay_for_each_window(self) -> None:
+        pieces = repeated_pieces(*mesh(wall(5)))
+        assert sorted(len(each.poses) for each in pieces) == [1, 1, 5]
+        bays = next(each for each in pieces if len(each.poses) == 5)
+        assert np.allclose(np.sort([pose[0, 3] for pose in bays.poses]) - min(p[0, 3] for p in bays.poses), range(5))
+
+    def test_two_grids_that_cross_make_nine_pieces(self) -> None:
+        """Symmetry figure 7a: the corners once, the borders in one direction, the middle in both."""
+        assert counts(wall(4, 3)) == [1, 1, 1, 1, 3, 3, 4, 4, 12]
+
+    @pytest.mark.slow
+    def test_the_steps_of_a_spiral_stair_are_one_piece_under_a_screw(self) -> None:
+        pieces = repeated_pieces(*mesh(spiral_stair(7)))
+        steps = [each for each in pieces if len(each.poses) == 6]
+        assert steps
+        relative = np.linalg.inv(steps[0].poses[0]) @ steps[0].poses[1]
+        assert min(np.abs(relative - screw(a, b)).max() for a, b in ((0.5, 0.35), (-0.5, -0.35))) < 1e-6
+
+    def test_pieces_at_their_poses_are_the_surface(self) -> None:
+        pieces = repeated_pieces(*mesh(wall(4)))
+        area = sum(len(each.poses) * each.triangles.area for each in pieces)
+        assert area == pytest.approx(2 * (5.2 * 2.4 - 2) + 0.3 * (2 * 7.6 + 12), rel=1e-6)
+
+    def test_what_repeats_nothing_stays_whole(self) -> None:
+        assert counts(box((0, 0, 0), (3, 2, 1))) == [1]
+
+
+class TestBridge:
+    def test_a_mesh_in_one_piece_is_cut_by_what_it_repeats(self) -> None:
+        source, why = pick(one_object(wall(4)))
+        assert source == "symmetry"
+        assert "6 pieces between copies of what repeats" in why
+        parts = segment(one_object(wall(4)), source)
+        assert len(parts.surfaces) == 3
+        assert sorted(np.bincount([each.surface for each in parts.placements]).tolist()) == [1, 1, 4]
+
+    def test_a_mesh_that_repeats_nothing_is_left_alone(self) -> None:
+        source, why = pick(one_object(box((0, 0, 0), (3, 2, 1))))
+        assert source == "objects"
+        assert "nothing tells parts apart" in why
+
+    def test_triangles_without_area_are_counted(self) -> None:
+        flat = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
+        parts = segment(one_object(np.concatenate([wall(4), flat])), "symmetry")
+        assert parts.warnings == ("1 triangles without area are left out",)
