@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pkgutil import iter_modules
 
 from pipeline.config import nearest
+from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
 
 __all__ = ["Constraint", "Labels", "Test", "find_constraints", "made_test", "module_of", "unknown_in"]
@@ -66,8 +67,17 @@ def unknown_in(asked: Mapping[str, Labels]) -> str | None:
 
 
 def made_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
-    """One test of all constraints that are asked for, in their order."""
+    """One test of all constraints that are asked for, in their order. Raises ConfigError for labels of parts that the
+    kit has not."""
     known = find_constraints()
+    for name, labels in asked.items():
+        for what, each in ((what, each) for what, listed in labels.items() for each in listed):
+            if each not in kit.labels:
+                close = nearest(each, kit.labels)
+                told = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
+                raise ConfigError(
+                    f"variations.require.constraints.{name}.{what}: kit {kit.name} has no parts called {each}; {told}"
+                )
     tests = [known[name].test(kit, labels) for name, labels in asked.items()]
 
     def unmet(assembly: Assembly) -> str | None:

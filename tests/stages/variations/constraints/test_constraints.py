@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
 from stages.variations.constraint import find_constraints, made_test, unknown_in
 from tests.stages.variations.toy import Placed, box, kit_of, pose
@@ -65,6 +66,11 @@ def test_a_path_must_reach_an_exit_and_never_rise(kit: Kit) -> None:
     assert unmet(assembly.select(parts[parts != slide])) == "no path from an entry to an exit"
     assert unmet(changed(assembly, slide, 0.3)) == "a path leads upwards"
     assert made_test(kit, {"path": {"entries": ("top",), "exits": ("end",)}})(assembly) is None
+
+
+def test_labels_that_a_kit_has_not_are_told(kit: Kit) -> None:
+    with pytest.raises(ConfigError, match="no parts called slyde; did you mean slide"):
+        made_test(kit, {"path": {**LABELS, "through": ("slyde",)}})
 
 
 def test_what_was_always_borne_must_be(kit: Kit) -> None:
