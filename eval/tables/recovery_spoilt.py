@@ -29,6 +29,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     if not models:
         raise ConfigError(f"{wrong[0]}; make train")
     rows, foreign, strips, seed = [], [], [], subject.config.seed
+    brought = {(folder, kind): foreign_inputs(folder, kind) for folder in asked.foreign for _, kind in models}
     for (program, kind), model in sorted(models.items()):
         ways = methods(model, asked.tries, seed)
         for name, shapes, inputs in held_out(model, asked.spoilt, decision_rng(seed, "recovery", program)):
@@ -41,7 +42,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
                     pictures.append((given.name, picture_png(recovery_picture(given, found))))
                 strips.append(Strip(f"Input and result, {label}", pictures))
         for folder in asked.foreign:
-            strangers = foreign_inputs(folder, kind)
+            strangers = brought[folder, kind]
             if not strangers:
                 continue
             label = f"{model.program.name}, {folder.name}"

@@ -109,10 +109,11 @@ def check(config: Config) -> None:
 
 
 def reads_samples(config: Config, only: str) -> bool:
-    """Whether a model called so, or `<name>-<subject>`, or any where `only` is empty, learns from samples."""
+    """Whether a model called so, or `<name>-<subject>`, learns from samples; where none is, or `only` is empty,
+    whether any does."""
     asked = config.section(TrainingConfig).models
-    chosen = [each for each in asked if not only or f"{only}-".startswith(f"{each.name}-")]
-    return any(isinstance(each, KitModelEntry) for each in chosen)
+    chosen = [each for each in asked if f"{only}-".startswith(f"{each.name}-")]
+    return any(isinstance(each, KitModelEntry) for each in chosen or asked)
 
 
 def estimate_bytes(plan: Plan) -> int:

@@ -12,6 +12,8 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import FloatArray
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.program import AXES, FACES, Attach, Block, Program, Reflect, Squeeze, Translate
 from stages.training.program_vae.draft import Choice, Draft, Numbers
@@ -61,8 +63,9 @@ class _Node:
 def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[Program | None]:
     """A program for each point, float32 (n, latent), its numbers to three decimals.
 
-    None where a line broke a rule and no other could be found; without `reject` such a line is left out, as for
-    interpolation, and None is a program without a cuboid.
+    None where a line broke a rule and no other could be found, and for a program that is beyond the limits of
+    execution; without `reject` an assembly ends before such a line, as for interpolation. None is a program without a
+    cuboid, too.
     """
     device = next(module.parameters()).device
     codes = torch.from_numpy(points).to(device)
@@ -73,7 +76,7 @@ def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[
     for depth in range(MOST_DEPTH):
         if not level:
             break
-        _write_level(module, level, reject=reject)
+        _write_level(module, level)
         failed |= {node.shape for node in level if node.failed}
         below: list[_Node] = []
         for node in level:
@@ -84,12 +87,12 @@ def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[
                     below.append(_Node(draft, code, node.shape))
         level = below
     return [
-        None if (reject and shape in failed) or not root.grounded else _assembled(root)
+        None if (reject and shape in failed) or not root.grounded else _executable(_assembled(root))
         for shape, root in enumerate(roots)
     ]
 
 
-def _write_level(module: ProgramVae, level: Sequence[_Node], *, reject: bool) -> None:
+def _write_level(module: ProgramVae, level: Sequence[_Node]) -> None:
     """Writes the assemblies of a level to their ends."""
     states = module.start(torch.stack([node.code for node in level]))
     open_ = list(range(len(level)))
@@ -97,13 +100,13 @@ def _write_level(module: ProgramVae, level: Sequence[_Node], *, reject: bool) ->
         nodes = [level[each] for each in open_]
         shown = torch.stack([node.last for node in nodes]).to(states.device)[:, None]
         written, states = module.write(shown, states)
-        ended = _write_lines(module, nodes, written[:, 0], reject=reject)
+        ended = _write_lines(module, nodes, written[:, 0])
         going = [place for place, over in enumerate(ended) if not over]
         open_ = [open_[place] for place in going]
         states = states[:, going]
 
 
-def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor, *, reject: bool) -> list[bool]:
+def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor) -> list[bool]:
     """One line more of each assembly; whether each has ended."""
     boxes = states.new_tensor([node.draft.box for node in nodes])
     heads = module.lines
@@ -207,6 +210,15 @@ def _one_hot(command: int) -> Tensor:
     row = torch.zeros(WIDTH)
     row[command] = 1
     return row
+
+
+def _executable(program: Program) -> Program | None:
+    """The program, or None: each of its assemblies could be executed, and copies of copies may still be too many."""
+    try:
+        execute(program)
+    except ProgramError:
+        return None
+    return program
 
 
 def _assembled(root: Draft) -> Program:

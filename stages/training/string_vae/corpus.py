@@ -30,8 +30,8 @@ def prepare_corpus(task: Task) -> Outcome:
     """Files of the shard: `.<split>.safetensors`, the `Strings` of each split; `.json`, what the tokens stand for.
 
     The strings of train say which cycle numbers there are; strings of other splits with more are refused, and so are
-    those of more than `longest` tokens, and those that train has as well. Raises Rejected where train or val keeps no
-    string.
+    those of more than `longest` tokens, and those that train has as well; and with its first, canonical string all of a
+    shape. Raises Rejected where train or val keeps no string.
     """
     name, splits, longest = task.shard.params["kit"], task.shard.params["splits"], task.shard.params["longest"]
     kit = input_kit(task, name)
@@ -40,6 +40,7 @@ def prepare_corpus(task: Task) -> Outcome:
     for done, (shard, split) in enumerate(splits.items()):
         for key, strings in _strings_of(task, name, shard):
             kept = [each for each in strings if len(split_tokens(each)) <= longest]
+            kept = kept if strings[0] in kept[:1] else []  # what the others shall be written as
             refused = len(strings) - len(kept)
             if refused:
                 task.reject(key, "longer than training.longest", count=refused)
@@ -121,7 +122,10 @@ def _numbered(
     most = 0
     for strings in shapes:
         before = len(graph)
-        for string in strings:
+        for place, string in enumerate(strings):
+            if place and len(graph) == before:
+                task.reject(string, "its canonical string was refused", count=len(strings) - place)
+                break
             if string in elsewhere:
                 task.reject(string, "stands in train as well")
                 continue

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +13,10 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
-from stages.variations.constraint import find_constraints, made_test, unknown_in
+from stages.variations.constraint import made_test, unknown_in
 from tests.stages.variations.toy import Placed, box, kit_of, pose
+
+ROOT = Path(__file__).resolve().parents[4]
 
 CHUTE = {
     "top": box(1.0, 0.4, 1.0),
@@ -106,12 +111,20 @@ def test_what_is_wrong_with_a_constraint_is_told(asked: dict[str, dict[str, tupl
     assert unknown_in({"path": LABELS, "support": {}}) is None
 
 
-def test_a_constraint_in_a_file_of_the_users_own_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import stages.variations.constraints as package
-
-    (tmp_path / "small.py").write_text(
+def test_a_constraint_in_a_file_of_the_users_own_is_found_and_its_code_counts(tmp_path: Path) -> None:
+    folder = tmp_path / "stages/variations/constraints"
+    folder.mkdir(parents=True)
+    (folder / "small.py").write_text(
         "from stages.variations.constraint import Constraint\n"
         "CONSTRAINT = Constraint((), (), lambda kit, labels: lambda shape: None if len(shape) < 3 else 'large')\n"
     )
-    monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
-    assert set(find_constraints()) == {"path", "small", "support"}
+    asked = (
+        "from pipeline.code import reached\n"
+        "from stages.variations.constraint import find_constraints, module_of\n"
+        "print(*find_constraints(), *reached([module_of('small')]))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", asked], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[:3] == ["path", "small", "support"]
+    assert any("small" in each for each in done.stdout.split()[3:])
