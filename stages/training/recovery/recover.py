@@ -26,7 +26,7 @@ __all__ = ["SHIPPED", "Models", "Recovered", "find_models", "recover", "recover_
 
 Up = Literal["x", "y", "z", ""]
 
-SHIPPED = Path(__file__).with_name("weights")
+SHIPPED = Path(__file__).parents[3] / "datasets/exemplars/models"
 """Models that come with Shapemill; `ship.py` puts them there."""
 
 UNLIKE = {"points": 0.004, "sketch": 0.001}
