@@ -90,7 +90,7 @@ def tilt_to_fall(body: Body, diagonal: float) -> float:
         tilt, _, rest = heappop(ahead)
         if abs(rest.height - start) > FALL * start:
             return tilt
-        if any(np.abs(rest.points - other.points).max() <= 10 * near for other in rests):
+        if any(np.abs(rest.points[:, 2] - other.points[:, 2]).max() <= 10 * near for other in rests):
             continue
         rests.append(rest)
         support = rest.support(near)
