@@ -69,7 +69,8 @@ def choose(config: KitConfig, models: Sequence[Model], identified: Identified, t
         values["contact.tolerance"], reasons["contact.tolerance"] = found
     stated = config.decide(values)
     sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up)
-    rungs = climb(sight, _rails(stated, sight, open_keys), tries)
+    one_surface = any(each.segmentation == "symmetry" for each in models)
+    rungs = climb(sight, _rails(stated, sight, open_keys, one_surface), tries)
     if not rungs:
         return Choices(values, reasons, None, 1.0, False, 0)
     chosen = rungs[-1]
@@ -87,6 +88,8 @@ def choose(config: KitConfig, models: Sequence[Model], identified: Identified, t
         if key in open_keys:
             values[key] = value
             reasons[key] = _reason(key, chosen, rungs)
+    if "hubs.types" in open_keys and one_surface:
+        reasons["hubs.types"] = "the parts are pieces of one surface, which has a hole where one is left out"
     if "disconnected" in open_keys:
         stand = "1 part stands" if left == 1 else f"{left} parts stand"
         reasons["disconnected"] = f"{stand} apart from the largest piece" if left else "nothing stands apart"
@@ -106,10 +109,14 @@ def _rung_words(rung: Rung) -> str:
     return found_words(rung.finds) + back
 
 
-def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str]) -> Rails:
-    """What the ladder may choose from: one value of each key that the config states."""
+def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str], one_surface: bool) -> Rails:
+    """What the ladder may choose from: one value of each key that the config states.
+
+    Hubs are peeled off because shapes stand without them, and get back those that fit. Pieces of one surface are no
+    such parts: a piece that does not come back is a hole.
+    """
     made = stated.decided()
-    peels = "hubs.types" in open_keys and stated.types != "meaning"
+    peels = "hubs.types" in open_keys and stated.types != "meaning" and not one_surface
     return Rails(
         kinds=KINDS if "contact.kinds" in open_keys else (made.kinds,),
         grammars=GRAMMARS if "grammar" in open_keys else (made.grammar,),

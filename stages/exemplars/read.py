@@ -89,13 +89,13 @@ def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
     scene = _read(path)
     warnings = list(scene.warnings)
     if segmentation == "auto":
-        source, why = pick(scene)
+        source, why, parted = pick(scene)
     else:
         source, why = segmentation, "as the config says"
         if source not in (scene.kind, "symmetry") and source not in (counts := count_parts(scene)):
             offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
             raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
-    parted = segment(scene, source)
+        parted = segment(scene, source)
     surfaces, placements = bake(*centre(parted.surfaces, parted.placements))
     offset = _off_origin(surfaces, placements, warnings)
     names: set[str] = set()

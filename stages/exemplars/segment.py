@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.exemplars.components import connected_faces
 from stages.exemplars.formats.scene import Placement, Scene, Surface, unique_name
-from stages.exemplars.symmetry.parts import by_symmetry
+from stages.exemplars.symmetry.parts import by_symmetry, search_size
 
 __all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
 
@@ -20,6 +20,8 @@ PALETTE = 64
 """More colours than this are shading, not labels."""
 ENOUGH = 3
 """A mesh in one piece is cut by its symmetries if that makes so many parts."""
+LARGEST = 1_200_000
+"""Cells and triangles up to which symmetries are looked for unasked: with more it takes minutes and gigabytes."""
 
 _WORDS = {
     "nodes": "scene nodes",
@@ -42,14 +44,15 @@ def count_parts(scene: Scene) -> dict[Segmentation, int]:
     return counts
 
 
-def pick(scene: Scene) -> tuple[Segmentation, str]:
-    """The source that `auto` takes, and one sentence that says why.
+def pick(scene: Scene) -> tuple[Segmentation, str, Scene]:
+    """The source that `auto` takes, one sentence that says why, and the scene with one placement for each part.
 
     Scene nodes or named objects if there are at least two, for they are their author's parts; then materials, then
-    colours, unless they are too many to be labels; then connected components; and of a mesh in one piece what repeats.
+    colours, unless they are too many to be labels; then connected components; and of a mesh in one piece what repeats,
+    unless it has so much surface for its size that the search would take long.
     """
     if len(scene.placements) > 1:
-        return scene.kind, f"{len(scene.placements)} {_WORDS[scene.kind]}"
+        return scene.kind, f"{len(scene.placements)} {_WORDS[scene.kind]}", scene
     counts = count_parts(scene)
     passed = [f"one {_WORDS[scene.kind][:-1]}"]
     for source in SOURCES[2:]:
@@ -62,13 +65,18 @@ def pick(scene: Scene) -> tuple[Segmentation, str]:
             pieces = f"{counts[source]} {_WORDS[source]}"
             if source != "components":
                 pieces = f"{counts[source]} connected pieces of {labels} {_WORDS[source]}"
-            return source, f"{', '.join(passed)}; {pieces}"
+            return source, f"{', '.join(passed)}; {pieces}", segment(scene, source)
         else:
             passed.append("one connected component")
-    parts = len(by_symmetry(scene).placements)
-    if parts >= ENOUGH:
-        return "symmetry", f"{', '.join(passed)}; {parts} pieces between copies of what repeats"
-    return scene.kind, f"{', '.join(passed)}: nothing tells parts apart"
+    told = ", ".join(passed)
+    size = search_size(scene)
+    if size > LARGEST:
+        why = f"{told}: too much surface to look unasked for what repeats, about {size:,} cells and triangles"
+        return scene.kind, f"{why} where {LARGEST:,} are the most; `parts: symmetry` looks all the same", scene
+    parted = by_symmetry(scene)
+    if len(parted.placements) >= ENOUGH:
+        return "symmetry", f"{told}; {len(parted.placements)} pieces between copies of what repeats", parted
+    return scene.kind, f"{told}: nothing tells parts apart", scene
 
 
 def segment(scene: Scene, source: Segmentation) -> Scene:

@@ -10,6 +10,7 @@ import numpy as np
 
 from stages.exemplars.symmetry.clip import cell_of
 from stages.exemplars.symmetry.matching import eroded, symmetric_cells
+from stages.exemplars.symmetry.places import items_in
 from stages.exemplars.symmetry.surface import SurfaceGrid, cell_index
 from stages.shape.arrays import FloatArray, IntArray
 
@@ -68,14 +69,15 @@ def docking_sites(grid: SurfaceGrid, motion: FloatArray) -> list[DockingSite]:
         grid.size,
         grid.keys,
     )
+    of_region, of_image = _members(regions, count), _members(regions_back, count_back)
+    of_border = _members(border[:, 1], count)
     sites = []
     for own, other in _dependent(np.unique(links, axis=0), count, count_back):
         if len(own) == count and len(other) == count_back:
             continue
-        primary = np.flatnonzero(np.isin(regions, own)).astype(np.int32)
-        secondary = np.flatnonzero(np.isin(regions_back, other)).astype(np.int32)
-        around = np.flatnonzero(np.isin(border[:, 1], own))
-        cells = np.unique(border[around, 0]).astype(np.int32)
+        primary = np.sort(np.concatenate([of_region[each] for each in own])).astype(np.int32)
+        secondary = np.sort(np.concatenate([of_image[each] for each in other])).astype(np.int32)
+        cells = np.unique(border[np.concatenate([of_border[each] for each in own]), 0]).astype(np.int32)
         sites.append(
             DockingSite(motion, primary, secondary, cells, _kind(primary, secondary), slippable_motions(grid, cells))
         )
@@ -88,13 +90,20 @@ def slippable_motions(grid: SurfaceGrid, cells: IntArray) -> int:
     1 for a straight prism, 2 for a cylinder, 3 for a plane or a sphere: there a docker could stand anywhere.
     """
     near = np.unique(np.r_[cells, grid.neighbours[cells].ravel()])
-    there = np.isin(grid.item_cell, near[near >= 0]) & ~grid.is_line
+    there = items_in(grid, near[near >= 0])
+    there = there[~grid.is_line[there]]
     points, normals = grid.points[there], grid.directions[there]
     points = points - points.mean(axis=0)
     points = points / max(float(np.linalg.norm(points, axis=1).mean()), 1e-300)
     rows = np.column_stack([np.cross(points, normals), normals])
     values = np.linalg.eigvalsh(rows.T @ rows)
     return int((values < SLIPPERY * values[-1]).sum())
+
+
+def _members(region: np.ndarray, count: int) -> list[np.ndarray]:
+    """The places of each of `count` regions in `region`, int (n,), -1 for none."""
+    order = np.argsort(region, kind="stable")
+    return np.split(order, np.searchsorted(region[order], np.arange(count + 1)))[1:-1]
 
 
 def _kind(primary: IntArray, secondary: IntArray) -> OperationKind:
@@ -133,7 +142,7 @@ def _regions(chosen, neighbours):
 def _links(kept, regions, regions_back, neighbours, points, starts, motion, origin, size, keys):
     """Pairs (region, region of the image) whose borders the motion takes onto each other, and pairs (cell, region) of
     r-symmetric cells beside regions."""
-    links, border = [], []
+    links, border = [(0, 0) for _ in range(0)], [(0, 0) for _ in range(0)]
     at, cell = np.empty(3), np.empty(3, dtype=np.int64)
     for n in range(len(kept)):
         if not kept[n]:
@@ -159,11 +168,14 @@ def _links(kept, regions, regions_back, neighbours, points, starts, motion, orig
                     if middle < 0:
                         continue
                     if regions_back[middle] >= 0:
-                        links.append((beside, regions_back[middle]))
+                        if len(links) == 0 or links[-1] != (beside, regions_back[middle]):
+                            links.append((beside, regions_back[middle]))
                         continue
                     for third in range(26):
                         last = neighbours[middle, third]
-                        if last >= 0 and regions_back[last] >= 0:
+                        if last < 0 or regions_back[last] < 0:
+                            continue
+                        if len(links) == 0 or links[-1] != (beside, regions_back[last]):
                             links.append((beside, regions_back[last]))
     pairs, cells = np.empty((len(links), 2), dtype=np.int64), np.empty((len(border), 2), dtype=np.int64)
     for place in range(len(links)):
@@ -182,6 +194,6 @@ def _dependent(links: np.ndarray, count: int, count_back: int) -> list[tuple[np.
     total = count + count_back
     graph = coo_array((np.ones(len(links), dtype=bool), (links[:, 0], count + links[:, 1])), shape=(total, total))
     number, component = connected_components(graph, directed=False)
-    groups = [np.flatnonzero(component == each) for each in range(number)]
+    groups = _members(component, number)
     split = [(each[each < count], each[each >= count] - count) for each in groups]
     return [(own, other) for own, other in split if len(own) and len(other)]

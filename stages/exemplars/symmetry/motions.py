@@ -14,6 +14,8 @@ __all__ = ["candidate_motions"]
 
 MATES = 24
 """Each frame is aligned with so many of its kind, the nearest."""
+FRAMES = 16_000
+"""Of about so many frames, evenly through all of them, mates are looked for."""
 CLUSTERS = 1500
 """So many clusters of motions are tried on a sample of the surface."""
 SAMPLE = 400
@@ -65,9 +67,9 @@ def _mates(found: CornerFrames, radius: float) -> tuple[np.ndarray, np.ndarray]:
         for members in np.split(order, ends) if len(order) else []:
             if len(members) < 2:
                 continue
-            places = found.frames[members, :3, 3]
-            _, near = KDTree(places).query(places, k=min(len(members), MATES))
-            sources.append(np.repeat(members, near.shape[1]))
+            places, asked = found.frames[members, :3, 3], slice(None, None, 1 + len(found.frames) // FRAMES)
+            _, near = KDTree(places).query(places[asked], k=min(len(members), MATES))
+            sources.append(np.repeat(members[asked], near.shape[1]))
             targets.append(members[near.reshape(-1)])
     if not sources:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)

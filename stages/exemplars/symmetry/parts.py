@@ -7,17 +7,51 @@ from dataclasses import replace
 import numpy as np
 
 from stages.exemplars.formats.scene import Placement, Scene, Surface
-from stages.exemplars.symmetry.pieces import Piece, repeated_pieces
-from stages.exemplars.symmetry.surface import with_area
-from stages.shape.arrays import ByteArray
+from stages.exemplars.symmetry.pieces import RADIUS, Piece, repeated_pieces
+from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, with_area
+from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
-__all__ = ["by_symmetry"]
+__all__ = ["by_symmetry", "search_size"]
 
 
 def by_symmetry(scene: Scene) -> Scene:
     """The scene as one mesh in the world, cut into `repeated_pieces`: a surface for each of them, `piece-00` and so on,
-    with a placement for each of its poses. Triangles without area are left out, with a warning that counts them."""
+    with a placement for each of its poses. Triangles without area are left out, with a warning that counts them; where
+    there are no others, the scene stays as it is."""
+    vertices, joined = _in_the_world(scene)
+    real = with_area(vertices[joined])
+    if not real.any():
+        return scene
+    colors = np.concatenate([scene.surfaces[placement.surface].face_colors for placement in scene.placements])
+    pieces = repeated_pieces(vertices, joined)
+    width = max(2, len(str(len(pieces))))
+    surfaces: list[Surface] = []
+    placements: list[Placement] = []
+    for number, piece in enumerate(pieces):
+        name = f"piece-{number:0{width}d}"
+        surfaces.append(_surface(name, piece, colors))
+        placements += [Placement(f"{name}.{copy}", None, number, pose) for copy, pose in enumerate(piece.poses)]
+    flat = len(joined) - int(real.sum())
+    warnings = (*scene.warnings, f"{flat} triangles without area are left out") if flat else scene.warnings
+    return replace(scene, kind="nodes", surfaces=tuple(surfaces), placements=tuple(placements), warnings=warnings)
+
+
+def search_size(scene: Scene) -> int:
+    """How large a search for symmetries of the scene would be: its triangles, and about the cells that they lie in. A
+    plane at a random slant crosses 3/2 cells of a lattice for each square as wide as a cell."""
+    vertices, faces = _in_the_world(scene)
+    corners = vertices[faces]
+    corners = corners[with_area(corners)]
+    if not len(corners):
+        return 0
+    size = RADIUS / CELLS_A_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
+    return len(corners) + round(1.5 * area / 2 / size**2)
+
+
+def _in_the_world(scene: Scene) -> tuple[FloatArray, IntArray]:
+    """All surfaces where they are placed, as one mesh: vertices float64 (v, 3), faces int32 (f, 3)."""
     moved = [
         transform_points(placement.pose, scene.surfaces[placement.surface].vertices) for placement in scene.placements
     ]
@@ -28,19 +62,7 @@ def by_symmetry(scene: Scene) -> Scene:
         (each.faces[:, ::-1] if mirrored else each.faces) + shift
         for each, shift, mirrored in zip(own, shifts, turned, strict=True)
     ]
-    colors = np.concatenate([each.face_colors for each in own])
-    vertices, joined = np.concatenate(moved), np.concatenate(faces).astype(np.int32)
-    pieces = repeated_pieces(vertices, joined)
-    width = max(2, len(str(len(pieces))))
-    surfaces: list[Surface] = []
-    placements: list[Placement] = []
-    for number, piece in enumerate(pieces):
-        name = f"piece-{number:0{width}d}"
-        surfaces.append(_surface(name, piece, colors))
-        placements += [Placement(f"{name}.{copy}", None, number, pose) for copy, pose in enumerate(piece.poses)]
-    flat = len(joined) - int(with_area(vertices[joined]).sum())
-    warnings = (*scene.warnings, f"{flat} triangles without area are left out") if flat else scene.warnings
-    return replace(scene, kind="nodes", surfaces=tuple(surfaces), placements=tuple(placements), warnings=warnings)
+    return np.concatenate(moved), np.concatenate(faces).astype(np.int32)
 
 
 def _surface(name: str, piece: Piece, colors: ByteArray) -> Surface:

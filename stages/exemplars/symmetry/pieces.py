@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup, carve, connected_soups, joined
-from stages.exemplars.symmetry.repetition import Repetition, repetitions
+from stages.exemplars.symmetry.repetition import PART, Repetition, repetitions
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert
@@ -18,8 +18,6 @@ RADIUS = 0.016
 """Radius of similarity, as a share of the longest side of the model's box (symmetry §5)."""
 TRIED = 10
 """So many 1-grids are tried, those that save most first."""
-PART = 2e-3
-"""A part costs so much of the whole surface: cuts that save less than they cost are not made."""
 BETTER = 0.98
 """Cuts must lower the cost at least by this factor."""
 CRUMB = 1e-7
@@ -42,7 +40,8 @@ def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[Piece]:
     once with all their poses. One piece alone where nothing repeats.
 
     1-grids are taken one after another, that which saves most surface first, as long as the surface of the pieces that
-    differ gets smaller by it; two that cross cut the pieces of a 2-grid. Triangles without area are left out.
+    differ gets smaller by more than `PART` a piece; two that cross cut the pieces of a 2-grid. Triangles without area
+    are left out.
     """
     corners = vertices[faces]
     grid = surface_grid(corners, RADIUS)

@@ -7,18 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.exemplars.symmetry.carve import cell_keys
 from stages.exemplars.symmetry.docking import DockingSite, docking_sites
 from stages.exemplars.symmetry.matching import matched_items
 from stages.exemplars.symmetry.motions import candidate_motions
+from stages.exemplars.symmetry.places import items_in, items_moved_into, keys_at
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Repetition", "repetitions"]
+__all__ = ["PART", "Repetition", "repetitions"]
 
 MOTIONS = 40
-"""So many motions are looked at for docking sites."""
+"""So many motions are looked at for docking sites, of a grid of many cells fewer."""
+WORK = 16_000_000
+"""Cells that are looked at in all, each once for a motion."""
+PART = 2e-3
+"""A part costs so much of the whole surface: copies of less are never worth a cut."""
 SLIPPERY = 3
 """A site that slips in so many ways lies on a plane or a sphere, where a docker could stand anywhere."""
 EQUAL = 0.999
@@ -70,7 +74,7 @@ def repetitions(grid: SurfaceGrid) -> list[Repetition]:
     """
     found = [
         each
-        for motion in candidate_motions(grid, MOTIONS)
+        for motion in candidate_motions(grid, min(MOTIONS, max(1, WORK // len(grid))))
         for site in docking_sites(grid, motion)
         for each in _repetition(grid, site)
     ]
@@ -81,38 +85,35 @@ def _repetition(grid: SurfaceGrid, site: DockingSite) -> Iterator[Repetition]:
     if site.kind == "replace" or site.slips >= SLIPPERY:
         return
     more, less = (site.primary, site.secondary) if site.kind == "insert" else (site.secondary, site.primary)
-    cells = np.setdiff1d(more, less).astype(np.int32)
-    allowed = np.zeros(len(grid), dtype=bool)
-    allowed[more if site.kind == "insert" else np.setdiff1d(np.arange(len(grid)), less)] = True
+    cells = np.setdiff1d(more, less, assume_unique=True).astype(np.int32)
+    area = float(grid.area[cells].sum())
+    if area <= PART * grid.area.sum():
+        return
+    allowed = np.full(len(grid), site.kind == "delete")
+    allowed[more if site.kind == "insert" else less] = site.kind == "insert"
     band = cells
     for _ in range(BAND):
         around = np.unique(np.r_[band, grid.neighbours[band].ravel()])
         band = around[(around >= 0) & allowed[around]].astype(np.int32)
-    alone = Repetition(site.motion, cells, band, (0,), float(grid.area[cells].sum()))
+    alone = Repetition(site.motion, cells, band, (0,), area)
     up, down = _reach(grid, alone, 1), _reach(grid, alone, -1)
     if up + down:
         yield Repetition(site.motion, cells, band, tuple(range(-down, up + 1)), alone.area)
 
 
 def _reach(grid: SurfaceGrid, repetition: Repetition, step: int) -> int:
-    """How many copies follow one another in one direction."""
-    items = np.flatnonzero(np.isin(grid.item_cell, repetition.cells))
+    """How many copies follow one another in one direction: no more than the surface has room for."""
+    items = items_in(grid, repetition.cells)
     keys = grid.keys[repetition.cells]
+    room = int(grid.area.sum() / repetition.area)
     count = 0
-    while True:
+    while count < room:
         pose = repetition.pose(step * (count + 1))
-        if np.isin(_keys_at(grid, pose, grid.points[items]), keys).mean() > ANOTHER:
+        if np.isin(keys_at(grid, pose, grid.points[items]), keys).mean() > ANOTHER:
             break
         if matched_items(grid, pose, items).mean() < EQUAL:
             break
-        back = invert(pose)
-        there = np.flatnonzero(np.isin(_keys_at(grid, back, grid.points), keys))
-        if matched_items(grid, back, there).mean() < EQUAL:
+        if matched_items(grid, invert(pose), items_moved_into(grid, repetition.cells, pose)).mean() < EQUAL:
             break
         count += 1
     return count
-
-
-def _keys_at(grid: SurfaceGrid, pose: FloatArray, points: FloatArray) -> np.ndarray:
-    """Keys of the cells to which a pose takes points."""
-    return cell_keys(np.floor((transform_points(pose, points) - grid.origin) / grid.size).astype(np.int64))

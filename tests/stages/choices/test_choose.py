@@ -113,6 +113,17 @@ class TestLadder:
         assert made.values["disconnected"] == "largest"
         assert made.reasons["disconnected"] == "1 part stands apart from the largest piece"
 
+    def test_pieces_of_one_surface_are_never_left_out_as_hubs(self) -> None:
+        meshes = {**ROAD, "floor": box(20.0, 1.0, 20.0)}
+        shapes = [[*ring(*size), ("floor", pose(0, -0.6, 0))] for size in ((1, 1), (2, 3))]
+        config, models = left_open(shapes), models_of(meshes, shapes)
+        identified = identify_parts(models, config)
+        cut = [replace(each, segmentation="symmetry") for each in models]
+        parts, pieces = (choose(config, each, identified, TRIES) for each in (models, cut))
+        assert pieces.values["hubs.types"] == "none"
+        assert "a hole where one is left out" in pieces.reasons["hubs.types"]
+        assert parts.settings > pieces.settings
+
     def test_what_is_told_by_meaning_is_probed_by_meaning(self) -> None:
         models = [table(THIN, SQUARE), table(THICK, ROUND)]
         config = left_open([[], []], types="meaning")

@@ -68,15 +68,14 @@ class TestAuto:
 
     def test_colours_of_one_object_are_labels_of_its_pieces(self) -> None:
         scene = painted([box(), box(at=(1, 0, 0)), box(at=(2, 0, 0))], [RED, BLUE, RED])
-        source, why = pick(scene)
+        source, why, parted = pick(scene)
         assert source == "colors"
         assert "3 connected pieces of 2 face or vertex colours" in why
-        parts = segment(scene, source).placements
-        assert [part.name for part in parts] == ["#ff0000", "#0000ff", "#ff0000#2"]
+        assert [part.name for part in parted.placements] == ["#ff0000", "#0000ff", "#ff0000#2"]
 
     def test_shading_is_no_label(self) -> None:
         corners = [box(at=(3 * k, 0, 0)) for k in range(70)]
-        source, why = pick(painted(corners, [(k, k, k) for k in range(70)]))
+        source, why, _ = pick(painted(corners, [(k, k, k) for k in range(70)]))
         assert source == "components"
         assert "70 colours, which are shading" in why
 

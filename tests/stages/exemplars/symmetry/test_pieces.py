@@ -77,17 +77,34 @@ class TestRepeatedPieces:
 
 class TestBridge:
     def test_a_mesh_in_one_piece_is_cut_by_what_it_repeats(self) -> None:
-        source, why = pick(one_object(wall(4)))
+        source, why, parts = pick(one_object(wall(4)))
         assert source == "symmetry"
         assert "6 pieces between copies of what repeats" in why
-        parts = segment(one_object(wall(4)), source)
         assert len(parts.surfaces) == 3
         assert sorted(np.bincount([each.surface for each in parts.placements]).tolist()) == [1, 1, 4]
 
     def test_a_mesh_that_repeats_nothing_is_left_alone(self) -> None:
-        source, why = pick(one_object(box((0, 0, 0), (3, 2, 1))))
+        source, why, _ = pick(one_object(box((0, 0, 0), (3, 2, 1))))
         assert source == "objects"
         assert "nothing tells parts apart" in why
+
+    def test_much_surface_in_a_small_box_is_not_searched_unasked(self) -> None:
+        x, y, z = np.arange(20) / 19, np.array([0.0, 1.0]), np.arange(20) % 2
+        fold = np.array([[[x[k], y[0], z[k]], [x[k + 1], y[0], z[k + 1]], [x[k], y[1], z[k]]] for k in range(19)])
+        back = np.array(
+            [[[x[k + 1], y[0], z[k + 1]], [x[k + 1], y[1], z[k + 1]], [x[k], y[1], z[k]]] for k in range(19)]
+        )
+        source, why, parts = pick(one_object(np.concatenate([fold, back])))
+        assert source == "objects"
+        assert "too much surface to look unasked for what repeats" in why
+        assert len(parts.placements) == 1
+
+    def test_a_mesh_without_any_area_stays_as_it_is(self) -> None:
+        flat = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
+        source, why, parts = pick(one_object(flat))
+        assert source == "objects"
+        assert "nothing tells parts apart" in why
+        assert len(parts.placements) == 1
 
     def test_triangles_without_area_are_counted(self) -> None:
         flat = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
