@@ -1,6 +1,7 @@
 """Make trained models come with Shapemill: `python -m stages.training.recovery.ship OUT/chairs-models/clouds-chair-0`.
 
-For maintainers: what is put below `datasets/exemplars/models/` is committed, so that `make recover` works at once from a fresh clone.
+For maintainers: what is put below `datasets/exemplars/models/` is committed, so that `make recover` works at once from
+a fresh clone.
 """
 
 from __future__ import annotations
