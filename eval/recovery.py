@@ -7,17 +7,19 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
 from eval.table import Cell, Published, Table
+from pipeline.errors import ConfigError
 from stages.programs.program import Program
 from stages.programs.schema import Values
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import drawn
 from stages.training.recovery.reading import Input
-from stages.training.recovery.recover import Models, recover_input
+from stages.training.recovery.recover import Models, find_models, recover_input
 from stages.training.recovery.shapes import TEST, TRAIN, RandomShape, random_shapes
 from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
 from stages.training.recovery.trained import TrainedRecovery
@@ -32,6 +34,7 @@ __all__ = [
     "published_chamfer",
     "recovery_table",
     "tried",
+    "usable_models",
 ]
 
 MEASURED = 10_000
@@ -102,6 +105,14 @@ def held_out(
         angle = "trained" if not model.entry.views or view.name in model.entry.views else "novel"
         inputs = [Input(name, ink=each) for name, each in zip(names, inks, strict=True)]
         yield f"sketch, {angle} angle ({view.name})", shapes, inputs
+
+
+def usable_models(folder: Path) -> Models:
+    """The recovery models in a folder of published models. Raises ConfigError where none can be used."""
+    models, wrong = find_models(folder)
+    if not models:
+        raise ConfigError(f"{wrong[0]}; make train")
+    return models
 
 
 def methods(model: TrainedRecovery, budget: int, seed: int) -> dict[str, Method]:

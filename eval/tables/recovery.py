@@ -7,7 +7,6 @@ from argparse import ArgumentParser, Namespace
 from eval.evaluation import Answer, Evaluation, Strip
 from eval.needs import RECOVERY
 from eval.subject import Subject
-from pipeline.errors import ConfigError
 from stages.training.checkpoint import weights_of_kind
 
 __all__ = ["TABLE"]
@@ -17,15 +16,13 @@ SHOWN = 8
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.recovery import accuracy_chart, floor, held_out, methods, recovery_table, tried
+    from eval.recovery import accuracy_chart, floor, held_out, methods, recovery_table, tried, usable_models
     from pipeline.randomness import decision_rng
     from stages.shape.views.sheet import picture_png
     from stages.training.recovery.files import recovery_picture
-    from stages.training.recovery.recover import find_models, recover_input
+    from stages.training.recovery.recover import recover_input
 
-    models, wrong = find_models(subject.models)
-    if not models:
-        raise ConfigError(f"{wrong[0]}; make train")
+    models = usable_models(subject.models)
     rows, floors, strips, seed = [], {}, [], subject.config.seed
     for (program, kind), model in sorted(models.items()):
         ways = methods(model, asked.budget, seed)

@@ -8,7 +8,6 @@ from pathlib import Path
 from eval.evaluation import Answer, Evaluation, Strip
 from eval.needs import RECOVERY
 from eval.subject import Subject
-from pipeline.errors import ConfigError
 from stages.training.checkpoint import weights_of_kind
 
 __all__ = ["TABLE"]
@@ -18,16 +17,14 @@ SHOWN = 8
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.recovery import held_out, methods, tried
+    from eval.recovery import held_out, methods, tried, usable_models
     from eval.spoilt import WAYS, foreign_inputs, foreign_rows, foreign_table, spoilt_inputs, spoilt_table
     from pipeline.randomness import decision_rng
     from stages.shape.views.sheet import picture_png
     from stages.training.recovery.files import recovery_picture
-    from stages.training.recovery.recover import find_models, recover_input
+    from stages.training.recovery.recover import recover_input
 
-    models, wrong = find_models(subject.models)
-    if not models:
-        raise ConfigError(f"{wrong[0]}; make train")
+    models = usable_models(subject.models)
     rows, foreign, strips, seed = [], [], [], subject.config.seed
     brought = {(folder, kind): foreign_inputs(folder, kind) for folder in asked.foreign for _, kind in models}
     for (program, kind), model in sorted(models.items()):

@@ -209,7 +209,12 @@ def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_pat
         np.testing.assert_allclose(one.detach(), other.detach(), atol=1e-3)
 
 
-SHIPPED_MODELS, _ = find_models(SHIPPED)
+SHIPPED_MODELS, REFUSED = find_models(SHIPPED)
+
+
+def test_what_ships_can_be_used_as_the_programs_are_now() -> None:
+    assert not REFUSED
+    assert ("chair", "points") in SHIPPED_MODELS
 
 
 @pytest.mark.parametrize(("program", "kind"), sorted(SHIPPED_MODELS))
