@@ -24,6 +24,12 @@ class ProgramFiles(NamedFiles):
     folder: str = Field(
         "", description="Only the files below this folder of the archive, such as data/chair; empty for all."
     )
+    lists: dict[Literal["val", "test"], str] = Field(
+        default_factory=dict,
+        description="Splits that were published: files below `path` that name programs, one a line, such as `{val: "
+        "data_splits/chair/val.txt}`. The named programs make the split, all others of the entry are for training, and "
+        "`splits` shares out none of them.",
+    )
 
 
 class ShapeAssemblySplitConfig(StrictModel):

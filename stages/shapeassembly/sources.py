@@ -11,7 +11,7 @@ from pathlib import Path
 from pipeline.places import file_digest
 from stages.shapeassembly.limits import MAX_TEXT
 
-__all__ = ["existing_programs", "program_texts", "source_digest"]
+__all__ = ["existing_programs", "listed_names", "program_texts", "source_digest"]
 
 
 def existing_programs(path: Path) -> Path:
@@ -49,6 +49,13 @@ def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
             assert stored is not None
             texts[name] = stored.read(MAX_TEXT + 1).decode(errors="replace")
     yield from sorted(texts.items())
+
+
+def listed_names(path: Path, name: str) -> list[str]:
+    """The lines of the list called `name` below `path`, without those that are empty. Raises KeyError where there is no
+    such `.txt` file."""
+    lists = dict(program_texts(path, name.rpartition("/")[0]))
+    return lists[name].split()
 
 
 def _below(name: str, folder: str) -> bool:

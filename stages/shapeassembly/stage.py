@@ -22,7 +22,7 @@ from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import unstated
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
+from stages.shape.splits import SPLITS, shard_sizes, shards_of_split
 from stages.shapeassembly.checks import overflow, reaching_out, violations
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
@@ -33,6 +33,7 @@ from stages.shapeassembly.parser import parse
 from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.shapeassembly.shape import shape_of_execution
+from stages.shapeassembly.sharing import splits_of
 from stages.shapeassembly.sources import program_texts, source_digest
 from stages.shapeassembly.structure import signature
 
@@ -94,10 +95,7 @@ def run_assignment(task: Task) -> Outcome:
         Classes.of(Programs(labels).sources)
     except ValueError as error:
         raise ShardFailed(f"{error}; the names in the programs make them") from error
-    groups: dict[str, list[int]] = {}
-    for index, row in enumerate(rows):
-        groups.setdefault(row["graph"], []).append(index)
-    split_of = share_out(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
+    split_of = splits_of(rows, config, task.rng("splits"))
     order = task.rng("order").permutation(len(rows))
     shards: dict[str, int] = {}
     for split, name in enumerate(SPLITS):
@@ -111,7 +109,8 @@ def run_assignment(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.labels.json") as stream:
         stream.write(json_bytes(labels))
     parts = float(np.mean([row["parts"] for row in rows]))
-    return Outcome(0, {"shards": shards, "programs": counts, "structures": len(groups), "parts": round(parts, 2)})
+    structures = len({row["graph"] for row in rows})
+    return Outcome(0, {"shards": shards, "programs": counts, "structures": structures, "parts": round(parts, 2)})
 
 
 def _accepted(task: Task, config: ShapeAssemblyConfig) -> Iterator[dict[str, Any]]:
@@ -138,7 +137,8 @@ def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, 
     """Of each program the name of its source, its own name there, and its text: those read, then those extracted."""
     for source in config.programs:
         for name, text in program_texts(source.path, source.folder):
-            yield source.name, name, text
+            if name not in source.lists.values():
+                yield source.name, name, text
     for each in read_extracted(task):
         yield each.kind, each.name, each.text
 

@@ -5,15 +5,21 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import shutil
 import tarfile
 from pathlib import Path
+from typing import Literal
 
+import numpy as np
 import pytest
 import yaml
 
+from pipeline.errors import ShardFailed
 from stages.shape.sample import Sample, read_samples
 from stages.shapeassembly import execute, parse
+from stages.shapeassembly.settings import ProgramFiles, ShapeAssemblyConfig
 from stages.shapeassembly.shape import shape_of_text
+from stages.shapeassembly.sharing import splits_of
 from stages.shapeassembly.structure import signature
 from tests.mill import mill
 
@@ -133,3 +139,43 @@ def test_a_source_that_is_not_there_is_said_before_anything_starts(tmp_path: Pat
     code, printed, _ = make(tmp_path, {"programs": [{"name": "a", "path": str(tmp_path / "a.txt")}]})
     assert code == 2
     assert "neither a folder nor a tar archive" in printed
+
+
+def test_published_lists_make_the_splits(folder: Path, tmp_path: Path) -> None:
+    """All programs of a structure would stand in one split; a list parts them, and what it does not name is train."""
+    source = tmp_path / "listed"
+    shutil.copytree(folder / "good", source / "data")
+    names = sorted(path.stem for path in (source / "data").glob("*.txt"))
+    (source / "val.txt").write_text("".join(f"{name}\n" for name in names[::3]))
+    (source / "test.txt").write_text(f"{names[1]}.txt\nnot-there\n")
+    (source / "none.txt").write_text("nobody\n")
+    entry = {"name": "good", "path": str(source), "lists": {"val": "val.txt", "test": "test.txt"}}
+    code, printed, out = make(tmp_path, {"programs": [entry]})
+    assert code == 0, printed
+    found = {sample.lineage["parents"][0]: sample.split for shard in samples(out).values() for sample in shard}
+    expected = {
+        name: "val" if place % 3 == 0 else "test" if place == 1 else "train" for place, name in enumerate(names)
+    }
+    assert found == {name: expected[Path(name).stem] for name in found}
+    assert set(found.values()) == {"train", "val", "test"}
+    assert len(found) >= len(EXAMPLES)
+
+
+@pytest.mark.parametrize(
+    ("lists", "said"),
+    [
+        ({"val": "gone.txt"}, "there is no gone.txt"),
+        ({"val": "none.txt"}, "name none of its programs"),
+        ({"val": "val.txt", "test": "val.txt"}, "for both val and test"),
+    ],
+)
+def test_lists_that_cannot_be_followed_are_said(
+    tmp_path: Path, lists: dict[Literal["val", "test"], str], said: str
+) -> None:
+    (tmp_path / "val.txt").write_text("one\n")
+    (tmp_path / "none.txt").write_text("nobody\n")
+    (tmp_path / "one.txt").write_text(CHAIR)
+    config = ShapeAssemblyConfig(programs=(ProgramFiles(name="good", path=tmp_path, lists=lists),))
+    rows = [{"kit": "good", "file": "one.txt", "graph": "a"}]
+    with pytest.raises(ShardFailed, match=said):
+        splits_of(rows, config, np.random.default_rng(0))
