@@ -31,11 +31,12 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         variability,
         variability_table,
     )
+    from eval.realism import POINTS, realism
     from pipeline.randomness import decision_rng
     from stages.training.program_vae.trained import load_program_vae
 
     models = trained_models(subject.models, "program_vae", load_program_vae)
-    quality, written, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, []
+    quality, seen, written, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, {}, []
     for each in models:
         train, val = (_programs(subject, each.kit, split) for split in ("train", "val"))
         clouds = {split: clouds_of(programs) for split, programs in (("train", train), ("val", val))}
@@ -45,6 +46,8 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         for name, programs in ((each.folder, samples), (real, val[: asked.samples])):
             if name not in quality:
                 quality[name] = physics_of(programs)
+                shown, learnt = clouds_of(programs, POINTS), clouds_of(train[: len(programs)], POINTS)
+                seen[name] = realism(shown, learnt, subject.config.seed)
                 written[name] = programs
                 varied[name] = variability(programs, clouds["train"], None if name == real else clouds["val"])
                 novel[name] = novelty(programs, train)
@@ -54,7 +57,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         strips.append(Strip(f"Samples of {each.folder}", _pictures(samples[:SHOWN])))
     return Answer(
         [
-            quality_table(quality, rejected),
+            quality_table(quality, seen, rejected),
             editability_table(written),
             variability_table(varied, novel),
             smoothness_table(smooth),

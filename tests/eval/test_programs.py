@@ -18,6 +18,7 @@ from eval.programs import (
     variability,
     variability_table,
 )
+from eval.realism import Realism
 from stages.shapeassembly import parse
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.program_vae.trained import TrainedProgramVae
@@ -71,7 +72,7 @@ def test_steps_between_points_are_measured_and_tables_hold_the_published_rows() 
     smooth = smoothness(model, 2, 5, np.random.default_rng(0))
     assert smooth[0] == "" or float(smooth[0]) >= 0
     tables = [
-        quality_table({"a": physics_of(PROGRAMS)}, {"a": 12.5}),
+        quality_table({"a": physics_of(PROGRAMS)}, {"a": Realism(20.0, 3.5)}, {"a": 12.5}),
         editability_table({"a": PROGRAMS}),
         variability_table({"a": variability(PROGRAMS, clouds_of(PROGRAMS), None)}, {"a": 50.0}),
         smoothness_table({"a": smooth}),
