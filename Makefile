@@ -60,7 +60,7 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset choices exemplars variations programs shapeassembly synthesis validity strings points sketches package
+.PHONY: dataset choices exemplars variations programs writing shapeassembly synthesis validity strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
 choices: setup  ## Choose what the config leaves at auto: up axis, contacts, grammar, hubs
@@ -71,7 +71,9 @@ variations: exemplars  ## Make new shapes from the exemplars' parts
 	$(RUN)
 programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
-shapeassembly: setup  ## Make shapes from ShapeAssembly programs, or from part hierarchies
+writing: setup  ## Let trained models write ShapeAssembly programs
+	$(RUN)
+shapeassembly: writing  ## Make shapes from ShapeAssembly programs, or from part hierarchies
 	$(RUN)
 synthesis: exemplars  ## Make new shapes from what trained models write
 	$(RUN)

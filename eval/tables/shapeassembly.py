@@ -41,7 +41,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         train, val = (_programs(subject, each.kit, split) for split in ("train", "val"))
         clouds = {split: clouds_of(programs) for split, programs in (("train", train), ("val", val))}
         rng = decision_rng(subject.config.seed, "shapeassembly", each.folder)
-        samples, share = each.model.sample(asked.samples, rng)
+        samples, drawn = each.model.sample(asked.samples, rng)
         real = f"{each.kit}, val"
         for name, programs in ((each.folder, samples), (real, val[: asked.samples])):
             if name not in quality:
@@ -51,7 +51,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
                 written[name] = programs
                 varied[name] = variability(programs, clouds["train"], None if name == real else clouds["val"])
                 novel[name] = novelty(programs, train)
-        rejected[each.folder] = 100 * share
+        rejected[each.folder] = 100 * (1 - len(samples) / drawn)
         smooth[each.folder] = smoothness(each.model, asked.sequences, asked.steps, rng)
         curves[each.folder] = training_curve(subject.models / each.folder, "val_loss")
         strips.append(Strip(f"Samples of {each.folder}", _pictures(samples[:SHOWN])))

@@ -65,7 +65,7 @@ def plan(plan: Plan) -> list[Shard]:
     drawn = (*read, *(f"{stage}/{name}" for name in shown for stage in (producer, *rows)))
     picture = Shard(PICTURE, pictured, drawn, member_modules())
     declared, language = producers()[producer], language_of(producer)
-    origins = declared.origins(plan.config)
+    origins = declared.origins(plan)
     params = {
         "facts": _facts(plan),
         "producer": producer,

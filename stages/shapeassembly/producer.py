@@ -10,7 +10,7 @@ __all__ = ["PRODUCER"]
 
 PRODUCER = Producer(
     language="shapeassembly",
-    keys="shapeassembly.programs or hierarchies",
+    keys="shapeassembly.programs, hierarchies or written",
     asked=lambda config: config.section(ShapeAssemblyConfig).has_sources,
     sentence="ShapeAssembly programs are executed; a shape's program is its `txt`.",
     origins=program_origins,

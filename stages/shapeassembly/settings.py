@@ -12,7 +12,7 @@ from stages.shape.physics.settings import Requirements
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles, NamedFiles
 from stages.shapeassembly.sources import existing_programs
 
-__all__ = ["ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig"]
+__all__ = ["ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig", "WrittenPrograms"]
 
 
 class ProgramFiles(NamedFiles):
@@ -30,6 +30,34 @@ class ProgramFiles(NamedFiles):
         "data_splits/chair/val.txt}`. The named programs make the split, all others of the entry are for training, and "
         "`splits` shares out none of them.",
     )
+
+
+class WrittenPrograms(NamedFiles):
+    """Programs that a trained model writes."""
+
+    dataset: str = Field(
+        pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
+        max_length=64,
+        description="Name of the dataset that the model was trained on, in the same output folder.",
+    )
+    model: str = Field(
+        pattern=r"^[a-z][a-z0-9]*(_[a-z0-9]+)*$",
+        max_length=32,
+        description="Name of the model there, as in training.models.",
+    )
+    kit: str = Field(description="What it has learnt: a name of `programs` or `hierarchies` there.")
+    seed: int = Field(0, ge=0, lt=100, description="Which of its trainings, if it has several seeds.")
+    samples: int = Field(
+        ge=1, le=10_000_000, description="Programs that it writes; those that it writes twice count once."
+    )
+    temperature: float = Field(
+        1.0, gt=0, le=10, description="Spread of the points of the latent space that are drawn; 1: that of the prior."
+    )
+
+    @property
+    def folder(self) -> str:
+        """The folder of the model, below the output folder."""
+        return f"{self.dataset}-models/{self.model}-{self.kit}-{self.seed}"
 
 
 class ShapeAssemblySplitConfig(StrictModel):
@@ -50,6 +78,7 @@ class ShapeAssemblyConfig(StrictModel):
     hierarchies: tuple[HierarchyFiles, ...] = Field(
         (), description="Where the part hierarchies are from which programs are extracted."
     )
+    written: tuple[WrittenPrograms, ...] = Field((), description="The trained models that write programs.")
     extraction: Gates = Field(default_factory=Gates, description="What an extracted program must pass.")
     cleaning: Cleaning = Field(default_factory=Cleaning, description="How hierarchies are made tidier before.")
     accept: Literal["executable", "valid"] = Field(
@@ -72,12 +101,12 @@ class ShapeAssemblyConfig(StrictModel):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [each.name for each in self.programs] + [each.name for each in self.hierarchies]
+        names = [each.name for each in (*self.programs, *self.hierarchies, *self.written)]
         if len(set(names)) < len(names):
-            raise ValueError(f"two entries of programs and hierarchies have one name: {', '.join(names)}")
+            raise ValueError(f"two entries of programs, hierarchies and written have one name: {', '.join(names)}")
         return self
 
     @property
     def has_sources(self) -> bool:
         """Whether the dataset is made of programs."""
-        return bool(self.programs or self.hierarchies)
+        return bool(self.programs or self.hierarchies or self.written)

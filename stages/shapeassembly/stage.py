@@ -1,8 +1,8 @@
 """Stage `shapeassembly`: ShapeAssembly programs in; those that pass, as the shards `<dataset>-<split>-<index>.tar`.
 
-Its first shards extract programs from part hierarchies, if there are any. Then one reads all programs, refuses what is
-no program, and gives each of the others its split and shard. A sample carries no meshes: its text is the canonical
-program, and `stages.shapeassembly.shape.shape_of_text` executes it.
+Its first shards extract programs from part hierarchies, if there are any. Then one reads all programs, those of stage
+`writing` among them, refuses what is no program, and gives each of the others its split and shard. A sample carries no
+meshes: its text is the canonical program, and `stages.shapeassembly.shape.shape_of_text` executes it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shard_sizes, shards_of_split
 from stages.shapeassembly.checks import overflow, reaching_out, violations
 from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.extraction.shards import extraction_shards, read_extracted, run_extraction
+from stages.shapeassembly.extraction.shards import extraction_shards, read_made, run_extraction
 from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.language import Programs, assignment_name
 from stages.shapeassembly.origins import program_origins
@@ -52,7 +52,10 @@ def planned_shards(plan: Plan) -> list[Shard]:
     if any(plan.summary("shapeassembly", shard.name) is None for shard in extraction):
         return extraction
     digests = [source_digest(each.path) for each in config.programs]
-    inputs = tuple(f"shapeassembly/{shard.name}" for shard in extraction)
+    made = [("shapeassembly", shard.name) for shard in extraction]
+    inputs = tuple(
+        f"{stage}/{shard}" for stage, shard in (*made, *(("writing", name) for name in plan.shards("writing")))
+    )
     assignment = Shard(assignment_name(plan.config.name), {"job": "assignment", "digests": digests}, inputs)
     summary = plan.summary("shapeassembly", assignment.name)
     if summary is None:
@@ -84,9 +87,11 @@ def run_assignment(task: Task) -> Outcome:
     the part labels of all programs of each category, sorted. Raises ShardFailed for no program, or too many labels.
     """
     config = task.config.section(ShapeAssemblyConfig)
-    rows = list(_accepted(task, config))
+    refused: Counter[str] = Counter()
+    rows = list(_accepted(task, config, refused))
     if not rows:
-        raise ShardFailed("no program was accepted; the rejects of this shard say why")
+        why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common(3))
+        raise ShardFailed(f"no program was accepted; refused: {why or 'none'}")
     found: dict[str, set[str]] = {}
     for row in rows:
         found.setdefault(row["kit"], set()).update(row.pop("labels"))
@@ -113,8 +118,8 @@ def run_assignment(task: Task) -> Outcome:
     return Outcome(0, {"shards": shards, "programs": counts, "structures": structures, "parts": round(parts, 2)})
 
 
-def _accepted(task: Task, config: ShapeAssemblyConfig) -> Iterator[dict[str, Any]]:
-    """The programs that become samples; the others are refused."""
+def _accepted(task: Task, config: ShapeAssemblyConfig, refused: Counter[str]) -> Iterator[dict[str, Any]]:
+    """The programs that become samples; the others are refused, and counted in `refused`."""
     known: set[str] = set()
     places: Counter[str] = Counter()
     for kind, name, text in _texts(task, config):
@@ -122,11 +127,10 @@ def _accepted(task: Task, config: ShapeAssemblyConfig) -> Iterator[dict[str, Any
             row = _row(text, config)
             if row["text"] in known:
                 raise Rejected("program is there already", name)
-        except ProgramError as error:
-            task.reject(f"{kind}/{name}", error.reason, str(error))
-            continue
-        except Rejected as error:
-            task.reject(f"{kind}/{name}", error.reason, error.detail)
+        except (ProgramError, Rejected) as error:
+            detail = str(error) if isinstance(error, ProgramError) else error.detail
+            task.reject(f"{kind}/{name}", error.reason, detail)
+            refused[error.reason] += 1
             continue
         known.add(row["text"])
         yield {"key": f"{kind}-{places[kind]:06d}", "kit": kind, "file": name, **row}
@@ -134,12 +138,13 @@ def _accepted(task: Task, config: ShapeAssemblyConfig) -> Iterator[dict[str, Any
 
 
 def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, str]]:
-    """Of each program the name of its source, its own name there, and its text: those read, then those extracted."""
+    """Of each program the name of its source, its own name there, and its text: those read, those extracted, and those
+    that models have written."""
     for source in config.programs:
         for name, text in program_texts(source.path, source.folder):
             if name not in source.lists.values():
                 yield source.name, name, text
-    for each in read_extracted(task):
+    for each in read_made(task):
         yield each.kind, each.name, each.text
 
 
@@ -206,7 +211,7 @@ def report(plan: Plan) -> Sequence[str]:
     for shard in (*extraction, name):
         refused.update(plan.rejects("shapeassembly", shard))
     why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
-    asked = [f"warning: {sentence}" for sentence in unstated(program_origins(plan.config))]
+    asked = [f"warning: {sentence}" for sentence in unstated(program_origins(plan))]
     return [f"programs: {counts}; {summary['structures']:,} structures; refused: {why or 'none'}", *asked]
 
 
@@ -220,22 +225,24 @@ def asked(config: Config) -> Sequence[int]:
     """The programs of each shard of the collection, if all are accepted."""
     section = config.section(ShapeAssemblyConfig)
     total = sum(sum(1 for _ in program_texts(each.path, each.folder)) for each in section.programs)
-    total += sum(len(each.source) for each in section.hierarchies)
+    total += sum(len(each.source) for each in section.hierarchies) + sum(each.samples for each in section.written)
     val, test = round(section.splits.val * total), round(section.splits.test * total)
     return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
 
 
 def trial(config: Config) -> ShapeAssemblyConfig:
-    """The same programs in shards of few."""
+    """The same programs in shards of few, and of models a few."""
     section = config.section(ShapeAssemblyConfig)
-    return section.model_copy(update={"splits": section.splits.model_copy(update={"samples_per_shard": 8})})
+    written = tuple(each.model_copy(update={"samples": min(each.samples, 16)}) for each in section.written)
+    splits = section.splits.model_copy(update={"samples_per_shard": 8})
+    return section.model_copy(update={"splits": splits, "written": written})
 
 
 STAGE = Stage(
     name="shapeassembly",
     module=__name__,
     config=ShapeAssemblyConfig,
-    inputs=(),
+    inputs=("writing",),
     plan=planned_shards,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

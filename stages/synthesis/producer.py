@@ -79,7 +79,7 @@ PRODUCER = Producer(
     splits="No two samples have the same shape graph. Near relatives may stand in different splits.",
     apart=True,
     lineage=_lineage,
-    origins=exemplar_origins,
+    origins=lambda plan: exemplar_origins(plan.config),
     limits=(
         "All parts are those of the exemplars, and they meet only as parts meet there.",
         "A model writes what is like what it has learnt from: that of another dataset of the same kits, whose splits "

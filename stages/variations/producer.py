@@ -138,7 +138,7 @@ PRODUCER = Producer(
     nearness=_splits,
     apart=True,
     lineage=_lineage,
-    origins=exemplar_origins,
+    origins=lambda plan: exemplar_origins(plan.config),
     limits=(
         "All parts are those of the exemplars, and they meet only as parts meet there. What is learnt of these kits "
         "need not hold for other castles, temples or tracks.",

@@ -22,7 +22,7 @@ def _no_lineage(_: Config) -> Mapping[str, Field]:
     return {}
 
 
-def _no_origins(_: Config) -> Sequence[Origin]:
+def _no_origins(_: Plan) -> Sequence[Origin]:
     return ()
 
 
@@ -58,7 +58,7 @@ class Producer:
     apart: bool
     limits: tuple[str, ...] = ()
     lineage: Callable[[Config], Mapping[str, Field]] = _no_lineage
-    origins: Callable[[Config], Sequence[Origin]] = _no_origins
+    origins: Callable[[Plan], Sequence[Origin]] = _no_origins
     nearness: Callable[[Plan], Sequence[str]] = _nothing_to_add
     card: Callable[[Plan], Sequence[str]] = _nothing_to_add
     variety: Callable[[Plan], Sequence[str]] = _nothing_to_add

@@ -15,15 +15,15 @@ from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles
 from stages.shapeassembly.printer import print_program
 
-__all__ = ["Extracted", "extraction_shards", "read_extracted", "run_extraction"]
+__all__ = ["Made", "extraction_shards", "read_made", "run_extraction"]
 
 HIERARCHIES_A_SHARD = 1000
 """About a minute of work."""
 
 
 @dataclass(frozen=True)
-class Extracted:
-    """A program that was extracted. kind: the name of its source in the config; name: its hierarchy's in the source."""
+class Made:
+    """A program that a shard has made. kind: the name of its source in the config; name: its own in the source."""
 
     kind: str
     name: str
@@ -64,9 +64,9 @@ def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gat
     return Outcome(0, {"programs": len(rows), "f_score": round(float(np.mean(scores or [0.0])), 2)})
 
 
-def read_extracted(task: Task) -> Iterator[Extracted]:
-    """The programs of all extraction shards among the inputs of a task, in order."""
+def read_made(task: Task) -> Iterator[Made]:
+    """The programs of all shards among the inputs of a task that extract or write some, in order."""
     for record in task.shard.inputs:
         stage, shard = record.split("/")
         for line in task.input(stage, f"{shard}.jsonl").read_text().splitlines():
-            yield Extracted(**json.loads(line))
+            yield Made(**json.loads(line))

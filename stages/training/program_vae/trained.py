@@ -51,18 +51,20 @@ class TrainedProgramVae:
             found += write_programs(self.module, points[start : start + AT_ONCE], reject=reject)
         return found
 
-    def sample(self, count: int, rng: np.random.Generator) -> tuple[list[Program], float]:
-        """So many programs of random points, and the share of points that were rejected. Raises ValueError where
-        nearly all are."""
+    def sample(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> tuple[list[Program], int]:
+        """So many programs, and how many random points it took: those that are rejected count too. temperature: their
+        spread. Raises ValueError where nearly all are rejected."""
         kept: list[Program] = []
         drawn = 0
         while len(kept) < count:
             if drawn > 50 * (count + AT_ONCE):
                 raise ValueError(f"{len(kept)} of {drawn} random points gave a program; train the model longer")
-            points = rng.standard_normal((AT_ONCE, self.latent)).astype(np.float32)
-            drawn += AT_ONCE
-            kept += [each for each in self.decode(points, reject=True) if each is not None]
-        return kept[:count], 1 - len(kept) / drawn
+            points = temperature * rng.standard_normal((AT_ONCE, self.latent))
+            for each in self.decode(points.astype(np.float32), reject=True):
+                if len(kept) < count:
+                    drawn += 1
+                    kept += [] if each is None else [each]
+        return kept, drawn
 
 
 def load_program_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedProgramVae:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import yaml
 
 from eval.__main__ import main as evaluate
+from stages.shape.sample import read_samples
 from stages.shapeassembly import parse
 from stages.training.program_vae.trained import load_program_vae
 from tests.mill import mill
@@ -50,3 +52,41 @@ def test_a_model_of_programs_is_trained_and_read_again(tmp_path: Path) -> None:
     assert evaluate(["shapeassembly", *asked]) == 0
     table = (out / "toy-eval/shapeassembly.md").read_text()
     assert all(row in table for row in ("tiny-furniture-0", "furniture, val", "storage, ShapeAssembly"))
+    dreamt(tmp_path, out)
+
+
+def dreamt(folder: Path, out: Path) -> None:
+    """What the model writes becomes samples, the same ones however they are shared out among shards and workers."""
+    source = {"name": "stool", "dataset": "toy", "model": "tiny", "kit": "furniture", "samples": 12}
+    sections = {
+        "shapeassembly": {"written": [source], "overflow": 100, "splits": {"shards": 1}},
+        "writing": {"programs_per_shard": 5},
+    }
+    config = folder / "dreamt.yaml"
+    config.write_text(yaml.safe_dump({"name": "dreamt", "seed": 5, **sections}))
+    found = []
+    for workers in (1, 2):
+        made = folder / f"out{workers}"
+        shutil.copytree(out / "toy-models", made / "toy-models")
+        for stage in ("writing", "shapeassembly"):
+            code, printed = mill("run", stage, "--config", config, "--out", made, "--workers", workers)
+            assert code == 0, printed
+        work = made / ".work/dreamt"
+        written = [json.loads(line) for path in sorted((work / "writing").glob("*.jsonl")) for line in path.open()]
+        assert [row["name"] for row in written] == [f"toy-models/tiny-furniture-0/{n:06d}" for n in range(12)]
+        texts = {row["name"]: row["text"] for row in written}
+        samples = [each for path in sorted((work / "shapeassembly").glob("*.tar")) for each in read_samples(path)]
+        assert samples
+        assert all(texts[each.lineage["parents"][0]] == each.text for each in samples)
+        found.append([(each.key, each.split, each.text) for each in samples])
+    assert found[0] == found[1]
+
+
+def test_a_model_that_is_not_there_is_said_with_what_makes_it(tmp_path: Path) -> None:
+    source = {"name": "stool", "dataset": "toy", "model": "tiny", "kit": "furniture", "samples": 12}
+    config = tmp_path / "dreamt.yaml"
+    config.write_text(yaml.safe_dump({"name": "dreamt", "seed": 5, "shapeassembly": {"written": [source]}}))
+    code, printed = mill("run", "writing", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    assert code
+    assert "toy-models/tiny-furniture-0/weights.safetensors" in printed
+    assert "MODEL=tiny" in printed

@@ -1,0 +1,1 @@
+"""Trained models write ShapeAssembly programs, which stage `shapeassembly` makes shapes of (shapeassembly §6.1)."""
