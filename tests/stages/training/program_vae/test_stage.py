@@ -80,13 +80,3 @@ def dreamt(folder: Path, out: Path) -> None:
         assert all(texts[each.lineage["parents"][0]] == each.text for each in samples)
         found.append([(each.key, each.split, each.text) for each in samples])
     assert found[0] == found[1]
-
-
-def test_a_model_that_is_not_there_is_said_with_what_makes_it(tmp_path: Path) -> None:
-    source = {"name": "stool", "dataset": "toy", "model": "tiny", "kit": "furniture", "samples": 12}
-    config = tmp_path / "dreamt.yaml"
-    config.write_text(yaml.safe_dump({"name": "dreamt", "seed": 5, "shapeassembly": {"written": [source]}}))
-    code, printed = mill("run", "writing", "--config", config, "--out", tmp_path / "out", "--workers", 1)
-    assert code
-    assert "toy-models/tiny-furniture-0/weights.safetensors" in printed
-    assert "MODEL=tiny" in printed
