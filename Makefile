@@ -60,7 +60,8 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset choices exemplars variations programs writing shapeassembly synthesis validity strings points sketches package
+.PHONY: dataset choices exemplars variations programs writing shapeassembly synthesis
+.PHONY: validity abstraction strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
 choices: setup  ## Choose what the config leaves at auto: up axis, contacts, grammar, hubs
@@ -79,13 +80,15 @@ synthesis: exemplars  ## Make new shapes from what trained models write
 	$(RUN)
 validity: variations programs shapeassembly synthesis  ## Judge each shape: is it rooted, does it stand?
 	$(RUN)
+abstraction: variations programs shapeassembly synthesis  ## Find a ShapeAssembly program of each shape, if asked for
+	$(RUN)
 strings: variations programs shapeassembly synthesis  ## Write each shape as strings, and the text corpus
 	$(RUN)
 points: variations programs shapeassembly synthesis  ## Turn each shape into a labelled point cloud
 	$(RUN)
 sketches: variations programs shapeassembly synthesis  ## Draw each shape as lines
 	$(RUN)
-package: validity strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
+package: validity abstraction strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)
 
 .PHONY: train recover

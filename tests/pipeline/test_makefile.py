@@ -49,7 +49,7 @@ def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
     runs = calls("dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
     assert [run[3] for run in runs] == [
         "choices", "exemplars", "variations", "programs", "writing", "shapeassembly", "synthesis", "validity",
-        "strings", "points", "sketches", "package",
+        "abstraction", "strings", "points", "sketches", "package",
     ]  # fmt: skip
     asked = ["--config", "c.yaml", "--out", "/data", "--seed", "7", "--workers", "3"]
     assert all(run == ["-m", "pipeline", "run", run[3], *asked] for run in runs)
@@ -105,9 +105,11 @@ def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
     targets = ("dataset", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert len(reached) == 12 + len(targets[1:]) + 1  # dataset is twelve stages; inspect looks at a program and a model
+    assert (
+        len(reached) == 13 + len(targets[1:]) + 1
+    )  # dataset is thirteen stages; inspect looks at a program and a model
     assert all(any(said in each for each in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 12 * 4
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 13 * 4
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 

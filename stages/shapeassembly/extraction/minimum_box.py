@@ -17,11 +17,11 @@ WORTH_TURNING = 0.99
 """How large a turned box may be, as a share of the upright one: a round or square part has many smallest boxes."""
 
 
-def minimum_box(points: FloatArray) -> Box:
+def minimum_box(points: FloatArray, worth_turning: float = WORTH_TURNING) -> Box:
     """The box of least volume around `points`, float64 (n, 3), among those with a side on a large side of their hull.
 
-    It stands along the coordinate axes unless a turned one is smaller by more than a hundredth. Points in a plane get
-    a box of no thickness and least area, turned with the plane.
+    It stands along the coordinate axes unless a turned one has less than `worth_turning` of its volume. Points in a
+    plane get a box of no thickness and least area, turned with the plane.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -34,7 +34,7 @@ def minimum_box(points: FloatArray) -> Box:
     normals = _largest_sides(hull.equations[:, :3], points[hull.simplices])
     boxes = [_on_side(corners, normal) for normal in normals]
     best = min(boxes, key=lambda box: float(np.prod(box.size)))
-    return best if np.prod(best.size) < WORTH_TURNING * np.prod(upright.size) else upright
+    return best if np.prod(best.size) < worth_turning * np.prod(upright.size) else upright
 
 
 def _largest_sides(normals: FloatArray, triangles: FloatArray) -> FloatArray:

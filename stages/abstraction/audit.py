@@ -1,0 +1,47 @@
+"""How `make verify` looks at the ShapeAssembly programs of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from stages.abstraction.members import FOUND, PROGRAM
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.packaged import Packaged
+from stages.shape.geometry.bounds import shape_bounds
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.interpreter import execute
+from stages.shapeassembly.parser import parse
+
+__all__ = ["AUDIT"]
+
+AROUND = 0.35
+"""By how much of the sample's diagonal a corner of the box around a program may miss that of the sample: it was let
+through by its surface, and its parts may reach out a little."""
+
+
+def _faults(sample: Packaged) -> Iterator[str]:
+    if PROGRAM not in sample.members:
+        return
+    said, text = sample.record["program"], sample.members[PROGRAM].decode()
+    if bool(text) != (said["refused"] == FOUND):
+        yield "it has a ShapeAssembly program and a reason why it has none, or neither"
+        return
+    if not text:
+        return
+    try:
+        program = parse(text)
+        corners = execute(program).corners.reshape(-1, 3)
+    except ProgramError as error:
+        yield f"its ShapeAssembly program: {error}"
+        return
+    if sum(1 + len(block.lines) for block in program.blocks) != said["lines"]:
+        yield "its ShapeAssembly program has another number of lines than its json says"
+    bounds = shape_bounds(sample.shape)
+    placed = np.array(said["centre"]) + said["scale"] * np.stack([corners.min(axis=0), corners.max(axis=0)])
+    if np.abs(placed - bounds).max() > AROUND * np.linalg.norm(bounds[1] - bounds[0]):
+        yield "its ShapeAssembly program stands elsewhere than its mesh"
+
+
+AUDIT = Audit(faults=_faults)

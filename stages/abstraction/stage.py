@@ -1,0 +1,90 @@
+"""Stage `abstraction`: each sample of the collection gets a ShapeAssembly program, if a config asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pipeline.errors import Rejected
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.abstraction.hierarchy import Boxes, hierarchy_of
+from stages.abstraction.members import FOUND, PROGRAM, figures
+from stages.abstraction.settings import AbstractionConfig
+from stages.shape.collection.collection import Collection, add_members
+from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
+from stages.shape.sample import Sample
+from stages.shapeassembly.extraction.extract import Extraction, extract
+from stages.shapeassembly.extraction.rules import RULES
+from stages.shapeassembly.printer import print_program
+
+__all__ = ["STAGE"]
+
+BYTES_A_SAMPLE = 4096
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """One shard for each shard of the collection; none unless programs are asked for."""
+    return collection_shards(plan) if plan.config.section(AbstractionConfig).programs else []
+
+
+def run_shard(task: Task) -> Outcome:
+    """What `members.py` declares, of each sample. The summary has sums over the programs that were found."""
+    config = task.config.section(AbstractionConfig)
+    boxes = Boxes()
+    sums: dict[str, float] = {"programs": 0, "f_score": 0.0, "lines": 0}
+
+    def abstracted(collection: Collection, sample: Sample) -> Mapping[str, bytes]:
+        shape = collection.shape(sample)
+        try:
+            hierarchy = hierarchy_of(shape, config.children, boxes)
+            found = extract(hierarchy, RULES["any"], config.gates, config.cleaning)
+        except Rejected as error:
+            nothing = {"refused": error.reason, "f_score": 0, "lines": 0, "leaves": 0, "centre": [0, 0, 0], "scale": 0}
+            return {PROGRAM: b"", "json": json_bytes({"program": nothing})}
+        fields = _fields(found)
+        sums["programs"] += 1
+        sums["f_score"] += fields["f_score"]
+        sums["lines"] += fields["lines"]
+        return {PROGRAM: print_program(found.program).encode(), "json": json_bytes({"program": fields})}
+
+    samples = add_members(task, abstracted)
+    return Outcome(samples, {"split": task.shard.params["split"], "samples": samples, **sums})
+
+
+def _fields(found: Extraction) -> dict[str, Any]:
+    return {
+        "refused": FOUND,
+        "f_score": round(found.f_score, 3),
+        "lines": sum(1 + len(block.lines) for block in found.program.blocks),
+        "leaves": found.leaves,
+        "centre": [float(f"{each:.9g}") for each in found.center],
+        "scale": float(f"{found.scale:.9g}"),
+    }
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """How many samples have a program, and how well they fit."""
+    found = figures(plan)
+    if found is None:
+        return []
+    return [
+        f"{found['programs']:,} of {found['samples']:,} samples have a program, mean F-score {found['f_score']:.1f} %, "
+        f"{found['lines']:.1f} lines"
+    ]
+
+
+def _bytes(plan: Plan) -> int:
+    return BYTES_A_SAMPLE * sample_count(plan) if plan.config.section(AbstractionConfig).programs else 0
+
+
+STAGE = Stage(
+    name="abstraction",
+    module=__name__,
+    config=AbstractionConfig,
+    inputs=(PRODUCERS,),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=_bytes,
+    report=report,
+)

@@ -1,0 +1,65 @@
+"""The stage on the real mill: programs beside samples, reasons beside the others, all of it found good by verify."""
+
+from __future__ import annotations
+
+import json
+import tarfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from stages.shapeassembly import execute, parse
+from tests.mill import mill
+
+
+def made(folder: Path, name: str, asked: dict[str, Any], stages: tuple[str, ...]) -> tuple[Path, Path]:
+    sections = {
+        "programs": {"program": "table", "mode": "sweep", "sweep": {"samples": 3}},
+        "abstraction": asked,
+        "sketches": {"views": [{"name": "front", "azimuth": 30, "elevation": 20}]},
+    }
+    config = folder / f"{name}.yaml"
+    config.write_text(yaml.safe_dump({"name": name, "seed": 5, "license": "MIT", **sections}))
+    for stage in stages:
+        code, printed = mill("run", stage, "--config", config, "--out", folder, "--workers", 1)
+        assert code == 0, printed
+    return config, folder / ".work" / name / "abstraction"
+
+
+def members(root: Path) -> dict[str, bytes]:
+    found = {}
+    for path in sorted(root.glob("*.tar")):
+        with tarfile.open(path) as archive:
+            for each in archive:
+                stream = archive.extractfile(each)
+                assert stream is not None
+                found[each.name] = stream.read()
+    return found
+
+
+@pytest.mark.slow
+def test_samples_have_programs_and_verify_finds_them_good(tmp_path: Path) -> None:
+    stages = ("programs", "abstraction", "validity", "points", "sketches", "package")
+    config, root = made(tmp_path, "asked", {"programs": True}, stages)
+    found = members(root)
+    for name, content in found.items():
+        if name.endswith(".program.txt"):
+            said = json.loads(found[name.replace(".program.txt", ".json")])["program"]
+            assert said["refused"] == "not refused"
+            assert said["f_score"] >= 75
+            assert len(execute(parse(content.decode()))) >= 2
+            assert said["lines"] == sum("(" in line for line in content.decode().splitlines())
+    code, printed = mill("verify", "--config", config, "--out", tmp_path, "--samples", "all")
+    assert code == 0, printed
+
+
+def test_a_sample_without_a_program_says_why_and_stays(tmp_path: Path) -> None:
+    gates = {"fewest_leaves": 1, "most_leaves": 1}
+    found = members(made(tmp_path, "few", {"programs": True, "gates": gates}, ("programs", "abstraction"))[1])
+    assert len(found) == 6
+    assert all(content == b"" for name, content in found.items() if name.endswith(".txt"))
+    reasons = {json.loads(content)["program"]["refused"] for name, content in found.items() if name.endswith(".json")}
+    assert reasons == {"too many parts"}
+    assert not members(made(tmp_path, "none", {}, ("programs", "abstraction"))[1])
