@@ -91,9 +91,9 @@ def test_random_toys_are_closed_and_in_one_piece(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("between", [False, True])
 @pytest.mark.parametrize("name", program_names())
-def test_a_thousand_random_shapes_are_closed_and_in_one_piece(name: str, between: bool) -> None:
+def test_many_random_shapes_are_closed_and_in_one_piece(name: str, between: bool) -> None:
     program = find_program(name)
-    check(program, random_values(program, 1000, between))
+    check(program, random_values(program, 200, between))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -144,9 +144,9 @@ def test_no_part_cuts_itself(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", program_names())
 def test_next_to_no_part_of_many_shapes_cuts_itself(name: str) -> None:
-    # Arm supports that are thick and bend sharply do, two of so many chairs, and necks that fold over, nine of vases.
-    found = cut_themselves(find_program(name), 400)
-    assert len({text for _, text in found}) <= 10, found
+    # Arm supports that are thick and bend sharply do, two of 400 chairs, and necks that fold over, nine of 400 vases.
+    found = cut_themselves(find_program(name), 80)
+    assert len({text for _, text in found}) <= 4, found
 
 
 def test_what_cuts_itself_is_found() -> None:
