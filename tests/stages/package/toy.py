@@ -15,6 +15,8 @@ from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.abstraction.settings import AbstractionConfig
+from stages.abstraction.stage import STAGE as ABSTRACTION
 from stages.exemplars.settings import ExemplarsConfig
 from stages.package.settings import PackageConfig
 from stages.package.stage import STAGE as PACKAGE
@@ -173,6 +175,7 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
         Stage("strings", __name__, StringsConfig, (PRODUCERS,), collection_shards, _make_strings, _no_bytes),
         POINTS,
         VALIDITY,
+        ABSTRACTION,
         Stage("sketches", __name__, SketchesConfig, (PRODUCERS,), collection_shards, _make_sketches, _no_bytes),
         replace(PACKAGE, check=lambda _: None),
     ]
@@ -187,6 +190,7 @@ def toy_config(shards: int = 8) -> Config:
         "variations": ToyConfig(shards=shards),
         "strings": StringsConfig(),
         "validity": PhysicsConfig(),
+        "abstraction": AbstractionConfig(),
         "points": PointsConfig(uniform=64, farthest=16, pool=256),
         "sketches": SketchesConfig(
             size=24, backend="raycast", views=(SketchView(name="left"), SketchView(name="right", azimuth=30.0))
