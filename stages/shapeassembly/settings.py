@@ -30,6 +30,16 @@ class ProgramFiles(NamedFiles):
         "data_splits/chair/val.txt}`. The named programs make the split, all others of the entry are for training, and "
         "`splits` shares out none of them.",
     )
+    edits: int = Field(
+        0,
+        ge=0,
+        le=1_000,
+        description="So many continuous edits of each accepted program: other sizes and places of attachment, the same "
+        "structure. Unit: programs.",
+    )
+    spread: float = Field(
+        0.2, gt=0, le=1, description="How far edits go: standard deviation of the logarithm of the size along an axis."
+    )
 
 
 class WrittenPrograms(NamedFiles):

@@ -9,33 +9,26 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from pipeline.config import Config
-from pipeline.errors import Rejected, ShardFailed
+from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import unstated
-from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shard_sizes, shards_of_split
-from stages.shapeassembly.checks import overflow, reaching_out, violations
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.extraction.shards import extraction_shards, read_made, run_extraction
-from stages.shapeassembly.interpreter import execute
+from stages.shapeassembly.accept import accepted_rows
+from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
 from stages.shapeassembly.language import Programs, assignment_name
 from stages.shapeassembly.origins import program_origins
-from stages.shapeassembly.parser import parse
-from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig
-from stages.shapeassembly.shape import shape_of_execution
 from stages.shapeassembly.sharing import splits_of
 from stages.shapeassembly.sources import program_texts, source_digest
-from stages.shapeassembly.structure import signature
 
 __all__ = ["STAGE"]
 
@@ -88,7 +81,7 @@ def run_assignment(task: Task) -> Outcome:
     """
     config = task.config.section(ShapeAssemblyConfig)
     refused: Counter[str] = Counter()
-    rows = list(_accepted(task, config, refused))
+    rows = list(accepted_rows(task, config, refused))
     if not rows:
         why = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common(3))
         raise ShardFailed(f"no program was accepted; refused: {why or 'none'}")
@@ -118,63 +111,6 @@ def run_assignment(task: Task) -> Outcome:
     return Outcome(0, {"shards": shards, "programs": counts, "structures": structures, "parts": round(parts, 2)})
 
 
-def _accepted(task: Task, config: ShapeAssemblyConfig, refused: Counter[str]) -> Iterator[dict[str, Any]]:
-    """The programs that become samples; the others are refused, and counted in `refused`."""
-    known: set[str] = set()
-    places: Counter[str] = Counter()
-    for kind, name, text in _texts(task, config):
-        try:
-            row = _row(text, config)
-            if row["text"] in known:
-                raise Rejected("program is there already", name)
-        except (ProgramError, Rejected) as error:
-            detail = str(error) if isinstance(error, ProgramError) else error.detail
-            task.reject(f"{kind}/{name}", error.reason, detail)
-            refused[error.reason] += 1
-            continue
-        known.add(row["text"])
-        yield {"key": f"{kind}-{places[kind]:06d}", "kit": kind, "file": name, **row}
-        places[kind] += 1
-
-
-def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, str]]:
-    """Of each program the name of its source, its own name there, and its text: those read, those extracted, and those
-    that models have written."""
-    for source in config.programs:
-        for name, text in program_texts(source.path, source.folder):
-            if name not in source.lists.values():
-                yield source.name, name, text
-    for each in read_made(task):
-        yield each.kind, each.name, each.text
-
-
-def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
-    """What there is to say of one program. Raises ProgramError or Rejected where it does not pass."""
-    program = parse(text)
-    execution = execute(program)
-    if not config.least_parts <= len(execution) <= config.most_parts:
-        raise Rejected("number of parts", f"{len(execution)} leaf cuboids")
-    beyond = overflow(program, execution)
-    if beyond > config.overflow:
-        raise Rejected("reaches out of the bounding box", f"by {100 * beyond:.1f} % of its size")
-    if config.accept == "valid":
-        broken = violations(program)
-        if broken:
-            raise Rejected(broken[0].rule, str(broken[0]))
-        for block in program.blocks:
-            for name in reaching_out(block):
-                raise Rejected("reaches out of its assembly", f"{name} of {block.name}")
-    weak = unmet(config.require, shape_of_execution(execution))
-    if weak is not None:
-        raise Rejected(weak)
-    return {
-        "text": print_program(program),
-        "graph": signature(program),
-        "parts": len(execution),
-        "labels": set(execution.labels),
-    }
-
-
 def run_collection(task: Task) -> Outcome:
     """Write the samples of one shard."""
     split, number = task.shard.params["split"], task.shard.params["number"]
@@ -193,7 +129,7 @@ def _sample(row: dict[str, Any], split: str) -> Sample:
         producer="shapeassembly",
         kit=row["kit"],
         graph=row["graph"],
-        lineage={"method": "executed", "parents": [row["file"]]},
+        lineage={"method": row["method"], "parents": [row["file"]]},
         text=row["text"],
     )
 
@@ -224,18 +160,19 @@ def estimate_bytes(plan: Plan) -> int:
 def asked(config: Config) -> Sequence[int]:
     """The programs of each shard of the collection, if all are accepted."""
     section = config.section(ShapeAssemblyConfig)
-    total = sum(sum(1 for _ in program_texts(each.path, each.folder)) for each in section.programs)
+    total = sum((1 + each.edits) * sum(1 for _ in program_texts(each.path, each.folder)) for each in section.programs)
     total += sum(len(each.source) for each in section.hierarchies) + sum(each.samples for each in section.written)
     val, test = round(section.splits.val * total), round(section.splits.test * total)
     return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
 
 
 def trial(config: Config) -> ShapeAssemblyConfig:
-    """The same programs in shards of few, and of models a few."""
+    """The same programs in shards of few, of edits and of models' programs a few."""
     section = config.section(ShapeAssemblyConfig)
     written = tuple(each.model_copy(update={"samples": min(each.samples, 16)}) for each in section.written)
+    programs = tuple(each.model_copy(update={"edits": min(each.edits, 1)}) for each in section.programs)
     splits = section.splits.model_copy(update={"samples_per_shard": 8})
-    return section.model_copy(update={"splits": splits, "written": written})
+    return section.model_copy(update={"splits": splits, "programs": programs, "written": written})
 
 
 STAGE = Stage(

@@ -131,6 +131,24 @@ def test_an_archive_is_read_like_a_folder(folder: Path, tmp_path: Path) -> None:
     assert sorted(sample.lineage["parents"][0] for sample in found) == [f"data/furniture/{e.name}" for e in EXAMPLES]
 
 
+def test_edits_of_a_program_are_samples_of_its_split_that_name_it(folder: Path, tmp_path: Path) -> None:
+    splits = {"shards": 1, "val": 0.2, "test": 0.2}
+    entry = {"name": "good", "path": str(EXAMPLES[0].parent.resolve()), "edits": 3, "spread": 0.1}
+    code, printed, out = make(tmp_path, {"programs": [entry], "splits": splits, "accept": "valid"})
+    assert code == 0, printed
+    found = [sample for shard in samples(out).values() for sample in shard]
+    own = {sample.lineage["parents"][0]: sample for sample in found if sample.lineage["method"] == "executed"}
+    edits = [sample for sample in found if sample.lineage["method"] == "edited"]
+    refused = sum(1 for path in (out / "rejects").iterdir() for _ in path.read_text().splitlines())
+    assert len(own) == len(EXAMPLES)
+    assert len(edits) + refused == 3 * len(EXAMPLES)
+    assert len(edits) > 2 * len(EXAMPLES)
+    for sample in edits:
+        parent = own[sample.lineage["parents"][0]]
+        assert (sample.split, sample.graph) == (parent.split, parent.graph)
+    assert len({sample.text for sample in found}) == len(found) == len({sample.key for sample in found})
+
+
 def test_a_source_that_is_not_there_is_said_before_anything_starts(tmp_path: Path) -> None:
     code, printed, _ = make(tmp_path, {"programs": [{"name": "a", "path": str(tmp_path / "nothing")}]})
     assert code == 2
