@@ -38,7 +38,7 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
         stated({"name": name, "shapes": [str(path) for path in sorted((ROOT / "datasets/exemplars" / name).glob("*"))]})
         for name in ("castle", "playground")
     ]
-    variations = {"per_kit": 12, "splits": {"shards": 1}, "search": {"duplicates": "graph", "tries": 300, "rounds": 3}}
+    variations = {"per_kit": 6, "splits": {"shards": 1}, "search": {"duplicates": "graph", "tries": 100, "rounds": 3}}
     config = {"name": "small", "seed": 3, "exemplars": {"kits": kits}, "variations": variations}
     (folder / "small.yaml").write_text(yaml.safe_dump(config))
     for stage in ("choices", "exemplars", "variations", "strings"):

@@ -192,7 +192,7 @@ def test_the_card_has_what_hugging_face_asks_for(toy_folder: Path) -> None:
         split: f"data/{split}/*.tar" for split in SPLITS
     }
     assert "](preview.png)" in text
-    assert "| all | 47 | 24 |" in text
+    assert "| all | 23 | 12 |" in text
 
 
 def test_checksums_cover_every_file_and_the_manifest_the_index(toy_folder: Path) -> None:
@@ -226,8 +226,8 @@ def test_a_smaller_config_takes_its_old_shards_away_and_nothing_of_others(toy_fo
 def test_a_sample_that_one_stage_has_refused_is_left_out_and_counted(toy_folder: Path) -> None:
     assert REFUSED not in all_samples(toy_folder)
     manifest = json.loads((toy_folder / "manifest.json").read_text())
-    assert manifest["samples"] == 47
-    assert manifest["splits"] == {"train": 15, "val": 16, "test": 16}
+    assert manifest["samples"] == 23
+    assert manifest["splits"] == {"train": 7, "val": 8, "test": 8}
     (line,) = (toy_folder.parent / ".work/toy/package/rejects/toy-train-000001.jsonl").read_text().splitlines()
     assert json.loads(line) == {"item": REFUSED, "reason": "refused by sketches", "detail": "", "count": 1}
 

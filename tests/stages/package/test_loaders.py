@@ -36,7 +36,7 @@ def outside(script: str, *arguments: str, cache: Path) -> str:
 
 
 def shard_pattern(folder: Path, split: str) -> str:
-    return f"{folder}/data/{split}/toy-1_2_0-{split}-{{000000..000007}}.tar"
+    return f"{folder}/data/{split}/toy-1_2_0-{split}-{{000000..000003}}.tar"
 
 
 @pytest.mark.parametrize("split", SPLITS)

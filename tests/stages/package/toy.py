@@ -109,7 +109,7 @@ REFUSED = toy_samples("train", 1, 2)[1].key
 """The sample that the toy sketches refuse."""
 
 
-def toy_keys(split: str, shards: int = 8) -> list[str]:
+def toy_keys(split: str, shards: int = 4) -> list[str]:
     """The keys of a split of the finished dataset, in order."""
     return [each.key for index in range(shards) for each in toy_samples(split, index, 2) if each.key != REFUSED]
 
@@ -117,7 +117,7 @@ def toy_keys(split: str, shards: int = 8) -> list[str]:
 class ToyConfig(StrictModel):
     """Shards a split."""
 
-    shards: int = 8
+    shards: int = 4
 
 
 def _make_kit(task: Task) -> Outcome:
@@ -182,7 +182,7 @@ TOY_STAGES: Mapping[str, Stage] = named_inputs(
 )
 
 
-def toy_config(shards: int = 8) -> Config:
+def toy_config(shards: int = 4) -> Config:
     """The config of the toy dataset of so many shards a split."""
     sections = {
         **ABSENT_SECTIONS,
@@ -195,7 +195,7 @@ def toy_config(shards: int = 8) -> Config:
         "sketches": SketchesConfig(
             size=24, backend="raycast", views=(SketchView(name="left"), SketchView(name="right", azimuth=30.0))
         ),
-        "package": PackageConfig(previewed=2),
+        "package": PackageConfig(previewed=1),
     }
     return Config(
         name="toy", version="1.2.0", seed=7, sections=sections, path=Path("toy.yaml"), title="Toy boxes", license="MIT"

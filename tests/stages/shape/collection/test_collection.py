@@ -18,6 +18,7 @@ from pipeline.shards import bytes_array
 from stages.package.verify_samples import read_packaged, read_record, sample_faults
 from stages.package.verify_shard import shard_samples
 from stages.programs.language import LANGUAGE
+from stages.shapeassembly import execute, parse
 from tests.mill import mill
 from tests.stated import stated
 
@@ -26,6 +27,7 @@ STAGES = (
     "variations",
     "programs",
     "shapeassembly",
+    "abstraction",
     "validity",
     "strings",
     "points",
@@ -38,9 +40,10 @@ STOOLS = {
         "each_value": {"train": 1, "val": 1, "test": 1},
         "splits": {"shards": 2},
     },
+    "abstraction": {"programs": True},
     "points": {"uniform": 128},
     "sketches": {"size": 64, "backend": "raycast", "views": [{"name": "front"}]},
-    "package": {"previewed": 4},
+    "package": {"previewed": 2},
 }
 KITS = {"exemplars": {"kits": [stated({"name": "fort", "shapes": ["datasets/exemplars/playground/fort.glb"]})]}}
 
@@ -81,6 +84,15 @@ def test_samples_of_a_program_have_the_members_and_fields_of_all_samples(made: t
         parts = np.array([part["class"] for part in record["parts"]])
         assert (parts[bytes_array(members["instances.npy"])] == labels).all()
         assert {part["label"] for part in record["parts"]} <= {"seat", "leg", "rail"}
+
+
+def test_samples_of_a_program_have_programs_of_their_boxes(made: tuple[Path, tuple[str, ...]]) -> None:
+    for members in samples_of(made[0]).values():
+        record, program = json.loads(members["json"]), members["program.txt"].decode()
+        assert record["program"]["refused"] == "not refused"
+        assert record["program"]["f_score"] >= 75
+        assert record["program"]["lines"] == sum("(" in line for line in program.splitlines())
+        assert len(execute(parse(program))) == len(record["parts"])
 
 
 def test_a_dataset_of_a_program_is_verified_and_has_no_corpus(made: tuple[Path, tuple[str, ...]]) -> None:
