@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from pipeline.config import Config
-from pipeline.places import Places, StagePlaces, file_digest
+from pipeline.places import Places, StagePlaces, file_digest, remove
 from pipeline.records import ShardRecord, read_record
 from pipeline.stage import Stage
 from pipeline.survey import StageSurvey, Survey
@@ -29,7 +29,7 @@ def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) 
             yield f"{name}: {len(missing)} of {len(surveyed.shards)} shards are not made, first {missing[0].name}"
         for shard, record in surveyed.records.items():
             for file in damaged_files(record, surveyed.places):
-                (surveyed.places.records / f"{shard}.json").unlink(missing_ok=True)
+                remove(surveyed.places.records / f"{shard}.json")
                 yield f"{name}: {file} is damaged; the next run makes {shard} again"
         if not surveyed.missing:
             yield from (f"{name}: {path} is not what the stage made" for path in _altered(surveyed, places))
@@ -58,5 +58,5 @@ def withdraw_damaged(places: Places, source: str) -> bool:
     record = read_record(path)
     if record is not None and not damaged_files(record, places.stage(stage)):
         return False
-    path.unlink(missing_ok=True)
+    remove(path)
     return True

@@ -2,7 +2,7 @@
 
 Exit codes: 0 all is well; 1 shards were set aside, or something that was checked is not as it should be; 2 nothing
 started, because of a mistake in the config or the command; 3 everything had to stop (disk full, no permission);
-130 stopped by Ctrl-C.
+130 stopped by Ctrl-C; 143 by SIGTERM, 129 by SIGHUP.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from typing import Annotated
 import typer
 
 from pipeline.config import Config, load_config, nearest
+from pipeline.endings import ends_in_order
 from pipeline.errors import ConfigError, Fatal
+from pipeline.patience import DEFAULT_PATIENCE
 from pipeline.places import Places
 from pipeline.registry import find_stages
 from pipeline.stage import Stage
@@ -58,6 +60,9 @@ def run(
     shards: Annotated[str, typer.Option(help="make part i of n, from 1, as one job of a job array: i/n")] = "1/1",
     retries: Annotated[int, typer.Option(min=0, help="how often a shard that failed is tried again")] = 2,
     only: Annotated[str, typer.Option(help="make the shards called so, or so-..., and what they read")] = "",
+    patience: Annotated[
+        float, typer.Option(min=0, help="minutes without progress after which a shard has failed; 0: never")
+    ] = DEFAULT_PATIENCE,
 ) -> None:
     """Make what is missing of one stage."""
     from pipeline.run import run_stage
@@ -69,7 +74,9 @@ def run(
         close = nearest(stage, stages)
         hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
         raise ConfigError(f"there is no stage {stage}; {hint}")
-    result = run_stage(stage, stages, *_load(stages, config, out, seed), workers, part, retries, only=only)
+    with ends_in_order():
+        loaded, places = _load(stages, config, out, seed)
+        result = run_stage(stage, stages, loaded, places, workers, part, retries, only=only, patience=patience)
     if result.failed:
         print(f"{stage}: set aside: {', '.join(result.failed)}; run again to try them again", file=sys.stderr)
         raise typer.Exit(1)

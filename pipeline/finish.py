@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections import Counter
 from pathlib import Path
 
-from pipeline.places import Places, file_digest, sync_folder, temporary, write_whole
+from pipeline.places import Places, file_digest, read_note, remove, sync_folder, temporary, write_whole
 from pipeline.shards import json_bytes
 from pipeline.survey import StageSurvey, Survey
 
@@ -39,7 +38,7 @@ def finish_stage(survey: Survey, name: str, places: Places) -> None:
         }
     )
     if not surveyed.places.manifest.is_file() or surveyed.places.manifest.read_bytes() != manifest:
-        write_whole(surveyed.places.manifest, manifest)
+        _write(surveyed.places.manifest, manifest)
 
 
 def publish(surveyed: StageSurvey, places: Places) -> None:
@@ -49,11 +48,11 @@ def publish(surveyed: StageSurvey, places: Places) -> None:
     """
     wanted = {_inside(target): file for target, file in sorted(surveyed.stage.publish(surveyed.view).items())}
     listing = surveyed.places.published
-    before = [Path(each) for each in json.loads(listing.read_bytes())] if listing.is_file() else []
+    before = _listed(listing)
     gone = [target for target in before if target not in wanted]
     if set(before) != set(wanted):
         # Everything that may lie there is listed before it does, so that no kill leaves a file nobody knows of.
-        write_whole(listing, json_bytes(sorted(str(each) for each in {*before, *wanted})))
+        _write(listing, json_bytes(sorted(str(each) for each in {*before, *wanted})))
     for target, file in wanted.items():
         record = surveyed.records.get(file.partition(".")[0])
         if record is None or file not in record.files:
@@ -62,7 +61,7 @@ def publish(surveyed: StageSurvey, places: Places) -> None:
     for target in gone:
         _take_away(places.out, target)
     if gone:
-        write_whole(listing, json_bytes(sorted(str(each) for each in wanted)))
+        _write(listing, json_bytes(sorted(str(each) for each in wanted)))
 
 
 def _forget_unplanned(surveyed: StageSurvey) -> None:
@@ -72,6 +71,20 @@ def _forget_unplanned(surveyed: StageSurvey) -> None:
         for path in folder.iterdir():
             if path.is_file() and path.name.lstrip(".").partition(".")[0] not in planned:
                 path.unlink(missing_ok=True)
+
+
+def _listed(listing: Path) -> list[Path]:
+    """What the stage has published before; nothing where that cannot be read any more, and nobody knows of it then."""
+    try:
+        return [_inside(each) for each in read_note(listing)]
+    except (ValueError, TypeError):
+        return []
+
+
+def _write(path: Path, content: bytes) -> None:
+    if path.is_dir():
+        remove(path)
+    write_whole(path, content)
 
 
 def _inside(target: str) -> Path:

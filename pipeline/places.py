@@ -18,9 +18,12 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pipeline.errors import ConfigError, Fatal
 
@@ -28,6 +31,8 @@ __all__ = [
     "Places",
     "StagePlaces",
     "file_digest",
+    "read_note",
+    "remove",
     "stops_everything",
     "sync_folder",
     "temporary",
@@ -122,6 +127,14 @@ def temporary(path: Path) -> Path:
     return path.with_name(f".{path.name}.tmp")
 
 
+def remove(path: Path) -> None:
+    """Take away what stands at a place of the mill's own, whatever it is: nothing there belongs to anybody else."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
 def sync_folder(folder: Path) -> None:
     """Bring renames in `folder` to the disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -144,6 +157,19 @@ def write_whole(path: Path, content: bytes) -> None:
         beside.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def read_note(path: Path) -> Any:
+    """The JSON in a file of the mill's own; None where there is none, or none any more: the disk has spoilt it.
+
+    Raises PermissionError.
+    """
+    try:
+        return json.loads(path.read_bytes())
+    except PermissionError:
+        raise
+    except (OSError, ValueError, RecursionError):
+        return None
 
 
 def write_file(path: Path, content: bytes) -> Path:

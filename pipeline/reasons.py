@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 
+from pipeline.places import read_note
 from pipeline.records import ShardRecord
 from pipeline.survey import StageSurvey
 
@@ -43,7 +43,7 @@ def _changes(surveyed: StageSurvey, old: ShardRecord) -> str:
 def _edited(surveyed: StageSurvey) -> list[str]:
     """The modules that are not as they were when the stage was last finished, as far as that is known."""
     try:
-        before = json.loads(surveyed.places.manifest.read_bytes())["code"]
-    except (FileNotFoundError, ValueError, KeyError):
+        before = read_note(surveyed.places.manifest)["code"].items()
+        return sorted({module for module, _ in before ^ surveyed.code.items()})
+    except (TypeError, KeyError, AttributeError):
         return []
-    return sorted({module for module, _ in before.items() ^ surveyed.code.items()})

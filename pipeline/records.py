@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.places import StagePlaces
+from pipeline.places import StagePlaces, read_note
 from pipeline.shards import json_bytes
 from pipeline.stage import Shard
 
@@ -51,20 +51,18 @@ class ShardRecord:
     def is_whole(self, places: StagePlaces) -> bool:
         """Whether all its files are there with the recorded size. Whoever reads one looks at its bytes (`Task.input`),
         and so does `make verify` at all."""
-        try:
-            return all((places.root / name).stat().st_size == each["bytes"] for name, each in self.files.items())
-        except FileNotFoundError:
-            return False
+        paths = {places.root / name: each["bytes"] for name, each in self.files.items()}
+        return all(path.is_file() and path.stat().st_size == size for path, size in paths.items())
 
 
 def read_record(path: Path) -> ShardRecord | None:
     """The record in a file, or None if there is none, or none that this version of the mill wrote, or a damaged one."""
+    written = read_note(path)
     try:
-        written = json.loads(path.read_bytes())
         seal = written.pop("seal")
         record = ShardRecord(**written)
         return record if record._seal() == seal else None
-    except (FileNotFoundError, ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError):
         return None
 
 

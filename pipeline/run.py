@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,13 +13,13 @@ from typing import BinaryIO
 from pipeline.check import withdraw_damaged
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal
+from pipeline.failures import Failures
 from pipeline.finish import finish_stage, publish
 from pipeline.journal import Journal, Standing, span
-from pipeline.places import Places, StagePlaces, stops_everything, write_whole
+from pipeline.patience import DEFAULT_PATIENCE, Patience
+from pipeline.places import Places, StagePlaces, remove, stops_everything
 from pipeline.reasons import reasons
-from pipeline.records import fingerprint
 from pipeline.registry import upstream
-from pipeline.shards import json_bytes
 from pipeline.slices import WHOLE, Slice, locked
 from pipeline.space import byte_size, check_space
 from pipeline.stage import Shard, Stage
@@ -29,7 +29,6 @@ from pipeline.workers import DIED, Workers
 
 __all__ = ["RunResult", "run_stage"]
 
-_DEATHS_BEFORE_ALONE = 3
 _LOOK_EVERY = 0.5
 """Seconds between two looks at how far the running shards are."""
 
@@ -53,14 +52,16 @@ def run_stage(
     retries: int = 2,
     waits: bool = False,
     only: str = "",
+    patience: float = DEFAULT_PATIENCE,
 ) -> RunResult:
     """Make all shards of stage `name` that have no matching record; the stages that these read must be finished.
 
     `only`: make no more than the shards called so, or `<only>-<anything>`, and those of the stage that they read.
 
     A shard that raises is tried again `retries` times, then set aside; one that has killed its worker three times
-    is run once more with nothing beside it, then set aside. The rest goes on. An input that is found damaged is made
-    again first, of whatever stage it is. `waits`: another run that is at work here is waited for.
+    is run once more with nothing beside it, then set aside. One that makes no progress for `patience` minutes has
+    failed like one that raises, and its worker is ended; 0 waits for ever. The rest goes on. An input that is found
+    damaged is made again first, of whatever stage it is. `waits`: another run that is at work here is waited for.
 
     Raises ConfigError when nothing can start (an earlier stage is unfinished, the disk is too small, another run
     is at work here) and Fatal when everything had to stop; whole files and their records are left, and the next
@@ -71,7 +72,7 @@ def run_stage(
     journal = Journal(name, places.log)
     try:
         with locked(own, part, waits) as lock:
-            return _Run(name, stages, config, places, workers, part, retries, journal, only).through(lock)
+            return _Run(name, stages, config, places, workers, part, retries, journal, only, patience).through(lock)
     except OSError as error:
         if stops_everything(error) is None:
             raise
@@ -92,6 +93,7 @@ class _Run:
         retries: int,
         journal: Journal,
         only: str,
+        patience: float,
     ) -> None:
         self._name = name
         self._stages = stages
@@ -106,8 +108,8 @@ class _Run:
         self._made: set[str] = set()
         self._damaged: dict[str, str] = {}
         self._mended: set[str] = set()
-        self._failures: Counter[str] = Counter()
-        self._deaths: Counter[str] = Counter()
+        self._failures = Failures(places.stage(name), journal, retries, self._result.failed)
+        self._patience = Patience(patience, places.stage(name))
         self._shown = 0.0
 
     def through(self, lock: BinaryIO) -> RunResult:
@@ -120,7 +122,7 @@ class _Run:
             self._check_machine()
             for line in reasons(surveyed):
                 self._journal.say(line)
-            surveyed.places.manifest.unlink(missing_ok=True)
+            remove(surveyed.places.manifest)
             missing = len(self._mine(surveyed))
             self._journal.say(f"{_shards(missing)} to make, {check_space(surveyed, self._places.out)}")
             self._make_missing()
@@ -163,7 +165,7 @@ class _Run:
         mine = {shard.name for index, shard in enumerate(surveyed.shards) if index in self._part}
         for path in folder.glob(pattern):
             if self._part == WHOLE or path.name.lstrip(".").partition(".")[0] in mine:
-                path.unlink(missing_ok=True)
+                remove(path)
 
     def _mine(self, surveyed: StageSurvey) -> list[Shard]:
         done, failed, chosen = surveyed.records, self._result.failed, self._chosen(surveyed)
@@ -243,62 +245,47 @@ class _Run:
                     *(each, self._stages, self._survey.config, self._places, self._workers),
                     retries=self._retries,
                     waits=True,
+                    patience=self._patience.seconds / 60,
                 )
                 self._survey.forget()
         self._check_upstream()
 
     def _make(self, workers: Workers, ready: deque[Job], surveyed: StageSurvey) -> None:
         """Make the `ready` shards, each until it is done or set aside."""
-        alone: deque[Job] = deque()
+        alone = self._failures.alone
         while ready or alone or workers.jobs:
             while ready and workers.has_room(ready[0]):
                 workers.submit(ready.popleft())
             if alone and not workers.jobs:
                 workers.submit(alone.popleft())
             for job, report in workers.finished(_LOOK_EVERY):
-                if report is None:
-                    self._count_death(job, ready, alone)
-                elif report.status == "done":
-                    self._result.made += 1
-                    self._made.add(job.shard.name)
-                    self._survey.accept(self._name, job.shard.name)
-                elif report.status == "damaged":
-                    self._damaged[report.damaged] = report.message
-                else:
-                    self._count_failure(job, report, ready)
+                self._patience.begin_anew(job.shard.name)
+                self._take_in(job, report, ready)
+            for job in self._patience.lost_with(workers.jobs):
+                self._give_up(job, workers, ready)
             if time.monotonic() - self._shown >= _LOOK_EVERY:
                 self._shown = time.monotonic()
                 self._show(surveyed, workers)
 
-    def _count_death(self, job: Job, ready: deque[Job], alone: deque[Job]) -> None:
-        self._deaths[job.shard.name] += 1
-        deaths = self._deaths[job.shard.name]
-        self._journal.note(f"{job.shard.name}: {DIED}, time {deaths}")
-        if deaths < _DEATHS_BEFORE_ALONE:
-            ready.append(job)
-        elif deaths == _DEATHS_BEFORE_ALONE:
-            alone.append(job)
+    def _take_in(self, job: Job, report: Report | None, ready: deque[Job]) -> None:
+        if report is None:
+            self._failures.death(job, DIED, ready)
+        elif report.status == "done":
+            self._result.made += 1
+            self._made.add(job.shard.name)
+            self._survey.accept(self._name, job.shard.name)
+        elif report.status == "damaged":
+            self._damaged[report.damaged] = report.message
         else:
-            self._set_aside(job, Report(job.shard.name, "failed", f"{DIED}, {deaths} times, at last alone"))
+            self._failures.failure(job, report, ready)
 
-    def _count_failure(self, job: Job, report: Report, ready: deque[Job]) -> None:
-        if report.status == "fatal":
-            self._journal.note(report.trace)
-            raise Fatal(f"shard {job.shard.name} of {self._name}: {report.message}")
-        self._failures[job.shard.name] += 1
-        if report.status == "failed" and self._failures[job.shard.name] <= self._retries:
-            self._journal.note(f"{job.shard.name} failed and is tried again: {report.message}\n{report.trace}")
-            ready.append(job)
-        else:
-            self._set_aside(job, report)
-
-    def _set_aside(self, job: Job, report: Report) -> None:
-        name = job.shard.name
-        self._result.failed[name] = report.message
-        self._journal.say(f"shard {name} is set aside: {report.message}")
-        self._journal.note(report.trace)
-        described = {"fingerprint": fingerprint(job.recipe), "message": report.message, "trace": report.trace}
-        write_whole(self._places.stage(self._name).failed / f"{name}.json", json_bytes(described))
+    def _give_up(self, job: Job, workers: Workers, ready: deque[Job]) -> None:
+        """End a shard that shows no sign of work, with its worker."""
+        workers.end(job)
+        self._patience.begin_anew(job.shard.name)
+        message = f"it made no progress for {span(self._patience.seconds)}, and its worker was ended"
+        self._journal.say(f"shard {job.shard.name}: {message}")
+        self._failures.failure(job, Report(job.shard.name, "failed", message), ready)
 
     def _show(self, surveyed: StageSurvey, workers: Workers) -> None:
         records = surveyed.records
@@ -343,5 +330,5 @@ def _how_far(places: StagePlaces, shard: str) -> float:
     try:
         done, total = (places.progress / shard).read_text().split()
         return min(int(done) / int(total), 1.0)
-    except (FileNotFoundError, ValueError, ZeroDivisionError):
+    except (OSError, ValueError, ZeroDivisionError):
         return 0.0

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from pipeline.config import Config
 from pipeline.journal import span
-from pipeline.places import Places
+from pipeline.places import Places, read_note
 from pipeline.reasons import reasons
 from pipeline.space import byte_size
 from pipeline.stage import Stage
@@ -74,9 +73,7 @@ def _failures(surveyed: StageSurvey) -> dict[str, str]:
     """The message of each shard that was set aside and has not been made since."""
     failures = {}
     for shard in surveyed.missing:
-        path = surveyed.places.failed / f"{shard.name}.json"
-        if path.is_file():
-            noted = json.loads(path.read_bytes())
-            if noted["fingerprint"] == surveyed.fingerprints[shard.name]:
-                failures[shard.name] = noted["message"]
+        noted = read_note(surveyed.places.failed / f"{shard.name}.json")
+        if isinstance(noted, dict) and noted.get("fingerprint") == surveyed.fingerprints[shard.name]:
+            failures[shard.name] = str(noted["message"])
     return failures

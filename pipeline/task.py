@@ -18,7 +18,16 @@ import numpy as np
 from pipeline.code import reached
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
-from pipeline.places import Places, StagePlaces, file_digest, stops_everything, sync_folder, temporary, write_whole
+from pipeline.places import (
+    Places,
+    StagePlaces,
+    file_digest,
+    remove,
+    stops_everything,
+    sync_folder,
+    temporary,
+    write_whole,
+)
 from pipeline.randomness import decision_rng
 from pipeline.records import ShardRecord, fingerprint, read_record
 from pipeline.shards import json_bytes
@@ -142,7 +151,7 @@ class _ShardTask:
         """Raises ShardFailed, and notes the damage, where an input is not what its record says."""
         try:
             wrong = "its sha256 is not the one in its record" if file_digest(path) != self._job.inputs[name] else ""
-        except FileNotFoundError:
+        except (FileNotFoundError, IsADirectoryError):
             wrong = "the file is gone"
         if wrong:
             message = f"{name} is damaged: {wrong}"
@@ -201,18 +210,20 @@ class _ShardTask:
         )
         content = record.to_bytes()
         # The old record goes first: killed between two renames, the shard must not look like the old one.
-        if record_path.exists():
-            record_path.unlink()
+        if os.path.lexists(record_path):
+            remove(record_path)
             sync_folder(self._places.records)
         for name in files:
+            if (self._places.root / name).is_dir():
+                remove(self._places.root / name)
             os.replace(temporary(self._places.root / name), self._places.root / name)
         if self._reject_stream is not None:
             os.replace(temporary(self._reject_path), self._reject_path)
         else:
-            self._reject_path.unlink(missing_ok=True)
+            remove(self._reject_path)
         for name in old.files if old else ():
             if name not in files:
-                (self._places.root / name).unlink(missing_ok=True)
+                remove(self._places.root / name)
         sync_folder(self._places.root)
         write_whole(record_path, content)
         self._forget_progress()

@@ -13,10 +13,12 @@ import faulthandler
 import os
 import signal
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
+from typing import Any
 
+from joblib.externals.loky.backend.utils import kill_process_tree
 from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor, TerminatedWorkerError
 
 from pipeline.task import Job, Report, make_shard
@@ -27,6 +29,9 @@ DIED = "its worker process died (out of memory, or a crash in a native library)"
 
 _RECYCLED_AFTER = 64
 """Shards that a worker makes before a fresh process takes its place: native libraries leak."""
+
+_SECONDS_TO_GO = 10.0
+"""After these, an idle worker that was asked to go is killed: it was stopped."""
 
 
 def _same_arithmetic() -> dict[str, str]:
@@ -93,9 +98,27 @@ class _Worker:
         return future
 
     def stop(self, kill: bool) -> None:
-        if self._executor is not None:
-            self._executor.shutdown(wait=True, kill_workers=kill)
-            self._executor = None
+        """End the process: at once, or after what it does now, which it is not waited for longer than it takes to go.
+
+        A process that was stopped (SIGSTOP) would never go by itself.
+        """
+        if self._executor is None:
+            return
+        executor, self._executor = self._executor, None
+        processes, manager = list((executor._processes or {}).values()), executor._executor_manager_thread
+        if kill:
+            _kill(processes)
+        executor.shutdown(wait=kill, kill_workers=kill)
+        if not kill and manager is not None:
+            manager.join(_SECONDS_TO_GO)
+            if manager.is_alive():
+                _kill(processes)
+                manager.join()
+
+
+def _kill(processes: Iterable[Any]) -> None:
+    for process in processes:
+        kill_process_tree(process)
 
 
 class Workers:
@@ -140,6 +163,13 @@ class Workers:
                 report = Report(job.shard.name, "failed", f"the job did not reach its worker: {error}", repr(error))
             self._idle += [worker, *others]
             yield job, report
+
+    def end(self, job: Job) -> None:
+        """Kill the worker of a running job; another takes its place."""
+        future = next(future for future, (_, running) in self._busy.items() if running is job)
+        taken, _ = self._busy.pop(future)
+        taken[0].stop(kill=True)
+        self._idle += taken
 
     def stop(self, kill: bool) -> None:
         """End all workers: at once, or after what they do now."""

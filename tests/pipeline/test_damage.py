@@ -10,12 +10,13 @@ import pytest
 
 from pipeline.config import Config, StrictModel
 from pipeline.errors import Fatal
-from pipeline.places import Places, file_digest
+from pipeline.places import Places, file_digest, remove
 from pipeline.records import read_record
 from pipeline.run import run_stage
 from pipeline.stage import Outcome, Shard, Stage, Task
+from pipeline.status import status_lines
 from tests.pipeline.conftest import WriteConfig, made, record_times
-from tests.pipeline.turn import turn
+from tests.pipeline.turn import STAGES, load, turn
 
 WORK = Path(".work/mill")
 
@@ -135,3 +136,74 @@ def test_disk_that_damages_what_was_made_again_just_now_stops_everything(tmp_pat
     run_stage("first", stages, config, Places(tmp_path, "mill"), workers=1)
     with pytest.raises(Fatal, match=r"first/a\.txt is damaged: .*, and a was made again just now: disk or memory"):
         run_stage("second", stages, config, Places(tmp_path, "mill"), workers=1)
+
+
+def in_place_of(path: Path, what: str) -> None:
+    """Spoil a file of the mill's own."""
+    whole = path.read_bytes()
+    path.unlink()
+    if what == "a folder":
+        (path / "with").mkdir(parents=True)
+        (path / "with/a file").write_text("in it")
+    else:
+        content = {"half": whole[:-40], "not UTF-8": b'{"seal": "\xff\xfe"}', "a list": b"[]", "text": b'"seal"'}
+        content |= {"deep": b"[" * 100_000, "long number": b"9" * 10_000, "empty": b""}
+        content["other types"] = json.dumps(dict.fromkeys(json.loads(whole), 7)).encode() if whole[:1] == b"{" else b"7"
+        path.write_bytes(content[what])
+
+
+SPOILT = ("half", "not UTF-8", "a list", "text", "deep", "long number", "empty", "other types", "a folder")
+
+
+def test_record_that_is_none_any_more_has_its_shard_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
+    out = tmp_path / "out"
+    turn(write_config(salt={"bags": len(SPOILT)}), out, "salt")
+    whole = made(out)
+    for number, what in enumerate(SPOILT):
+        in_place_of(out / WORK / f"salt/records/bag-{number}.json", what)
+    in_place_of(out / WORK / "salt/mill/manifest.json", "a folder")
+    assert turn(write_config(salt={"bags": len(SPOILT)}), out, "salt")["salt"].made == len(SPOILT)
+    assert made(out) == whole
+
+
+def test_other_notes_of_the_mill_may_be_spoilt_too(tmp_path: Path, write_config: WriteConfig) -> None:
+    out, config = tmp_path / "out", write_config(salt={"bags": 2})
+    turn(config, out, "salt")
+    whole, stage = made(out), out / WORK / "salt"
+    for what in SPOILT:
+        (stage / "mill/published.json").write_bytes(b"[]")
+        (stage / "failed/bag-1.json").write_bytes(b"{}")
+        for note in ("mill/manifest.json", "mill/published.json", "failed/bag-1.json"):
+            in_place_of(stage / note, what)
+        list(status_lines(load(config), STAGES, Places(out, "mill"), workers=1))
+        turn(config, out, "salt")
+        remove(stage / "mill/published.json")
+        assert made(out) == whole, what
+    (stage / "records/bag-1.json").unlink()
+    for what in SPOILT:
+        (stage / "failed/bag-1.json").write_bytes(b"{}")
+        in_place_of(stage / "failed/bag-1.json", what)
+        lines = list(status_lines(load(config), STAGES, Places(out, "mill"), workers=1))
+        assert any(line.split()[:3] == ["salt", "1/2", "0"] for line in lines), what
+        remove(stage / "failed/bag-1.json")
+
+
+def test_folder_in_place_of_a_shard_is_taken_for_damage(tmp_path: Path, write_config: WriteConfig) -> None:
+    out, config = tmp_path / "out", write_config(grain={"fields": 1, "wanted": 8})
+    turn(config, out, "grain")
+    whole = made(out)
+    in_place_of(out / WORK / "grain/harvest0-0.tar", "a folder")
+    assert turn(config, out, "grain")["grain"].made == 1
+    assert made(out) == whole
+
+
+def test_listing_that_names_a_file_elsewhere_takes_nothing_away_there(
+    tmp_path: Path, write_config: WriteConfig
+) -> None:
+    out, outside, small = tmp_path / "out", tmp_path / "precious.txt", {"fields": 1, "wanted": 1}
+    turn(write_config(grain=small), out)
+    outside.write_text("mine")
+    (out / WORK / "bread/mill/published.json").write_text('["../precious.txt"]')
+    turn(write_config(grain=small), out)
+    assert outside.read_text() == "mine"
+    assert json.loads((out / WORK / "bread/mill/published.json").read_bytes()) == ["mill/loaves/0.bin"]
