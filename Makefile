@@ -26,6 +26,8 @@ OUT     ?= datasets
 WORKERS ?=
 ## SEED     a seed instead of the config's
 SEED    ?=
+## PATIENCE minutes without progress after which a shard has failed, 0 for never; unless you say, 30
+PATIENCE ?=
 ## MESH     a model that `make inspect` looks at, or several of one kit
 MESH    ?=
 ## PROGRAM  a shape program that `make inspect` and `recover` are about: a name, such as chair, or a module
@@ -43,7 +45,7 @@ SAMPLES ?= 100
 
 # Their values are text, whatever stands in it: make expands none of it, and recipes read it from the environment, as
 # "$$CONFIG", so that no shell does. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED MESH PROGRAM INPUT UP MODEL TABLE SAMPLES
+VARIABLES := CONFIG OUT WORKERS SEED PATIENCE MESH PROGRAM INPUT UP MODEL TABLE SAMPLES
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -56,7 +58,8 @@ ASKED   := --config "$$CONFIG" --out "$$OUT"
 SEEDED  := $${SEED:+--seed "$$SEED"}
 HOW     := $(ASKED) $(SEEDED) --workers "$$WORKERS"
 MODELS  := $${MODEL:+--only "$$MODEL"}
-RUN      = @$(PYTHON) -m pipeline run $@ $(HOW)
+LASTS   := $${PATIENCE:+--patience "$$PATIENCE"}
+RUN      = @$(PYTHON) -m pipeline run $@ $(HOW) $(LASTS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
@@ -94,7 +97,7 @@ package: validity abstraction strings points sketches  ## Put the dataset's fold
 .PHONY: train recover
 train: setup  ## Train the models of CONFIG, on the dataset's samples where they learn from these, from where they stand
 	@if $(PYTHON) -m stages.training --config "$$CONFIG" $(MODELS); then $(MAKE) --no-print-directory exemplars strings; fi
-	@$(PYTHON) -m pipeline run training $(HOW) $(MODELS)
+	@$(PYTHON) -m pipeline run training $(HOW) $(LASTS) $(MODELS)
 
 recover: setup  ## Find the parameters of PROGRAM, or of the likeliest program, whose shape is like INPUT
 	@[ -n "$$INPUT" ] || { echo 'make recover needs INPUT=scan.ply or INPUT=drawing.png' >&2; exit 2; }

@@ -56,6 +56,7 @@ def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Pat
         flour = out / WORK / "flour"
         wait_until(lambda: list(flour.glob("records/*.json")) and list(flour.glob(".*.tmp")))
         workers = descendants(run.pid)
+        os.kill(max(workers), signal.SIGSTOP)
         run.send_signal(signal.SIGKILL)
     assert len(workers) >= 2
     wait_until(lambda: not alive(workers), seconds=10)
@@ -197,7 +198,10 @@ def test_second_run_in_the_same_place_is_refused(tmp_path: Path, write_config: W
         run.kill()
 
 
-def test_ctrl_c_stops_with_130_and_leaves_whole_files(tmp_path: Path, write_config: WriteConfig) -> None:
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_signal_ends_the_run_with_its_workers_stopped_ones_too_and_leaves_whole_files(
+    tmp_path: Path, write_config: WriteConfig, number: int, code: int
+) -> None:
     config = write_config(flour={"seconds": 0.5})
     out = tmp_path / "out"
     turn(config, out, "salt", "grain")
@@ -210,6 +214,9 @@ def test_ctrl_c_stops_with_130_and_leaves_whole_files(tmp_path: Path, write_conf
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as run:
         wait_until(lambda: list((out / WORK / "flour").glob(".*.tmp")))
-        os.killpg(run.pid, signal.SIGINT)
-        assert run.wait(timeout=30) == 130
+        workers = descendants(run.pid)
+        os.kill(max(workers), signal.SIGSTOP)
+        os.killpg(run.pid, number)
+        assert run.wait(timeout=30) == code
+    wait_until(lambda: not alive(workers), seconds=10)
     assert not list((out / WORK / "flour").rglob("*.tmp"))

@@ -12,7 +12,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-VARIABLES = ("CONFIG", "OUT", "WORKERS", "SEED", "MESH", "PROGRAM", "INPUT", "UP", "MODEL", "TABLE", "SAMPLES")
+VARIABLES = (
+    "CONFIG",
+    "OUT",
+    "WORKERS",
+    "SEED",
+    "PATIENCE",
+    "MESH",
+    "PROGRAM",
+    "INPUT",
+    "UP",
+    "MODEL",
+    "TABLE",
+    "SAMPLES",
+)
 SAY_ARGUMENTS = "import json, sys; print(json.dumps(sys.argv[1:]))"
 
 
@@ -95,7 +108,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert all(len(row) > 2 for row in rows.values()), "each is explained"
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
-        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "MESH": "-", "PROGRAM": "-",
+        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "PATIENCE": "-", "MESH": "-", "PROGRAM": "-",
         "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-", "SAMPLES": "100",
     }  # fmt: skip
 
@@ -109,7 +122,7 @@ def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
         len(reached) == 13 + len(targets[1:]) + 1
     )  # dataset is thirteen stages; inspect looks at a program and a model
     assert all(any(said in each for each in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 13 * 4
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 13 * 5
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 

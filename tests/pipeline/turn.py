@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from pipeline.cli import main
 from pipeline.config import Config, load_config
@@ -22,10 +23,13 @@ def load(config: Path) -> Config:
     return load_config(config, {name: stage.config for name, stage in STAGES.items()})
 
 
-def turn(config: Path, out: Path, *stages: str, workers: int = 1, part: Slice = WHOLE) -> dict[str, RunResult]:
+def turn(
+    config: Path, out: Path, *stages: str, workers: int = 1, part: Slice = WHOLE, **how: Any
+) -> dict[str, RunResult]:
     """Run `stages` (all of them, if none is named) in order, in this process and its workers."""
     loaded = load(config)
-    return {name: run_stage(name, STAGES, loaded, Places(out, loaded.name), workers, part) for name in stages or STAGES}
+    places = Places(out, loaded.name)
+    return {name: run_stage(name, STAGES, loaded, places, workers, part, **how) for name in stages or STAGES}
 
 
 if __name__ == "__main__":

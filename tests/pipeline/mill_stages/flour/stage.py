@@ -18,7 +18,7 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
 __all__ = ["STAGE", "FlourConfig"]
 
-Trouble = Literal["dies", "dies once", "fails", "fails once", "refuses", "no space", "big"]
+Trouble = Literal["dies", "dies once", "fails", "fails once", "refuses", "no space", "big", "sleeps", "stops once"]
 
 
 class FlourConfig(StrictModel):
@@ -58,6 +58,10 @@ def _meet(config: FlourConfig, task: Task) -> None:
     first = (config.marks / task.shard.name).stat().st_size == 1
     if trouble == "dies" or (trouble == "dies once" and first):
         os.kill(os.getpid(), signal.SIGKILL)
+    if trouble == "sleeps":
+        time.sleep(10_000)
+    if trouble == "stops once" and first:
+        os.kill(os.getpid(), signal.SIGSTOP)
     if trouble == "fails" or (trouble == "fails once" and first):
         raise ShardFailed("the stones are blunt")
     if trouble == "refuses":

@@ -1,0 +1,104 @@
+"""Nothing hangs unseen: a shard without a sign of work is noticed, ended, tried again and set aside."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from pipeline import workers
+from pipeline.patience import Patience
+from pipeline.places import Places
+from pipeline.stage import Shard
+from pipeline.survey import Survey
+from pipeline.task import Job
+from pipeline.workers import Workers
+from tests.pipeline.conftest import WriteConfig
+from tests.pipeline.test_failures import alive, descendants, wait_until
+from tests.pipeline.turn import STAGES, load, turn
+
+WORK = Path(".work/mill")
+
+
+@pytest.fixture
+def bag(tmp_path: Path, write_config: WriteConfig) -> Job:
+    places = Places(tmp_path / "out", "mill")
+    places.stage("salt").make()
+    survey = Survey(load(write_config()), STAGES, places)
+    survey.stage("salt")
+    return survey.job("salt", Shard("bag-0", {"samples": 1}))
+
+
+def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_is_made(
+    tmp_path: Path, write_config: WriteConfig, capfd: pytest.CaptureFixture[str]
+) -> None:
+    config = write_config(
+        grain={"fields": 2, "wanted": 1}, flour={"trouble": {"harvest0-0": "stops once", "harvest0-1": "sleeps"}}
+    )
+    before = descendants(os.getpid())
+    results = turn(config, tmp_path / "out", "salt", "grain", "flour", workers=2, patience=0.12, retries=1)
+    message = "it made no progress for 7s, and its worker was ended"
+    assert results["flour"].failed == {"harvest0-1": message}
+    assert results["flour"].made == 1
+    assert [(tmp_path / "marks" / name).read_text() for name in ("harvest0-0", "harvest0-1")] == ["xx", "xx"]
+    flour = tmp_path / "out" / WORK / "flour"
+    assert json.loads((flour / "failed/harvest0-1.json").read_bytes())["message"] == message
+    assert sorted(path.name for path in flour.glob("*.*")) == ["harvest0-0.tar"]
+    assert not list(flour.glob(".*.tmp"))
+    assert f"flour: shard harvest0-0: {message}" in capfd.readouterr().err
+    assert not [pid for pid in descendants(os.getpid()) - before if "LokyProcess" in _command(pid)]
+
+
+def test_what_counts_as_progress_is_that_something_changes(bag: Job) -> None:
+    places = bag.places.stage("salt")
+    patience, start, growing = Patience(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
+    (places.progress / "bag-0").write_text("1 4")
+    while time.monotonic() - start < 4:
+        growing.write_bytes(b"a" * int(10 * (time.monotonic() - start)))
+        assert not patience.lost_with([bag])
+        time.sleep(0.1)
+    while not patience.lost_with([bag]):
+        (places.progress / "bag-0").write_text("1 4")
+        assert time.monotonic() - start < 20, "the same words again are no progress"
+        time.sleep(0.1)
+    patience.begin_anew("bag-0")
+    start = time.monotonic()
+    while not patience.lost_with([bag]):
+        time.sleep(0.1)
+    assert time.monotonic() - start >= 1.4, "a shard that is tried again has all its time again"
+
+
+def test_patience_of_0_has_no_end(bag: Job) -> None:
+    patience = Patience(0, bag.places.stage("salt"))
+    time.sleep(0.6)
+    assert not patience.lost_with([bag])
+
+
+def test_time_in_which_the_mill_was_stopped_is_not_counted(bag: Job) -> None:
+    patience = Patience(0.05, bag.places.stage("salt"))
+    patience.lost_with([bag])
+    time.sleep(4)
+    assert not patience.lost_with([bag])
+
+
+def test_idle_worker_that_was_stopped_does_not_hold_the_end(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "_SECONDS_TO_GO", 0.5)
+    crew, before = Workers(1, bag.places.worker_output), descendants(os.getpid())
+    crew.submit(bag)
+    assert [report and report.status for _, report in crew.finished(None)] == ["done"]
+    worker = {pid for pid in descendants(os.getpid()) - before if "LokyProcess" in _command(pid)}
+    assert len(worker) == 1
+    os.kill(max(worker), signal.SIGSTOP)
+    crew.stop(kill=False)
+    wait_until(lambda: not alive(worker), seconds=10)
+
+
+def _command(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except FileNotFoundError:
+        return ""
