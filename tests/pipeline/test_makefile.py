@@ -108,7 +108,8 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert all(len(row) > 2 for row in rows.values()), "each is explained"
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
-        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "PATIENCE": "-", "MESH": "-", "PROGRAM": "-",
+        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "PATIENCE": "-", "MESH": "-",
+        "PROGRAM": "-",
         "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-", "SAMPLES": "100",
     }  # fmt: skip
 
