@@ -26,7 +26,7 @@ OUT     ?= datasets
 WORKERS ?=
 ## SEED     a seed instead of the config's
 SEED    ?=
-## PATIENCE minutes without progress after which a shard has failed, 0 for never; unless you say, 30
+## PATIENCE minutes without progress after which a shard has failed, 0 for never; unless you say, 60
 PATIENCE ?=
 ## MESH     a model that `make inspect` looks at, or several of one kit
 MESH    ?=

@@ -16,8 +16,8 @@ from pipeline.task import Job
 
 __all__ = ["DEFAULT_PATIENCE", "Patience"]
 
-DEFAULT_PATIENCE = 30.0
-"""Minutes. A shard is minutes of work at most, and tells more than once how far it is."""
+DEFAULT_PATIENCE = 60.0
+"""Minutes. A shard is minutes of work at most; on a machine that is too busy, some that tell nothing take many."""
 
 _Signs = tuple[str, tuple[tuple[str, int], ...]]
 
