@@ -1,0 +1,159 @@
+"""What can befall a run: processes that die or stop, disks and rights that go, files that spoil, hands that meddle."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.chaos.arena import Arena, Run
+
+__all__ = ["BLOWS", "Blow", "Struck"]
+
+PATIENCE = "0.5"
+"""Minutes in the rounds where a worker is stopped."""
+
+
+@dataclass
+class Struck:
+    """What a blow has done: in words; files that it has spoilt itself, below `out`; what has to be put right again
+    when the run has ended; and the code and the words of another run that it has started."""
+
+    words: str
+    spoilt: set[str] = field(default_factory=set)
+    put_right: Callable[[], None] = lambda: None
+    other: tuple[int, str] | None = None
+
+
+@dataclass(frozen=True)
+class Blow:
+    """A kind of blow: how it strikes, with which codes the run may end, and which options and config it runs with.
+
+    needs_worker: it is about a worker, so it comes when there is one. needs_disk: `out` is on a small disk of its own.
+    """
+
+    strike: Callable[[Arena, Run, np.random.Generator], Struck]
+    codes: frozenset[int]
+    options: tuple[str, ...] = ()
+    edited: bool = False
+    needs_worker: bool = False
+    needs_disk: bool = False
+    prepare: Callable[[], None] | None = None
+
+
+def _signal_worker(run: Run, rng: np.random.Generator, number: int) -> str:
+    workers = sorted(run.look())
+    if not workers:
+        return "no worker there"
+    pid = workers[rng.integers(len(workers))]
+    try:
+        os.kill(pid, number)
+    except ProcessLookupError:
+        return "the worker was gone"
+    return f"{signal.Signals(number).name} to a worker"
+
+
+def kill_worker(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+    return Struck(_signal_worker(run, rng, signal.SIGKILL))
+
+
+def stop_worker(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+    return Struck(_signal_worker(run, rng, signal.SIGSTOP))
+
+
+def end_driver(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+    """Every second time with a worker that was stopped before."""
+    number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][rng.integers(3)]
+    words = _signal_worker(run, rng, signal.SIGSTOP) + ", " if rng.random() < 0.5 else ""
+    run.process.send_signal(number)
+    return Struck(f"{words}{signal.Signals(number).name} to the driver")
+
+
+def fill_disk(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+    junk = arena.folder / "junk"
+    left = int(rng.integers(0, 60_000))
+    with open(junk, "wb") as stream:
+        try:
+            while True:
+                os.write(stream.fileno(), b"\0" * 65_536)
+        except OSError:
+            os.ftruncate(stream.fileno(), max(os.fstat(stream.fileno()).st_size - left, 0))
+    return Struck(f"disk filled but for {left // 1000} kB", put_right=lambda: junk.unlink(missing_ok=True))
+
+
+def take_rights(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+    folders = [arena.out, *(each for each in arena.out.rglob("*") if each.is_dir())]
+    folder = sorted(folders)[rng.integers(len(folders))]
+    folder.chmod(0o555)
+    return Struck(f"no right to write in {folder.relative_to(arena.folder)}", put_right=lambda: folder.chmod(0o755))
+
+
+def _obey_permissions() -> None:
+    # Root writes everywhere; without CAP_DAC_OVERRIDE in its bounding set, what it executes does not.
+    ctypes.CDLL(None).prctl(24, 1)
+
+
+def _some_file(arena: Arena, rng: np.random.Generator, pattern: str) -> Path | None:
+    files = [path for path in sorted(arena.work.glob(pattern)) if path.is_file() and not path.name.startswith(".")]
+    files = [path for path in files if path.stat().st_size]
+    return files[rng.integers(len(files))] if files else None
+
+
+def spoil_shard(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+    path = _some_file(arena, rng, "*/*.*")
+    if path is None:
+        return Struck("no shard there")
+    place = int(rng.integers(path.stat().st_size))
+    with open(path, "r+b") as stream:
+        stream.seek(place)
+        byte = stream.read(1)[0] ^ (1 << int(rng.integers(8)))
+        stream.seek(place)
+        stream.write(bytes([byte]))
+    linked = [each for each in arena.out.rglob("*") if each.is_file() and each.samefile(path)]
+    return Struck(f"a bit of {path.relative_to(arena.work)}", {str(each.relative_to(arena.out)) for each in linked})
+
+
+def cut_record(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
+    path = _some_file(arena, rng, "*/records/*.json")
+    if path is None:
+        return Struck("no record there")
+    size = int(rng.integers(path.stat().st_size))
+    os.truncate(path, size)
+    return Struck(f"{path.relative_to(arena.work)} cut to {size} bytes", {str(path.relative_to(arena.out))})
+
+
+def edit_config(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
+    """The run is of an edited config already; it is killed, or comes to its end."""
+    if rng.random() < 0.5:
+        run.process.kill()
+    return Struck("a run with an edited config, then back")
+
+
+def second_run(arena: Arena, run: Run, _: np.random.Generator) -> Struck:
+    other = arena.start(arena.stages)
+    return Struck("a second run", other=(other.end(), other.said()))
+
+
+def edits(rng: np.random.Generator) -> dict[str, Any]:
+    """Sections with another value somewhere."""
+    choices = [{"points": {"uniform": 100}}, {"sketches": {"size": 40}}, {"package": {"previewed": 1}}]
+    return choices[rng.integers(len(choices))]
+
+
+BLOWS: dict[str, Blow] = {
+    "kill a worker": Blow(kill_worker, frozenset({0}), needs_worker=True),
+    "stop a worker": Blow(stop_worker, frozenset({0}), ("--patience", PATIENCE), needs_worker=True),
+    "end the driver": Blow(end_driver, frozenset({0, -9, -2, -15, 130, 143})),
+    "fill the disk": Blow(fill_disk, frozenset({0, 2, 3}), needs_disk=True),
+    "take rights": Blow(take_rights, frozenset({0, 3}), prepare=_obey_permissions),
+    "spoil a shard": Blow(spoil_shard, frozenset({0})),
+    "cut a record": Blow(cut_record, frozenset({0})),
+    "edit the config": Blow(edit_config, frozenset({0, -9}), edited=True),
+    "a second run": Blow(second_run, frozenset({0, 2})),
+}
