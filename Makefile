@@ -42,10 +42,12 @@ MODEL   ?=
 TABLE   ?=
 ## SAMPLES  how many samples `make verify` looks at by all means: a number, or all
 SAMPLES ?= 100
+## ROUNDS   how many rounds `make chaos` does
+ROUNDS  ?= 20
 
 # Their values are text, whatever stands in it: make expands none of it, and recipes read it from the environment, as
 # "$$CONFIG", so that no shell does. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED PATIENCE MESH PROGRAM INPUT UP MODEL TABLE SAMPLES
+VARIABLES := CONFIG OUT WORKERS SEED PATIENCE MESH PROGRAM INPUT UP MODEL TABLE SAMPLES ROUNDS
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -123,9 +125,11 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 # Working on it ------------------------------------------------------------------------------------------------------
 
-.PHONY: test lint bench kits keys lock
+.PHONY: test chaos lint bench kits keys lock
 test: lint  ## Check style and types, then run the tests on WORKERS cores
 	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder
+chaos: setup  ## Kill, starve and spoil ROUNDS runs over the real stages, and see that each ends as it must
+	$(PYTHON) -m tests.chaos --rounds "$$ROUNDS" $(SEEDED)
 lint: setup  ## Check style and types
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
