@@ -25,6 +25,7 @@ VARIABLES = (
     "MODEL",
     "TABLE",
     "SAMPLES",
+    "ROUNDS",
 )
 SAY_ARGUMENTS = "import json, sys; print(json.dumps(sys.argv[1:]))"
 
@@ -110,7 +111,7 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert values == {
         "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "PATIENCE": "-", "MESH": "-",
         "PROGRAM": "-",
-        "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-", "SAMPLES": "100",
+        "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-", "SAMPLES": "100", "ROUNDS": "20",
     }  # fmt: skip
 
 
