@@ -69,7 +69,7 @@ def _arguments(arguments: list[str]) -> argparse.Namespace:
 
 
 def _rounds(said: argparse.Namespace, below: Path, small_disk: bool) -> int:
-    kinds = {name: blow for name in said.only if small_disk or not (blow := BLOWS[name]).needs_disk}
+    kinds = {name: BLOWS[name] for name in said.only if small_disk or not BLOWS[name].needs_disk}
     for name in sorted({*said.only} - {*kinds}):
         print(f"without the blow '{name}': this machine lets nobody mount a small disk", flush=True)
     arenas = []

@@ -1,0 +1,50 @@
+"""The short form of `make chaos`: two rounds over three real stages, and what a round must not let pass."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.chaos.arena import Arena
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.mark.slow
+def test_two_rounds_of_chaos_end_as_they_must() -> None:
+    blows = ["end the driver", "spoil a shard"]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.chaos",
+        "--arena",
+        "texts",
+        "--rounds",
+        "2",
+        "--seed",
+        "4",
+        "--only",
+        *blows,
+    ]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("then with 0 and the same bytes") == 2, done.stdout
+
+
+def test_what_is_half_written_under_a_final_name_is_seen(tmp_path: Path) -> None:
+    arena = Arena(tmp_path, "toy", ("first",), {})
+    (arena.work / "first/records").mkdir(parents=True)
+    for name in ("a.tar", "b.tar", "c.tar"):
+        (arena.work / "first" / name).write_bytes(b"whole")
+    arena.calm = arena.digests()
+    (arena.work / "first/a.tar").write_bytes(b"who")
+    (arena.work / "first/b.tar").unlink()
+    (arena.work / "first/.b.tar.tmp").write_bytes(b"wh")
+    (arena.work / "first/records/a.json").write_bytes(b"{")
+    (arena.work / "log.txt").write_text("a log")
+    first = ".work/toy/first"
+    assert sorted(arena.half_written(set())) == [f"{first}/a.tar", f"{first}/records/a.json"]
+    assert arena.half_written({f"{first}/a.tar"}) == [f"{first}/records/a.json"]
