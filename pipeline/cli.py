@@ -63,6 +63,7 @@ def run(
     patience: Annotated[
         float, typer.Option(min=0, help="minutes without progress after which a shard has failed; 0: never")
     ] = DEFAULT_PATIENCE,
+    cluster: Annotated[str, typer.Option(help="scheduler of a cluster whose workers make the shards: tcp://...")] = "",
 ) -> None:
     """Make what is missing of one stage."""
     from pipeline.run import run_stage
@@ -76,7 +77,9 @@ def run(
         raise ConfigError(f"there is no stage {stage}; {hint}")
     with ends_in_order():
         loaded, places = _load(stages, config, out, seed)
-        result = run_stage(stage, stages, loaded, places, workers, part, retries, only=only, patience=patience)
+        result = run_stage(
+            *(stage, stages, loaded, places, workers, part, retries), only=only, patience=patience, cluster=cluster
+        )
     if result.failed:
         print(f"{stage}: set aside: {', '.join(result.failed)}; run again to try them again", file=sys.stderr)
         raise typer.Exit(1)

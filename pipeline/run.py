@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from pipeline.check import withdraw_damaged
+from pipeline.cluster import ClusterWorkers
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal
 from pipeline.failures import Failures
@@ -53,9 +54,11 @@ def run_stage(
     waits: bool = False,
     only: str = "",
     patience: float = DEFAULT_PATIENCE,
+    cluster: str = "",
 ) -> RunResult:
     """Make all shards of stage `name` that have no matching record; the stages that these read must be finished.
 
+    `cluster`: the address of a scheduler whose workers make the shards, in place of `workers` on this machine.
     `only`: make no more than the shards called so, or `<only>-<anything>`, and those of the stage that they read.
 
     A shard that raises is tried again `retries` times, then set aside; one that has killed its worker three times
@@ -72,7 +75,9 @@ def run_stage(
     journal = Journal(name, places.log)
     try:
         with locked(own, part, waits) as lock:
-            return _Run(name, stages, config, places, workers, part, retries, journal, only, patience).through(lock)
+            return _Run(name, stages, config, places, workers, part, retries, journal, only, patience, cluster).through(
+                lock
+            )
     except OSError as error:
         if stops_everything(error) is None:
             raise
@@ -94,6 +99,7 @@ class _Run:
         journal: Journal,
         only: str,
         patience: float,
+        cluster: str,
     ) -> None:
         self._name = name
         self._stages = stages
@@ -103,6 +109,7 @@ class _Run:
         self._retries = retries
         self._journal = journal
         self._only = only
+        self._cluster = cluster
         self._survey = Survey(config, stages, places)
         self._result = RunResult()
         self._made: set[str] = set()
@@ -189,7 +196,7 @@ class _Run:
         return chosen
 
     def _make_missing(self) -> None:
-        workers = Workers(self._workers, self._places.worker_output)
+        workers = ClusterWorkers(self._cluster) if self._cluster else Workers(self._workers, self._places.worker_output)
         surveyed = self._survey.stage(self._name)
         try:
             while True:
@@ -246,11 +253,12 @@ class _Run:
                     retries=self._retries,
                     waits=True,
                     patience=self._patience.seconds / 60,
+                    cluster=self._cluster,
                 )
                 self._survey.forget()
         self._check_upstream()
 
-    def _make(self, workers: Workers, ready: deque[Job], surveyed: StageSurvey) -> None:
+    def _make(self, workers: Workers | ClusterWorkers, ready: deque[Job], surveyed: StageSurvey) -> None:
         """Make the `ready` shards, each until it is done or set aside."""
         alone = self._failures.alone
         while ready or alone or workers.jobs:
@@ -279,7 +287,7 @@ class _Run:
         else:
             self._failures.failure(job, report, ready)
 
-    def _give_up(self, job: Job, workers: Workers, ready: deque[Job]) -> None:
+    def _give_up(self, job: Job, workers: Workers | ClusterWorkers, ready: deque[Job]) -> None:
         """End a shard that shows no sign of work, with its worker."""
         workers.end(job)
         self._patience.begin_anew(job.shard.name)
@@ -287,7 +295,7 @@ class _Run:
         self._journal.say(f"shard {job.shard.name}: {message}")
         self._failures.failure(job, Report(job.shard.name, "failed", message), ready)
 
-    def _show(self, surveyed: StageSurvey, workers: Workers) -> None:
+    def _show(self, surveyed: StageSurvey, workers: Workers | ClusterWorkers) -> None:
         records = surveyed.records
         share = {job.shard.name: _how_far(surveyed.places, job.shard.name) for job in workers.jobs}
         share |= dict.fromkeys(records, 1.0)

@@ -1,4 +1,4 @@
-"""The short form of `make chaos`: two rounds over three real stages, and what a round must not let pass."""
+"""The short form of `make chaos`: two rounds over two real stages, and what a round must not let pass."""
 
 from __future__ import annotations
 

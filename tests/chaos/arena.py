@@ -23,8 +23,8 @@ __all__ = ["Arena", "Run", "alive"]
 
 ROOT = Path(__file__).resolve().parents[2]
 
-_HUNG_AFTER = 900.0
-"""Seconds after which a run is taken to hang."""
+_HUNG_AFTER = 3600.0
+"""Seconds after which a run is taken to hang; where nothing is compiled yet, the first one takes long."""
 
 _DIFFERS = {"seconds", "peak_bytes"}
 

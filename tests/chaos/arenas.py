@@ -39,18 +39,26 @@ ARENAS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     ),
     "vases": (
         ("programs", *_AFTER),
-        {"programs": {"program": "vase", "random": {"train": 12, "val": 4, "test": 4}}, **_SMALL},
+        {
+            "programs": {
+                "program": "vase",
+                "mode": "sweep",
+                "sweep": {"samples": 12, "val": 0.2, "test": 0.2},
+                "splits": {"shards": 2},
+            },
+            **_SMALL,
+        },
     ),
     "furniture": (
         ("shapeassembly", *_AFTER),
         {"shapeassembly": {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}]}, **_SMALL},
     ),
     "texts": (
-        ("shapeassembly", "validity", "strings"),
+        ("shapeassembly", "strings"),
         {"shapeassembly": {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}]}},
     ),
 }
-"""Stages and config of each. `texts` is for the tests: the stages that are quick to start."""
+"""Stages and config of each. `texts` is for the tests: stages that are quick to start."""
 
 
 def arena_in(folder: Path, name: str) -> Arena:

@@ -1,0 +1,149 @@
+"""Workers on other machines: a cluster of dask.distributed, of which the mill uses little and trusts less.
+
+Each shard is sent to one idle worker and to no other, so that a worker that goes takes one shard with it and no other
+is to blame. There it is made as it is here, in a process of its own with the same environment (`pipeline/workers.py`),
+so that its bytes are the same and what kills it leaves the cluster's worker alive. Workers may come and go. The output
+folder must be the same on every machine, by the same path, and so must the project: a worker with other code stops
+the run.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from pipeline.errors import ConfigError, Fatal
+from pipeline.task import Job, Report
+from pipeline.workers import Workers
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+__all__ = ["ClusterWorkers"]
+
+_ANSWERS_WITHIN = 10.0
+"""Seconds that a scheduler has to answer."""
+
+_LOOK_EVERY = 0.5
+
+_crew: Workers | None = None
+"""The process in which this worker of the cluster makes its shards."""
+
+
+class ClusterWorkers:
+    """The workers of the cluster whose scheduler is at `address`, such as `tcp://10.0.0.1:8786`.
+
+    Raises ConfigError where there is none when work begins, and Fatal when it goes away.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._client: Client | None = None
+        self._busy: dict[Future[Report | None], tuple[str, Job]] = {}
+
+    @property
+    def jobs(self) -> list[Job]:
+        """The jobs that run now."""
+        return [job for _, job in self._busy.values()]
+
+    def has_room(self, job: Job) -> bool:
+        """Whether a worker is idle."""
+        return bool(self._idle())
+
+    def submit(self, job: Job) -> None:
+        """Start a job on an idle worker. Raises IndexError when there is none."""
+        address = self._idle()[0]
+        future = self._connected().submit(
+            _make_here, job, workers=[address], allow_other_workers=False, pure=False, retries=0
+        )
+        self._busy[future] = (address, job)
+
+    def finished(self, timeout: float | None) -> Iterator[tuple[Job, Report | None]]:
+        """Jobs that end within `timeout` seconds (None: the next), with None for one whose worker has died."""
+        begun = time.monotonic()
+        while not any(future.done() for future in self._busy):
+            if timeout is not None and time.monotonic() - begun >= timeout:
+                break
+            time.sleep(0.02)
+        there = self._workers()
+        for future, (address, job) in list(self._busy.items()):
+            if future.done() or address not in there:
+                del self._busy[future]
+                yield job, _report(future) if future.done() else None
+
+    def end(self, job: Job) -> None:
+        """Let go of a running job: its worker ends the process that makes it."""
+        future = next(future for future, (_, running) in self._busy.items() if running is job)
+        del self._busy[future]
+        future.cancel()
+
+    def stop(self, kill: bool) -> None:
+        """Let go of all running jobs, and of the cluster."""
+        if self._client is not None:
+            client, self._client = self._client, None
+            client.close(timeout=_ANSWERS_WITHIN)  # the scheduler cancels what its client has left
+        self._busy.clear()
+
+    def _idle(self) -> list[str]:
+        return sorted(self._workers() - {address for address, _ in self._busy.values()})
+
+    def _workers(self) -> set[str]:
+        client = self._connected()
+        try:
+            return set(client.nthreads())
+        except OSError as error:
+            raise Fatal(f"the scheduler at {self._address} does not answer any more: {error}") from error
+
+    def _connected(self) -> Client:
+        if self._client is None:
+            self._client = _client(self._address)
+        return self._client
+
+
+def _client(address: str) -> Client:
+    try:
+        import dask
+        from distributed import Client
+    except ImportError as error:
+        raise ConfigError(f"a cluster needs dask.distributed, which is not there ({error}): run make setup") from error
+    dask.config.set({"distributed.comm.timeouts.connect": _ANSWERS_WITHIN})
+    try:
+        return Client(address, timeout=_ANSWERS_WITHIN, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ConfigError(
+            f"no scheduler answers at {address} ({error}): start one, with `make cluster` on this machine"
+        ) from error
+
+
+def _report(future: Future[Report | None]) -> Report | None:
+    """What a job that has ended reports; None where it took its worker with it."""
+    from concurrent.futures import CancelledError
+
+    from distributed import KilledWorker
+
+    try:
+        return future.result(timeout=_ANSWERS_WITHIN)
+    except (CancelledError, KilledWorker, OSError):
+        return None
+    except Exception as error:  # whatever goes wrong there before the shard begins, such as a module that is missing
+        return Report("", "failed", f"its worker could not begin: {type(error).__name__}: {error}", repr(error))
+
+
+def _make_here(job: Job) -> Report | None:
+    """Runs in a worker of the cluster: makes a shard as long as somebody wants it. None where its process has died."""
+    global _crew
+    from distributed import get_worker
+    from distributed.worker import thread_state
+
+    worker, key = get_worker(), thread_state.key
+    if _crew is None:
+        _crew = Workers(1, job.places.worker_output)
+    _crew.submit(job)
+    while True:
+        for _, report in _crew.finished(_LOOK_EVERY):
+            return report
+        task = worker.state.tasks.get(key)
+        if task is None or task.state == "cancelled" or worker.status.name != "running":
+            _crew.end(job)
+            return None
