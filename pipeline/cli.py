@@ -1,4 +1,4 @@
-"""The command line: `python -m pipeline run|plan|status|verify|inspect|doctor|keys|clean`.
+"""The command line: `python -m pipeline run|plan|status|verify|inspect|doctor|cluster|keys|clean`.
 
 Exit codes: 0 all is well; 1 shards were set aside, or something that was checked is not as it should be; 2 nothing
 started, because of a mistake in the config or the command; 3 everything had to stop (disk full, no permission);
@@ -154,6 +154,19 @@ def doctor(out: OutOption = DEFAULT_OUT) -> None:
     from pipeline.doctor import examine
 
     raise typer.Exit(examine(out))
+
+
+@app.command()
+def cluster(
+    workers: WorkersOption = DEFAULT_WORKERS,
+    port: Annotated[
+        int, typer.Option(min=1, max=65535, help="where the scheduler listens, on this machine alone")
+    ] = 8786,
+) -> None:
+    """Start a scheduler and workers of a cluster on this machine, for runs with --cluster; Ctrl-C ends them."""
+    from pipeline.cluster_here import serve
+
+    raise typer.Exit(serve(workers, port))
 
 
 @app.command()

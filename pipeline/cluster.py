@@ -27,8 +27,8 @@ _ANSWERS_WITHIN = 10.0
 
 _LOOK_EVERY = 0.5
 
-_crew: Workers | None = None
-"""The process in which this worker of the cluster makes its shards."""
+_crew: tuple[str, Workers] | None = None
+"""The process in which this worker of the cluster makes its shards, and for which run: another finds other code."""
 
 
 class ClusterWorkers:
@@ -55,7 +55,11 @@ class ClusterWorkers:
         """Start a job on an idle worker. Raises IndexError when there is none."""
         address = self._idle()[0]
         future = self._connected().submit(
-            _make_here, job, workers=[address], allow_other_workers=False, pure=False, retries=0
+            *(_make_here, job, self._connected().id),
+            workers=[address],
+            allow_other_workers=False,
+            pure=False,
+            retries=0,
         )
         self._busy[future] = (address, job)
 
@@ -123,27 +127,31 @@ def _report(future: Future[Report | None]) -> Report | None:
     from distributed import KilledWorker
 
     try:
-        return future.result(timeout=_ANSWERS_WITHIN)
+        report: Report | None = future.result(timeout=_ANSWERS_WITHIN)
+        return report
     except (CancelledError, KilledWorker, OSError):
         return None
     except Exception as error:  # whatever goes wrong there before the shard begins, such as a module that is missing
         return Report("", "failed", f"its worker could not begin: {type(error).__name__}: {error}", repr(error))
 
 
-def _make_here(job: Job) -> Report | None:
+def _make_here(job: Job, run: str) -> Report | None:
     """Runs in a worker of the cluster: makes a shard as long as somebody wants it. None where its process has died."""
     global _crew
     from distributed import get_worker
     from distributed.worker import thread_state
 
     worker, key = get_worker(), thread_state.key
-    if _crew is None:
-        _crew = Workers(1, job.places.worker_output)
-    _crew.submit(job)
+    if _crew is None or _crew[0] != run:
+        if _crew is not None:
+            _crew[1].stop(kill=True)
+        _crew = run, Workers(1, job.places.worker_output)
+    workers = _crew[1]
+    workers.submit(job)
     while True:
-        for _, report in _crew.finished(_LOOK_EVERY):
+        for _, report in workers.finished(_LOOK_EVERY):
             return report
         task = worker.state.tasks.get(key)
         if task is None or task.state == "cancelled" or worker.status.name != "running":
-            _crew.end(job)
+            workers.end(job)
             return None

@@ -1,0 +1,55 @@
+"""A cluster on this machine: a scheduler and its workers, each a process of its own. To try it, and for tests."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from pipeline.endings import ends_in_order
+
+__all__ = ["serve"]
+
+_PR_SET_PDEATHSIG = 1
+
+_ENVIRONMENT = {
+    # Deaths are counted by the mill, shard by shard: the scheduler's own count blames whatever a dead worker held.
+    "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1000000",
+    "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "warning",
+}
+
+
+def serve(workers: int, port: int) -> int:
+    """Start a scheduler on `port` of this machine alone, and `workers` workers of one thread each, and stay until a
+    signal ends them all. The exit code: 1 where the scheduler has ended by itself."""
+    address = f"tcp://127.0.0.1:{port}"
+    with ends_in_order(), tempfile.TemporaryDirectory(prefix="shapemill-cluster-") as folder:
+        alone = ["--no-dashboard"]
+        scheduler = _start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), *alone)
+        one = ["--nthreads", "1", "--no-nanny", "--memory-limit", "0", "--local-directory", folder]
+        started = [scheduler]
+        try:
+            started += [_start("distributed.cli.dask_worker", address, *one, *alone) for _ in range(workers)]
+            print(f"a scheduler and {workers} workers: make dataset CLUSTER={address}", flush=True)
+            while scheduler.poll() is None:
+                time.sleep(0.2)
+            print(f"the scheduler has ended with {scheduler.returncode}", file=sys.stderr)
+            return 1
+        finally:
+            for process in reversed(started):
+                process.kill()
+                process.wait()
+
+
+def _start(module: str, *arguments: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", module, *arguments], env={**os.environ, **_ENVIRONMENT}, preexec_fn=_die_with_parent
+    )
+
+
+def _die_with_parent() -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

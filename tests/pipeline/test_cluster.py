@@ -1,0 +1,128 @@
+"""A cluster of real processes makes the same bytes, whatever dies: a shard's process, a worker, the scheduler."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import ConfigError
+from tests.pipeline.conftest import WriteConfig, made
+from tests.pipeline.test_failures import alive, descendants, mill, wait_until
+from tests.pipeline.turn import turn
+
+pytest.importorskip("distributed")
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = Path(".work/mill")
+
+
+class Cluster:
+    """A scheduler and two workers, as `make cluster WORKERS=2` starts them."""
+
+    def __init__(self) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{port}"
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "pipeline", "cluster", "--workers", "2", "--port", str(port)],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+        )
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline().decode().endswith(f"CLUSTER={self.address}\n")
+
+    def pids(self, module: str) -> list[int]:
+        return sorted(pid for pid in descendants(self.process.pid) if module in _command(pid))
+
+    def end(self) -> None:
+        everything = descendants(self.process.pid)
+        self.process.terminate()
+        assert self.process.wait(timeout=60) == 143
+        wait_until(lambda: not alive(everything), seconds=20)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    running = Cluster()
+    yield running
+    running.end()
+
+
+@pytest.mark.slow
+def test_cluster_makes_the_same_bytes_though_workers_die_and_a_shard_kills_its_own(
+    tmp_path: Path, write_config: WriteConfig, cluster: Cluster
+) -> None:
+    out = tmp_path / "out"
+    turn(write_config(), tmp_path / "calm", "salt", "grain", "flour")
+    turn(write_config(), out, "salt", "grain")
+    config = write_config(flour={"seconds": 0.1, "trouble": {"harvest1-0": "dies", "harvest2-1": "dies once"}})
+    flour = out / WORK / "flour"
+    command = [*mill(config, out, "flour"), "--cluster", cluster.address]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as run:
+        wait_until(lambda: list(flour.glob("records/*.json")) and list(flour.glob(".*.tmp")))
+        os.kill(cluster.pids("dask_worker")[0], signal.SIGKILL)
+        assert run.wait(timeout=120) == 1
+        assert run.stderr is not None
+        assert "set aside: harvest1-0; run again" in run.stderr.read()
+    assert (tmp_path / "marks/harvest1-0").read_text() == "xxxx", "three times beside others, once alone"
+    turn(write_config(), out, "flour")
+    assert made(out) == made(tmp_path / "calm"), "a run that moves from a cluster to this machine"
+
+
+@pytest.mark.slow
+def test_shard_ends_with_the_run_that_wanted_it_and_the_cluster_stays(
+    tmp_path: Path, write_config: WriteConfig, cluster: Cluster
+) -> None:
+    out, small = tmp_path / "out", {"fields": 1, "wanted": 1}
+    config = write_config(grain=small, flour={"trouble": {"harvest0-0": "sleeps"}})
+    turn(config, out, "salt", "grain", cluster=cluster.address)
+    with subprocess.Popen([*mill(config, out, "flour"), "--cluster", cluster.address], cwd=ROOT) as run:
+        wait_until(lambda: (tmp_path / "marks/harvest0-0").exists())
+        makers = cluster.pids("LokyProcess")
+        run.kill()
+    wait_until(lambda: not set(makers) <= set(cluster.pids("LokyProcess")), seconds=30)
+    result = turn(config, out, "flour", cluster=cluster.address, patience=0.1, retries=0)["flour"]
+    assert result.failed == {"harvest0-0": "it made no progress for 6s, and its worker was ended"}
+    assert not turn(write_config(grain=small), out, "flour", cluster=cluster.address)["flour"].failed
+
+
+@pytest.mark.slow
+def test_scheduler_that_goes_away_is_told_and_the_run_goes_on_here(
+    tmp_path: Path, write_config: WriteConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipeline.cluster._ANSWERS_WITHIN", 3.0)
+    out, mine = tmp_path / "out", Cluster()
+    config = write_config(flour={"seconds": 0.1})
+    turn(config, out, "salt", "grain")
+    with subprocess.Popen(
+        [*mill(config, out, "flour"), "--cluster", mine.address], cwd=ROOT, stderr=subprocess.PIPE, text=True
+    ) as run:
+        wait_until(lambda: list((out / WORK / "flour").glob("records/*.json")))
+        os.kill(mine.pids("dask_scheduler")[0], signal.SIGKILL)
+        assert run.wait(timeout=120) == 3
+        assert run.stderr is not None
+        said = run.stderr.read()
+        assert f"stopped: the scheduler at {mine.address} does not answer any more" in said
+        assert "run again to go on" in said
+        assert "Traceback" not in said
+    assert mine.process.wait(timeout=60) == 1
+    with pytest.raises(ConfigError, match=f"no scheduler answers at {mine.address}"):
+        turn(config, out, "flour", cluster=mine.address)
+    turn(config, out, "flour")
+    turn(config, tmp_path / "calm", "salt", "grain", "flour")
+    assert made(out) == made(tmp_path / "calm")
+
+
+def _command(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except FileNotFoundError:
+        return ""
