@@ -108,6 +108,9 @@ class ClusterWorkers:
 def _client(address: str) -> Client:
     try:
         import dask
+
+        # What goes wrong is said by the mill; before the import, which sets up the logs.
+        dask.config.set({"distributed.logging": dict.fromkeys(("distributed", "distributed.client"), "critical")})
         from distributed import Client
     except ImportError as error:
         raise ConfigError(f"a cluster needs dask.distributed, which is not there ({error}): run make setup") from error

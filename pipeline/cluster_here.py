@@ -28,7 +28,7 @@ def serve(workers: int, port: int) -> int:
     signal ends them all. The exit code: 1 where the scheduler has ended by itself."""
     address = f"tcp://127.0.0.1:{port}"
     with ends_in_order(), tempfile.TemporaryDirectory(prefix="shapemill-cluster-") as folder:
-        alone = ["--no-dashboard"]
+        alone = ["--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
         scheduler = _start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), *alone)
         one = ["--nthreads", "1", "--no-nanny", "--memory-limit", "0", "--local-directory", folder]
         started = [scheduler]

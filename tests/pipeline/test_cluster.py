@@ -88,6 +88,7 @@ def test_shard_ends_with_the_run_that_wanted_it_and_the_cluster_stays(
         wait_until(lambda: (tmp_path / "marks/harvest0-0").exists())
         makers = cluster.pids("LokyProcess")
         run.kill()
+    assert makers
     wait_until(lambda: not set(makers) <= set(cluster.pids("LokyProcess")), seconds=30)
     result = turn(config, out, "flour", cluster=cluster.address, patience=0.1, retries=0)["flour"]
     assert result.failed == {"harvest0-0": "it made no progress for 6s, and its worker was ended"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import resource
@@ -36,11 +37,12 @@ def wait_until(true: Callable[[], object], seconds: float = 60.0) -> None:
 
 
 def descendants(pid: int) -> set[int]:
-    try:
-        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    except FileNotFoundError:
-        return set()
-    return {int(child) for child in children}.union(*(descendants(int(child)) for child in children))
+    """All processes that `pid` has started, whichever of its threads did, and theirs."""
+    children: set[int] = set()
+    for path in Path(f"/proc/{pid}/task").glob("*/children"):
+        with contextlib.suppress(OSError):
+            children |= {int(child) for child in path.read_text().split()}
+    return children.union(*map(descendants, children))
 
 
 def alive(pids: set[int]) -> bool:
