@@ -14,7 +14,7 @@ from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
 from stages.exemplars.hubs import chosen_hubs
 from stages.exemplars.identify import Identified
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, KitConfig
 
 __all__ = ["Choices", "choose", "found_words"]

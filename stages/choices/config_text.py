@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 
 __all__ = ["config_text", "dataset_name"]

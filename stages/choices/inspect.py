@@ -19,8 +19,10 @@ from stages.choices.prospect import Prospect, look_at
 from stages.choices.settings import ChoicesConfig
 from stages.choices.sheet import forecast_sheet
 from stages.exemplars.inspect import inspection, inspection_lines
+from stages.exemplars.model import Model
+from stages.exemplars.parse import FORMATS
 from stages.exemplars.portrait import kit_sheet
-from stages.exemplars.read import FORMATS, Model, read_model
+from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ShapeFile
 from stages.shape.kit import ContactKind, Strictness

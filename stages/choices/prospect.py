@@ -12,7 +12,7 @@ from stages.choices.forecast import Forecast, forecast
 from stages.choices.sheet import SHOWN
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import identify_parts
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.shape.kit import Assembly
 from stages.variations.backdrop import Backdrop

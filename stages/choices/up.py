@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from stages.exemplars.identify import Identified
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import rotation_angle, transform_points
 

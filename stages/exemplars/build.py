@@ -11,11 +11,12 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.findings import kit_warnings, pieces, refusals
 from stages.exemplars.fits import fitting_dockings
-from stages.exemplars.formats.scene import unique_name
+from stages.exemplars.formats.scene import UniqueNames
 from stages.exemplars.grammar import observe_contacts, observe_grammar
 from stages.exemplars.hubs import chosen_hubs, set_hubs_aside, with_touching
 from stages.exemplars.identify import Identified, identify_parts
-from stages.exemplars.read import Model, read_model
+from stages.exemplars.model import Model
+from stages.exemplars.read import read_model
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
@@ -182,8 +183,8 @@ def _kept_parts(
 def _exemplar_names(models: Sequence[Model]) -> list[str]:
     """The names of the files; where those are alike (all are `model.glb`) the names of their folders."""
     stems = [model.path.stem for model in models]
-    names: list[str] = []
-    for model in models:
-        folder = model.path.resolve().parent.name
-        names.append(unique_name(folder if stems.count(model.path.stem) > 1 else model.path.stem, names))
-    return names
+    unique = UniqueNames()
+    return [
+        unique(model.path.resolve().parent.name if stems.count(model.path.stem) > 1 else model.path.stem)
+        for model in models
+    ]

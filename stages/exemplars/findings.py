@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.exemplars.congruence import comparable_mesh, congruences
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.pose import pose_vectors, relative_poses

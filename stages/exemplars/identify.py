@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.congruence import ComparableMesh, comparable_mesh, congruences
 from stages.exemplars.frame import extremal_frame
-from stages.exemplars.read import Model, RawPart
+from stages.exemplars.model import Model, RawPart
 from stages.exemplars.repair import repair_mesh
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import FloatArray

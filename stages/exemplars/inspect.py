@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.exemplars.build import Observation
 from stages.exemplars.findings import hubs, mirror_twins, pieces, ways_together
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.shape.kit_files import describe_kit
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.exemplars.formats.scene import Placement, Surface, unique_name
+from stages.exemplars.formats.scene import Placement, Surface, UniqueNames
 from stages.shape.arrays import FloatArray
 
 __all__ = ["bake", "centre", "distance_from_origin"]
@@ -38,7 +38,7 @@ def bake(surfaces: Sequence[Surface], placements: Sequence[Placement]) -> tuple[
     baked: list[Surface] = []
     placed: list[Placement] = []
     variants: dict[int, list[tuple[FloatArray, int]]] = {}
-    taken: set[str] = set()
+    names = UniqueNames()
     for placement in placements:
         rotation, stretch = _polar(placement.pose[:3, :3])
         known = variants.setdefault(placement.surface, [])
@@ -46,8 +46,7 @@ def bake(surfaces: Sequence[Surface], placements: Sequence[Placement]) -> tuple[
         if index is None:
             index = len(baked)
             known.append((stretch, index))
-            baked.append(_stretched(surfaces[placement.surface], stretch, taken))
-            taken.add(baked[-1].name)
+            baked.append(_stretched(surfaces[placement.surface], stretch, names))
         pose = np.eye(4)
         pose[:3, :3] = rotation
         pose[:3, 3] = placement.pose[:3, 3]
@@ -83,7 +82,7 @@ def _same(one: FloatArray, other: FloatArray) -> bool:
     return bool(np.abs(one - other).max() <= SAME_STRETCH * np.abs(one).max())
 
 
-def _stretched(surface: Surface, stretch: FloatArray, taken: set[str]) -> Surface:
+def _stretched(surface: Surface, stretch: FloatArray, names: UniqueNames) -> Surface:
     """The surface under a linear map, with its faces turned around if that mirrors, under a new name."""
     factors = np.diag(stretch)
     mirrored = np.linalg.det(stretch) < 0
@@ -97,7 +96,7 @@ def _stretched(surface: Surface, stretch: FloatArray, taken: set[str]) -> Surfac
     stem = surface.name + ("@" + ",".join(words) if words else "")
     return replace(
         surface,
-        name=unique_name(stem, taken),
+        name=names(stem),
         vertices=surface.vertices @ stretch.T if words else surface.vertices,
         faces=np.ascontiguousarray(surface.faces[:, ::-1]) if mirrored else surface.faces,
     )

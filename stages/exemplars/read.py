@@ -1,195 +1,38 @@
-"""Reading exemplars: from a model file to parts with rigid poses."""
+"""Reading exemplars: each model file in a process of its own, which may take so much and no more."""
 
 from __future__ import annotations
 
-import contextlib
-import difflib
-import os
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
-import numpy as np
-
+from pipeline.bounded import Escaped, in_child
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.dae import read_dae
-from stages.exemplars.formats.enclosure import Enclosure
-from stages.exemplars.formats.gltf import read_gltf
-from stages.exemplars.formats.off import read_off
-from stages.exemplars.formats.ply import read_ply
-from stages.exemplars.formats.scene import Placement, Scene, Surface, unique_name
-from stages.exemplars.formats.stl import read_stl
-from stages.exemplars.formats.wavefront import read_wavefront
-from stages.exemplars.placing import bake, centre, distance_from_origin
-from stages.exemplars.segment import Segmentation, count_parts, pick, segment
-from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.exemplars.model import Model, pack_model, unpack_model
+from stages.exemplars.parse import parse_model
+from stages.exemplars.segment import Segmentation
+from stages.exemplars.settings import ReadLimits
 
-__all__ = ["FORMATS", "Model", "RawPart", "read_model"]
-
-FORMATS: dict[str, Callable[[Path, Enclosure], Scene]] = {
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
-    ".obj": read_wavefront,
-    ".ply": read_ply,
-    ".stl": lambda path, _: read_stl(path),
-    ".off": lambda path, _: read_off(path),
-    ".dae": read_dae,
-}
-
-FAR = 1e3
-"""How many of its own diagonals a model stands from the origin when it is moved there."""
-
-COARSE = 1e-3
-"""Spacing of 32-bit floats, as a share of the median part's diagonal, at which contacts begin to be lost."""
+__all__ = ["read_model"]
 
 
-@dataclass(frozen=True)
-class RawPart:
-    """One part as the file has it.
+def read_model(path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None) -> Model:
+    """The parts of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE; as `parse_model`.
 
-    name: unique in the model. mesh_name: the mesh that the part places, equal exactly for parts that share one (and
-    its scale); their arrays are then the same objects. label: the file's own word for the part's type, if any.
-    pose: float64 (4, 4), rigid, determinant +1. vertices: float64 (v, 3) in part coordinates, the origin in the middle
-    of the part's box; faces: int32 (f, 3); face_colors: uint8 (f, 3) sRGB.
+    Raises ConfigError, with the file, the element and the mend, for a file of which no parts can be made, whatever it
+    did to the process that read it, and for one that takes more than `limits`.
     """
-
-    name: str
-    mesh_name: str
-    label: str | None
-    pose: FloatArray
-    vertices: FloatArray
-    faces: IntArray
-    face_colors: ByteArray
-
-
-@dataclass(frozen=True)
-class Model:
-    """The parts of a model file in the file's order.
-
-    segmentation: the source of the parts, what `auto` picked; why: one sentence on that; warnings: one sentence each;
-    up: the axis that points up by the file's own word, where its format lets files choose.
-    """
-
-    path: Path
-    parts: tuple[RawPart, ...]
-    segmentation: Segmentation
-    why: str
-    warnings: tuple[str, ...]
-    up: Literal["y", "z"] | None = None
-
-
-def read_model(path: Path, segmentation: Segmentation = "auto") -> Model:
-    """The parts of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE.
-
-    Opens nothing outside the folder of `path`. Scale, shear and mirroring of the scene are in the vertices, so that
-    poses are rigid. A model far from the origin is moved there, with a warning.
-    Raises ConfigError, with the file, the element and the mend, for a file of which no parts can be made.
-    """
-    scene = _read(path)
-    warnings = list(scene.warnings)
-    if segmentation == "auto":
-        source, why, parted = pick(scene)
-    else:
-        source, why = segmentation, "as the config says"
-        if source not in (scene.kind, "symmetry") and source not in (counts := count_parts(scene)):
-            offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
-            raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
-        parted = segment(scene, source)
-    surfaces, placements = bake(*centre(parted.surfaces, parted.placements))
-    offset = _off_origin(surfaces, placements, warnings)
-    names: set[str] = set()
-    parts = []
-    for placement in placements:
-        surface = surfaces[placement.surface]
-        name = unique_name(placement.name, names)
-        names.add(name)
-        pose = placement.pose.copy()
-        pose[:3, 3] -= offset
-        parts.append(
-            RawPart(name, surface.name, placement.label, pose, surface.vertices, surface.faces, surface.face_colors)
-        )
-    return Model(path, tuple(parts), source, why, tuple(warnings), scene.up)
-
-
-def _read(path: Path) -> Scene:
-    """The scene in a file, once it is known to be a readable file of a known format."""
-    reader = FORMATS.get(path.suffix.lower())
-    if reader is None:
-        near = difflib.get_close_matches(path.suffix.lower(), FORMATS, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise ConfigError(
-            f"{path}: {path.suffix or 'a name without an extension'} is no model format; {hint}"
-            f"Shapemill reads {', '.join(FORMATS)}"
-        )
-    if not os.access(path, os.F_OK):  # Path.exists() raises where a folder on the way may not be entered
-        beside: list[str] = []
-        with contextlib.suppress(OSError):
-            beside = [each.name for each in path.parent.iterdir()]
-        near = difflib.get_close_matches(path.name, beside, n=1)
-        raise ConfigError(f"{path}: no such file" + (f"; did you mean {near[0]}?" if near else ""))
-    if not path.is_file():
-        raise ConfigError(f"{path}: is {'a folder' if path.is_dir() else 'no regular file'}; name one model file")
-    if not os.access(path, os.R_OK):
-        raise ConfigError(f"{path}: may not be read; give this user permission to read it (chmod u+r)")
-    if path.stat().st_size == 0:
-        raise ConfigError(f"{path}: the file is empty; copy or export it again")
+    limits = limits or ReadLimits()
     try:
-        scene = reader(path, Enclosure(path))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return _solid_placements(path, scene)
-
-
-def _solid_placements(path: Path, scene: Scene) -> Scene:
-    """The scene without placements that show no triangle, and without vertices that no face uses.
-
-    Raises ConfigError if nothing is left, or for coordinates that are not finite.
-    """
-    warnings = list(scene.warnings)
-    surfaces = [each.select(np.arange(len(each.faces))) for each in scene.surfaces]
-    placements = []
-    for placement in scene.placements:
-        surface = surfaces[placement.surface]
-        broken = int(np.count_nonzero(~np.isfinite(surface.vertices).all(axis=1)))
-        if broken:
-            raise ConfigError(
-                f"{path}: part {placement.name!r} has {broken} vertices that are not finite numbers; mend the part in "
-                "the modelling tool (delete broken vertices) and export it again"
-            )
-        if not np.isfinite(placement.pose).all():
-            raise ConfigError(f"{path}: part {placement.name!r} has a transform that is not finite; export it again")
-        if not len(surface.faces):
-            warnings.append(f"part {placement.name!r} has no triangles and is left out")
-        elif np.linalg.matrix_rank(placement.pose[:3, :3]) < 3:
-            warnings.append(f"part {placement.name!r} is scaled to nothing along an axis and is left out")
-        else:
-            placements.append(placement)
-    if not placements:
-        reasons = f" ({'; '.join(warnings)})" if warnings else ""
-        raise ConfigError(f"{path}: holds no triangles{reasons}; export it as a triangle mesh")
-    used = sorted({each.surface for each in placements})
-    return Scene(
-        kind=scene.kind,
-        surfaces=tuple(surfaces[index] for index in used),
-        placements=tuple(replace(each, surface=used.index(each.surface)) for each in placements),
-        warnings=tuple(warnings),
-        up=scene.up,
-    )
-
-
-def _off_origin(surfaces: list[Surface], placements: list[Placement], warnings: list[str]) -> FloatArray:
-    """What is to be taken off all poses, float64 (3,): zero unless the model stands far from the origin."""
-    middle, diagonal = distance_from_origin(surfaces, placements)
-    distance = float(np.linalg.norm(middle))
-    if distance <= FAR * diagonal:
-        return np.zeros(3)
-    spacing = float(np.spacing(np.float32(np.abs(middle).max())))
-    diagonals = [float(np.linalg.norm(np.ptp(surfaces[each.surface].vertices, axis=0))) for each in placements]
-    share = spacing / (float(np.median(diagonals)) or 1.0)
-    advice = "; contacts may be lost, move it to the origin before the export" if share > COARSE else ""
-    warnings.append(
-        f"the model stands {distance:.4g} units from the origin and is moved there; 32-bit floats are {spacing:.2g} "
-        f"units apart at that place, {share:.2g} of the median part{advice}"
-    )
-    return middle
+        content = in_child(
+            lambda: pack_model(parse_model(path, segmentation, limits)),
+            cpu_seconds=limits.cpu_seconds,
+            memory_mb=limits.memory_mb,
+            refusal=ConfigError,
+        )
+        return unpack_model(path, content)
+    except Escaped as error:
+        raise ConfigError(
+            f"{path}: cannot be read: {error}; export it again, simpler if it is large, or raise exemplars.limits in "
+            "the config"
+        ) from None
+    except ValueError:
+        raise ConfigError(f"{path}: cannot be read: its parts are no meshes; export it again") from None

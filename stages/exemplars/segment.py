@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from stages.exemplars.components import connected_faces
-from stages.exemplars.formats.scene import Placement, Scene, Surface, unique_name
+from stages.exemplars.formats.scene import Placement, Scene, Surface, UniqueNames
 from stages.exemplars.symmetry.parts import by_symmetry, search_size
 
 __all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
@@ -128,12 +128,11 @@ def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | Non
     order = np.argsort(component, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(component[order])) + 1) if len(order) else []
     width = max(3, len(str(len(groups))))
-    taken: set[str] = set()
+    names = UniqueNames()
     pieces: list[tuple[str, str | None, np.ndarray]] = []
     for number, faces in enumerate(groups):
         label = labels[kinds[faces[0]]]
-        name = unique_name(label, taken) if label is not None else f"component-{number:0{width}d}"
-        taken.add(name)
+        name = names(label) if label is not None else f"component-{number:0{width}d}"
         pieces.append((name, label, faces))
     return pieces
 

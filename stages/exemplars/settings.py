@@ -21,6 +21,7 @@ __all__ = [
     "ExemplarsConfig",
     "HubConfig",
     "KitConfig",
+    "ReadLimits",
     "ShapeFile",
 ]
 
@@ -38,6 +39,19 @@ STRICTEST: Mapping[str, Any] = {
 """Where every choice of these keys begins."""
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry"]
+
+
+class ReadLimits(StrictModel):
+    """What reading one model may take; a model that takes more is refused."""
+
+    cpu_seconds: int = Field(600, ge=1, le=86_400, description="Most CPU seconds of reading one model.")
+    memory_mb: int = Field(8_000, ge=100, description="Most memory of reading one model; unit: MB.")
+    parts: int = Field(20_000, ge=1, description="Most parts of one model.")
+    triangles: int = Field(
+        5_000_000,
+        ge=1,
+        description="Most triangles of one model, those of a mesh that stands often counted once.",
+    )
 
 
 class ContactConfig(StrictModel):
@@ -217,6 +231,12 @@ class ExemplarsConfig(StrictModel):
 
     kits: tuple[KitConfig, ...] = Field(
         (), description="One or more kits; none for a dataset that is made of programs."
+    )
+    # excluded from what the stage's fingerprint sees: a model that was read is read alike under wider limits
+    limits: ReadLimits = Field(
+        default_factory=ReadLimits,
+        exclude=True,
+        description="What reading one model may take, in a process of its own; one that takes more is refused.",
     )
 
     @field_validator("kits")

@@ -9,6 +9,7 @@ import numpy as np
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 __all__ = [
+    "IMAGES",
     "color_bytes",
     "decode_image",
     "face_paint",
@@ -17,6 +18,9 @@ __all__ = [
     "srgb_from_linear",
     "unit_colors",
 ]
+
+IMAGES = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TGA", "TIFF", "DDS", "PPM")
+"""The formats that are looked for, whatever a file is called: of others Pillow starts programs (EPS) or runs long."""
 
 
 def linear_from_srgb(colors: ByteArray) -> FloatArray:
@@ -45,14 +49,20 @@ def unit_colors(colors: np.ndarray) -> FloatArray:
 
 
 def decode_image(content: bytes) -> ByteArray:
-    """The pixels of an image file, uint8 (h, w, 3), first row at the top. Raises OSError if it is no image."""
+    """The pixels of an image file, uint8 (h, w, 3), first row at the top. Raises OSError if it is none of IMAGES."""
     from PIL import Image
 
     try:
-        with Image.open(io.BytesIO(content)) as image:
+        with Image.open(io.BytesIO(content), formats=IMAGES) as image:
             return np.asarray(image.convert("RGB"))
-    except (ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise OSError(str(error)) from None
+    except Image.DecompressionBombError:
+        raise OSError(f"it has more than {2 * (Image.MAX_IMAGE_PIXELS or 0):,} pixels") from None
+    except Image.UnidentifiedImageError:
+        raise OSError(f"it is none of {', '.join(IMAGES)}") from None
+    except OSError:
+        raise
+    except Exception:  # of a damaged file Pillow's readers raise what came up
+        raise OSError("it is damaged") from None
 
 
 def sample_texture(image: ByteArray, uv: FloatArray, faces: IntArray) -> ByteArray:

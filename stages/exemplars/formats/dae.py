@@ -15,14 +15,17 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
-from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface, type_label
+from stages.exemplars.formats.scene import GREY, SENSELESS, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 __all__ = ["read_dae"]
 
 _DEEPEST = 200
+_DEEPEST_ELEMENT = 250
+_MOST_NODES = 200_000
+"""Nodes that are walked at most. Nodes that place others doubly double at each level, without a part in them."""
 
 X_TO_Y = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 """The turn after which y points up where x did."""
@@ -33,18 +36,56 @@ def read_dae(path: Path, enclosure: Enclosure) -> Scene:
 
     Everything that one node places is one surface. Coordinates are in metres, by the file's own unit; up is the axis
     that it says, and y where that is x, for then all is turned.
-    Raises ConfigError for a file that is no COLLADA, declares XML entities, or names images outside its folder.
+    Raises ConfigError for a file that is no COLLADA, or declares XML entities.
     """
     import collada
 
     content = path.read_bytes()
-    if b"<!ENTITY" in content or b"<!DOCTYPE" in content:
-        raise ConfigError(f"{path}: declares XML entities, which are not read; export it again as plain COLLADA")
+    _check_markup(path, content)
+    enclosure.at = "its asset or one of its libraries"
     try:
         document = collada.Collada(io.BytesIO(content), ignore=[collada.common.DaeError])
         return _Reader(path, enclosure, document).scene()
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, SyntaxError, collada.common.DaeError) as error:
-        raise ConfigError(f"{path}: not a whole COLLADA file ({error}); copy or export it again") from error
+    except (ArithmeticError, AttributeError, LookupError, SyntaxError, TypeError, ValueError, collada.common.DaeError):
+        raise ConfigError(
+            f"{path}: not a whole COLLADA file ({enclosure.at} {SENSELESS}); copy or export it again"
+        ) from None
+
+
+def _check_markup(path: Path, content: bytes) -> None:
+    """Raise ConfigError for what is no plain XML, in whatever encoding: pycollada would open an archive, its parser
+    follow entities, and both go down as deep as a file goes."""
+    from xml.parsers import expat
+
+    depth = 0
+
+    def declare(*_: object) -> None:
+        raise ConfigError(f"{path}: declares XML entities, which are not read; export it again as plain COLLADA")
+
+    def enter(name: str, _: object) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _DEEPEST_ELEMENT:
+            raise ConfigError(
+                f"{path}: its elements nest deeper than {_DEEPEST_ELEMENT}, at <{name}>; export it flatter"
+            )
+
+    def leave(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    if content[:2] == b"PK":
+        raise ConfigError(f"{path}: is a zip archive; unpack it and name the .dae file in it")
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = declare
+    parser.StartElementHandler, parser.EndElementHandler = enter, leave
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        where = f"line {error.lineno}, column {error.offset + 1}"
+        raise ConfigError(f"{path}: not a whole COLLADA file ({where} is no XML); copy or export it again") from None
+    except (LookupError, ValueError):
+        raise ConfigError(f"{path}: not a whole COLLADA file (its encoding is unknown); export it as UTF-8") from None
 
 
 class _Reader:
@@ -54,13 +95,12 @@ class _Reader:
         self.document = document
         self.warnings: list[str] = []
         self.images: dict[str, ByteArray | None] = {}
+        self.walked = 0
 
     def scene(self) -> Scene:
         surfaces: list[Surface] = []
         placements: list[Placement] = []
         place_of: dict[tuple[Any, ...], int] = {}
-        for each in self.document.images:
-            self.enclosure.check(each.path, f"image {each.id!r}", encoded=True)
         for error in self.document.errors:
             self.warnings.append(f"left out: {error}")
         roots = [] if self.document.scene is None else self.document.scene.nodes
@@ -101,6 +141,12 @@ class _Reader:
         for node in nodes:
             if not isinstance(node, Node):
                 continue
+            self.walked += 1
+            if self.walked > _MOST_NODES:
+                raise ConfigError(
+                    f"{self.path}: places more than {_MOST_NODES:,} nodes, by placing nodes again; export it simpler"
+                )
+            self.enclosure.at = f"node {node.id!r}"
             pose = parent @ np.asarray(node.matrix, dtype=np.float64)
             if any(isinstance(child, ControllerNode) for child in node.children):
                 self.warnings.append(f"node {node.id!r} has a skin or a morph and is left out")
@@ -117,6 +163,7 @@ class _Reader:
         painted = False
         offset = 0
         for placed in geometries:
+            self.enclosure.at = f"geometry {placed.geometry.id!r}"
             bound = {each.symbol: each.target for each in placed.materials}
             for primitive in placed.geometry.primitives:
                 corners = self.corners(primitive)
@@ -187,6 +234,10 @@ class _Reader:
             self.images[name] = None
             try:
                 self.images[name] = decode_image(self.enclosure.read(name, "image", encoded=True))
+            except Outside:
+                self.warnings.append(
+                    f"texture {name!r} is outside the folder of the model and is not opened; its faces are grey"
+                )
             except FileNotFoundError:
                 self.warnings.append(f"texture {name!r} is not there; its faces are grey")
             except OSError as error:

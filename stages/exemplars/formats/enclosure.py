@@ -10,9 +10,16 @@ from urllib.parse import unquote
 
 from pipeline.errors import ConfigError
 
-__all__ = ["Enclosure"]
+__all__ = ["Enclosure", "Outside"]
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+_LONGEST = 4096
+"""Characters that the name of a file has at most, on Linux."""
+
+
+class Outside(ConfigError):
+    """A name that leads out of the model's folder, or nowhere: that of a texture or of a material library costs the
+    colours and not the model."""
 
 
 class Enclosure:
@@ -24,14 +31,15 @@ class Enclosure:
 
     def __init__(self, model: Path) -> None:
         self.model = model
+        self.at = "the file"  # the element that is being read, for whoever finds that it makes no sense
         self._folder = model.parent.resolve()
 
     def read(self, name: str, element: str, *, encoded: bool = False) -> bytes:
         """The bytes of the file that `element` of the model calls `name`.
 
         `encoded` says that `name` is a URI: it may be percent-encoded and may be a `data:` URI.
-        Raises ConfigError if the name leaves the folder or is no file name at all, FileNotFoundError if there is
-        no such file.
+        Raises Outside if the name leaves the folder or is no file name at all, FileNotFoundError if there is no such
+        file, OSError for one that cannot be read.
         """
         self.check(name, element, encoded=encoded)
         if encoded and name.startswith("data:"):
@@ -41,28 +49,33 @@ class Enclosure:
             path = self._path(name)
         if not path.is_file():
             raise FileNotFoundError(name)
-        try:
-            return path.read_bytes()
-        except OSError as error:
-            raise ConfigError(
-                f"{self.model}: {element} names {name!r}, which cannot be read: {error.strerror}"
-            ) from None
+        return path.read_bytes()
 
     def check(self, name: str, element: str, *, encoded: bool = False) -> None:
-        """Raise ConfigError, without opening anything, if `name` leaves the folder."""
+        """Raise Outside, without opening anything, if `name` leaves the folder or is no name of a file."""
+        if not isinstance(name, str):
+            raise Outside(f"{self.model}: {element} names a file by what is no text; export it again")
         if encoded and name.startswith("data:"):
             return
+        if len(name) > _LONGEST:
+            raise Outside(f"{self.model}: {element} names a file by {len(name):,} characters; export it again")
         written = [name]
         while (decoded := unquote(written[-1])) != written[-1]:
             written.append(decoded)  # an encoded slash may itself be encoded
         for each in written:
             plain = each.strip().replace("\\", "/")
             leaves = plain.startswith(("/", "~")) or "\0" in plain or _SCHEME.match(plain) is not None
-            if leaves or not self._path(plain).resolve().is_relative_to(self._folder):
-                raise ConfigError(
+            if leaves or not self._leads_inside(plain):
+                raise Outside(
                     f"{self.model}: {element} names {name!r}, a path outside the folder of the model; nothing outside "
                     "is opened. Put the file beside the model and name it by a relative path, or embed it (as .glb)"
                 )
+
+    def _leads_inside(self, name: str) -> bool:
+        try:
+            return self._path(name).resolve().is_relative_to(self._folder)
+        except (OSError, RuntimeError, ValueError):  # a name that is too long, links in a ring, half a character
+            return False
 
     def _path(self, name: str) -> Path:
         return self._folder / name.strip().replace("\\", "/")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,9 +21,9 @@ from stages.exemplars.formats.colors import (
     srgb_from_linear,
     unit_colors,
 )
-from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.gltf_file import COMPRESSED, GltfFile
-from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface, type_label
+from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 __all__ = ["read_gltf"]
@@ -39,11 +39,11 @@ def read_gltf(path: Path, enclosure: Enclosure) -> Scene:
     """
     try:
         return _Reader(GltfFile(path, enclosure)).scene()
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, MemoryError) as error:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {SENSELESS}"
         raise ConfigError(
-            f"{path}: malformed glTF ({type(error).__name__}: {error}); check it with a glTF validator and export it "
-            "again"
-        ) from error
+            f"{path}: malformed glTF: {reason}; check it with a glTF validator and export it again"
+        ) from None
 
 
 class _Reader:
@@ -60,12 +60,14 @@ class _Reader:
         place_of = {mesh: place for place, mesh in enumerate(used)}
         placements = []
         for index, pose in nodes:
+            self.file.enclosure.at = f"node {index}"
             node = self.header["nodes"][index]
-            mesh_name = self.header["meshes"][node["mesh"]].get("name")
-            name = node.get("name") or mesh_name or f"node{index}"
+            mesh_name = self.name("mesh", node["mesh"])
+            node_name = self.name("node", index)
+            name = node_name or mesh_name or f"node{index}"
             if "skin" in node:
                 self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken as it stands")
-            label = type_label(name) if type_label(name) != name else mesh_name or node.get("name")
+            label = type_label(name) if type_label(name) != name else mesh_name or node_name
             placements.append(Placement(name, label, place_of[node["mesh"]], pose))
         return Scene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
 
@@ -85,8 +87,9 @@ class _Reader:
         while stack:
             index, parent = stack.pop()
             if index in seen:
-                raise ValueError(f"node {index} hangs from two places of the node tree")
+                raise Malformed(f"node {index} hangs from two places of the node tree")
             seen.add(index)
+            self.file.enclosure.at = f"node {index}"
             node = nodes[index]
             pose = parent @ _local_matrix(node)
             if not np.isfinite(pose).all():
@@ -102,15 +105,24 @@ class _Reader:
                 yield index, pose
             stack.extend((child, pose) for child in reversed(node.get("children", [])))
 
+    def name(self, kind: Literal["node", "mesh", "material"], index: int) -> str | None:
+        """What a node, mesh or material is called, if it is."""
+        name = self.header[f"{kind}es" if kind == "mesh" else f"{kind}s"][index].get("name")
+        if name is not None and not isinstance(name, str):
+            self.warnings.append(f"{kind} {index} has a name that is no text, and goes without")
+            return None
+        return name or None
+
     def surface(self, index: int) -> Surface:
+        self.file.enclosure.at = f"mesh {index}"
         mesh = self.header["meshes"][index]
-        name = mesh.get("name") or f"mesh{index}"
+        name = self.name("mesh", index) or f"mesh{index}"
         materials = self.header.get("materials", [])
         vertices, faces, colors, material, paint = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], [], [], []
         painted = False
         offset = 0
         for number, primitive in enumerate(mesh["primitives"]):
-            element = f"mesh {name!r}, primitive {number}"
+            element = self.file.enclosure.at = f"mesh {name!r}, primitive {number}"
             if primitive.get("targets"):
                 self.warnings.append(f"mesh {name!r} has morph targets; they are left out")
             triangles = self.triangles(primitive, element)
@@ -130,7 +142,7 @@ class _Reader:
             vertices=np.concatenate(vertices),
             faces=np.concatenate(faces),
             face_colors=np.concatenate(colors) if colors else np.empty((0, 3), np.uint8),
-            materials=tuple(each.get("name") or f"material{place}" for place, each in enumerate(materials)),
+            materials=tuple(self.name("material", each) or f"material{each}" for each in range(len(materials))),
             face_material=np.concatenate(material) if material else np.empty(0, np.int32),
             paint=np.concatenate(paint) if painted else None,
         )
@@ -154,7 +166,7 @@ class _Reader:
         else:
             corners = np.arange(len(vertices))
         if len(corners) and corners.max() >= len(vertices):
-            raise ValueError(f"{element} has a face on vertex {corners.max()} of {len(vertices)}")
+            raise Malformed(f"{element} has a face on vertex {corners.max()} of {len(vertices)}")
         if mode == _TRIANGLES:
             faces = corners[: len(corners) // 3 * 3].reshape(-1, 3)
         else:
@@ -220,9 +232,13 @@ class _Reader:
                 else:
                     content = self.file.enclosure.read(image["uri"], f"image {index}", encoded=True)
                 self.images[index] = decode_image(content)
+            except Outside:
+                self.images[index] = None
+                self.warnings.append(f"image {index} is a file outside the folder of the model, which is not opened")
             except OSError as error:
                 self.images[index] = None
-                self.warnings.append(f"image {index} ({image.get('uri', 'embedded')[:80]}) cannot be read: {error}")
+                said = "is not there" if isinstance(error, FileNotFoundError) else f"cannot be read: {error}"
+                self.warnings.append(f"image {index} ({image.get('uri', 'embedded')[:80]}) {said}")
         return self.images[index]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.scene import Malformed
 
 __all__ = ["COMPRESSED", "GltfFile"]
 
@@ -23,8 +24,8 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 class GltfFile:
     """A `.glb` or `.gltf` file, its buffers read when they are first needed.
 
-    Raises ConfigError for a file that is cut off or names files outside its folder, and the exceptions of indexing
-    and conversion (KeyError, IndexError, TypeError, ValueError) where the header contradicts itself.
+    Raises ConfigError for a file that is cut off or names files outside its folder, Malformed for what was looked at,
+    and whatever indexing and conversion raise where the header contradicts itself; `enclosure.at` then says where.
     """
 
     def __init__(self, path: Path, enclosure: Enclosure) -> None:
@@ -35,10 +36,10 @@ class GltfFile:
         version = str(self.header.get("asset", {}).get("version", ""))
         if not version.startswith("2."):
             raise ConfigError(f"{path}: glTF version {version or 'unknown'}; only 2.x is read, export it again as 2.0")
-        for kind in ("buffer", "image"):
-            for index, each in enumerate(self.header.get(f"{kind}s", [])):
-                if "uri" in each:
-                    enclosure.check(each["uri"], f"{kind} {index}", encoded=True)
+        for index, each in enumerate(self.header.get("buffers", [])):
+            enclosure.at = f"buffer {index}"
+            if "uri" in each:
+                enclosure.check(each["uri"], f"buffer {index}", encoded=True)
 
     def is_stored(self, accessor: int) -> bool:
         stored: dict[str, Any] = self.header["accessors"][accessor]
@@ -71,7 +72,7 @@ class GltfFile:
         content, stride = self.view(view, element)
         row = shape[1] * np.dtype(dtype).itemsize
         if offset < 0 or shape[0] < 0 or (shape[0] and offset + (shape[0] - 1) * (stride or row) + row > len(content)):
-            raise ValueError(f"{element} needs more bytes than bufferView {view} has")
+            raise Malformed(f"{element} needs more bytes than bufferView {view} has")
         return np.ndarray(shape, dtype, content, offset, (stride or row, np.dtype(dtype).itemsize)).copy()
 
     def view(self, index: int, element: str) -> tuple[bytes, int]:
@@ -96,6 +97,8 @@ class GltfFile:
                     raise ConfigError(
                         f"{self.path}: buffer {index} is the file {uri!r}, which is not there; put it beside the model"
                     ) from None
+                except OSError:
+                    raise ConfigError(f"{self.path}: buffer {index}, the file {uri!r}, cannot be read") from None
             elif index == 0 and self.chunk is not None:
                 self.buffers[index] = self.chunk
             elif compressed:
@@ -130,8 +133,15 @@ def _container(path: Path) -> tuple[dict[str, Any], bytes | None]:
         text = content
     try:
         header = json.loads(text)
-    except ValueError as error:
-        raise ConfigError(f"{path}: not a glTF file: its JSON is broken ({error}); export it again") from None
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise ConfigError(f"{path}: not a glTF file: its JSON breaks off in {where}; export it again") from None
+    except ValueError:
+        raise ConfigError(
+            f"{path}: not a glTF file: its JSON is no text, or holds endless numbers; export it again"
+        ) from None
+    except RecursionError:
+        raise ConfigError(f"{path}: not a glTF file: its JSON nests too deeply; export it again") from None
     if not isinstance(header, dict):
         raise ConfigError(f"{path}: not a glTF file: its JSON is no object; export it again")
     return header, chunk

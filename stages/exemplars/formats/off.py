@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, face_paint
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface
+from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface
 from stages.shape.arrays import ByteArray
 
 __all__ = ["read_off"]
@@ -19,31 +19,34 @@ def read_off(path: Path) -> Scene:
     """The one surface of an ASCII `.off` file. Raises ConfigError for a file that is cut off or malformed."""
     try:
         surface = _parse(path.read_bytes().decode("utf-8", errors="replace"), path.stem)
-    except (ValueError, IndexError) as error:
-        raise ConfigError(f"{path}: not a whole ASCII OFF file ({error}); copy or export it again") from None
+    except (ArithmeticError, LookupError, ValueError) as error:
+        reason = error if isinstance(error, Malformed) else f"its count of vertices and faces, or a colour, {SENSELESS}"
+        raise ConfigError(f"{path}: not a whole ASCII OFF file ({reason}); copy or export it again") from None
     return Scene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),))
 
 
 def _parse(text: str, name: str) -> Surface:
     lines = [words for line in text.splitlines() if (words := line.partition("#")[0].split())]
     if not lines or lines[0][0] not in ("OFF", "COFF", "NOFF", "CNOFF"):
-        raise ValueError("the first line must be OFF or COFF")
+        raise Malformed("the first line must be OFF or COFF")
     kind = lines[0].pop(0)
     if not lines[0]:
         del lines[0]
     vertex_count, face_count = (int(word) for word in lines[0][:2])
-    if len(lines) < 1 + vertex_count + face_count:
-        raise ValueError(f"{vertex_count} vertices and {face_count} faces are announced, {len(lines) - 1} lines follow")
+    if min(vertex_count, face_count) < 0 or len(lines) < 1 + vertex_count + face_count:
+        raise Malformed(f"{vertex_count} vertices and {face_count} faces are announced, {len(lines) - 1} lines follow")
     rows = lines[1 : 1 + vertex_count]
-    vertices = np.array([[float(word) for word in row[:3]] for row in rows], dtype=np.float64).reshape(-1, 3)
+    vertices = np.array([_point(row) for row in rows], dtype=np.float64).reshape(-1, 3)
     corners: list[int] = []
     counts: list[int] = []
     colors: list[ByteArray | None] = []
     for row in lines[1 + vertex_count : 1 + vertex_count + face_count]:
-        count = int(row[0])
-        places = [int(word) for word in row[1 : 1 + count]]
-        if len(places) < count or any(not 0 <= place < vertex_count for place in places):
-            raise ValueError(f"face {' '.join(row)[:40]!r} does not stand on {vertex_count} vertices")
+        try:
+            count, *places = (int(word) for word in row[: 1 + max(0, int(row[0]))])
+        except ValueError:
+            raise Malformed(f"face {' '.join(row)[:40]!r} is not made of whole numbers") from None
+        if len(places) != count or any(not 0 <= place < vertex_count for place in places):
+            raise Malformed(f"face {' '.join(row)[:40]!r} does not stand on {vertex_count} vertices")
         corners += places
         counts.append(count)
         colors.append(_color(row[1 + count :]))
@@ -57,6 +60,14 @@ def _parse(text: str, name: str) -> Surface:
         paint = face_paint(np.array([GREY if each is None else each for each in of_vertices], np.uint8), faces)
     grey = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
     return Surface(name, vertices, faces, grey if paint is None else paint, paint=paint)
+
+
+def _point(words: list[str]) -> list[float]:
+    try:
+        x, y, z = (float(word) for word in words[:3])
+    except ValueError:
+        raise Malformed(f"vertex {' '.join(words)[:40]!r} is not three numbers") from None
+    return [x, y, z]
 
 
 def _color(words: list[str]) -> ByteArray | None:

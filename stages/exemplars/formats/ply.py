@@ -13,9 +13,9 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
-from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface
+from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface
 from stages.shape.arrays import ByteArray, FloatArray
 
 __all__ = ["read_ply"]
@@ -69,48 +69,50 @@ def read_ply(path: Path, enclosure: Enclosure) -> Scene:
     """The one surface of a `.ply` file. Raises ConfigError for a file that is cut off or malformed."""
     content = path.read_bytes()
     try:
-        elements, order, texture, start = _header(content)
-        columns = _ascii(content[start:], elements) if order == "" else _binary(content[start:], elements, order)
+        elements, order, texture, start = _header(content, enclosure)
+        read = _ascii if order == "" else _binary
+        columns = read(content[start:], elements, order, enclosure)
         vertex, face = columns.get("vertex", {}), columns.get("face", {})
-        vertices = np.stack([vertex[axis].values for axis in "xyz"], axis=1).astype(np.float64)
+        vertices = _rows("vertex", vertex, ("x", "y", "z")).astype(np.float64)
         corners = face.get("vertex_indices") or face.get("vertex_index")
         if corners is None or corners.lengths is None:
             corners = _Column(np.empty(0, np.int64), np.empty(0, np.int64))
         places = corners.values.astype(np.int64)
         if len(places) and (places.min() < 0 or places.max() >= len(vertices)):
-            raise ValueError(f"a face on vertex {places.max()} of {len(vertices)}")
-    except (KeyError, ValueError, IndexError, TypeError) as error:
-        raise ConfigError(
-            f"{path}: not a whole PLY file ({str(error) or type(error).__name__}); copy or export it again"
-        ) from None
-    assert corners.lengths is not None
+            raise Malformed(f"a face on vertex {places.max()} of {len(vertices)}")
+        of_faces, of_vertices = _colors("face", face), _colors("vertex", vertex)
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {SENSELESS}"
+        raise ConfigError(f"{path}: not a whole PLY file ({reason}); copy or export it again") from None
     triangles, polygon = triangulate(vertices, places, corners.lengths)
     faces = places[triangles].astype(np.int32)
     warnings: list[str] = []
     paint: ByteArray | None = None
     face_colors: ByteArray = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
-    of_faces, of_vertices = _colors(face), _colors(vertex)
     if of_faces is not None:
         face_colors = paint = of_faces[polygon]
     elif of_vertices is not None:
         paint = face_paint(of_vertices, faces)
         face_colors = np.rint(of_vertices[faces].mean(axis=1)).astype(np.uint8)
     elif texture is not None:
-        face_colors = _textured(texture, enclosure, vertex, face, triangles, faces, face_colors, warnings)
+        face_colors = _textured(
+            texture, enclosure, vertex, face, corners.lengths, triangles, faces, face_colors, warnings
+        )
     surface = Surface(path.stem, vertices, faces, face_colors, paint=paint)
     return Scene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),), tuple(warnings))
 
 
-def _header(content: bytes) -> tuple[list[_Element], str, str | None, int]:
+def _header(content: bytes, enclosure: Enclosure) -> tuple[list[_Element], str, str | None, int]:
     """Elements, byte order (empty for ASCII), texture file, and where the header ends."""
     end = content.find(b"end_header")
     if not content.startswith(b"ply") or end < 0:
-        raise ValueError("no PLY header")
+        raise Malformed("no PLY header")
     start = content.index(b"\n", end) + 1
     elements: list[_Element] = []
     order, texture = None, None
     for line in content[:end].decode("utf-8", errors="replace").splitlines():
         words = line.split()
+        enclosure.at = f"the header's line {line[:60]!r}"
         if words[:1] == ["format"]:
             order = _ENCODINGS[words[1]]
         elif words[:2] == ["comment", "TextureFile"]:
@@ -121,15 +123,20 @@ def _header(content: bytes) -> tuple[list[_Element], str, str | None, int]:
             elements[-1].properties.append(_Property(words[4], _TYPES[words[3]], _TYPES[words[2]]))
         elif words[:1] == ["property"]:
             elements[-1].properties.append(_Property(words[2], _TYPES[words[1]], None))
+    # a row without properties takes no bytes, so that nothing would end a count that is too large
+    elements = [each for each in elements if each.properties]
+    if any(each.count < 0 for each in elements):
+        raise Malformed("an element of fewer than no rows")
     if order is None:
-        raise ValueError("no format line")
+        raise Malformed("no format line")
     return elements, order, texture, start
 
 
-def _binary(body: bytes, elements: list[_Element], order: str) -> dict[str, dict[str, _Column]]:
+def _binary(body: bytes, elements: list[_Element], order: str, enclosure: Enclosure) -> dict[str, dict[str, _Column]]:
     columns: dict[str, dict[str, _Column]] = {}
     offset = 0
     for element in elements:
+        enclosure.at = f"element {element.name}"
         fixed = _fixed_rows(body, offset, element, order)
         if fixed is not None:
             columns[element.name], offset = fixed
@@ -142,7 +149,7 @@ def _binary(body: bytes, elements: list[_Element], order: str) -> dict[str, dict
                     size = int(np.frombuffer(body, order + each.length, 1, offset)[0])
                     offset += np.dtype(each.length).itemsize
                 if size < 0:
-                    raise ValueError(f"a list of {size} values")
+                    raise Malformed(f"element {element.name} has a list of {size} values")
                 values.append(np.frombuffer(body, order + each.dtype, size, offset))
                 offset += size * np.dtype(each.dtype).itemsize
         columns[element.name] = {
@@ -187,11 +194,12 @@ def _fixed_rows(body: bytes, offset: int, element: _Element, order: str) -> tupl
     return columns, offset + element.count * dtype.itemsize
 
 
-def _ascii(body: bytes, elements: list[_Element]) -> dict[str, dict[str, _Column]]:
+def _ascii(body: bytes, elements: list[_Element], order: str, enclosure: Enclosure) -> dict[str, dict[str, _Column]]:
     words = body.split()
     columns: dict[str, dict[str, _Column]] = {}
     at = 0
     for element in elements:
+        enclosure.at = f"element {element.name}"
         gathered: list[list[bytes]] = [[] for _ in element.properties]
         lengths: list[list[int]] = [[] for _ in element.properties]
         for _ in range(element.count):
@@ -200,8 +208,8 @@ def _ascii(body: bytes, elements: list[_Element]) -> dict[str, dict[str, _Column
                 if each.length is not None:
                     size = int(words[at])
                     at += 1
-                if at + size > len(words):
-                    raise ValueError(f"element {element.name} is cut off")
+                if not 0 <= size <= len(words) - at:
+                    raise Malformed(f"element {element.name} is cut off")
                 gathered[number].extend(words[at : at + size])
                 lengths[number].append(size)
                 at += size
@@ -215,10 +223,19 @@ def _ascii(body: bytes, elements: list[_Element]) -> dict[str, dict[str, _Column
     return columns
 
 
-def _colors(columns: dict[str, _Column]) -> ByteArray | None:
-    if not {"red", "green", "blue"} <= columns.keys():
-        return None
-    return color_bytes(unit_colors(np.stack([columns[name].values for name in ("red", "green", "blue")], axis=1)))
+def _rows(element: str, columns: dict[str, _Column], names: tuple[str, ...]) -> np.ndarray:
+    """The single values called `names` of each item of an element (n, len(names))."""
+    for name in names:
+        if name not in columns:
+            raise Malformed(f"element {element} has no property {name}")
+        if columns[name].lengths is not None:
+            raise Malformed(f"property {name} of element {element} is a list")
+    return np.stack([columns[name].values for name in names], axis=1)
+
+
+def _colors(element: str, columns: dict[str, _Column]) -> ByteArray | None:
+    names = ("red", "green", "blue")
+    return color_bytes(unit_colors(_rows(element, columns, names))) if columns.keys() >= set(names) else None
 
 
 def _textured(
@@ -226,6 +243,7 @@ def _textured(
     enclosure: Enclosure,
     vertex: dict[str, _Column],
     face: dict[str, _Column],
+    lengths: np.ndarray,
     triangles: np.ndarray,
     faces: np.ndarray,
     plain: ByteArray,
@@ -235,12 +253,18 @@ def _textured(
     uv: FloatArray | None = None
     corners = faces
     for names in (("texture_u", "texture_v"), ("s", "t"), ("u", "v")):
-        if set(names) <= vertex.keys():
-            uv = np.stack([vertex[name].values for name in names], axis=1).astype(np.float64)
-    if "texcoord" in face and len(face["texcoord"].values) >= 2 * (triangles.max(initial=-1) + 1):
-        uv, corners = face["texcoord"].values.reshape(-1, 2).astype(np.float64), triangles
+        if all(name in vertex and vertex[name].lengths is None for name in names):
+            uv = _rows("vertex", vertex, names).astype(np.float64)
+    if "texcoord" in face:
+        if np.array_equal(face["texcoord"].lengths, 2 * lengths):
+            uv, corners = face["texcoord"].values.reshape(-1, 2).astype(np.float64), triangles
+        else:
+            warnings.append("property texcoord of element face has not two numbers for each corner, and is left out")
     try:
         image = decode_image(enclosure.read(texture, "TextureFile"))
+    except Outside:
+        warnings.append(f"texture {texture!r} is outside the folder of the model and is not opened; its faces are grey")
+        return plain
     except FileNotFoundError:
         warnings.append(f"texture {texture!r} is not there; its faces are grey")
         return plain

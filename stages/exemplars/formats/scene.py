@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,10 +10,32 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["GREY", "Placement", "Scene", "Surface", "type_label", "unique_name"]
+__all__ = [
+    "GREY",
+    "SENSELESS",
+    "Malformed",
+    "Placement",
+    "Scene",
+    "Surface",
+    "UniqueNames",
+    "plain_name",
+    "plain_text",
+    "type_label",
+]
+
+SENSELESS = "is not there, or says what cannot be"
+"""What becomes of an element in a message, where only Python knows more."""
+
+
+class Malformed(ValueError):
+    """What a file says makes no sense; the message says what and where, in our words."""
+
 
 GREY = (160, 160, 160)
 """sRGB of a face of which the file says nothing."""
+
+_LONGEST = 200
+"""Characters that the name of a part has at most."""
 
 
 @dataclass(frozen=True)
@@ -83,10 +104,27 @@ def type_label(name: str) -> str:
     return re.sub(r"(?<=.)[._]\d+$", "", name)
 
 
-def unique_name(name: str, taken: Container[str]) -> str:
-    """`name`, or `name#2`, `name#3`, ... where that is taken."""
-    found, copy = name, 1
-    while found in taken:
-        copy += 1
-        found = f"{name}#{copy}"
-    return found
+class UniqueNames:
+    """Gives names out, each once."""
+
+    def __init__(self) -> None:
+        self._copies: dict[str, int] = {}
+
+    def __call__(self, name: str) -> str:
+        """`name`, or `name#2`, `name#3`, ... where that is taken."""
+        found = name
+        while found in self._copies:
+            self._copies[name] += 1
+            found = f"{name}#{self._copies[name]}"
+        self._copies[found] = 1
+        return found
+
+
+def plain_text(text: str) -> str:
+    """`text` as it can be shown and written anywhere: what does not print, and half a character, is replaced."""
+    return text if text.isprintable() else "".join(each if each.isprintable() else "\ufffd" for each in text)
+
+
+def plain_name(name: str) -> str:
+    """`plain_text`, cut where it is too long for a name."""
+    return plain_text(name) if len(name) <= _LONGEST else plain_text(name[:_LONGEST]) + "…"

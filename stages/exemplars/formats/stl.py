@@ -1,45 +1,72 @@
-"""STL, ASCII and binary, through trimesh. The solids of an ASCII file are its objects."""
+"""STL, ASCII and binary. The solids of an ASCII file are its objects.
+
+trimesh's reader is not used here: it ends a file of text where its words stop being numbers, and says nothing.
+"""
 
 from __future__ import annotations
 
-import io
-import re
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface
+from stages.exemplars.formats.scene import GREY, Malformed, Placement, Scene, Surface
+from stages.shape.arrays import FloatArray
 
 __all__ = ["read_stl"]
 
+_HEAD, _TRIANGLE = 84, 50  # bytes
+_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
 
 def read_stl(path: Path) -> Scene:
-    """The surfaces of a `.stl` file, one for each solid. Raises ConfigError for a file that is cut off."""
-    import trimesh
-
+    """The surfaces of a `.stl` file, one for each solid. Raises ConfigError, with the line where the file is text, for
+    a file that is cut off or malformed."""
     content = path.read_bytes()
-    announced = int.from_bytes(content[80:84], "little")
-    if len(content) != 84 + 50 * announced:
-        opened, ended = (len(re.findall(rb"^\s*%s\b" % word, content, re.M | re.I)) for word in (b"solid", b"endsolid"))
-        if not opened:
-            raise _cut_off(path, f"{announced} triangles are announced, the file has {len(content)} bytes")
-        if ended < opened:
-            raise _cut_off(path, "its last solid does not end")
+    announced = int.from_bytes(content[80:_HEAD], "little")
     try:
-        scene = trimesh.load_scene(io.BytesIO(content), file_type="stl", process=False)
-    except Exception as error:
-        raise _cut_off(path, str(error)) from None
-    surfaces: list[Surface] = []
-    placements: list[Placement] = []
-    for name, mesh in scene.geometry.items():
-        faces = np.asarray(mesh.faces, dtype=np.int32).reshape(-1, 3)
+        if len(content) == _HEAD + _TRIANGLE * announced:
+            corners = np.frombuffer(content, _ROW, announced, _HEAD)["corners"]
+            solids = [(path.stem, corners.reshape(-1, 3).astype(np.float64))]
+        elif content.lstrip()[:5].lower() == b"solid":
+            solids = _solids(content.decode("utf-8", errors="replace"), path.stem)
+        else:
+            raise Malformed(f"{announced} triangles are announced, the file has {len(content)} bytes")
+    except Malformed as error:
+        raise ConfigError(f"{path}: not a whole STL file ({error}); copy or export it again") from None
+    surfaces, placements = [], []
+    for name, vertices in solids:
+        faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
         grey = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
-        title = name if len(scene.geometry) > 1 and name else path.stem
-        placements.append(Placement(title, None, len(surfaces), np.eye(4)))
-        surfaces.append(Surface(title, np.asarray(mesh.vertices, dtype=np.float64), faces, grey))
+        placements.append(Placement(name, None, len(surfaces), np.eye(4)))
+        surfaces.append(Surface(name, vertices, faces, grey))
     return Scene("objects", tuple(surfaces), tuple(placements))
 
 
-def _cut_off(path: Path, reason: str) -> ConfigError:
-    return ConfigError(f"{path}: not a whole STL file ({reason}); copy or export it again")
+def _solids(text: str, stem: str) -> list[tuple[str, FloatArray]]:
+    """Name and corners, float64 (3 * f, 3), of each solid that has any; one alone is called as the file."""
+    solids: list[tuple[str, FloatArray]] = []
+    corners: list[list[float]] = []
+    name: str | None = None
+    for number, line in enumerate(text.splitlines(), start=1):
+        keyword, *words = line.split()[:4] or [""]
+        keyword = keyword.lower()
+        if keyword == "vertex":
+            try:
+                x, y, z = (float(word) for word in words)
+            except ValueError:
+                raise Malformed(f"line {number}, {line.strip()[:60]!r}, is no vertex") from None
+            corners.append([x, y, z])
+        elif keyword == "solid":
+            if name is not None:
+                raise Malformed(f"line {number}: a solid begins before the last one ends")
+            name = line.strip()[5:].strip()
+        elif keyword == "endsolid":
+            if len(corners) % 3:
+                raise Malformed(f"line {number}: a solid ends within a triangle")
+            if corners:
+                solids.append((name or stem, np.array(corners, dtype=np.float64)))
+            name, corners = None, []
+    if name is not None or corners:
+        raise Malformed("its last solid does not end")
+    return solids if len(solids) > 1 else [(stem, each) for _, each in solids]

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture
-from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.polygons import triangulate
 from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray
@@ -57,9 +57,8 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
     corners = np.array(lines.corners, dtype=np.int64)
     triangles, polygon = triangulate(vertices, corners, np.array(lines.counts, dtype=np.int64))
     names = sorted({state[2] for state in lines.states if state[2] is not None})
-    material_of = np.array(
-        [-1 if state[2] is None else names.index(state[2]) for state in lines.states], dtype=np.int32
-    )
+    place_of: dict[str | None, int] = {None: -1, **{name: place for place, name in enumerate(names)}}
+    material_of = np.array([place_of[state[2]] for state in lines.states], dtype=np.int32)
     warnings += [
         f"material {name!r} is not in its library; its faces are grey" for name in names if name not in materials
     ]
@@ -81,9 +80,9 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
     )
     owner, objects = _objects(lines.states, path.stem)
     face_owner = owner[polygon]
-    surfaces = [
-        replace(whole.select(np.flatnonzero(face_owner == index)), name=name) for index, name in enumerate(objects)
-    ]
+    order = np.argsort(face_owner, kind="stable")
+    of_object = np.split(order, np.searchsorted(face_owner[order], np.arange(1, len(objects))))
+    surfaces = [replace(whole.select(own), name=name) for own, name in zip(of_object, objects, strict=True)]
     placements = [Placement(name, type_label(name), index, np.eye(4)) for index, name in enumerate(objects)]
     return Scene("objects", tuple(surfaces), tuple(placements), tuple(warnings))
 
@@ -159,7 +158,13 @@ def _libraries(libraries: Sequence[str], enclosure: Enclosure, warnings: list[st
         for names in ([line], line.split()):
             try:
                 contents = [enclosure.read(name, "mtllib") for name in names]
-            except FileNotFoundError:
+            except Outside:
+                warnings.append(
+                    f"material library {line!r} is outside the folder of the model and is not opened; its "
+                    "faces are grey"
+                )
+                break
+            except OSError:
                 continue
             for content in contents:
                 _parse_library(content.decode("utf-8", errors="replace"), enclosure, materials, warnings)
@@ -178,13 +183,19 @@ def _parse_library(text: str, enclosure: Enclosure, materials: dict[str, _Materi
             material = materials.setdefault(rest, _Material())
         elif keyword == "Kd":
             try:
-                material.color = color_bytes(np.array([float(word) for word in rest.split()[:3]]))
+                red, green, blue = (float(word) for word in rest.split()[:3])
+                material.color = color_bytes(np.array([red, green, blue]))
             except ValueError:
                 warnings.append(f"material colour 'Kd {rest}' is not red, green, blue; its faces are grey")
         elif keyword.lower() == "map_kd":
             name = _map_file(rest)
             try:
                 material.image = decode_image(enclosure.read(name, "map_Kd"))
+            except Outside:
+                warnings.append(
+                    f"texture {name!r} is outside the folder of the model and is not opened; its faces have the "
+                    "material's colour"
+                )
             except FileNotFoundError:
                 warnings.append(f"texture {name!r} is not there; its faces have the material's colour")
             except OSError as error:

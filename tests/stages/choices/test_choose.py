@@ -16,7 +16,8 @@ from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
 from stages.exemplars.build import build_kit
 from stages.exemplars.identify import identify_parts
-from stages.exemplars.read import Model, read_model
+from stages.exemplars.model import Model
+from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
 from stages.shape.kit import ContactKind
 from stages.variations.kernels.answers import ContactAnswers

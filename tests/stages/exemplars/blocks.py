@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import Model, RawPart
+from stages.exemplars.model import Model, RawPart
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.kit import Kit
 from tests.stages.shape.geometry.bodies import Body, box, placed

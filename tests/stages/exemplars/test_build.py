@@ -8,7 +8,8 @@ import pytest
 from pipeline.errors import ConfigError
 from stages.exemplars.build import build_kit, observe_models
 from stages.exemplars.findings import hubs, mirror_twins, pieces, ways_together
-from stages.exemplars.read import Model, read_model
+from stages.exemplars.model import Model
+from stages.exemplars.read import read_model
 from stages.exemplars.settings import ContactConfig
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly

@@ -10,7 +10,7 @@ import trimesh
 
 from pipeline.errors import ConfigError
 from stages.exemplars.build import observe_models
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.exemplars.settings import HubConfig
 from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit_files import load_kit, write_kit

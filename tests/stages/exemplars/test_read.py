@@ -15,7 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
-from stages.exemplars.read import Model, RawPart, read_model
+from stages.exemplars.model import Model, RawPart
+from stages.exemplars.read import read_model
 from tests.stages.exemplars.model_files import (
     BOX_FACES,
     Glb,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import trimesh
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import Model
+from stages.exemplars.model import Model
 from stages.shape.kit import Kit
 from tests.stages.variations.toy import Placed, box, config_of, models_of, pose
 

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from stages.exemplars.build import build_kit
-from stages.exemplars.read import Model, RawPart
+from stages.exemplars.model import Model, RawPart
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Kit
