@@ -50,14 +50,14 @@ def unit_colors(colors: np.ndarray) -> FloatArray:
 
 def decode_image(content: bytes) -> ByteArray:
     """The pixels of an image file, uint8 (h, w, 3), first row at the top. Raises OSError if it is none of IMAGES."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(io.BytesIO(content), formats=IMAGES) as image:
             return np.asarray(image.convert("RGB"))
     except Image.DecompressionBombError:
         raise OSError(f"it has more than {2 * (Image.MAX_IMAGE_PIXELS or 0):,} pixels") from None
-    except Image.UnidentifiedImageError:
+    except UnidentifiedImageError:
         raise OSError(f"it is none of {', '.join(IMAGES)}") from None
     except OSError:
         raise

@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
 from stages.exemplars.formats.enclosure import Enclosure, Outside
+from stages.exemplars.formats.markup import check_markup
 from stages.exemplars.formats.polygons import triangulate
 from stages.exemplars.formats.scene import GREY, SENSELESS, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
@@ -23,7 +24,6 @@ from stages.shape.arrays import ByteArray, FloatArray, IntArray
 __all__ = ["read_dae"]
 
 _DEEPEST = 200
-_DEEPEST_ELEMENT = 250
 _MOST_NODES = 200_000
 """Nodes that are walked at most. Nodes that place others doubly double at each level, without a part in them."""
 
@@ -41,7 +41,7 @@ def read_dae(path: Path, enclosure: Enclosure) -> Scene:
     import collada
 
     content = path.read_bytes()
-    _check_markup(path, content)
+    check_markup(path, content)
     enclosure.at = "its asset or one of its libraries"
     try:
         document = collada.Collada(io.BytesIO(content), ignore=[collada.common.DaeError])
@@ -50,42 +50,6 @@ def read_dae(path: Path, enclosure: Enclosure) -> Scene:
         raise ConfigError(
             f"{path}: not a whole COLLADA file ({enclosure.at} {SENSELESS}); copy or export it again"
         ) from None
-
-
-def _check_markup(path: Path, content: bytes) -> None:
-    """Raise ConfigError for what is no plain XML, in whatever encoding: pycollada would open an archive, its parser
-    follow entities, and both go down as deep as a file goes."""
-    from xml.parsers import expat
-
-    depth = 0
-
-    def declare(*_: object) -> None:
-        raise ConfigError(f"{path}: declares XML entities, which are not read; export it again as plain COLLADA")
-
-    def enter(name: str, _: object) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > _DEEPEST_ELEMENT:
-            raise ConfigError(
-                f"{path}: its elements nest deeper than {_DEEPEST_ELEMENT}, at <{name}>; export it flatter"
-            )
-
-    def leave(_: str) -> None:
-        nonlocal depth
-        depth -= 1
-
-    if content[:2] == b"PK":
-        raise ConfigError(f"{path}: is a zip archive; unpack it and name the .dae file in it")
-    parser = expat.ParserCreate()
-    parser.StartDoctypeDeclHandler = declare
-    parser.StartElementHandler, parser.EndElementHandler = enter, leave
-    try:
-        parser.Parse(content, True)
-    except expat.ExpatError as error:
-        where = f"line {error.lineno}, column {error.offset + 1}"
-        raise ConfigError(f"{path}: not a whole COLLADA file ({where} is no XML); copy or export it again") from None
-    except (LookupError, ValueError):
-        raise ConfigError(f"{path}: not a whole COLLADA file (its encoding is unknown); export it as UTF-8") from None
 
 
 class _Reader:

@@ -75,16 +75,16 @@ def read_ply(path: Path, enclosure: Enclosure) -> Scene:
         vertex, face = columns.get("vertex", {}), columns.get("face", {})
         vertices = _rows("vertex", vertex, ("x", "y", "z")).astype(np.float64)
         corners = face.get("vertex_indices") or face.get("vertex_index")
-        if corners is None or corners.lengths is None:
-            corners = _Column(np.empty(0, np.int64), np.empty(0, np.int64))
-        places = corners.values.astype(np.int64)
+        places = lengths = np.empty(0, np.int64)
+        if corners is not None and corners.lengths is not None:
+            places, lengths = corners.values.astype(np.int64), corners.lengths
         if len(places) and (places.min() < 0 or places.max() >= len(vertices)):
             raise Malformed(f"a face on vertex {places.max()} of {len(vertices)}")
         of_faces, of_vertices = _colors("face", face), _colors("vertex", vertex)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         reason = error if isinstance(error, Malformed) else f"{enclosure.at} {SENSELESS}"
         raise ConfigError(f"{path}: not a whole PLY file ({reason}); copy or export it again") from None
-    triangles, polygon = triangulate(vertices, places, corners.lengths)
+    triangles, polygon = triangulate(vertices, places, lengths)
     faces = places[triangles].astype(np.int32)
     warnings: list[str] = []
     paint: ByteArray | None = None
@@ -95,9 +95,7 @@ def read_ply(path: Path, enclosure: Enclosure) -> Scene:
         paint = face_paint(of_vertices, faces)
         face_colors = np.rint(of_vertices[faces].mean(axis=1)).astype(np.uint8)
     elif texture is not None:
-        face_colors = _textured(
-            texture, enclosure, vertex, face, corners.lengths, triangles, faces, face_colors, warnings
-        )
+        face_colors = _textured(texture, enclosure, vertex, face, lengths, triangles, faces, face_colors, warnings)
     surface = Surface(path.stem, vertices, faces, face_colors, paint=paint)
     return Scene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),), tuple(warnings))
 

@@ -26,7 +26,7 @@ def read_stl(path: Path) -> Scene:
     announced = int.from_bytes(content[80:_HEAD], "little")
     try:
         if len(content) == _HEAD + _TRIANGLE * announced:
-            corners = np.frombuffer(content, _ROW, announced, _HEAD)["corners"]
+            corners = np.ndarray(announced, _ROW, content, _HEAD)["corners"]
             solids = [(path.stem, corners.reshape(-1, 3).astype(np.float64))]
         elif content.lstrip()[:5].lower() == b"solid":
             solids = _solids(content.decode("utf-8", errors="replace"), path.stem)
@@ -34,7 +34,8 @@ def read_stl(path: Path) -> Scene:
             raise Malformed(f"{announced} triangles are announced, the file has {len(content)} bytes")
     except Malformed as error:
         raise ConfigError(f"{path}: not a whole STL file ({error}); copy or export it again") from None
-    surfaces, placements = [], []
+    surfaces: list[Surface] = []
+    placements: list[Placement] = []
     for name, vertices in solids:
         faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
         grey = np.tile(np.array(GREY, np.uint8), (len(faces), 1))

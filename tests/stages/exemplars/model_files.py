@@ -9,7 +9,17 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["BOX_FACES", "Glb", "box", "png", "signed_volume", "world_triangles", "write_obj"]
+__all__ = [
+    "BOX_FACES",
+    "Glb",
+    "box",
+    "png",
+    "signed_volume",
+    "textured_dae",
+    "textured_glb",
+    "world_triangles",
+    "write_obj",
+]
 
 BOX_FACES = np.array(
     [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7],
@@ -122,3 +132,51 @@ def write_obj(path: Path, boxes: dict[str, np.ndarray], head: str = "", before: 
         lines += [f"f {a} {b} {c}" for a, b, c in (BOX_FACES + 1 + 8 * number).tolist()]
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def textured_glb(image: str) -> Glb:
+    """Two boxes beside each other with a texture, the file `image`."""
+    glb = Glb()
+    glb.header["images"] = [{"uri": image}]
+    glb.header["textures"] = [{"source": 0}]
+    glb.header["materials"] = [{"name": "skin", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    primitive = glb.primitive(box(), BOX_FACES, material=0)
+    primitive["attributes"]["TEXCOORD_0"] = glb.accessor(box()[:, :2].astype("<f4"))
+    mesh = glb.mesh(primitive, name="box")
+    glb.node(name="box.001", mesh=mesh)
+    glb.node(name="box.002", mesh=mesh, translation=[2, 0, 0])
+    return glb
+
+
+def textured_dae(image: str) -> str:
+    """A square that two nodes place, one below the other, with a texture, the file `image`."""
+    return f"""<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><created>2020-01-01T00:00:00Z</created><modified>2020-01-01T00:00:00Z</modified>
+<unit name="half" meter="0.5"/><up_axis>Z_UP</up_axis></asset>
+<library_images><image id="i"><init_from>{image}</init_from></image></library_images>
+<library_effects><effect id="e"><profile_COMMON><newparam sid="s"><surface type="2D"><init_from>i</init_from></surface>
+</newparam><newparam sid="t"><sampler2D><source>s</source></sampler2D></newparam><technique sid="c"><lambert><diffuse>
+<texture texture="t" texcoord="UV"/></diffuse></lambert></technique></profile_COMMON></effect></library_effects>
+<library_materials><material id="m" name="skin"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g" name="tile"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 1 0 0 1 1 0 0 1 0</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<source id="u"><float_array id="ua" count="8">0 0 1 0 1 1 0 1</float_array><technique_common>
+<accessor source="#ua" count="4" stride="2"><param name="S" type="float"/><param name="T" type="float"/></accessor>
+</technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist material="skin" count="1"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#u" offset="1" set="0"/><vcount>4</vcount><p>0 0 1 1 2 2 3 3</p></polylist>
+</mesh></geometry></library_geometries>
+<library_nodes><node id="leaf" name="leaf"><translate>0 0 3</translate>{_PLACED}</node></library_nodes>
+<library_visual_scenes><visual_scene id="w"><node id="n1" name="tile.001"><rotate>0 0 1 30</rotate>{_PLACED}
+<node id="n2" name="tile.002"><scale>2 2 2</scale>{_PLACED}</node><instance_node url="#leaf"/></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#w"/></scene></COLLADA>"""
+
+
+_PLACED = (
+    '<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="skin" target="#m"/>'
+    "</technique_common></bind_material></instance_geometry>"
+)

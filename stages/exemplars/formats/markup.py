@@ -1,0 +1,68 @@
+"""What the XML of a COLLADA file must be before pycollada sees it.
+
+pycollada would open an archive, its parser would follow entities, both go down as deep as a file goes, and an array is
+made as long as a file announces.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.parsers import expat
+
+from pipeline.errors import ConfigError
+
+__all__ = ["check_markup"]
+
+_DEEPEST = 250
+
+
+def check_markup(path: Path, content: bytes) -> None:
+    """Look through the XML of a COLLADA file, in whatever encoding.
+
+    Raises ConfigError for what is no plain XML, declares entities, nests deeper than 250 elements, or announces
+    polygons of more corners than the file has bytes.
+    """
+    if content[:2] == b"PK":
+        raise ConfigError(f"{path}: is a zip archive; unpack it and name the .dae file in it")
+    look = _Look(path, len(content))
+    try:
+        look.parser.Parse(content, True)
+    except expat.ExpatError as error:
+        where = f"line {error.lineno}, column {error.offset + 1}"
+        raise ConfigError(f"{path}: not a whole COLLADA file ({where} is no XML); copy or export it again") from None
+    except (LookupError, ValueError):
+        raise ConfigError(f"{path}: not a whole COLLADA file (its encoding is unknown); export it as UTF-8") from None
+
+
+class _Look:
+    def __init__(self, path: Path, size: int) -> None:
+        self.path = path
+        self.size = size
+        self.depth = 0
+        self.counts: list[str] = []
+        self.parser = expat.ParserCreate()
+        self.parser.buffer_text = True
+        self.parser.StartDoctypeDeclHandler = self.declare
+        self.parser.StartElementHandler = self.enter
+        self.parser.EndElementHandler = self.leave
+
+    def declare(self, *_: object) -> None:
+        raise ConfigError(f"{self.path}: declares XML entities, which are not read; export it again as plain COLLADA")
+
+    def enter(self, name: str, _: object) -> None:
+        self.depth += 1
+        if self.depth > _DEEPEST:
+            raise ConfigError(f"{self.path}: its elements nest deeper than {_DEEPEST}, at <{name}>; export it flatter")
+        if name == "vcount":
+            self.parser.CharacterDataHandler = self.counts.append
+
+    def leave(self, name: str) -> None:
+        self.depth -= 1
+        if name == "vcount":
+            self.parser.CharacterDataHandler = None
+            words, self.counts = "".join(self.counts).split(), []
+            if any(len(word) > 9 for word in words) or sum(int(word) for word in words if word.isdecimal()) > self.size:
+                raise ConfigError(
+                    f"{self.path}: <vcount> in line {self.parser.CurrentLineNumber} announces more corners than the "
+                    "file can hold; export it again"
+                )
