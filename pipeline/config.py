@@ -20,6 +20,9 @@ from pipeline.yaml_text import KeyPath, read_yaml
 
 __all__ = ["Config", "DatasetFacts", "ExistingFile", "StrictModel", "existing_file", "load_config", "nearest"]
 
+LONGEST_SHOWN = 200
+"""Characters of a value that a message shows."""
+
 Section = TypeVar("Section", bound="StrictModel")
 
 
@@ -79,8 +82,13 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 def existing_file(path: Path) -> Path:
     """`path` itself. Raises ValueError, naming the nearest file that is there, when it is no readable file."""
-    if path.is_file():
-        return path
+    try:
+        if "\0" not in str(path) and path.is_file():
+            return path
+    except OSError as error:
+        raise ValueError(f"{_shown(str(path))} is no file: {error.strerror}") from None
+    if not str(path).isprintable():
+        raise ValueError(f"{_shown(str(path))} is no path: it holds what cannot be written")
     if path.is_dir():
         raise ValueError(f"{path} is a folder, not a file")
     folder = path.parent
@@ -113,11 +121,12 @@ def load_config(
     for key in values:
         if key not in facts and key not in sections:
             known = [*DatasetFacts.model_fields, *sections]
-            mistakes.append(f"{_where(path, lines, (key,))}: {key}: unknown key; {_known(key, known)}")
+            mistakes.append(f"{_where(path, lines, (key,))}: {_shown(key)}: unknown key; {_known(key, known)}")
     header = _validate(path, lines, (), DatasetFacts, facts, mistakes)
     validated: dict[str, StrictModel] = {}
     for name, model in sections.items():
-        section = _validate(path, lines, (name,), model, values.get(name) or {}, mistakes)
+        said = values.get(name)  # a section without anything in it is one that takes its defaults
+        section = _validate(path, lines, (name,), model, {} if said is None else said, mistakes)
         if section is not None:
             validated[name] = section
     if mistakes or header is None:
@@ -155,9 +164,15 @@ def _validate(
             ):
                 continue
             key = (*place, *each["loc"])
-            dotted = ".".join(str(step) for step in key) or "(the file)"
+            dotted = _shown(".".join(str(step) for step in key)) or "(the file)"
             mistakes.append(f"{_where(path, lines, key)}: {dotted}: {_explain(schema, each)}")
         return None
+
+
+def _shown(text: str) -> str:
+    """`text` as it fits into a line."""
+    plain = "".join(each if each.isprintable() else "\ufffd" for each in text[:LONGEST_SHOWN])
+    return plain if len(text) <= LONGEST_SHOWN else f"{plain}… ({len(text):,} characters)"
 
 
 def _where(path: Path, lines: Mapping[KeyPath, int], key: KeyPath) -> str:
@@ -185,7 +200,7 @@ def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
     wanted = error["msg"][0].lower() + error["msg"][1:]
     if kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
         wanted = f"must lie in {_range(field)}" if _range(field) else wanted
-    return f"{wanted}, and is {json.dumps(error['input'])}{described}"
+    return f"{wanted}, and is {_shown(json.dumps(error['input']))}{described}"
 
 
 def _known(key: str, known: Iterable[str]) -> str:

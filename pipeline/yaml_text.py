@@ -1,4 +1,8 @@
-"""YAML as people mistype it: values with the line of every key, duplicate keys refused, `1e-3` a number."""
+"""YAML as people mistype it: values with the line of every key, duplicate keys refused, `1e-3` a number.
+
+A file is looked through, event by event, before anything is built of it: its aliases may stand for billions of values,
+and the builder goes down as deep as a file goes.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,13 @@ from pipeline.errors import ConfigError
 __all__ = ["KeyPath", "read_yaml"]
 
 KeyPath = tuple[str | int, ...]
+
+
+LONGEST = 1_000_000
+DEEPEST = 40
+MOST_VALUES = 50_000
+
+_CONTROLS = frozenset(map(chr, (*range(9), 11, 12, *range(14, 32), 127)))
 
 
 class _Loader(yaml.SafeLoader):
@@ -32,17 +43,22 @@ _Loader.add_implicit_resolver(
 def read_yaml(path: Path) -> tuple[Mapping[str, Any], Mapping[KeyPath, int]]:
     """The mapping in a YAML file, and the line (from 1) where each key and list item stands.
 
-    Raises ConfigError, with file and line, for an unreadable file, bad syntax, a duplicate key, a key that is no
-    text, and a file that holds no mapping.
+    Raises ConfigError, with file and line, for an unreadable or huge file, bad syntax, a duplicate key, a key that is
+    no text, a tag, values that contain themselves, nest deeply or are too many, and a file that holds no mapping.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = _text(path)
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is no UTF-8 text ({error.reason} at byte {error.start})") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    loader = _Loader(text)
+    if (unfit := next((each for each in text if each in _CONTROLS), None)) is not None:
+        line = text[: text.index(unfit)].count("\n") + 1
+        raise ConfigError(f"{path}:{line}: holds the control character {unfit!r}; take it out")
+    loader = _Loader("")
     try:
+        _look_through(path, text)
+        loader = _Loader(text)
         node = loader.get_single_node()
         lines: dict[KeyPath, int] = {}
         if not isinstance(node, yaml.MappingNode):
@@ -53,10 +69,50 @@ def read_yaml(path: Path) -> tuple[Mapping[str, Any], Mapping[KeyPath, int]]:
         mark = error.problem_mark
         where = f"{path}:{mark.line + 1}" if mark is not None else f"{path}"
         raise ConfigError(f"{where}: is no YAML: {error.problem or error.context}") from error
-    except (yaml.YAMLError, ValueError) as error:
-        raise ConfigError(f"{path}: is no YAML: {error}") from error
+    except (yaml.YAMLError, ValueError):
+        raise ConfigError(f"{path}: is no YAML: it holds a character or a number that is none") from None
     finally:
         loader.dispose()
+
+
+def _text(path: Path) -> str:
+    if path.exists() and not path.is_file():
+        raise ConfigError(f"{path}: is {'a folder' if path.is_dir() else 'no regular file'}; name one config file")
+    with open(path, encoding="utf-8") as stream:
+        text = stream.read(LONGEST + 1)
+    if len(text) > LONGEST:
+        raise ConfigError(f"{path}: is longer than {LONGEST:,} characters, which no config is")
+    return text
+
+
+def _look_through(path: Path, text: str) -> None:
+    """Raise ConfigError for tags, and for values that contain themselves, nest too deeply or are too many."""
+    open_since: list[tuple[str | None, int]] = []
+    sizes: dict[str, int] = {}
+    count = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        where = f"{path}:{event.start_mark.line + 1}"
+        if getattr(event, "tag", None) is not None:
+            raise ConfigError(f"{where}: the tag {event.tag[:60]} is not read; write the value without it")
+        if isinstance(event, yaml.AliasEvent):
+            if any(anchor == event.anchor for anchor, _ in open_since):
+                raise ConfigError(f"{where}: *{event.anchor} contains itself; write out what is meant")
+            count += sizes.get(event.anchor, 1)
+        elif isinstance(event, yaml.ScalarEvent):
+            count += 1
+            if event.anchor is not None:
+                sizes[event.anchor] = 1
+        elif isinstance(event, yaml.CollectionStartEvent):
+            open_since.append((event.anchor, count))
+            count += 1
+            if len(open_since) > DEEPEST:
+                raise ConfigError(f"{where}: nests deeper than {DEEPEST}, which no config does")
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = open_since.pop()
+            if anchor is not None:
+                sizes[anchor] = count - before
+        if count > MOST_VALUES:
+            raise ConfigError(f"{where}: holds more than {MOST_VALUES:,} values by here, which no config does")
 
 
 def _collect(path: Path, node: yaml.Node, place: KeyPath, lines: dict[KeyPath, int]) -> None:

@@ -24,7 +24,7 @@ from stages.exemplars.parse import FORMATS
 from stages.exemplars.portrait import kit_sheet
 from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
-from stages.exemplars.settings import ContactConfig, KitConfig, ShapeFile
+from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.shape.kit import ContactKind, Strictness
 
 __all__ = ["main"]
@@ -39,7 +39,8 @@ def main(arguments: list[str]) -> int:
     asked = _parser().parse_args(arguments)
     try:
         paths = [path for text in asked.models for path in _paths(text)]
-        models = [read_model(path, asked.parts) for path in paths]
+        limits = _limits(asked)
+        models = [read_model(path, asked.parts, limits) for path in paths]
         config = _config(asked, paths)
         found = look_at(config, models, asked.tries)
         seen = inspection(found.seen, models, found.config)
@@ -101,6 +102,17 @@ def _config(asked: argparse.Namespace, paths: Sequence[Path]) -> KitConfig:
         raise ConfigError("\n".join(lines)) from None
 
 
+def _limits(asked: argparse.Namespace) -> ReadLimits:
+    said = {key: getattr(asked, f"most_{key}") for key in ReadLimits.model_fields}
+    try:
+        return ReadLimits(**{key: value for key, value in said.items() if value is not None})
+    except ValidationError as error:
+        lines = [
+            f"--most-{str(each['loc'][0]).replace('_', '-')}: {each['msg']}" for each in error.errors(include_url=False)
+        ]
+        raise ConfigError("\n".join(lines)) from None
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="pipeline inspect",
@@ -115,6 +127,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--kinds", type=_kinds, help="kinds of contact that count, such as face or line,face")
     parser.add_argument("--grammar", choices=get_args(Strictness), help="which neighbours a part may have")
     parser.add_argument("--up", choices=["y", "z"], help="the axis that points up")
+    for key in ReadLimits.model_fields:
+        option = f"--most-{key.replace('_', '-')}"
+        parser.add_argument(option, type=int, metavar="MOST", help=f"as exemplars.limits.{key} in a config")
     parser.add_argument("--tries", type=int, default=ChoicesConfig().tries, help="as choices.tries in a config")
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER", help=f"where config and pictures go; {FOLDER}, with --json nowhere"

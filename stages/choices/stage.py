@@ -38,7 +38,8 @@ def plan(plan: Plan) -> list[Shard]:
 def run_shard(task: Task) -> Outcome:
     """Read the models and decide."""
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
-    models = [read_model(shape.path, config.parts) for shape in config.shapes]
+    limits = task.config.section(ExemplarsConfig).limits
+    models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
     tries = task.config.section(ChoicesConfig).tries
     made = choose(config, models, identify_parts(models, config), tries).as_json()
     with task.output(f"{config.name}.json") as stream:

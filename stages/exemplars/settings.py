@@ -103,7 +103,9 @@ class ShapeFile(StrictModel):
 class KitConfig(StrictModel):
     """One kit: exemplar shapes that share part types."""
 
-    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$", description="Name of the kit; starts the keys of its samples.")
+    name: str = Field(
+        pattern=r"^[a-z0-9][a-z0-9-]*$", max_length=64, description="Name of the kit; starts the keys of its samples."
+    )
     shapes: tuple[ShapeFile, ...] = Field(
         min_length=1,
         description="Model files (GLB, glTF, OBJ, PLY, STL, OFF, DAE), from the run's folder: their paths, or the keys "

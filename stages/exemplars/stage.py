@@ -36,13 +36,13 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Read, repair, identify, observe, write."""
-    kits = task.config.section(ExemplarsConfig).kits
-    config = next(kit for kit in kits if kit.name == task.shard.params["kit"])
+    section = task.config.section(ExemplarsConfig)
+    config = next(kit for kit in section.kits if kit.name == task.shard.params["kit"])
     chosen: dict[str, Any] = {"chosen": {}, "why": {}}
     if config.left_open():
         chosen = json.loads(task.input("choices", f"{config.name}.json").read_bytes())
         config = config.decide(chosen["chosen"])
-    models = [read_model(shape.path, config.parts) for shape in config.shapes]
+    models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
         write_kit(kit, text, arrays)

@@ -146,12 +146,13 @@ def find_program(name: str) -> Program:
 
 
 def program_module(name: str) -> str:
-    """The module in which `find_program` finds a program. Raises ConfigError for a name without a dot that is none."""
+    """The module in which `find_program` finds a program. Raises ConfigError for what names neither a program of the
+    library nor a module."""
     names = program_names()
     if name in names:
         return f"{__package__}.library.{name}"
-    if "." in name:
+    if "." in name and all(step.isidentifier() for step in name.split(".")):
         return name
     close = nearest(name, names)
     hint = f"did you mean {close}?" if close else f"programs are {', '.join(names) or 'none'}"
-    raise ConfigError(f"there is no program {name!r}; {hint}")
+    raise ConfigError(f"there is no program {name[:200]!r}; {hint}")

@@ -15,15 +15,15 @@ __all__ = ["EachValueConfig", "ProgramSplitConfig", "ProgramsConfig", "SweepConf
 class EachValueConfig(StrictModel):
     """How many shapes have each value of each parameter fixed, all others being random (geocode §4)."""
 
-    train: int = Field(30, ge=1, description="Shapes of each value in the training split.")
-    val: int = Field(3, ge=1, description="Shapes of each value in the validation split.")
-    test: int = Field(3, ge=1, description="Shapes of each value in the test split.")
+    train: int = Field(30, ge=1, le=1_000_000, description="Shapes of each value in the training split.")
+    val: int = Field(3, ge=1, le=1_000_000, description="Shapes of each value in the validation split.")
+    test: int = Field(3, ge=1, le=1_000_000, description="Shapes of each value in the test split.")
 
 
 class SweepConfig(StrictModel):
     """A plain random sweep: how many shapes, and how they are shared out."""
 
-    samples: int = Field(10_000, ge=3, description="Shapes in all.")
+    samples: int = Field(10_000, ge=3, le=1_000_000_000, description="Shapes in all.")
     val: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the validation split.")
     test: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the test split.")
 
@@ -31,7 +31,7 @@ class SweepConfig(StrictModel):
 class ProgramSplitConfig(StrictModel):
     """How the samples are shared out."""
 
-    shards: int = Field(8, ge=1, description="Fewest shards of a split.")
+    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 

@@ -75,7 +75,7 @@ class ShapeAssemblySplitConfig(StrictModel):
 
     val: float = Field(0.1, gt=0, lt=0.5, description="Share of programs in the validation split.")
     test: float = Field(0.1, gt=0, lt=0.5, description="Share of programs in the test split.")
-    shards: int = Field(8, ge=1, description="Fewest shards of a split.")
+    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 

@@ -15,7 +15,9 @@ __all__ = ["Augmentation", "SketchView", "SketchesConfig", "StrokeOptions"]
 class SketchView(StrictModel):
     """One drawing of each sample, and how far its camera wanders from sample to sample."""
 
-    name: str = Field("view", pattern=r"^[a-z0-9_]+$", description="name of the view, as the sample's JSON lists it")
+    name: str = Field(
+        "view", pattern=r"^[a-z0-9_]+$", max_length=64, description="name of the view, as the sample's JSON lists it"
+    )
     azimuth: float = Field(
         -40.0, ge=-360.0, le=360.0, description="angle around the up axis, 0 from the front, 90 from +x; unit: degrees"
     )

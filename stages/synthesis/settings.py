@@ -28,7 +28,7 @@ class SourceConfig(StrictModel):
     )
     seed: int = Field(0, ge=0, lt=100, description="Which of its trainings, if it has several seeds.")
     kit: str = Field(description="The kit that it has learnt; the same must stand under exemplars.kits.")
-    samples: int = Field(ge=1, description="Shapes wanted.")
+    samples: int = Field(ge=1, le=1_000_000_000, description="Shapes wanted.")
     way: Literal["prior", "perturbation", "linear", "path"] = Field(
         "prior",
         description="How points of its latent space are found: drawn from the prior, or by a search around training "
@@ -44,7 +44,7 @@ class DreamSplitConfig(StrictModel):
 
     val: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in validation.")
     test: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in test.")
-    shards: int = Field(8, ge=1, description="Fewest shards of a split.")
+    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 

@@ -159,7 +159,7 @@ class SplitConfig(StrictModel):
     )
     val: float = Field(0.1, gt=0, lt=0.5, description="Share of samples (by graph: of distinct ones) in validation.")
     test: float = Field(0.1, gt=0, lt=0.5, description="Share of samples (by graph: of distinct ones) in test.")
-    shards: int = Field(8, ge=1, description="Fewest shards of a split.")
+    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 
@@ -189,7 +189,10 @@ class VariationsConfig(StrictModel):
     """The variations of each kit."""
 
     per_kit: int = Field(
-        500, ge=0, description="Variants wanted of each kit; 0 for a dataset of these kits that is made otherwise."
+        500,
+        ge=0,
+        le=1_000_000_000,
+        description="Variants wanted of each kit; 0 for a dataset of these kits that is made otherwise.",
     )
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
     selection: SelectionConfig = Field(
