@@ -20,6 +20,8 @@ from pipeline.yaml_text import KeyPath, read_yaml
 
 __all__ = ["Config", "DatasetFacts", "ExistingFile", "StrictModel", "existing_file", "load_config", "nearest"]
 
+MOST_MISTAKES = 50
+"""Mistakes that are told at once."""
 LONGEST_SHOWN = 200
 """Characters of a value that a message shows."""
 
@@ -130,7 +132,9 @@ def load_config(
         if section is not None:
             validated[name] = section
     if mistakes or header is None:
-        raise ConfigError("\n".join(mistakes))
+        beyond = len(mistakes) - MOST_MISTAKES
+        more = [f"{path}: and {beyond:,} more mistakes"] if beyond > 0 else []
+        raise ConfigError("\n".join([*mistakes[:MOST_MISTAKES], *more]))
     return Config(
         name=header.name,
         version=header.version,

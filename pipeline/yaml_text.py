@@ -52,9 +52,6 @@ def read_yaml(path: Path) -> tuple[Mapping[str, Any], Mapping[KeyPath, int]]:
         raise ConfigError(f"{path}: is no UTF-8 text ({error.reason} at byte {error.start})") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    if (unfit := next((each for each in text if each in _CONTROLS), None)) is not None:
-        line = text[: text.index(unfit)].count("\n") + 1
-        raise ConfigError(f"{path}:{line}: holds the control character {unfit!r}; take it out")
     loader = _Loader("")
     try:
         _look_through(path, text)
@@ -88,20 +85,22 @@ def _text(path: Path) -> str:
 def _look_through(path: Path, text: str) -> None:
     """Raise ConfigError for tags, and for values that contain themselves, nest too deeply or are too many."""
     open_since: list[tuple[str | None, int]] = []
-    sizes: dict[str, int] = {}
+    sizes: dict[str | None, int] = {}
     count = 0
     for event in yaml.parse(text, Loader=_Loader):
         where = f"{path}:{event.start_mark.line + 1}"
         if getattr(event, "tag", None) is not None:
-            raise ConfigError(f"{where}: the tag {event.tag[:60]} is not read; write the value without it")
+            tag = event.tag[:60].replace("tag:yaml.org,2002:", "!!")
+            raise ConfigError(f"{where}: the tag {tag} is not read; write the value without it")
         if isinstance(event, yaml.AliasEvent):
             if any(anchor == event.anchor for anchor, _ in open_since):
                 raise ConfigError(f"{where}: *{event.anchor} contains itself; write out what is meant")
             count += sizes.get(event.anchor, 1)
         elif isinstance(event, yaml.ScalarEvent):
             count += 1
-            if event.anchor is not None:
-                sizes[event.anchor] = 1
+            sizes[event.anchor] = 1
+            if any(each in _CONTROLS or "\ud800" <= each <= "\udfff" for each in event.value):
+                raise ConfigError(f"{where}: a value holds a control character or half a character; take it out")
         elif isinstance(event, yaml.CollectionStartEvent):
             open_since.append((event.anchor, count))
             count += 1
@@ -109,8 +108,7 @@ def _look_through(path: Path, text: str) -> None:
                 raise ConfigError(f"{where}: nests deeper than {DEEPEST}, which no config does")
         elif isinstance(event, yaml.CollectionEndEvent):
             anchor, before = open_since.pop()
-            if anchor is not None:
-                sizes[anchor] = count - before
+            sizes[anchor] = count - before
         if count > MOST_VALUES:
             raise ConfigError(f"{where}: holds more than {MOST_VALUES:,} values by here, which no config does")
 
@@ -120,7 +118,8 @@ def _collect(path: Path, node: yaml.Node, place: KeyPath, lines: dict[KeyPath, i
         for key, value in node.value:
             line = key.start_mark.line + 1
             if not isinstance(key, yaml.ScalarNode) or key.tag != "tag:yaml.org,2002:str":
-                raise ConfigError(f"{path}:{line}: key {key.value!r} must be text: put it in quotes")
+                named = f"key {key.value!r}" if isinstance(key, yaml.ScalarNode) else "a key"
+                raise ConfigError(f"{path}:{line}: {named} must be text: put it in quotes")
             below = (*place, key.value)
             if below in lines:
                 dotted = ".".join(str(each) for each in below)

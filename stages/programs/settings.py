@@ -40,6 +40,7 @@ class ProgramsConfig(StrictModel):
 
     program: str = Field(
         "",
+        max_length=200,
         description="Name of the program, such as chair, or the module that holds one of your own, with dots, such as "
         "furniture.bench; empty for a dataset that is made of exemplars.",
     )

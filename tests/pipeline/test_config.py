@@ -168,6 +168,50 @@ def test_unreadable_config_is_told(tmp_path: Path) -> None:
         load_config(tmp_path / "latin.yaml", {})
 
 
-def test_python_objects_in_yaml_are_refused(tmp_path: Path) -> None:
-    (told,) = mistakes(tmp_path, "name: !!python/object/apply:os.getcwd []\n")
-    assert told.startswith("bread.yaml:1: is no YAML: could not determine a constructor")
+_BOMB = "a: &a [x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 8)}]\n"
+    for before, name in zip("abcdefghi", "bcdefghij", strict=True)
+)
+
+HOSTILE = {
+    "name: !!python/object/apply:os.getcwd []\n": "bread.yaml:1: the tag !!python/object/apply:os.getcwd is not read",
+    "name: !!set {a, b}\n": "bread.yaml:1: the tag !!set is not read",
+    "name: &a [*a]\n": "bread.yaml:1: *a contains itself",
+    "name: bread\noven: &o\n  <<: *o\n": "bread.yaml:3: *o contains itself",
+    _BOMB: "bread.yaml:6: holds more than 50,000 values by here",
+    "name: " + "[" * 50_000: "bread.yaml:1: nests deeper than 40",
+    "? " * 50_000: "bread.yaml:1: nests deeper than 40",
+    "name: bread\x00\n": "bread.yaml: is no YAML: it holds a character",
+    'name: bread\nbakery: {recipe: "a\\0b"}\n': "bread.yaml:2: a value holds a control character",
+    'name: bread\ntitle: "\\ud800"\n': "bread.yaml:2: a value holds a control character or half a character",
+    f"name: {'b' * 50_000}\n": "bread.yaml:1: name: string should have at most 64 characters",
+    f"name: bread\nbakery: {{recipe: {'a' * 5_000}}}\n": "bread.yaml:2: bakery.recipe: aaaa",
+    f"name: bread\nbakery: {{recipe: {'a/' * 5_000}}}\n": "bread.yaml:2: bakery.recipe: a/a/",
+    f"name: bread\nseed: {'9' * 5_000}\n": "bread.yaml: is no YAML: it holds a character or a number that is none",
+    "name: bread\n" + "#" * 1_100_000: "bread.yaml: is longer than 1,000,000 characters",
+    "name: bread\n? [a]\n: 1\n": "bread.yaml:2: a key must be text",
+}
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+def test_hostile_config_is_one_short_mistake(tmp_path: Path, text: str) -> None:
+    (told,) = mistakes(tmp_path, text)
+    assert told.startswith(HOSTILE[text])
+    assert len(told) < 600
+
+
+@pytest.mark.parametrize("value", ["0", "[]", "''", "false"])
+def test_section_that_holds_another_thing_is_no_default(tmp_path: Path, value: str) -> None:
+    (told,) = mistakes(tmp_path, f"name: bread\noven: {value}\n")
+    assert told.startswith("bread.yaml:2: oven: input should be an object, and is ")
+
+
+def test_aliases_that_stand_for_little_are_read(tmp_path: Path) -> None:
+    text = "name: bread\nbakery:\n  loaves:\n    - &rye {flour: rye}\n    - *rye\n"
+    assert [each.flour for each in load(tmp_path, text).section(Bakery).loaves] == ["rye", "rye"]
+
+
+def test_of_very_many_mistakes_the_first_are_told(tmp_path: Path) -> None:
+    told = mistakes(tmp_path, "name: bread\nbakery: {small: [" + "{kind: pie}, " * 80 + "]}\n")
+    assert len(told) == 51
+    assert told[-1].endswith("and 30 more mistakes")
