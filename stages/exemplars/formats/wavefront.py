@@ -81,8 +81,11 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
     owner, objects = _objects(lines.states, path.stem)
     face_owner = owner[polygon]
     order = np.argsort(face_owner, kind="stable")
-    of_object = np.split(order, np.searchsorted(face_owner[order], np.arange(1, len(objects))))
-    surfaces = [replace(whole.select(own), name=name) for own, name in zip(of_object, objects, strict=True)]
+    starts = np.searchsorted(face_owner[order], np.arange(len(objects) + 1))
+    surfaces = [
+        replace(whole.select(order[start:end]), name=name)
+        for name, start, end in zip(objects, starts, starts[1:], strict=False)
+    ]
     placements = [Placement(name, type_label(name), index, np.eye(4)) for index, name in enumerate(objects)]
     return Scene("objects", tuple(surfaces), tuple(placements), tuple(warnings))
 

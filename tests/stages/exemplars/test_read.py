@@ -221,7 +221,7 @@ class TestNodes:
             return
         glb = Glb()
         glb.node(mesh=glb.mesh(glb.primitive(box((1, 2, 3)), BOX_FACES)), matrix=matrix.T.ravel().tolist())
-        part = read_model(glb.write(tmp_path / "m.glb"), "nodes").parts[0]
+        part = parse_model(glb.write(tmp_path / "m.glb"), "nodes", ReadLimits()).parts[0]
         rotation = part.pose[:3, :3]
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
         assert np.linalg.det(rotation) > 0
@@ -532,7 +532,7 @@ class TestBadFiles:
         (tmp_path / "m.glb").write_bytes(bytes(content))
         parts: tuple[RawPart, ...] = ()
         with contextlib.suppress(ConfigError):
-            parts = read_model(tmp_path / "m.glb").parts
+            parts = parse_model(tmp_path / "m.glb", "nodes", ReadLimits()).parts
         assert all(np.isfinite(part.vertices).all() for part in parts)
 
     def test_an_external_buffer_that_is_too_short_is_refused(self, tmp_path: Path) -> None:

@@ -1,0 +1,48 @@
+"""Hostile model files in numbers: what became of each kind, and what the worst cost.
+
+python -m tests.hostile [--count 2000] [--seed 0]
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+from tests.hostile.corpus import Outcome, outcomes
+
+ENDS = ("read", "refused", "stopped", "escaped")
+
+
+def main() -> int:
+    """Print tables by mutation and by format, the worst, and every escape; 1 if anything escaped."""
+    parser = argparse.ArgumentParser(prog="python -m tests.hostile", description="Read hostile model files.")
+    parser.add_argument("--count", type=int, default=2000, help="how many files are made")
+    parser.add_argument("--seed", type=int, default=0, help="what they are drawn from")
+    asked = parser.parse_args()
+    found: list[Outcome] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for each in outcomes(Path(folder), asked.count, asked.seed):
+            found.append(each)
+            if each.end in ("stopped", "escaped"):
+                print(f"{each.number} {each.mutation}: {each.end}: {each.message}", flush=True)
+    for key in ("mutation", "suffix"):
+        print(f"\n| {key} | {' | '.join(ENDS)} |\n|---|{'---:|' * len(ENDS)}")
+        for kind in sorted({getattr(each, key) for each in found}):
+            counts = Counter(each.end for each in found if getattr(each, key) == kind)
+            print(f"| {kind} | {' | '.join(str(counts[end]) for end in ENDS)} |")
+    worst = max(found, key=lambda each: each.cpu)
+    memory = max(resource.getrusage(each).ru_maxrss for each in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
+    counts = Counter(each.end for each in found)
+    print(f"\n{len(found)} files: {', '.join(f'{counts[end]} {end}' for end in ENDS)}")
+    print(
+        f"worst: {worst.cpu:.2f} CPU seconds (file {worst.number}, {worst.suffix}, {worst.mutation}), {memory:.0f} MB"
+    )
+    return int(counts["escaped"] > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
