@@ -16,7 +16,8 @@ __all__ = ["Operations", "find_operations"]
 MOST_DEFECTS = 64
 """Defects of one partial symmetry that dummy edges are tried on."""
 DUMMY_WORK = 10_000_000
-"""Darts looked at for symmetries with dummy edges, which are for sparse outliers: in dense graphs the rest is left."""
+"""Darts and pairs of them looked at for symmetries with dummy edges, which are for sparse outliers: in dense graphs the
+rest is left. It bounds memory too, for what is still to be laid over is counted when it is put on the stack."""
 
 
 @dataclass(frozen=True)
@@ -25,13 +26,13 @@ class Operations:
 
     pairs: int64 (p, 2), darts of the first and of the second graph, each pointing from what stays into what is
     replaced; the rows of an operation are its boundary. A row (d, -1) or (-1, e) is a dart that a dummy edge passes
-    over: it loses what it points to. starts: int64 (k + 1,), the rows of each of k operations. whole: whether all dummy
-    edges that were allowed were tried, and not only as many as DUMMY_WORK is enough for.
+    over: it loses what it points to. starts: int64 (k + 1,), the rows of each of k operations. work: how many darts,
+    and pairs of them, were looked at to find them.
     """
 
     pairs: np.ndarray
     starts: np.ndarray
-    whole: bool
+    work: int
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -52,8 +53,7 @@ def find_operations(a: OrderedGraph, b: OrderedGraph, violations: int = 0, by_do
     Without violations each is found from a pair of darts, so there are at most as many as pairs: O(k² n²), and in
     practice far below k n². A symmetry that meets no part twice is the same from all its pairs and is found once.
     """
-    pairs, starts, work = _enumerate(a, b, a is b, by_docking, violations)
-    return Operations(pairs, starts, bool(work < DUMMY_WORK))
+    return Operations(*_enumerate(a, b, a is b, by_docking, violations))
 
 
 @numba.njit(cache=True)
@@ -103,7 +103,7 @@ def _pair_hash(x, y):
 
 @numba.njit(cache=True)
 def _enumerate(a, b, same, by_docking, violations):
-    """Rows and starts of all operations between a and b; `same` where they are one graph."""
+    """Rows and starts of all operations between a and b, `same` where they are one graph, and the work."""
     darts, other = len(a.tails), len(b.tails)
     room = _room(a, b)
     visited = np.zeros((darts, other), dtype=np.bool_)
@@ -113,7 +113,7 @@ def _enumerate(a, b, same, by_docking, violations):
     filled = np.zeros(2, dtype=np.int64)
     stack = np.empty((256, violations, 4), dtype=np.int64)
     depths = np.empty(256, dtype=np.int64)
-    work = 0
+    plain, work = darts * other, np.zeros(1, dtype=np.int64)
     for trivial in range(2):
         for d in range(darts):
             for e in range(d + 1 if same else 0, other):
@@ -123,21 +123,18 @@ def _enumerate(a, b, same, by_docking, violations):
                     continue
                 depths[0] = 0
                 waiting = 1
+                plain += darts + other
                 while waiting > 0:
                     waiting -= 1
                     depth = depths[waiting]
                     dummies = stack[waiting, :depth].copy()
-                    if depth > 0:
-                        if work >= DUMMY_WORK:
-                            continue
-                        work += darts + other
                     _lay(a, b, d, e, by_docking, dummies, room, visited)
                     pairs, starts, table = _emit(a, b, same, by_docking, room, pairs, starts, table, filled)
-                    if depth < violations and work < DUMMY_WORK:
+                    if depth < violations:
                         for k in range(room[6][DEFECTS]):
-                            stack, depths, waiting = _pass_over(a, b, room[5][k], dummies, stack, depths, waiting)
-                        stack, depths, waiting = _jump(a, b, room, dummies, stack, depths, waiting)
-    return pairs[: filled[0]].copy(), starts[: filled[1] + 1, 0].copy(), work
+                            stack, depths, waiting = _pass_over(a, b, room[5][k], dummies, stack, depths, waiting, work)
+                        stack, depths, waiting = _jump(a, b, room, dummies, stack, depths, waiting, work)
+    return pairs[: filled[0]].copy(), starts[: filled[1] + 1, 0].copy(), plain + work[0]
 
 
 @numba.njit(cache=True)
@@ -168,30 +165,40 @@ def _lay(a, b, d, e, by_docking, dummies, room, visited):
 
 
 @numba.njit(cache=True)
-def _pass_over(a, b, defect, dummies, stack, depths, waiting):
+def _pass_over(a, b, defect, dummies, stack, depths, waiting, work):
     """Put on the stack each way to pass over one docking site where two orders of them do not agree."""
     v, w = a.tails[defect[0]], b.tails[defect[1]]
     first, second = a.starts[v + 1] - a.starts[v], b.starts[w + 1] - b.starts[w]
     for place in range(1, max(first, second)):
+        if work[0] >= DUMMY_WORK:
+            break
+        work[0] += len(a.tails) + len(b.tails)
         row = (defect[0], defect[1], 0 if first > second else 1, place)
         stack, depths, waiting = _push(stack, depths, waiting, dummies, row)
     return stack, depths, waiting
 
 
 @numba.njit(cache=True)
-def _jump(a, b, room, dummies, stack, depths, waiting):
+def _jump(a, b, room, dummies, stack, depths, waiting, work):
     """Put on the stack each way to go on beyond an unmatched region, at dual nodes at a distance of at most two in one
     graph and of one in the other from a cut of the symmetry in hand."""
     image, owner, partner, _, _, _, _, _, is_cut = room
     for d in range(len(a.tails)):
+        if work[0] >= DUMMY_WORK:
+            break
         if not is_cut[d] or image[a.tails[a.twins[d]]] >= 0 or owner[b.tails[b.twins[partner[d]]]] >= 0:
             continue
         near, far = _beyond(a, d, image)
         near_there, far_there = _beyond(b, partner[d], owner)
+        work[0] += len(far) + len(far_there)
         for xs, ys in ((near, near_there), (near, far_there), (far, near_there)):
             for x in xs:
                 for y in ys:
+                    if work[0] >= DUMMY_WORK:
+                        return stack, depths, waiting
+                    work[0] += 1
                     if _is_alike(a, b, x, y):
+                        work[0] += len(a.tails) + len(b.tails)
                         stack, depths, waiting = _push(stack, depths, waiting, dummies, (x, y, -1, 0))
     return stack, depths, waiting
 

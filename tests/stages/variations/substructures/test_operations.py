@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.variations.substructures.operations import find_operations
+from stages.variations.substructures.operations import DUMMY_WORK, find_operations
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
 from stages.variations.substructures.replacement import piece_of, repeated_boundary, replace_piece
 from tests.stages.variations.substructures import brute_force
@@ -113,6 +113,22 @@ def test_a_dummy_edge_passes_over_a_missing_docking_site() -> None:
     seeds = find_operations(base, giver, 1)
     results = [replace_piece(base, giver, seeds.boundary(number)) for number in range(len(seeds))]
     assert wanted in {code(each.graph) for each in results if each is not None and is_connected(each.graph)}
+
+
+def test_what_waits_to_be_laid_over_a_hub_of_many_alike_neighbours_is_work() -> None:
+    """Two hubs of other types, each with 24 alike neighbours that have two leaves: what may go on beyond the hub is any
+    neighbour at any other, 24 times 24, and then any of the others."""
+
+    def hub(kind: int) -> OrderedGraph:
+        orders = [list(range(1, 25)), *([0, 2 * at + 23, 2 * at + 24] for at in range(1, 25))]
+        orders += [[at] for at in range(1, 25) for _ in range(2)]
+        return ordered_graph([kind, *[1] * 24, *[2] * 48], orders)
+
+    one, two = hub(5), hub(6)
+    plain, most = find_operations(one, two).work, len(one.tails) + len(two.tails)
+    work = find_operations(one, two, 1).work
+    assert work - plain > (23 * 23) * most
+    assert find_operations(one, two, 3).work - plain <= DUMMY_WORK + 2 * most
 
 
 @pytest.mark.parametrize("violations", [0, 1])
