@@ -171,7 +171,7 @@ class Search:
                     variant, work = self._grow(rng)
                     number += max(round(work / TRY_WORK), 1)
                 elif choice.way == REPLACED:
-                    variant, work = self._replace(rng, choice)
+                    variant, work, choice = self._replace(rng, choice)
                     number += max(round(work / TRY_WORK), 1)
                 else:
                     number += 1
@@ -249,22 +249,27 @@ class Search:
             outcome, key = complete(self.tables, self.answers.table, self._ws, with_labels)
         return outcome, key
 
-    def _replace(self, rng: np.random.Generator, choice: Choice) -> tuple[Variant | str, float]:
-        """One replacement: a new variant, or the reason why there is none; and what it cost."""
+    def _replace(self, rng: np.random.Generator, choice: Choice) -> tuple[Variant | str, float, Choice]:
+        """One replacement: a new variant, or the reason why there is none; what it cost; and the choice to which it is
+        owed, an earlier one while operations of its pair are left."""
+        assert self._replacer is not None, "no choice is to replace where the method forbids it"
+        outcome, work = self._replacer.replace(rng, choice, self._ws)
+        used = self._replacer.choice
+        return (self._replaced(used) if outcome == Outcome.OK else REPLACED_REASONS[outcome]), work, used
+
+    def _replaced(self, choice: Choice) -> Variant | str:
+        """What was put together by replacement, as a new variant, or the reason why it is none."""
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
         ws = self._ws
-        outcome, work = self._replacer.replace(rng, choice.a, choice.b, ws)
-        if outcome != Outcome.OK:
-            return REPLACED_REASONS[outcome], work
         with_labels = self.config.duplicates == "docking"
         outcome, key = self._answered(*complete(self.tables, self.answers.table, ws, with_labels))
         if outcome != Outcome.OK:
-            return f"replaced: {REASONS[outcome]}", work
+            return f"replaced: {REASONS[outcome]}"
         if not self._replacer.is_joined(ws):
-            return "replaced: boundary contact lost", work
+            return "replaced: boundary contact lost"
         if not self._is_connected():
-            return APART, work
-        return self._finished(int(key), *self._descent("substructures", *self._replacer.parents)), work
+            return APART
+        return self._finished(int(key), *self._descent("substructures", choice.a, choice.b))
 
     def _descent(self, method: str, a: Parent, b: Parent) -> tuple[np.ndarray, dict[str, Any]]:
         """The exemplar that each part of the variant in hand came from, int8 (n,), and its lineage, where a piece of A

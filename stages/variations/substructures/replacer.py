@@ -12,6 +12,7 @@ from stages.shape.kit import Kit
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import TRY, UPRIGHT, KitTables, Outcome, Workspace
 from stages.variations.search.parents import Parent
+from stages.variations.search.steering import Choice
 from stages.variations.substitution.pieces import Exchanged
 from stages.variations.substitution.substitute import Docked, find_motion, put_together
 from stages.variations.substructures.embedding import Side, embed, pieces
@@ -21,23 +22,31 @@ from stages.variations.substructures.sites import docking_graph
 __all__ = ["Replacer"]
 
 DRAWS = 48
-"""Operations between two shapes that are carried out before it is another pair's turn."""
+"""Operations between two shapes that are carried out before it is another pair's turn, if listing them took no longer:
+else as many as take that long."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
 DARTS_A_TRY = 4000.0
-"""Pairs of darts that are looked at in the time of one such try."""
+"""Darts, and pairs of them, that are looked at in the time of one such try."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two shapes, what can be replaced between them, and what of it is left: numbers of operations, the second half of
-    them the other way round."""
+    """Two shapes, as they were chosen, what can be replaced between them, and what of it is left: numbers of
+    operations, the second half of them the other way round."""
 
-    base: Parent
-    giver: Parent
+    choice: Choice
     sides: tuple[Side, Side]
     operations: Operations
     left: Iterator[int]
+
+    @property
+    def giver(self) -> Parent:
+        return self.choice.a
+
+    @property
+    def base(self) -> Parent:
+        return self.choice.b
 
 
 class Replacer:
@@ -60,19 +69,19 @@ class Replacer:
         self._docked: Docked = []
 
     @property
-    def parents(self) -> tuple[Parent, Parent]:
-        """The giver and the base of the last try."""
+    def choice(self) -> Choice:
+        """What was chosen when the pair of the last try was, of which `a` was the giver and `b` the base."""
         assert self._pair is not None, "nothing was tried yet"
-        return self._pair.giver, self._pair.base
+        return self._pair.choice
 
-    def replace(self, rng: np.random.Generator, giver: Parent, base: Parent, ws: Workspace) -> tuple[int, float]:
-        """Carry out one more operation of the pair in hand, or one between these two shapes where nothing is left of
-        it, in the workspace: the outcome and the work. After OK the contacts between the two are to be found by
-        `connect`."""
+    def replace(self, rng: np.random.Generator, choice: Choice, ws: Workspace) -> tuple[int, float]:
+        """Carry out one more operation of the pair in hand, or one between the two shapes that are chosen where nothing
+        is left of it, in the workspace: the outcome and the work. After OK the contacts between the two are to be found
+        by `connect`."""
         work = 1.0
         number = None if self._pair is None else next(self._pair.left, None)
         if self._pair is None or number is None:
-            self._pair, cost = self._opened(rng, giver, base)
+            self._pair, cost = self._opened(rng, choice)
             work += cost
             number = next(self._pair.left, None)
             if number is None:
@@ -123,16 +132,16 @@ class Replacer:
         """Whether, once contacts are found, every boundary part touches its new neighbour (§4.2)."""
         return all(ws.stamp[ws.from_a[inner], ws.from_b[hold]] == ws.counts[TRY] for inner, hold, _ in self._docked)
 
-    def _opened(self, rng: np.random.Generator, giver: Parent, base: Parent) -> tuple[Pair, float]:
+    def _opened(self, rng: np.random.Generator, choice: Choice) -> tuple[Pair, float]:
         """All operations between two shapes, in random order; and what that cost."""
         kit = self.answers.kit
-        sides = _side(kit, base), _side(kit, giver)
-        first, second = sides[0].graph, (sides[0] if giver is base else sides[1]).graph
+        sides = _side(kit, choice.b), _side(kit, choice.a)
+        first, second = sides[0].graph, (sides[0] if choice.a is choice.b else sides[1]).graph
         operations = find_operations(first, second, self.dummies, self._by_docking)
         ways = len(operations) * (2 if first is second else 1)
-        order = rng.permutation(ways)[:DRAWS].tolist()
-        work = len(first.tails) * len(second.tails) * (1 + self.dummies) / DARTS_A_TRY
-        return Pair(base, giver, sides, operations, iter(order)), work
+        work = operations.work / DARTS_A_TRY
+        order = rng.permutation(ways)[: max(DRAWS, round(work / EMBEDDING_WORK))].tolist()
+        return Pair(choice, sides, operations, iter(order)), work
 
 
 def _side(kit: Kit, parent: Parent) -> Side:
