@@ -134,12 +134,22 @@ def test_two_workers_make_the_same_bytes(made: tuple[Path, str]) -> None:
     folder, _ = made
     search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}
     make(folder, "two", 2, per_kit=2000, search=search)
+    assert digests(folder, "one") == digests(folder, "two")
 
-    def digests(out: str) -> dict[str, str]:
-        root = folder / out / ".work" / "toy" / "variations"
-        return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(root.glob("*.*"))}
 
-    assert digests("one") == digests("two")
+def test_two_workers_make_the_same_bytes_by_replacement(tmp_path: Path) -> None:
+    search = {"method": "substructures", "tries": 300, "rounds": 2}
+    for out, workers in (("one", 1), ("two", 2)):
+        make(tmp_path, out, workers, per_kit=40, search=search)
+    assert digests(tmp_path, "one") == digests(tmp_path, "two")
+    methods = {each.lineage["method"] for shard in collection(tmp_path, "one") for each in read_samples(shard)}
+    assert methods == {"substructures"}
+
+
+def digests(folder: Path, out: str) -> dict[str, str]:
+    """The sha256 of every file of the stage."""
+    root = folder / out / ".work" / "toy" / "variations"
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(root.glob("*.*"))}
 
 
 def test_only_towers_that_bear_the_required_push_are_kept(tmp_path: Path) -> None:
