@@ -109,6 +109,14 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "translation, in the coordinates of the model files; a grown shape is not moved",
             }
         ),
+        "times": Field(
+            {
+                **whole,
+                "minimum": 1,
+                "description": "how often that was done, each time upon what was made the time before, of which "
+                "images and motion are then: a recursive rule may be carried out several times",
+            }
+        ),
         "copied": Field(
             {
                 "type": "object",

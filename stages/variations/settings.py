@@ -96,6 +96,13 @@ class SearchConfig(StrictModel):
         description="Dummy edges of replaceable substructures: places where the boundaries of two pieces may differ by "
         "a docking site or by a part. What is looked at grows exponentially with it, up to a limit in dense graphs.",
     )
+    repeats: int = Field(
+        3,
+        ge=1,
+        le=100,
+        description="Most times that a recursive rule of replaceable substructures, where one of two pieces is part of "
+        "the other, is carried out at once: it lets a row of arches grow or shrink by several.",
+    )
     grown: GrownConfig = Field(default_factory=GrownConfig, description="What grown shapes are to be like.")
     growth_share: float = Field(
         0.3,

@@ -269,11 +269,12 @@ class Search:
             return "replaced: boundary contact lost"
         if not self._is_connected():
             return APART
-        return self._finished(int(key), *self._descent("substructures", choice.a, choice.b))
+        descent = self._descent("substructures", choice.a, self._replacer.base, self._replacer.times)
+        return self._finished(int(key), *descent)
 
-    def _descent(self, method: str, a: Parent, b: Parent) -> tuple[np.ndarray, dict[str, Any]]:
+    def _descent(self, method: str, a: Parent, b: Parent, times: int = 1) -> tuple[np.ndarray, dict[str, Any]]:
         """The exemplar that each part of the variant in hand came from, int8 (n,), and its lineage, where a piece of A
-        was put into B."""
+        was put into B, or so many one after another."""
         ws = self._ws
         from_b = int((ws.origin[: ws.counts[PARTS]] == 1).sum())
         lineage = {
@@ -283,6 +284,7 @@ class Search:
             "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
             "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
             "motion": np.round(ws.motion, 9).tolist(),
+            "times": times,
         }
         origins = np.empty(int(ws.counts[PARTS]), dtype=np.int8)
         for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
@@ -291,9 +293,7 @@ class Search:
         return origins, lineage
 
     def _made_replacer(self) -> Replacer:
-        by_docking = self.config.matching == "pose"
-        limits = self.smallest, self.largest
-        return Replacer(self.answers, self.tables, *limits, self.config.dummies, by_docking)
+        return Replacer(self.answers, self.tables, self.smallest, self.largest, self.config)
 
     def _made_grower(self) -> Grower:
         grown, limits = self.config.grown, (self.smallest, self.largest)
@@ -321,6 +321,7 @@ class Search:
             "boundary": [part],
             "images": [0],
             "motion": [*np.eye(3).tolist(), [0.0, 0.0, 0.0]],
+            "times": 1,
         }
         return self._finished(int(key), origins, lineage), work
 

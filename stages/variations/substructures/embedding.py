@@ -129,18 +129,12 @@ def _gap(kit: Kit, motion: FloatArray, moved: Side, still: Side, rows: np.ndarra
     cut = set(rows[:, 0].tolist())
     total = 0.0
     for dart, image in rows.tolist():
-        darts, images = _turned(moved.graph, dart), _turned(still.graph, image)
+        darts, images = moved.graph.around(dart), still.graph.around(image)
         for own, other in zip(darts, images, strict=False):
             if own not in cut:
                 place = motion @ _centre(kit, moved, own) - frame @ _centre(kit, still, other)
                 total += float(np.linalg.norm(place))
     return total
-
-
-def _turned(graph: OrderedGraph, dart: int) -> list[int]:
-    """The darts of a node in their order, from one on."""
-    start, end = graph.starts[graph.tails[dart]], graph.starts[graph.tails[dart] + 1]
-    return [*range(dart, int(end)), *range(int(start), dart)]
 
 
 def _centre(kit: Kit, side: Side, dart: int) -> FloatArray:

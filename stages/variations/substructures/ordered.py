@@ -33,12 +33,25 @@ class OrderedGraph(NamedTuple):
         around: list[int] = self.tails[self.twins[self.starts[node] : self.starts[node + 1]]].tolist()
         return around
 
+    def around(self, dart: int) -> list[int]:
+        """The darts of a node in their order, from one on."""
+        start, end = int(self.starts[self.tails[dart]]), int(self.starts[self.tails[dart] + 1])
+        return [*range(dart, end), *range(start, dart)]
+
     def edges(self) -> np.ndarray:
         """The edges as pairs of nodes i < j in lexicographic order, int32 (m, 2)."""
         heads = self.tails[self.twins]
         pairs = np.stack([self.tails, heads], axis=1)[self.tails < heads]
         edges: np.ndarray = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int32)
         return edges
+
+    def docking_labels(self) -> np.ndarray:
+        """The dockings of `edges`, as seen from either end, counted from 0, int32 (m, 2)."""
+        heads = self.tails[self.twins]
+        forth = np.flatnonzero(self.tails < heads)
+        forth = forth[np.lexsort((heads[forth], self.tails[forth]))]
+        labels: np.ndarray = np.stack([self.labels[forth], self.labels[self.twins[forth]]], axis=1).astype(np.int32) - 1
+        return labels
 
 
 def ordered_graph(

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
 
-__all__ = ["Replacement", "piece_of", "repeated_boundary", "replace_piece"]
+__all__ = ["Replacement", "piece_of", "replace_piece"]
 
 
 @dataclass(frozen=True)
@@ -99,20 +99,3 @@ def replace_piece(base: OrderedGraph, giver: OrderedGraph, boundary: np.ndarray)
     graph = ordered_graph(types, orders, labels)
     darts = dict(zip(copied, range(int(graph.starts[stays]), len(graph.tails)), strict=True))
     return Replacement(graph, from_base, from_giver, darts)
-
-
-def repeated_boundary(made: Replacement, base: OrderedGraph, boundary: np.ndarray) -> np.ndarray | None:
-    """The boundary along which a recursive operation can be carried out again upon what it made, int64 (b, 2); None
-    where the operation is not recursive (§4.2: the piece that is taken out is part of the one that is put in).
-
-    boundary: that of the operation between two pieces of `base`, however often it was carried out before; made: what
-    it made last.
-    """
-    taken, piece = piece_of(base, boundary[:, 0]), piece_of(base, boundary[:, 1])
-    if (boundary < 0).any() or not taken.any() or (taken & ~piece).any() or (taken == piece).all():
-        return None
-    inner = base.twins[boundary[:, 0]]
-    if not taken[base.tails[inner]].all() or any(dart not in made.darts_of_giver for dart in inner.tolist()):
-        return None
-    outer = made.graph.twins[[made.darts_of_giver[dart] for dart in inner.tolist()]]
-    return np.stack([outer, boundary[:, 1]], axis=1)

@@ -8,15 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.kit import Kit
+from stages.shape.kit import Assembly, Kit
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import TRY, UPRIGHT, KitTables, Outcome, Workspace
+from stages.variations.kernels.tables import shape_tables
 from stages.variations.search.parents import Parent
 from stages.variations.search.steering import Choice
+from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import Exchanged
 from stages.variations.substitution.substitute import Docked, find_motion, put_together
 from stages.variations.substructures.embedding import Side, embed, pieces
 from stages.variations.substructures.operations import Operations, find_operations
+from stages.variations.substructures.ordered import OrderedGraph
+from stages.variations.substructures.recursion import cut_again, cut_farther, growth_of
+from stages.variations.substructures.replacement import replace_piece
 from stages.variations.substructures.sites import docking_graph
 
 __all__ = ["Replacer"]
@@ -26,6 +31,7 @@ DRAWS = 48
 else as many as take that long."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
+Found = tuple[FloatArray, FloatArray, Docked]
 DARTS_A_TRY = 4000.0
 """Darts, and pairs of them, that are looked at in the time of one such try."""
 
@@ -50,21 +56,25 @@ class Pair:
 
 
 class Replacer:
-    """Replaces pieces within limits of size.
+    """Replaces pieces within limits of size, as a config says. Matched by pose, edges match by their dockings, which
+    keeps rigid what is laid upon each other; else, and where types go by meaning, by the types at their ends alone.
 
-    dummies: dummy edges that a symmetry may use at most; by_docking: whether edges match by their dockings, which keeps
-    rigid what is laid upon each other, or by the types at their ends alone.
+    After a try that is OK, `base` is what the piece was put into: the shape that was chosen, or what all times but the
+    last of a recursive rule have made of it; `times` is how often the operation was carried out.
     """
 
+    base: Parent
+    times = 1
+
     def __init__(
-        self, answers: ContactAnswers, tables: KitTables, smallest: int, largest: int, dummies: int, by_docking: bool
+        self, answers: ContactAnswers, tables: KitTables, smallest: int, largest: int, config: SearchConfig
     ) -> None:
         self.answers, self.tables = answers, tables
         self.smallest, self.largest = smallest, largest
-        self.dummies = dummies
+        self.dummies, self.repeats = config.dummies, config.repeats
         kit = answers.kit
         self._by_meaning = len(kit.labels) < len(kit.types)
-        self._by_docking = by_docking and not self._by_meaning
+        self._by_docking = config.matching == "pose" and not self._by_meaning
         self._pair: Pair | None = None
         self._docked: Docked = []
 
@@ -89,8 +99,12 @@ class Replacer:
         pair = self._pair
         count = len(pair.operations)
         boundary = pair.operations.boundary(number % count)[:, :: 1 if number < count else -1]
-        base_side, giver_side = pair.sides
-        taken, piece = pieces(base_side, giver_side, boundary)
+        self.base, side, self.times = pair.base, pair.sides[0], 1
+        times = self._times(rng, pair, boundary)
+        if times > 1:
+            self.base, side, boundary, self.times = self._repeated(rng, pair, boundary, times)
+            work += EMBEDDING_WORK * (self.times - 1)
+        taken, piece = pieces(side, pair.sides[1], boundary)
         parts = int(piece.sum() + (~taken).sum())
         if not self.smallest <= parts <= self.largest:
             return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, work
@@ -100,33 +114,73 @@ class Replacer:
         if self._by_meaning:
             found = self._by_meanings(rng, pair, Exchanged(taken, piece))
         else:
-            found = self._rigidly(rng, pair, boundary, taken, piece)
+            found = self._rigidly(rng, side, pair.sides[1], boundary, Exchanged(taken, piece))
         if found is None:
             return Outcome.NO_MATCH, work
-        motion, moved, self._docked = found
-        put_together(self.tables, pair.giver, moved, Exchanged(taken, piece), motion, self._docked, ws)
+        motion, poses, self._docked = found
+        self.base = replace(self.base, assembly=replace(self.base.assembly, poses=poses))
+        put_together(self.tables, pair.giver, self.base, Exchanged(taken, piece), motion, self._docked, ws)
         return Outcome.OK, work
 
-    def _rigidly(
-        self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray, taken: np.ndarray, piece: np.ndarray
-    ) -> tuple[FloatArray, Parent, Docked] | None:
-        """The motion of the piece, the base as it makes room, and what docks to what; None where nothing does."""
-        base, giver = pair.sides
-        docked = _docked(base, giver, boundary, piece)
-        embedding = embed(rng, self.answers.kit, self.tables.up, base, giver, boundary, taken) if docked else None
-        if embedding is None:
-            return None
-        return embedding.motion, replace(pair.base, assembly=replace(base.assembly, poses=embedding.poses)), docked
+    def _times(self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray) -> int:
+        """How often to carry out an operation: a recursive rule at random, as often as limits allow; others once."""
+        if self.repeats == 1 or self._by_meaning or pair.giver is not pair.base:
+            return 1
+        parts, growth = len(pair.base.assembly), growth_of(pair.sides[0].graph, boundary)
+        room = self.largest - parts if growth > 0 else parts - self.smallest
+        return 1 + int(rng.random() * min(self.repeats, room // abs(growth))) if growth else 1
 
-    def _by_meanings(
-        self, rng: np.random.Generator, pair: Pair, exchanged: Exchanged
-    ) -> tuple[FloatArray, Parent, Docked] | None:
+    def _repeated(
+        self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray, times: int
+    ) -> tuple[Parent, Side, np.ndarray, int]:
+        """What a recursive rule makes of the base in all times but the last, along which boundary it can be carried out
+        then, and how many times these are in all: fewer than asked for where it cannot be carried out so often."""
+        side, giver = pair.sides
+        base, cut, done = pair.base, boundary, 1
+        if growth_of(giver.graph, boundary) < 0:
+            farther = boundary[:, 0]
+            while done < times and (beyond := cut_farther(giver.graph, boundary, farther)) is not None:
+                farther, done = beyond, done + 1
+            return base, side, np.stack([farther, boundary[:, 1]], axis=1), done
+        while done < times:
+            taken, piece = pieces(side, giver, cut)
+            found = self._rigidly(rng, side, giver, cut, Exchanged(taken, piece))
+            made = None if found is None else replace_piece(side.graph, giver.graph, cut)
+            again = None if made is None else cut_again(made, giver.graph, boundary)
+            if found is None or made is None or again is None:
+                break
+            base = self._inflated(base, pair.giver, Exchanged(taken, piece), made.graph, found)
+            side, cut, done = Side(base.assembly, made.graph), again, done + 1
+        return base, side, cut, done
+
+    def _inflated(self, base: Parent, giver: Parent, exchanged: Exchanged, graph: OrderedGraph, found: Found) -> Parent:
+        """The base with a piece put in, as the base of the next time: not looked at by any test."""
+        stays, comes = ~exchanged.taken, exchanged.piece
+        motion, moved, _ = found
+        poses = np.concatenate([moved[stays], motion @ giver.assembly.poses[comes]])
+        types = np.concatenate([base.assembly.types[stays], giver.assembly.types[comes]])
+        origins = np.concatenate([base.origins[stays], giver.origins[comes]])
+        assembly, labels = Assembly(types, poses, graph.edges()), graph.docking_labels()
+        tables = shape_tables(assembly, labels, len(self.answers.kit.types))
+        return replace(base, assembly=assembly, labels=labels, tables=tables, origins=origins)
+
+    def _rigidly(
+        self, rng: np.random.Generator, base: Side, giver: Side, boundary: np.ndarray, exchanged: Exchanged
+    ) -> Found | None:
+        """The motion of the piece, the poses of the base as it makes room, and what docks to what; None where nothing
+        does."""
+        docked = _docked(base, giver, boundary, exchanged.piece)
+        kit, up = self.answers.kit, self.tables.up
+        embedding = embed(rng, kit, up, base, giver, boundary, exchanged.taken) if docked else None
+        return None if embedding is None else (embedding.motion, embedding.poses, docked)
+
+    def _by_meanings(self, rng: np.random.Generator, pair: Pair, exchanged: Exchanged) -> Found | None:
         """The same where parts of one label are other meshes: a docking of one of them, fitted to all."""
         base, giver, kit, up = pair.base.assembly, pair.giver.assembly, self.answers.kit, self.tables.up
         found = find_motion(rng, kit.label_of, self.answers.dockings, giver, base, exchanged)
         if found is None or (up >= 0 and found[0][up, up] < UPRIGHT):
             return None
-        return found[0], pair.base, found[1]
+        return found[0], base.poses, found[1]
 
     def is_joined(self, ws: Workspace) -> bool:
         """Whether, once contacts are found, every boundary part touches its new neighbour (§4.2)."""

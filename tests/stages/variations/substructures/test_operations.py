@@ -7,7 +7,8 @@ import pytest
 
 from stages.variations.substructures.operations import DUMMY_WORK, find_operations
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
-from stages.variations.substructures.replacement import piece_of, repeated_boundary, replace_piece
+from stages.variations.substructures.recursion import cut_again, cut_farther, growth_of
+from stages.variations.substructures.replacement import piece_of, replace_piece
 from tests.stages.variations.substructures import brute_force
 from tests.stages.variations.substructures.graphs import code, grid, is_connected, path, random_graph, ring
 
@@ -140,24 +141,73 @@ def test_the_same_operation_is_listed_once(violations: int) -> None:
     assert all(back not in boundaries or back == each for each, back in zip(boundaries, turned, strict=True))
 
 
-def test_a_recursive_rule_is_repeated() -> None:
+def rules(graph: OrderedGraph) -> list[np.ndarray]:
+    """The boundaries of all operations of a graph, both ways, that are recursive rules."""
+    operations = find_operations(graph, graph)
+    ways = [operations.boundary(number)[:, ::way] for number in range(len(operations)) for way in (1, -1)]
+    return [each for each in ways if growth_of(graph, each)]
+
+
+def grown(graph: OrderedGraph, boundary: np.ndarray, times: int) -> OrderedGraph | None:
+    result, cut = replace_piece(graph, graph, boundary), boundary
+    for _ in range(times - 1):
+        again = None if result is None else cut_again(result, graph, boundary)
+        if result is None or again is None:
+            return None
+        cut = again
+        result = replace_piece(result.graph, graph, cut)
+    return None if result is None else result.graph
+
+
+def test_a_recursive_rule_that_grows_is_repeated() -> None:
     chain = path(0, 1, 2, 1, 2, 1, 0)
-    operations = find_operations(chain, chain)
-    grown = set()
-    for number in range(len(operations)):
-        for boundary in (operations.boundary(number), operations.boundary(number)[:, ::-1]):
-            result = replace_piece(chain, chain, boundary)
-            types = []
-            for _ in range(3):
-                assert result is not None
-                types.append(tuple(result.graph.types.tolist()))
-                again = repeated_boundary(result, chain, boundary)
-                if again is None:
-                    break
-                result = replace_piece(result.graph, chain, again)
-            grown.add(tuple(types))
-    longer = tuple((0, *[1, 2] * count, 1, 0) for count in (3, 4, 5))
-    assert longer in {tuple(tuple(each) for each in row) for row in grown}
+    wanted = [code(path(0, *[1, 2] * count, 1, 0)) for count in (3, 4, 5)]
+    ways = [each for each in rules(chain) if growth_of(chain, each) == 2]
+    made_by = [[grown(chain, each, times) for times in (1, 2, 3)] for each in ways]
+    assert wanted in [[code(each) for each in row if each is not None] for row in made_by]
+
+
+def test_a_recursive_rule_that_shrinks_takes_out_at_once_what_it_would_by_and_by() -> None:
+    chain = path(0, *[1, 2] * 5, 1, 0)
+    ways = [each for each in rules(chain) if growth_of(chain, each) == -2]
+    found = 0
+    for boundary in ways:
+        cut, lengths = boundary[:, 0], []
+        while cut is not None:
+            result = replace_piece(chain, chain, np.stack([cut, boundary[:, 1]], axis=1))
+            assert result is not None
+            assert code(result.graph) == code(path(0, *[1, 2] * (4 - len(lengths)), 1, 0))
+            lengths.append(len(result.graph.types))
+            cut = cut_farther(chain, boundary, cut)
+        found = max(found, len(lengths))
+    assert found >= 4
+
+
+@pytest.mark.parametrize(("width", "depth"), [(9, 2), (8, 3)])
+def test_what_a_rule_takes_out_at_once_is_as_many_periods_along_all_of_its_boundary(width: int, depth: int) -> None:
+    """In grids whose columns are alike, but for the first and the last: a cut goes across, through every row."""
+    graph = grid(width, depth, [min(x, 1) + (x == width - 1) for _ in range(depth) for x in range(width)])
+    most: dict[int, int] = {}
+    for boundary in rules(graph):
+        period = -growth_of(graph, boundary) // depth
+        if period <= 0 or len(boundary) != depth:
+            continue
+        cut, times = boundary[:, 0], 0
+        while (farther := cut_farther(graph, boundary, cut)) is not None:
+            cut, times = farther, times + 1
+            result = replace_piece(graph, graph, np.stack([cut, boundary[:, 1]], axis=1))
+            left = width - (times + 1) * period
+            assert result is not None
+            types = [min(x, 1) + (x == left - 1) for _ in range(depth) for x in range(left)]
+            assert code(result.graph) == code(grid(left, depth, types))
+        most[period] = max(most.get(period, 0), times)
+    assert most[1] >= 2
+
+
+def test_operations_whose_pieces_are_not_within_each_other_are_no_rules() -> None:
+    graph = ring(0, 1, 2, 3, 4, 5)
+    boundary = np.array([[graph.starts[0], graph.starts[3]], [graph.starts[2] + 1, graph.starts[5] + 1]])
+    assert growth_of(graph, boundary) == 0
 
 
 def test_a_graph_that_is_no_graph_is_refused() -> None:

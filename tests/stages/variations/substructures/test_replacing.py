@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Kit
@@ -95,3 +96,16 @@ def test_what_a_pair_of_shapes_brings_is_owed_to_the_choice_that_drew_it() -> No
     """Fewer tries than a pair has operations: all are of one pair, whatever else was chosen meanwhile."""
     line, _ = replaced(kit_of(CHAIN, [chain(9), chain(12)]), 30)
     assert np.count_nonzero(line.steering._work) == 1
+
+
+@pytest.mark.parametrize("repeats", [1, 4])
+def test_recursive_rules_are_carried_out_several_times_at_once(repeats: int) -> None:
+    kit = kit_of(CHAIN, [chain(7)])
+    _, found = replaced(kit, 700, repeats=repeats)
+    several = [each for each in found if each.lineage["times"] > 1]
+    assert all(each.lineage["times"] <= repeats for each in found)
+    assert {len(each.assembly) > len(kit.exemplars[0].assembly) for each in several} == (
+        {True, False} if repeats > 1 else set()
+    )
+    for each in several:
+        assert sum(each.lineage["parts_from"]) == len(each.assembly)
