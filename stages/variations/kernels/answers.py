@@ -12,6 +12,7 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
+from stages.shape.geometry.pose import invert
 from stages.shape.kit import Kit
 from stages.variations.kernels.layout import FORBIDDEN, LABELS, MISSING, NONE, Answers, Workspace
 from stages.variations.kernels.lookup import ask_around, hash_key, quantise
@@ -126,11 +127,10 @@ class ContactAnswers:
         self.asked += 1
         if self.contact.touches(a, b, pose):
             label = int(self.dockings.label(a, b, pose[None])[0])
-            if label >= 0:
-                back = np.eye(4)
-                back[:3, :3] = pose[:3, :3].T
-                back[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-                return label * LABELS + int(self.dockings.label(b, a, back[None])[0])
+            back = int(self.dockings.label(b, a, invert(pose)[None])[0])
+            # Seen from the smaller part a turn moves the larger one farther: within tolerance from one side alone.
+            if label >= 0 and back >= 0:
+                return label * LABELS + back
             fit = self.dockings.fit(a, b, pose)
             if fit is not None:
                 allowed = self.kit.grammar.dockings[fit[0] // 2].depth + self.contact.tolerance
