@@ -147,7 +147,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         kinds=tuple(kinds),
         repairs=identified.repairs,
         aliases={each.name: words for each, words in zip(types, aliases, strict=True) if words},
-        refusals=tuple(refusals(kit, models, identified.empty, left_out)),
+        refusals=tuple(refusals(kit, models, identified.empty, left_out, made.tolerance)),
         warnings=(*warnings, *kit_warnings(kit)),
     )
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from stages.exemplars.congruence import comparable_mesh, congruences
 from stages.exemplars.model import Model
+from stages.exemplars.settings import LOOSEST
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.pose import pose_vectors, relative_poses
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 
-__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "ways_together"]
+__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals"]
 
 LETTERS = 52
 """Part types beyond this number have names in brackets for string tokens, not letters."""
@@ -55,10 +56,15 @@ def hubs(assembly: Assembly) -> list[int]:
 
 
 def refusals(
-    kit: Kit, models: Sequence[Model], empty: Sequence[tuple[Model, str]], left_out: Sequence[str]
+    kit: Kit,
+    models: Sequence[Model],
+    empty: Sequence[tuple[Model, str]],
+    left_out: Sequence[str],
+    tolerance: float,
 ) -> Iterator[str]:
-    """Why a run does not start with `kit`, made of `models`; `empty` are parts without area, by model and name, and
-    `left_out` the names of the hub types that are not in its graphs."""
+    """Why a run does not start with `kit`, made of `models`; `empty` are parts without area, by model and name,
+    `left_out` the names of the hub types that are not in its graphs, and `tolerance` is what the kit's contact
+    tolerance is as a share of the median part's diagonal."""
     for model, part in empty:
         yield f"{model.path}: part {part!r} has no triangle with area; remove it from the model"
     for model, exemplar in zip(models, kit.exemplars, strict=True):
@@ -70,7 +76,7 @@ def refusals(
             )
         elif pieces(assembly).any():
             without = f" without its hubs {_some(left_out)}" if left_out else ""
-            yield f"{model.path}: the exemplar{without} falls into {_falls_apart(exemplar)}"
+            yield f"{model.path}: the exemplar{without} falls into {_falls_apart(kit, exemplar, tolerance)}"
         elif len(assembly) < 2:
             yield f"{model.path}: only one part of it is connected or has area, an exemplar needs at least 2"
         others = {
@@ -98,23 +104,6 @@ def kit_warnings(kit: Kit) -> Iterator[str]:
             f"{len(kit.labels)} part types are more than the {LETTERS} letters, so strings write them as names in "
             "brackets; raise `congruence_tolerance` if parts are meant to be alike"
         )
-
-
-def ways_together(kit: Kit) -> Iterator[str]:
-    """What would make one piece of each exemplar of `kit` that is in pieces."""
-    for exemplar in kit.exemplars:
-        assembly = exemplar.assembly
-        if not pieces(assembly).any():
-            continue
-        for factor in (1.0, *LOOSER):
-            looser = ContactTest(kit.types, factor * kit.contact_tolerance)
-            edges = looser.contacts(assembly.types, assembly.poses)
-            if not pieces(replace(assembly, edges=edges)).any():
-                if factor == 1.0:
-                    yield f"{exemplar.name}: in one piece if all contacts count, `contact.kinds: [point, line, face]`"
-                else:
-                    yield f"{exemplar.name}: in one piece with {factor:g} times the contact tolerance"
-                break
 
 
 def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int, int]]:
@@ -161,14 +150,33 @@ def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
         )
 
 
-def _falls_apart(exemplar: Exemplar) -> str:
+def _falls_apart(kit: Kit, exemplar: Exemplar, tolerance: float) -> str:
+    """The pieces of an exemplar, and of all mends those that help it."""
     piece = pieces(exemplar.assembly)
     sizes = np.bincount(piece).tolist()
     alone = _some([exemplar.part_names[index] for index in np.flatnonzero(piece).tolist()])
-    return (
-        f"{len(sizes)} pieces of {_some([str(size) for size in sizes], 8)} parts (apart: {alone}); move the parts "
-        "together, raise `contact.tolerance`, or set `disconnected: largest`"
-    )
+    way = _way_together(kit, exemplar, tolerance)
+    mends = [f"set {way}" if way else "no contact tolerance joins them, so move the parts together in the model"]
+    if sizes[0] > 1:
+        mends.append("keep the largest piece alone with `disconnected: largest`")
+    if len(sizes) > 1 and sizes[1] > 1:
+        mends.append("export each piece as a model of its own and name them all as shapes of one kit")
+    listed = _some([str(size) for size in sizes], 8)
+    return f"{len(sizes)} pieces of {listed} parts (apart: {alone}); {', or '.join(mends)}"
+
+
+def _way_together(kit: Kit, exemplar: Exemplar, tolerance: float) -> str:
+    """What a config must say so that an exemplar is in one piece; empty where nothing makes it so."""
+    assembly = exemplar.assembly
+    for looser in dict.fromkeys(min(factor * tolerance, LOOSEST) for factor in (1.0, *LOOSER)):
+        test = ContactTest(kit.types, looser / tolerance * kit.contact_tolerance)
+        edges = test.contacts(assembly.types, assembly.poses)
+        if not pieces(replace(assembly, edges=edges)).any():
+            said = [f"`contact.tolerance: {looser:g}`"] if looser > tolerance else []
+            if set(kit.contact_kinds) < {"point", "line", "face"}:
+                said.append("`contact.kinds: [point, line, face]`")
+            return " and ".join(said)
+    return ""
 
 
 def _count(number: int, noun: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stages.exemplars.build import Observation
-from stages.exemplars.findings import hubs, mirror_twins, pieces, ways_together
+from stages.exemplars.findings import hubs, mirror_twins, pieces
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.shape.kit_files import describe_kit
@@ -17,6 +17,8 @@ __all__ = ["inspection", "inspection_lines"]
 
 MOST_ROWS = 40
 """So many part types are listed for people."""
+MOST_PIECES = 8
+"""So are the sizes of so many pieces."""
 
 
 def inspection(seen: Observation, models: Sequence[Model], config: KitConfig) -> dict[str, Any]:
@@ -41,7 +43,7 @@ def inspection(seen: Observation, models: Sequence[Model], config: KitConfig) ->
         "dockings": described["dockings"],
         "tolerance": kit.contact_tolerance,
         "repairs": dict(seen.repairs),
-        "warnings": [*seen.refusals, *ways_together(kit), *seen.warnings],
+        "warnings": [*seen.refusals, *seen.warnings],
     }
     each_model = [_model(seen, index, model) for index, model in enumerate(models)]
     return {**each_model[0], **shared} if len(models) == 1 else {"models": each_model, **shared}
@@ -118,7 +120,8 @@ def _model_lines(model: dict[str, Any], config: KitConfig) -> Iterator[tuple[str
     uncounted = len(kinds) - len(model["contacts"])
     aside = f"; {uncounted} of them do not count, only kinds {', '.join(config.decided().kinds)}" if uncounted else ""
     yield "contacts", f"{len(kinds)}" + (f": {found}" if found else "") + aside
-    yield "connected", "yes" if len(sizes) == 1 else f"no, pieces of {', '.join(map(str, sizes))} parts"
+    listed = ", ".join(map(str, sizes[:MOST_PIECES])) + (" ..." if len(sizes) > MOST_PIECES else "")
+    yield "connected", "yes" if len(sizes) == 1 else f"no, {len(sizes)} pieces of {listed} parts"
     if len(degrees) > 1:
         yield "degree", f"a part touches {degrees.min()} to {degrees.max()} others, {degrees.mean():.1f} on average"
 

@@ -14,6 +14,7 @@ from stages.shape.collection.origin import Credit
 from stages.shape.kit import ContactKind, Strictness
 
 __all__ = [
+    "LOOSEST",
     "OPEN_KEYS",
     "STRICTEST",
     "ContactConfig",
@@ -38,6 +39,9 @@ STRICTEST: Mapping[str, Any] = {
 }
 """Where every choice of these keys begins."""
 
+LOOSEST = 0.05
+"""The greatest contact tolerance, as a share of the median part's diagonal."""
+
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry"]
 
 
@@ -57,7 +61,7 @@ class ReadLimits(StrictModel):
 class ContactConfig(StrictModel):
     """When two parts are neighbours."""
 
-    tolerance: Literal["auto"] | Annotated[float, Field(gt=0, le=0.05)] = Field(
+    tolerance: Literal["auto"] | Annotated[float, Field(gt=0, le=LOOSEST)] = Field(
         "auto",
         description="Largest distance of parts in contact, as a share of the median part diagonal; `auto` takes 0.001, "
         "or as much more as makes one piece of every exemplar.",

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.exemplars.build import build_kit, observe_models
-from stages.exemplars.findings import hubs, mirror_twins, pieces, ways_together
+from stages.exemplars.findings import hubs, mirror_twins, pieces
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ContactConfig
@@ -198,22 +198,34 @@ class TestPieces:
         assembly = Assembly(np.zeros(6, np.int16), np.tile(np.eye(4), (6, 1, 1)), edges)
         assert pieces(assembly).tolist() == [2, 1, 1, 0, 0, 0]
 
-    def test_the_tolerance_that_joins_them_is_found(self) -> None:
-        gap = 0.004 * np.sqrt(3)
-        apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + gap, 0, 0))})
-        (way,) = ways_together(observe_models(block_config(), [apart]).kit)
-        assert "5 times the contact tolerance" in way
-        assert block_kit(apart, contact=ContactConfig(tolerance=5e-3)).exemplars[0].assembly.edges.tolist() == [[0, 1]]
+    @pytest.mark.parametrize(("stated", "named"), [(1e-3, "0.005"), (2e-3, "0.004"), (3e-3, "0.006")])
+    def test_the_tolerance_that_is_named_joins_them(self, stated: float, named: str) -> None:
+        apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + 0.0038 * np.sqrt(3), 0, 0))})
+        assert f"set `contact.tolerance: {named}`" in refusal(apart, contact=ContactConfig(tolerance=stated))
+        joined = block_kit(apart, contact=ContactConfig(tolerance=float(named)))
+        assert joined.exemplars[0].assembly.edges.tolist() == [[0, 1]]
+
+    def test_no_tolerance_is_named_that_a_config_may_not_have(self) -> None:
+        apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + 0.045 * np.sqrt(3), 0, 0))})
+        assert "set `contact.tolerance: 0.05`" in refusal(apart, contact=ContactConfig(tolerance=0.04))
+        far = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1 + 0.06 * np.sqrt(3), 0, 0))})
+        message = refusal(far, contact=ContactConfig(tolerance=0.04))
+        assert "no contact tolerance joins them, so move the parts together in the model" in message
 
     def test_contacts_that_do_not_count_are_thought_of(self) -> None:
         corner = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 1, 1))})
-        (way,) = ways_together(observe_models(block_config(contact=ContactConfig(kinds=("face",))), [corner]).kit)
-        assert "contact.kinds" in way
+        message = refusal(corner, contact=ContactConfig(kinds=("face",)))
+        assert "set `contact.kinds: [point, line, face]`" in message
+        block_kit(corner, contact=ContactConfig(kinds=("point", "line", "face")))
 
-    def test_nothing_is_said_of_what_is_too_far_apart_or_together(self) -> None:
-        far = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, FAR)})
-        assert list(ways_together(observe_models(block_config(), [far]).kit)) == []
-        assert list(ways_together(block_kit(ring()))) == []
+    def test_pieces_are_kept_or_made_exemplars_only_where_they_are_some_parts(self) -> None:
+        scattered = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, FAR)})
+        assert "disconnected: largest" not in refusal(scattered)
+        assert "model of its own" not in refusal(scattered)
+        halves = [{"a": (CUBE, (x, 0, 0)), "b": (CUBE, (x + 1, 0, 0))} for x in (0, 9)]
+        both = {f"{name}.{x}": part for x, half in enumerate(halves) for name, part in half.items()}
+        assert "export each piece as a model of its own" in refusal(model(both))
+        block_kit(*map(model, halves))
 
 
 def test_a_model_a_million_units_away_has_the_same_contacts(tmp_path: Path) -> None:
