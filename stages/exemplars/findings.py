@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from stages.exemplars.congruence import comparable_mesh, congruences
-from stages.exemplars.model import Model
+from stages.exemplars.model import STATED, Model
 from stages.exemplars.settings import LOOSEST
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.pose import pose_vectors, relative_poses
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 
-__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals"]
+__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "stand_twice"]
 
 LETTERS = 52
 """Part types beyond this number have names in brackets for string tokens, not letters."""
@@ -70,9 +70,10 @@ def refusals(
     for model, exemplar in zip(models, kit.exemplars, strict=True):
         assembly = exemplar.assembly
         if len(model.parts) < 2:
+            mend = "set `parts: auto`, or " if model.why == STATED else ""
             yield (
-                f"{model.path}: has {len(model.parts)} part by {model.segmentation}, an exemplar needs at least 2; "
-                "set `parts: components` (or materials, colors), or split the model into one scene node a part"
+                f"{model.path}: has {len(model.parts)} part by {model.segmentation} ({model.why}), an exemplar needs "
+                f"at least 2; {mend}split the model into one scene node a part in the modelling tool"
             )
         elif pieces(assembly).any():
             without = f" without its hubs {_some(left_out)}" if left_out else ""
@@ -92,12 +93,12 @@ def refusals(
 def kit_warnings(kit: Kit) -> Iterator[str]:
     """What may disappoint in `kit`, though a run starts with it."""
     for exemplar in kit.exemplars:
-        yield from _stand_twice(kit, exemplar)
+        yield from _twice_warning(kit, exemplar)
         yield from _hub_warning(exemplar)
     if np.bincount(kit.label_of[np.concatenate([each.assembly.types for each in kit.exemplars])]).max() < 2:
         yield (
-            "no part type occurs twice, so nothing can be exchanged; repeat parts, add a second shape of the same "
-            "parts, or raise `congruence_tolerance` if parts are meant to be alike"
+            "no part type occurs twice, so little or nothing can be exchanged; repeat parts, add a second shape of the "
+            "same parts, or raise `congruence_tolerance` if parts are meant to be alike"
         )
     if len(kit.labels) > LETTERS:
         yield (
@@ -118,18 +119,23 @@ def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int,
     return twins
 
 
-def _stand_twice(kit: Kit, exemplar: Exemplar) -> Iterator[str]:
-    """A sentence where parts of one type stand in the same place."""
+def stand_twice(kit: Kit, exemplar: Exemplar) -> list[str]:
+    """The parts of an exemplar that stand in the place of another of their type, each as "b in a"."""
     assembly = exemplar.assembly
     edges = assembly.edges[assembly.types[assembly.edges[:, 0]] == assembly.types[assembly.edges[:, 1]]]
     moved = relative_poses(assembly.poses, edges)
-    twice: list[str] = []
+    twice: dict[str, str] = {}
     for (first, second), pose in zip(edges.tolist(), moved, strict=True):
         part_type = kit.types[assembly.types[first]]
         length = part_type.diagonal / 2
         gaps = pose_vectors(part_type.symmetries, length) - pose_vectors(pose[None], length)
         if np.linalg.norm(gaps, axis=1).min() <= kit.pose_tolerance:
-            twice.append(f"{exemplar.part_names[second]} in {exemplar.part_names[first]}")
+            twice.setdefault(exemplar.part_names[second], exemplar.part_names[first])
+    return [f"{part} in {other}" for part, other in twice.items()]
+
+
+def _twice_warning(kit: Kit, exemplar: Exemplar) -> Iterator[str]:
+    twice = stand_twice(kit, exemplar)
     if twice:
         yield (
             f"{exemplar.name}: {_count(len(twice), 'part')} at the very place of another of its type ({_some(twice)}); "
@@ -145,8 +151,8 @@ def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
         named = _some([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
         yield (
             f"{exemplar.name}: {_count(len(found), 'part')} of {len(assembly)} with very many contacts: {named}; "
-            "hardly another shape has the same around them, so variants keep them as they are, "
-            "unless they are split, or left out with `hubs`"
+            "hardly another shape has the same around them, so variants may keep them as they are; split them in the "
+            "model, or leave them out with `hubs.types`"
         )
 
 

@@ -20,7 +20,7 @@ from stages.exemplars.formats.ply import read_ply
 from stages.exemplars.formats.scene import Placement, Scene, Surface, UniqueNames, plain_name, plain_text
 from stages.exemplars.formats.stl import read_stl
 from stages.exemplars.formats.wavefront import read_wavefront
-from stages.exemplars.model import Model, RawPart
+from stages.exemplars.model import STATED, Model, RawPart
 from stages.exemplars.placing import bake, centre, distance_from_origin
 from stages.exemplars.segment import Segmentation, count_parts, pick, segment
 from stages.exemplars.settings import ReadLimits
@@ -38,8 +38,11 @@ FORMATS: dict[str, Callable[[Path, Enclosure], Scene]] = {
     ".dae": read_dae,
 }
 
-LARGEST = 1e30
+FARTHEST = 1e30
 """Numbers beyond this are no places: their squares and products leave the range of floats."""
+
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Diagonals, in units, between which areas and their squares are numbers that can be reckoned with."""
 
 MOST_WARNINGS = 200
 
@@ -64,14 +67,14 @@ def parse_model(path: Path, segmentation: Segmentation, limits: ReadLimits) -> M
     if segmentation == "auto":
         source, why, parted = pick(scene)
     else:
-        source, why = segmentation, "as the config says"
+        source, why = segmentation, STATED
         if source not in (scene.kind, "symmetry") and source not in (counts := count_parts(scene)):
             offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
             raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
         parted = segment(scene, source)
     _check_size(path, parted, limits)
     surfaces, placements = bake(*centre(parted.surfaces, parted.placements))
-    offset = _off_origin(surfaces, placements, warnings)
+    offset = _off_origin(path, surfaces, placements, warnings)
     names = UniqueNames()
     parts = []
     for placement in placements:
@@ -156,7 +159,7 @@ def _solid_placements(path: Path, scene: Scene) -> Scene:
     """
     warnings = list(scene.warnings)
     surfaces = [_plainly_named(each.select(np.arange(len(each.faces)))) for each in scene.surfaces]
-    broken_vertices = [int(np.count_nonzero(~(np.abs(each.vertices) <= LARGEST).all(axis=1))) for each in surfaces]
+    broken_vertices = [int(np.count_nonzero(~(np.abs(each.vertices) <= FARTHEST).all(axis=1))) for each in surfaces]
     placements = []
     for placement in scene.placements:
         label = None if placement.label is None else plain_name(placement.label)
@@ -164,13 +167,13 @@ def _solid_placements(path: Path, scene: Scene) -> Scene:
         surface, broken = surfaces[placement.surface], broken_vertices[placement.surface]
         if broken:
             raise ConfigError(
-                f"{path}: part {placement.name!r} has {broken} vertices that are not finite numbers up to {LARGEST:g}; "
-                "mend the part in the modelling tool (delete broken vertices) and export it again"
+                f"{path}: part {placement.name!r} has {broken} vertices that are not finite numbers up to {FARTHEST:g}; mend "
+                "the part in the modelling tool (delete broken vertices) and export it again"
             )
-        if not (np.abs(placement.pose) <= LARGEST).all():
+        if not (np.abs(placement.pose) <= FARTHEST).all():
             raise ConfigError(
-                f"{path}: part {placement.name!r} has a transform that is not finite, or beyond {LARGEST:g}; export it "
-                "again"
+                f"{path}: part {placement.name!r} has a transform that is not finite, or beyond {FARTHEST:g}; export "
+                "it again"
             )
         if not len(surface.faces):
             warnings.append(f"part {placement.name!r} has no triangles and is left out")
@@ -195,9 +198,15 @@ def _plainly_named(surface: Surface) -> Surface:
     return replace(surface, name=plain_name(surface.name), materials=tuple(map(plain_name, surface.materials)))
 
 
-def _off_origin(surfaces: list[Surface], placements: list[Placement], warnings: list[str]) -> FloatArray:
-    """What is to be taken off all poses, float64 (3,): zero unless the model stands far from the origin."""
+def _off_origin(path: Path, surfaces: list[Surface], placements: list[Placement], warnings: list[str]) -> FloatArray:
+    """What is to be taken off all poses, float64 (3,): zero unless the model stands far from the origin. Raises
+    ConfigError for a model that is too small or too large to be reckoned with."""
     middle, diagonal = distance_from_origin(surfaces, placements)
+    if 0 < diagonal < SMALLEST or diagonal > LARGEST:
+        raise ConfigError(
+            f"{path}: the model is {diagonal:.2g} units across, and only sizes from {SMALLEST:g} to {LARGEST:g} can be "
+            "reckoned with; scale it in the modelling tool, to metres say, and export it again"
+        )
     distance = float(np.linalg.norm(middle))
     if distance <= FAR * diagonal:
         return np.zeros(3)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stages.exemplars.findings import SMALL, hubs
+from stages.exemplars.findings import SMALL, hubs, stand_twice
 from stages.shape.kit import Kit
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
@@ -31,6 +31,10 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
         )
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
+    twice = sum(len(stand_twice(kit, each)) for each in kit.exemplars)
+    if twice:
+        stand = "1 part stands" if twice == 1 else f"{twice} parts stand"
+        return f"{stand} at the very place of another of the same type; remove from the model what stands twice"
     pinned = _hub(kit)
     if pinned:
         return f"{pinned}; split it into several parts in the model, or bring a second model"

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from pipeline.errors import ConfigError
 from stages.exemplars.build import build_kit, observe_models
 from stages.exemplars.findings import hubs, mirror_twins, pieces
-from stages.exemplars.model import Model
+from stages.exemplars.model import STATED, Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ContactConfig
 from stages.shape.geometry.pose import transform_points
@@ -101,9 +102,12 @@ class TestRepairs:
 
 class TestRefusals:
     def test_one_part_is_no_exemplar(self) -> None:
-        message = refusal(model({"only": (CUBE, (0, 0, 0))}))
-        assert message.startswith("blocks.glb: has 1 part by nodes")
-        assert "parts: components" in message
+        alone = model({"only": (CUBE, (0, 0, 0))})
+        message = refusal(alone)
+        assert message.startswith("blocks.glb: has 1 part by nodes (1 scene nodes)")
+        assert "split the model into one scene node a part" in message
+        assert "parts: auto" not in message
+        assert "set `parts: auto`" in refusal(replace(alone, why=STATED))
 
     def test_an_exemplar_in_pieces_is_refused_with_what_is_apart(self) -> None:
         apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "c": (CUBE, (2, 0, 0)), "moon": (CUBE, FAR)})
@@ -159,7 +163,7 @@ class TestWarnings:
 
     def test_a_kit_in_which_nothing_repeats_says_that_nothing_can_be_exchanged(self) -> None:
         _, report = build_kit(block_config(), [model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))})])
-        assert any("nothing can be exchanged" in warning for warning in report.warnings)
+        assert any("little or nothing can be exchanged" in warning for warning in report.warnings)
         _, report = build_kit(block_config(), [ring()])
         assert report.warnings == ()
 

@@ -643,6 +643,30 @@ class TestBadFiles:
             read_model(path)
 
 
+class TestSize:
+    @pytest.mark.parametrize(("scale", "said"), [(1e-12, "e-12 units across"), (1e12, "e+12 units across")])
+    def test_a_model_that_numbers_cannot_carry_is_refused_with_its_size(
+        self, scale: float, said: str, tmp_path: Path
+    ) -> None:
+        scaled = boxes_glb()
+        scaled.header["scenes"] = [{"nodes": [3]}]
+        scaled.node(root=False, children=[0, 1, 2], scale=[scale] * 3)
+        with pytest.raises(ConfigError, match="scale it in the modelling tool") as caught:
+            read_model(scaled.write(tmp_path / "scaled.glb"))
+        assert said in str(caught.value)
+        assert "scaled.glb: the model is" in str(caught.value)
+
+    @pytest.mark.parametrize("scale", [2.0**-26, 2.0**26])
+    def test_a_model_of_any_size_in_use_has_the_same_parts(self, scale: float, tmp_path: Path) -> None:
+        scaled = boxes_glb()
+        scaled.header["scenes"] = [{"nodes": [3]}]
+        scaled.node(root=False, children=[0, 1, 2], scale=[scale] * 3)
+        plain = read_model(boxes_glb().write(tmp_path / "plain.glb"))
+        for one, other in zip(plain.parts, read_model(scaled.write(tmp_path / "s.glb")).parts, strict=True):
+            np.testing.assert_allclose(other.vertices, scale * one.vertices, rtol=1e-5, atol=1e-5 * scale)
+            np.testing.assert_allclose(other.pose[:3, :3], one.pose[:3, :3], atol=1e-9)
+
+
 class TestFarFromTheOrigin:
     def test_a_million_unit_offset_changes_no_relative_pose(self, tmp_path: Path) -> None:
         # halves and whole numbers are exact in 32 bits a million units away

@@ -10,7 +10,7 @@ import pytest
 from stages.exemplars.build import build_kit
 from stages.shape.kit import Kit
 from stages.variations.advice import what_keeps
-from tests.stages.variations.toy import box, config_of, models_of, pose
+from tests.stages.variations.toy import CHAIN, box, chain, config_of, kit_of, models_of, pose
 
 BLOCKS = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
 ROW = [("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]
@@ -29,3 +29,12 @@ def test_where_every_part_is_its_own_type_the_key_that_is_advised_changes_that(t
     assert said.startswith("every part is its own type; ")
     (advised,) = re.findall(r"`types: (\w+)`", said)
     assert "own type" not in what_keeps(row(advised), {}, 100)
+
+
+def test_what_stands_twice_is_named_before_anything_else_is_advised() -> None:
+    """Doubled parts touch what no other part may touch; without them there are variants."""
+    said = what_keeps(kit_of(CHAIN, [[*chain(4), *chain(4)]]), {}, 100)
+    assert (
+        said == "6 parts stand at the very place of another of the same type; remove from the model what stands twice"
+    )
+    assert "twice" not in what_keeps(kit_of(CHAIN, [chain(4)]), {}, 100)
