@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.exemplars.symmetry.cells import cell_keys
 from stages.exemplars.symmetry.clip import cut_triangles, fragments
-from stages.exemplars.symmetry.surface import SurfaceGrid, pack
-from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.exemplars.symmetry.surface import SurfaceGrid
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Soup", "carve", "cell_keys", "connected_soups", "joined"]
+__all__ = ["Soup", "carve", "connected_soups", "joined"]
 
 
 @dataclass(frozen=True)
@@ -65,14 +66,6 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
     untouched[cut] = False
     pieces = Soup(corners, soup.faces[cut][of])
     return joined(soup.select(within), pieces.select(side)), joined(soup.select(untouched), pieces.select(~side))
-
-
-def cell_keys(cells: np.ndarray) -> np.ndarray:
-    """Packed keys of cells int64 (n, 3) anywhere; -1 for those below the lattice's lowest."""
-    keys = np.full(len(cells), -1, dtype=np.int64)
-    above: BoolArray = cells.min(axis=1, initial=0) >= 0
-    keys[above] = pack(cells[above])
-    return keys
 
 
 def connected_soups(soup: Soup, grid: SurfaceGrid) -> list[Soup]:

@@ -5,21 +5,15 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from stages.exemplars.symmetry.cells import grown
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["cell_of", "cut_triangles", "fragments"]
+__all__ = ["cut_triangles", "fragments"]
 
 MOST_CORNERS = 12
 """A triangle cut by six planes has at most nine corners."""
 SPECK = 1e-9
 """Fragments below this share of a cell's face are rounding."""
-
-
-@numba.njit(cache=True)
-def cell_of(point, origin, size, cell):
-    """The lattice cell of a point, into `cell` int64 (3,)."""
-    for axis in range(3):
-        cell[axis] = int(np.floor((point[axis] - origin[axis]) / size))
 
 
 @numba.njit(cache=True)
@@ -72,13 +66,6 @@ def _reach(polygon, count, axis, origin, size):
 
 
 @numba.njit(cache=True)
-def _grown(array):
-    larger = np.empty((2 * len(array), *array.shape[1:]), dtype=array.dtype)
-    larger[: len(array)] = array
-    return larger
-
-
-@numba.njit(cache=True)
 def _all_fragments(corners, origin, size):
     cells = np.empty((4 * len(corners) + 16, 3), dtype=np.int64)
     faces = np.empty(4 * len(corners) + 16, dtype=np.int64)
@@ -108,7 +95,7 @@ def _all_fragments(corners, origin, size):
                     if area <= SPECK * size * size:
                         continue
                     if total == len(faces):
-                        cells, faces, middles = _grown(cells), _grown(faces), _grown(middles)
+                        cells, faces, middles = grown(cells), grown(faces), grown(middles)
                     cells[total, 0], cells[total, 1], cells[total, 2] = i, j, k
                     faces[total] = face
                     for axis in range(3):
@@ -135,7 +122,7 @@ def _emit(polygon, count, size, side, face, triangles, sides, faces, total):
         return triangles, sides, faces, total
     for k in range(1, count - 1):
         if total == len(faces):
-            triangles, sides, faces = _grown(triangles), _grown(sides), _grown(faces)
+            triangles, sides, faces = grown(triangles), grown(sides), grown(faces)
         triangles[total, 0], triangles[total, 1], triangles[total, 2] = polygon[0], polygon[k], polygon[k + 1]
         sides[total], faces[total] = side, face
         total += 1

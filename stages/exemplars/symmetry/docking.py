@@ -8,10 +8,10 @@ from typing import Literal
 import numba
 import numpy as np
 
-from stages.exemplars.symmetry.clip import cell_of
+from stages.exemplars.symmetry.cells import cell_index, cell_of
 from stages.exemplars.symmetry.matching import eroded, symmetric_cells
 from stages.exemplars.symmetry.places import items_in
-from stages.exemplars.symmetry.surface import SurfaceGrid, cell_index
+from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
 
 __all__ = ["DockingSite", "docking_sites", "slippable_motions"]

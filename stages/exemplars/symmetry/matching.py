@@ -5,8 +5,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.exemplars.symmetry.clip import cell_of
-from stages.exemplars.symmetry.surface import SAME_ANGLE, SurfaceGrid, cell_index
+from stages.exemplars.symmetry.boundary import SAME_ANGLE
+from stages.exemplars.symmetry.cells import cell_index, cell_of
+from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert
 

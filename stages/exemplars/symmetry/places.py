@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.exemplars.symmetry.carve import cell_keys
+from stages.exemplars.symmetry.cells import cell_keys
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points

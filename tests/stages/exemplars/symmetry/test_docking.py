@@ -46,6 +46,16 @@ class TestSurface:
 
 
 class TestSymmetricCells:
+    def test_sides_that_others_cover_in_part_are_alike_wherever_cells_cut_them(self) -> None:
+        """Braces as thin sheets that run into rails, in one plane with the rails' faces."""
+        rails = [box((0, y, 0), (8.1, y + 0.3, 0.3)) for y in (0.0, 1.7)]
+        sheet = np.array([[0, -0.05, 0.3], [1.7, -0.05, 0.3], [1.7, 0.05, 0.3], [0, 0.05, 0.3]])[[[0, 1, 2], [0, 2, 3]]]
+        braces = [moved(sheet, shift(k + 0.5, 0.15, 0) @ screw(1.2, 0)) for k in range(7)]
+        grid = surface_grid(np.concatenate([*rails, *braces]), 0.0271)
+        for count in range(1, 6):
+            found = matched_items(grid, shift(count, 0, 0))
+            assert found[(grid.points[:, 0] > 0.2) & (grid.points[:, 0] < 7.4 - count)].all()
+
     def test_all_of_a_wall_is_symmetric_but_what_lies_a_period_before_its_end(self, four_windows: SurfaceGrid) -> None:
         forth, back = symmetric_cells(four_windows, shift(1, 0, 0))
         x = four_windows.origin[0] + four_windows.size * (four_windows.cells[:, 0] + 0.5)
