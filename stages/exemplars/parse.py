@@ -167,8 +167,8 @@ def _solid_placements(path: Path, scene: Scene) -> Scene:
         surface, broken = surfaces[placement.surface], broken_vertices[placement.surface]
         if broken:
             raise ConfigError(
-                f"{path}: part {placement.name!r} has {broken} vertices that are not finite numbers up to {FARTHEST:g}; mend "
-                "the part in the modelling tool (delete broken vertices) and export it again"
+                f"{path}: part {placement.name!r} has {broken} vertices that are not finite numbers up to "
+                f"{FARTHEST:g}; mend the part in the modelling tool (delete broken vertices) and export it again"
             )
         if not (np.abs(placement.pose) <= FARTHEST).all():
             raise ConfigError(
