@@ -7,12 +7,14 @@ comes back is bytes, which the parent reads as it would read a file: nothing in 
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import fcntl
 import json
 import os
 import resource
 import select
 import signal
+import sys
 import time
 import traceback
 from collections.abc import Callable
@@ -21,8 +23,7 @@ from typing import BinaryIO, NoReturn
 
 __all__ = ["Escaped", "in_child"]
 
-PATIENCE = 5
-"""A child is given up after so many times its CPU seconds by the clock, for it may sleep."""
+PATIENCE = 10
 _PR_SET_PDEATHSIG = 1
 _PIPE = 1 << 20
 _ANSWER, _REFUSAL, _ESCAPE = b"a", b"r", b"e"
@@ -33,14 +34,21 @@ class Escaped(Exception):
 
 
 def in_child(
-    work: Callable[[], bytes], *, cpu_seconds: int, memory_mb: int, refusal: type[Exception] = Escaped
+    work: Callable[[], bytes],
+    *,
+    cpu_seconds: int,
+    memory_mb: int,
+    seconds: float | None = None,
+    refusal: type[Exception] = Escaped,
 ) -> bytes:
     """What `work` answers, called in a forked child with at most `cpu_seconds` of CPU and `memory_mb` MB of memory
-    beyond what this process has now.
+    beyond what this process has now; and `seconds` by the clock, for it may sleep: ten times its CPU seconds, where
+    nobody says.
 
     Raises `refusal`, with the child's own message, where `work` raises one; Escaped for everything else that can happen
     to it.
     """
+    seconds = PATIENCE * cpu_seconds if seconds is None else seconds
     reader, writer = os.pipe()
     fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, _PIPE)
     parent = os.getpid()
@@ -50,13 +58,13 @@ def in_child(
         _answer(work, writer, parent, cpu_seconds, memory_mb, refusal)
     os.close(writer)
     try:
-        reply = _reply(reader, time.monotonic() + PATIENCE * cpu_seconds)
+        reply = _reply(reader, time.monotonic() + seconds)
     finally:
         os.close(reader)
         os.kill(child, signal.SIGKILL)  # one that has ended waits for us all the same, as nobody else
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if reply is None:
-        raise Escaped(f"it did not end within {PATIENCE * cpu_seconds} s")
+        raise Escaped(f"it did not end within {seconds:g} s")
     kind, size, content = reply[:1], int.from_bytes(reply[1:9], "little"), reply[9:]
     if len(reply) < 9 or size != len(content):
         raise Escaped(_end(status, cpu_seconds, memory_mb))
@@ -114,9 +122,11 @@ def _bind(parent: int, cpu_seconds: int, memory_mb: int) -> None:
         os._exit(1)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    silent = os.open(os.devnull, os.O_RDWR)
-    for stream in (0, 1, 2):
-        os.dup2(silent, stream)
+    faulthandler.disable()
+    silent = open(os.devnull, "r+")
+    for descriptor in (0, 1, 2):
+        os.dup2(silent.fileno(), descriptor)
+    sys.stdout = sys.stderr = silent
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + (memory_mb << 20)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

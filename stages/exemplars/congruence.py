@@ -77,8 +77,13 @@ def congruences(source: ComparableMesh, target: ComparableMesh, tolerance: float
     for motion, rotation in zip(motions, accepted, strict=True):
         motion[:3, :3] = rotation
         motion[:3, 3] = target.centroid - rotation @ source.centroid
-    if source is target and len(motions):
-        motions[np.argmin(rotation_angle(motions))] = np.eye(4)
+    if source is target:
+        # Of a part that is a hair thin the frames of two corners are rounding, and no candidate may be the identity.
+        turned = np.abs(motions[:, :3, :3] - np.eye(3)).max(axis=(1, 2))
+        if turned.min(initial=np.inf) * source.diagonal < 4 * slack:
+            motions[np.argmin(rotation_angle(motions))] = np.eye(4)
+        else:
+            motions = np.concatenate([np.eye(4)[None], motions])
     # Ordered by angle, then by the matrix itself, so that the identity is first and nothing depends on the search.
     rank = np.round(np.concatenate([rotation_angle(motions)[:, None], motions[:, :3, :3].reshape(-1, 9)], axis=1), 3)
     return motions[np.lexsort(rank.T[::-1])]

@@ -22,7 +22,7 @@ LIMITS = ReadLimits(cpu_seconds=20, memory_mb=1000)
 
 PYTHONS_OWN = (
     "Traceback", "Error:", "object at 0x", "not supported between", "unsupported operand", "has no attribute",
-    "invalid literal", "could not convert", "NoneType", "dtype(",
+    "invalid literal", "could not convert", "NoneType", "dtype(", "Exception",
 )  # fmt: skip
 """What a message in our own words does not hold."""
 

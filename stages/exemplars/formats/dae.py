@@ -66,7 +66,7 @@ class _Reader:
         placements: list[Placement] = []
         place_of: dict[tuple[Any, ...], int] = {}
         for error in self.document.errors:
-            self.warnings.append(f"left out: {error}")
+            self.warnings.append(f"left out: {error.msg}")
         roots = [] if self.document.scene is None else self.document.scene.nodes
         for node, pose, geometries in self.walk(roots, np.eye(4), 0):
             key = tuple(
