@@ -71,7 +71,7 @@ def test_escape_is_one_sentence(work: Callable[[], bytes], told: str) -> None:
 def test_child_that_loops_or_sleeps_is_ended() -> None:
     with pytest.raises(Escaped, match="it took more than 1 s of CPU"):
         in_child(loop, cpu_seconds=1, memory_mb=200, seconds=60)
-    with pytest.raises(Escaped, match="it did not end within 0.5 s"):
+    with pytest.raises(Escaped, match=r"it did not end within 0.5 s"):
         in_child(sleep, cpu_seconds=1, memory_mb=200, seconds=0.5)
 
 

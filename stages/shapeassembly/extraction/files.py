@@ -11,9 +11,10 @@ from typing import Literal
 
 from pipeline.errors import Rejected
 from pipeline.places import file_digest
+from stages.shapeassembly.extraction.apart import grass_read_apart, read_apart
 from stages.shapeassembly.extraction.hierarchy import PartHierarchy
 from stages.shapeassembly.extraction.read_glb import read_glb
-from stages.shapeassembly.extraction.read_grass import GrassFile, read_grass
+from stages.shapeassembly.extraction.read_grass import GrassFile
 from stages.shapeassembly.extraction.read_partnet import read_partnet
 from stages.shapeassembly.extraction.read_structurenet import read_structurenet
 
@@ -77,9 +78,8 @@ class HierarchySource:
         return _known_grass(self.path, state.st_mtime_ns, state.st_size)
 
     def _read(self, file: Path) -> PartHierarchy:
-        if self.kind == "structurenet":
-            return read_structurenet(file)
-        return read_partnet(file) if self.kind == "partnet" else read_glb(file, self.up)
+        readers = {"structurenet": read_structurenet, "partnet": read_partnet}
+        return read_apart(readers.get(self.kind, lambda path: read_glb(path, self.up)), file)
 
 
 @lru_cache(maxsize=65536)
@@ -90,4 +90,4 @@ def _known_digest(file: Path, modified: int, size: int) -> str:
 
 @lru_cache(maxsize=4)
 def _known_grass(file: Path, modified: int, size: int) -> GrassFile:
-    return read_grass(file)
+    return grass_read_apart(file)

@@ -43,9 +43,9 @@ def read_grass(path: Path) -> GrassFile:
     try:
         with np.load(path, allow_pickle=False) as arrays:
             boxes, offsets = arrays["full_boxes"].astype(np.float64), arrays["full_offsets"].astype(np.int64)
-    except (BadZipFile, ValueError, KeyError, EOFError, TypeError) as error:
+    except (BadZipFile, ValueError, KeyError, EOFError, TypeError):
         raise Rejected(
-            UNREADABLE, f"{path.name}: not a GRASS file with full_boxes and full_offsets ({error})"
+            UNREADABLE, f"{path.name}: not a whole GRASS file with full_boxes and full_offsets; download it again"
         ) from None
     if boxes.ndim != 2 or boxes.shape[1] != 12 or offsets.ndim != 1 or len(offsets) < 2:
         raise Rejected(UNREADABLE, f"{path.name}: full_boxes is (n, 12) and full_offsets is (k + 1,)")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipeline.bounded import Escaped, in_child
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray
 from stages.training.recovery.drawings import fitted
 
@@ -18,6 +19,11 @@ __all__ = ["Input", "InputError", "checked_cloud", "ink_of", "read_inputs"]
 
 CLOUDS = (".npy", ".txt", ".xyz", ".csv", ".ply", ".obj", ".glb", ".gltf", ".stl", ".off")
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
+PICTURES = ("PNG", "JPEG", "BMP", "WEBP", "TIFF")
+"""What is looked for in a picture, whatever it is called: of other formats Pillow starts programs."""
+CPU_SECONDS = 300
+MEMORY_MB = 4000
+"""What reading one file may take, in a process of its own."""
 FEWEST_POINTS = 32
 SURFACE_POINTS = 8192
 """Points that are drawn of a mesh."""
@@ -122,10 +128,25 @@ def ink_of(picture: ByteArray, name: str = "the drawing") -> BoolArray:
 def _of_file(path: Path) -> Input:
     suffix = path.suffix.lower()
     if suffix in IMAGES:
-        return Input(path.stem, ink=ink_of(_picture(path, str(path)), str(path)))
+        return Input(path.stem, ink=ink_of(_read_apart(lambda: _picture(path, str(path)), path), str(path)))
     if suffix not in CLOUDS:
         raise InputError(f"{path} is neither a cloud nor a drawing; known are {', '.join(CLOUDS + IMAGES)}, .tar")
-    return Input(path.stem, points=checked_cloud(_points(path), str(path)))
+    return Input(path.stem, points=checked_cloud(_read_apart(lambda: _points(path), path), str(path)))
+
+
+def _read_apart(read: Callable[[], Any], path: Path) -> Any:
+    """The array that `read` makes of a file, in a child process that may take so much and no more."""
+
+    def content() -> bytes:
+        stream = io.BytesIO()
+        np.save(stream, np.asarray(read()), allow_pickle=False)
+        return stream.getvalue()
+
+    try:
+        found = in_child(content, cpu_seconds=CPU_SECONDS, memory_mb=MEMORY_MB, refusal=InputError)
+    except Escaped as error:
+        raise InputError(f"{path} cannot be read: {error}") from None
+    return np.load(io.BytesIO(found), allow_pickle=False)
 
 
 def _of_shard(path: Path) -> Iterator[Input | InputError]:
@@ -161,8 +182,11 @@ def _points(path: Path) -> Any:
         if suffix in (".txt", ".xyz", ".csv"):
             return np.loadtxt(path, delimiter="," if suffix == ".csv" else None, ndmin=2)
         return _scene_points(path)
-    except Exception as error:  # readers of many formats, not ours: whatever they raise, the file is to blame
-        raise InputError(f"{path} cannot be read: {type(error).__name__}: {error}") from error
+    except MemoryError:
+        raise
+    except Exception:  # readers of many formats, not ours: whatever they raise, the file is to blame
+        kind = "table of numbers" if suffix in (".txt", ".xyz", ".csv") else f"{suffix} file"
+        raise InputError(f"{path} cannot be read: it is no whole {kind}; export it again") from None
 
 
 def _scene_points(path: Path) -> FloatArray:
@@ -171,7 +195,7 @@ def _scene_points(path: Path) -> FloatArray:
 
     from stages.points.area_sampling import sample_surface
 
-    loaded = trimesh.load_scene(path, process=False)
+    loaded = trimesh.load_scene(path, process=False, skip_materials=True)
     meshes = [each for each in loaded.dump() if isinstance(each, trimesh.Trimesh) and len(each.faces)]
     if meshes:
         starts = np.cumsum([0, *(len(each.vertices) for each in meshes[:-1])])
@@ -185,8 +209,8 @@ def _scene_points(path: Path) -> FloatArray:
 def _array(content: bytes, name: str) -> Any:
     try:
         return np.load(io.BytesIO(content), allow_pickle=False)
-    except Exception as error:  # a header that claims too much memory, or is no Python literal, among others
-        raise InputError(f"{name} is no array: {type(error).__name__}: {error}") from error
+    except Exception:  # a header that claims too much memory, or is no Python literal, among others
+        raise InputError(f"{name} is no whole NumPy array of numbers; save it again") from None
 
 
 def _picture(source: Path | io.BytesIO, name: str) -> ByteArray:
@@ -194,11 +218,17 @@ def _picture(source: Path | io.BytesIO, name: str) -> ByteArray:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(source) as image:
+        with Image.open(source, formats=PICTURES) as image:
             if max(image.size) > LARGEST_SIDE:
                 size = " × ".join(f"{side:,}" for side in image.size)
                 raise InputError(f"{name} has {size} pixels: a drawing has at most {LARGEST_SIDE:,} a side; shrink it")
             layer = image.convert("RGBA")
             return np.asarray(Image.alpha_composite(Image.new("RGBA", layer.size, "white"), layer).convert("RGB"))
-    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InputError(f"{name} is no picture: {error}") from error
+    except InputError:
+        raise
+    except UnidentifiedImageError:
+        raise InputError(f"{name} is no picture: none of {', '.join(PICTURES)}") from None
+    except Image.DecompressionBombError:
+        raise InputError(f"{name} has too many pixels: shrink it to {LARGEST_SIDE:,} a side") from None
+    except Exception:  # of a damaged file Pillow's readers raise what came up
+        raise InputError(f"{name} is no picture: it is cut off or damaged") from None
