@@ -28,6 +28,8 @@ WORKERS ?=
 SEED    ?=
 ## PATIENCE minutes without progress after which a shard has failed, 0 for never; unless you say, 60
 PATIENCE ?=
+## CLUSTER  the scheduler of a cluster whose workers make the shards, tcp://...; unless you say, WORKERS here
+CLUSTER ?=
 ## MESH     a model that `make inspect` looks at, or several of one kit
 MESH    ?=
 ## PROGRAM  a shape program that `make inspect` and `recover` are about: a name, such as chair, or a module
@@ -47,7 +49,7 @@ ROUNDS  ?= 20
 
 # Their values are text, whatever stands in it: make expands none of it, and recipes read it from the environment, as
 # "$$CONFIG", so that no shell does. A recipe never says $(CONFIG).
-VARIABLES := CONFIG OUT WORKERS SEED PATIENCE MESH PROGRAM INPUT UP MODEL TABLE SAMPLES ROUNDS
+VARIABLES := CONFIG OUT WORKERS SEED PATIENCE CLUSTER MESH PROGRAM INPUT UP MODEL TABLE SAMPLES ROUNDS
 $(foreach name,$(VARIABLES),$(eval override $(name) := $$(value $(name))))
 ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
@@ -60,7 +62,7 @@ ASKED   := --config "$$CONFIG" --out "$$OUT"
 SEEDED  := $${SEED:+--seed "$$SEED"}
 HOW     := $(ASKED) $(SEEDED) --workers "$$WORKERS"
 MODELS  := $${MODEL:+--only "$$MODEL"}
-LASTS   := $${PATIENCE:+--patience "$$PATIENCE"}
+LASTS   := $${PATIENCE:+--patience "$$PATIENCE"} $${CLUSTER:+--cluster "$$CLUSTER"}
 RUN      = @$(PYTHON) -m pipeline run $@ $(HOW) $(LASTS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
@@ -107,7 +109,7 @@ recover: setup  ## Find the parameters of PROGRAM, or of the likeliest program, 
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 
-.PHONY: plan status verify inspect eval doctor
+.PHONY: plan status verify inspect eval doctor cluster
 plan: setup  ## Show the shards, samples, disk and time that the whole dataset will take, before it starts
 	@$(PYTHON) -m pipeline plan $(HOW)
 status: setup  ## Show what is done, failed, rejected and left
@@ -120,6 +122,8 @@ inspect: setup  ## Show what MESH can become and write a config for it, or what 
 	@[ -z "$$MESH" ] || $(PYTHON) -m pipeline inspect --out "$$OUT/inspect" -- "$$MESH"
 eval: setup  ## Print TABLE about the finished dataset and keep it; all: every table, and a report; without: list them
 	@$(PYTHON) -m eval $(ASKED) -- "$$TABLE"
+cluster: setup  ## Start a cluster of WORKERS workers on this machine, for runs with the CLUSTER that it says
+	@$(PYTHON) -m pipeline cluster --workers "$$WORKERS"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails
 	@$(PYTHON) -m pipeline doctor --out "$$OUT"
 
@@ -145,7 +149,7 @@ keys: setup  ## Write the table of all config keys, configs/README.md, anew from
 lock: setup  ## Choose the newest versions of everything and pin them in requirements.lock
 	$(PYTHON) -m venv --clear .venv/lock
 	$(PYTHON) -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
-	    print(*p["dependencies"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
+	    print(*p["dependencies"], *p["optional-dependencies"]["cluster"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/lock/asked.txt
 	grep '^--' requirements.lock >> .venv/lock/asked.txt
 	.venv/lock/bin/python -m pip install -r .venv/lock/asked.txt
 	{ grep '^[#-]' requirements.lock; .venv/lock/bin/python -m pip freeze --all --exclude pip | sed 's/+.*//'; } > lock.tmp

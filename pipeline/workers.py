@@ -2,8 +2,7 @@
 
 One executor with many processes would break as a whole when one of them dies, and could not say which shard it
 was that killed it. Native libraries do kill (a segmentation fault, memory), so even one worker is a process of
-its own. On a cluster there is no executor at all: `--shards i/n` is one job of a job array, and brings its own
-workers like any other run.
+its own. Each worker of a cluster has such a process, too (`pipeline/cluster.py`), and so has each job of a job array.
 """
 
 from __future__ import annotations

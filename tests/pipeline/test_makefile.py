@@ -18,6 +18,7 @@ VARIABLES = (
     "WORKERS",
     "SEED",
     "PATIENCE",
+    "CLUSTER",
     "MESH",
     "PROGRAM",
     "INPUT",
@@ -109,9 +110,9 @@ def test_help_lists_every_target_and_every_variable_with_its_value() -> None:
     assert all(len(row) > 2 for row in rows.values()), "each is explained"
     values = {name: rows[name][1] for name in VARIABLES}
     assert values == {
-        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "PATIENCE": "-", "MESH": "-",
-        "PROGRAM": "-",
-        "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-", "SAMPLES": "100", "ROUNDS": "20",
+        "CONFIG": "configs/default.yaml", "OUT": "/data", "WORKERS": "3", "SEED": "-", "PATIENCE": "-", "CLUSTER": "-",
+        "MESH": "-", "PROGRAM": "-", "INPUT": "-", "UP": "-", "MODEL": "-", "TABLE": "-",
+        "SAMPLES": "100", "ROUNDS": "20",
     }  # fmt: skip
 
 
@@ -124,7 +125,7 @@ def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
         len(reached) == 13 + len(targets[1:]) + 1
     )  # dataset is thirteen stages; inspect looks at a program and a model
     assert all(any(said in each for each in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 13 * 5
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 13 * 6
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 

@@ -73,7 +73,8 @@ def dynamic_names(path: Path) -> tuple[set[str], set[str]]:
 
 def test_what_is_pinned_is_all_that_the_code_asks_for_and_all_that_this_needs() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    asked = [Requirement(each) for each in (*project["dependencies"], *project["optional-dependencies"]["dev"])]
+    extras = project["optional-dependencies"].values()
+    asked = [Requirement(each) for each in (*project["dependencies"], *(each for extra in extras for each in extra))]
     versions, reached = pinned(), set()
     while asked:
         requirement = asked.pop()
