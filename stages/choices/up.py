@@ -32,7 +32,8 @@ def upward(models: Sequence[Model], identified: Identified) -> tuple[Literal["y"
     """The axis that points up in `models`, whose parts are `identified`, and the reason, a sentence.
 
     A format that lets files choose is believed (COLLADA). glTF calls y up whatever stands in it, and other formats
-    say nothing: there it is the axis along which the models stand on the larger foot, the hull of their lowest points.
+    say nothing: there it is the axis along which alone the models would not fall over, their middle being above their
+    foot, the hull of their lowest points; else the one along which they stand on the larger foot.
     Where feet are about alike it is the axis about which equal parts are turned; else y.
     """
     said = {model.up for model in models}
@@ -40,7 +41,11 @@ def upward(models: Sequence[Model], identified: Identified) -> tuple[Literal["y"
         (word,) = said
         if word is not None:
             return word, "the file says so"
-    feet = {axis: sum(_foot(model, place) for model in models) for axis, place in _AXES.items()}
+    stood = {axis: [_foot(model, place) for model in models] for axis, place in _AXES.items()}
+    balanced = [axis for axis, each in stood.items() if all(stands for _, stands in each)]
+    if len(balanced) == 1:
+        return balanced[0], "along the other axis the middle of a model is not above its foot"
+    feet = {axis: sum(area for area, _ in each) for axis, each in stood.items()}
     larger: Literal["y", "z"] = "y" if feet["y"] >= feet["z"] else "z"
     ratio = feet[larger] / max(feet["z" if larger == "y" else "y"], 1e-3 * feet[larger], 1e-300)
     if ratio >= SURE:
@@ -52,18 +57,23 @@ def upward(models: Sequence[Model], identified: Identified) -> tuple[Literal["y"
     return "y", "neither the foot nor the turns of equal parts tell, and y is the custom"
 
 
-def _foot(model: Model, axis: int) -> float:
-    """Area of the hull of the lowest points along an axis, as a share of the box's largest side."""
+def _foot(model: Model, axis: int) -> tuple[float, bool]:
+    """Area of the hull of the lowest points along an axis, as a share of the box's largest side, and whether the middle
+    of the model's surface is above it."""
     from scipy.spatial import ConvexHull, QhullError
 
-    points = np.concatenate([transform_points(part.pose, part.vertices) for part in model.parts])
+    corners = np.concatenate([transform_points(part.pose, part.vertices)[part.faces] for part in model.parts])
+    points = corners.reshape(-1, 3)
     height = points[:, axis]
     low = np.delete(points[height <= height.min() + FOOT * np.ptp(height)], axis, axis=1)
-    spans = np.ptp(points, axis=0)
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    middle = np.delete(areas @ corners.mean(axis=1) / max(areas.sum(), 1e-300), axis)
     try:
-        return float(ConvexHull(low).volume / spans.max() ** 2)
+        hull = ConvexHull(low)
     except (QhullError, ValueError):
-        return 0.0
+        return 0.0, False
+    above = (hull.equations[:, :2] @ middle + hull.equations[:, 2] < 0).all()
+    return float(hull.volume / np.ptp(points, axis=0).max() ** 2), bool(above)
 
 
 def _turns(identified: Identified) -> list[int]:

@@ -50,6 +50,14 @@ class TestUp:
         models = models_of(ROAD, [shape])
         assert upward(models, identify_parts(models, config_of([shape])))[0] == axis
 
+    def test_a_tower_stands_where_its_middle_is_above_its_foot(self) -> None:
+        # wider and deeper from storey to storey: along z it would stand on a side of its top, the larger foot
+        storeys = {f"storey{k}": box(1 + 0.3 * k, 1.0, 1 + 0.4 * k) for k in range(6)}
+        shape = [(name, pose(0, k, 0)) for k, name in enumerate(storeys)]
+        models = models_of(storeys, [shape])
+        axis, why = upward(models, identify_parts(models, config_of([shape])))
+        assert (axis, "not above its foot" in why) == ("y", True)
+
     def test_the_word_of_a_file_that_chose_it_is_believed(self) -> None:
         models = [replace(each, up="z") for each in models_of(ROAD, [ring(2, 3)])]
         assert upward(models, identify_parts(models, config_of([ring(2, 3)]))) == ("z", "the file says so")
