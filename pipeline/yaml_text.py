@@ -88,10 +88,9 @@ def _look_through(path: Path, text: str) -> None:
     sizes: dict[str | None, int] = {}
     count = 0
     for event in yaml.parse(text, Loader=_Loader):
-        where = f"{path}:{event.start_mark.line + 1}" if event.start_mark else f"{path}"
-        tagged = getattr(event, "tag", None)
-        if tagged is not None:
-            tag = tagged[:60].replace("tag:yaml.org,2002:", "!!")
+        where = f"{path}:{event.start_mark.line + 1}" if event.start_mark is not None else f"{path}"
+        if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent) and event.tag is not None:
+            tag = event.tag[:60].replace("tag:yaml.org,2002:", "!!")
             raise ConfigError(f"{where}: the tag {tag} is not read; write the value without it")
         if isinstance(event, yaml.AliasEvent):
             if any(anchor == event.anchor for anchor, _ in open_since):

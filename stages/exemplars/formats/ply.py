@@ -254,9 +254,9 @@ def _textured(
         if all(name in vertex and vertex[name].lengths is None for name in names):
             uv = _rows("vertex", vertex, names).astype(np.float64)
     if "texcoord" in face:
-        counts = face["texcoord"].lengths
-        if counts is not None and np.array_equal(counts, 2 * lengths):
-            uv, corners = face["texcoord"].values.reshape(-1, 2).astype(np.float64), triangles
+        texcoord = face["texcoord"]
+        if texcoord.lengths is not None and np.array_equal(texcoord.lengths, 2 * lengths):
+            uv, corners = texcoord.values.reshape(-1, 2).astype(np.float64), triangles
         else:
             warnings.append("property texcoord of element face has not two numbers for each corner, and is left out")
     try:

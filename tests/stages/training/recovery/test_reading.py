@@ -174,3 +174,17 @@ def test_files_that_are_nothing_of_it_are_told(name: str, tmp_path: Path) -> Non
         found = error
     assert isinstance(found, InputError)
     assert name.partition(".")[0] in str(found)
+
+
+def test_program_in_place_of_a_drawing_is_not_run(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\nshowpage\n")
+    assert "is no picture: none of PNG" in str(only(tmp_path / "a.png"))
+
+
+def test_file_that_is_cut_off_is_told_without_words_of_the_library(tmp_path: Path) -> None:
+    np.save(tmp_path / "cloud.npy", CLOUD)
+    content = (tmp_path / "cloud.npy").read_bytes()
+    (tmp_path / "cloud.npy").write_bytes(content[: len(content) // 2])
+    assert str(only(tmp_path / "cloud.npy")).endswith("is no whole NumPy array of numbers; save it again")
+    (tmp_path / "cloud.csv").write_text("1,2,3\n4,x,6\n")
+    assert str(only(tmp_path / "cloud.csv")).endswith("it is no whole table of numbers; export it again")
