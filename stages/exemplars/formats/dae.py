@@ -6,6 +6,7 @@ trimesh's reader is not used here: it names parts by meshes and not by nodes, an
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -66,7 +67,8 @@ class _Reader:
         placements: list[Placement] = []
         place_of: dict[tuple[Any, ...], int] = {}
         for error in self.document.errors:
-            self.warnings.append(f"left out: {error.msg}")
+            told = re.sub(r" `?<.*>`?", "", error.msg)  # for want of a name it may show an object of Python
+            self.warnings.append(f"left out: {told}")
         roots = [] if self.document.scene is None else self.document.scene.nodes
         for node, pose, geometries in self.walk(roots, np.eye(4), 0):
             key = tuple(

@@ -6,6 +6,7 @@ reads one material library only, takes negative indices from the end of the file
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -92,7 +93,9 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
 
 def _parse(path: Path) -> _Lines:
     lines = _Lines()
-    text = path.read_bytes().decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ")
+    content = path.read_bytes()
+    encoding = "utf-16" if content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig"
+    text = content.decode(encoding, errors="replace").replace("\\\r\n", " ").replace("\\\n", " ")
     group: str | None = None
     current: str | None = None
     material: str | None = None

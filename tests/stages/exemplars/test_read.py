@@ -417,6 +417,12 @@ f 1 2 \\
         assert len(model.parts[0].faces) == 3
         assert "'unknown'" in model.warnings[0]
 
+    @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+    def test_text_in_another_encoding_is_read(self, tmp_path: Path, encoding: str) -> None:
+        path = write_obj(tmp_path / "m.obj", BOXES)
+        path.write_text(path.read_text(), encoding=encoding)
+        assert [part.name for part in read_model(path).parts] == list(BOXES)
+
     def test_two_libraries_on_one_line_are_both_read(self, tmp_path: Path) -> None:
         (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\n")
         (tmp_path / "b.mtl").write_text("newmtl b\nKd 0 1 0\n")
