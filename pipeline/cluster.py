@@ -9,6 +9,7 @@ the run.
 
 from __future__ import annotations
 
+import multiprocessing
 import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -26,6 +27,11 @@ _ANSWERS_WITHIN = 10.0
 """Seconds that a scheduler has to answer."""
 
 _LOOK_EVERY = 0.5
+
+_NO_PROCESSES = (
+    "the workers of the cluster may start no processes of their own: start them with --no-nanny, or with "
+    "DASK_DISTRIBUTED__WORKER__DAEMON=False in their environment"
+)
 
 _crew: tuple[str, Workers] | None = None
 """The process in which this worker of the cluster makes its shards, and for which run: another finds other code."""
@@ -144,6 +150,8 @@ def _make_here(job: Job, run: str) -> Report | None:
     from distributed import get_worker
     from distributed.worker import thread_state
 
+    if multiprocessing.current_process().daemon:
+        return Report(job.shard.name, "fatal", _NO_PROCESSES)
     worker, key = get_worker(), thread_state.key
     if _crew is None or _crew[0] != run:
         if _crew is not None:
