@@ -8,9 +8,10 @@ import numpy as np
 from stages.variations.exchange.cuts import cut
 from stages.variations.exchange.joins import join
 from stages.variations.exchange.matches import match_poses
+from stages.variations.exchange.units import shift
 from stages.variations.kernels.checks import connect
 from stages.variations.kernels.graph_key import graph_key
-from stages.variations.kernels.layout import PIECE, Outcome
+from stages.variations.kernels.layout import PIECE, UNITS, Outcome
 
 __all__ = ["attempt", "complete", "cut_piece"]
 
@@ -21,24 +22,27 @@ RECUTS = 4
 
 
 @numba.njit(cache=True)
-def cut_piece(rng, a, b, ws, way, large):
+def cut_piece(rng, a, b, ws, way, large, slack):
     """Cut a piece out of A; where it must be large it is cut anew while it is small or nearly everything."""
     parts = len(a.types)
-    outcome = cut(rng, a, b, ws, way)
+    outcome = cut(rng, a, b, ws, way, slack)
     for _ in range(RECUTS - 1 if large else 0):
         if outcome == Outcome.OK and SMALL * parts <= ws.counts[PIECE] <= NEARLY_ALL * parts:
             break
-        outcome = cut(rng, a, b, ws, way)
+        outcome = cut(rng, a, b, ws, way, slack)
     return outcome
 
 
 @numba.njit(cache=True)
 def attempt(rng, kit, a, b, same_shape, answers, ws, way, large, smallest, largest, with_labels):
-    """Outcome and key (0 unless OK) of a try. After UNKNOWN the pairs in `ws.unknown` must be answered, and
-    `complete` goes on."""
-    outcome = cut_piece(rng, a, b, ws, way, large)
-    if outcome == Outcome.OK:
-        outcome = match_poses(rng, kit, a, b, same_shape, ws)
+    """Outcome and key (0 unless OK) of a try; by UNITS, `b` is `a`. After UNKNOWN the pairs in `ws.unknown` must be
+    answered, and `complete` goes on."""
+    if way == UNITS:
+        outcome = shift(rng, kit, a, ws)
+    else:
+        outcome = cut_piece(rng, a, b, ws, way, large, kit.limits[0])
+        if outcome == Outcome.OK:
+            outcome = match_poses(rng, kit, a, b, same_shape, ws)
     if outcome == Outcome.OK:
         outcome = join(rng, kit, a, b, ws, smallest, largest)
     if outcome != Outcome.OK:

@@ -8,7 +8,7 @@ import numpy as np
 from stages.variations.kernels.layout import BOUNDARY, GROWN, JOINTS, PIECE, Outcome
 from stages.variations.kernels.lookup import random_below
 
-__all__ = ["cut"]
+__all__ = ["connected", "cut", "put_boundary"]
 
 OF_A_PART = 0.75
 """How likely planes stand along the axes of one of the parts; else they stand in any direction."""
@@ -17,22 +17,14 @@ HALF_SPACE, BOX = 0, 2
 
 
 @numba.njit(cache=True)
-def cut(rng, a, b, ws, way):
+def cut(rng, a, b, ws, way, slack):
     """Cut a random connected piece out of A: `ws.inside`, and its boundary, the parts with a neighbour outside, in
-    `ws.boundary`, that of the rarest type in B first."""
-    n = len(a.types)
-    size = _cut(rng, a, b, ws, way)
-    count = 0
-    for part in range(n):
-        if ws.inside[part]:
-            for e in range(a.starts[part], a.starts[part + 1]):
-                if not ws.inside[a.ends[e]]:
-                    ws.boundary[count] = part
-                    count += 1
-                    break
-    ws.counts[BOUNDARY] = count
+    `ws.boundary`, that of the rarest type in B first. `slack`: how far behind a plane a part may stand that is in it.
+    """
+    size = _cut(rng, a, b, ws, way, slack)
+    count = put_boundary(a, ws)
     ws.counts[PIECE] = size
-    if count == 0 or size == n:
+    if count == 0 or size == len(a.types):
         return Outcome.WHOLE
     rarest, fewest = 0, 1 << 30
     for k in range(count):
@@ -49,7 +41,23 @@ def cut(rng, a, b, ws, way):
 
 
 @numba.njit(cache=True)
-def _cut(rng, shape, other, ws, way):
+def put_boundary(a, ws):
+    """Put the parts of the piece with a neighbour outside into `ws.boundary`, and how many they are into its counts,
+    and return that."""
+    count = 0
+    for part in range(len(a.types)):
+        if ws.inside[part]:
+            for e in range(a.starts[part], a.starts[part + 1]):
+                if not ws.inside[a.ends[e]]:
+                    ws.boundary[count] = part
+                    count += 1
+                    break
+    ws.counts[BOUNDARY] = count
+    return count
+
+
+@numba.njit(cache=True)
+def _cut(rng, shape, other, ws, way, slack):
     """A random connected piece of a shape into `ws.inside`: grown part by part (GROWN), ended at joints (JOINTS), or
     cut out by planes (PLANES). Returns its number of parts."""
     ws.inside[: len(shape.types)] = False
@@ -58,7 +66,7 @@ def _cut(rng, shape, other, ws, way):
         return _cut_at_joints(rng, shape, other.type_starts, ws.inside, ws.stack, seed)
     if way == GROWN:
         return _grow(rng, shape.starts, shape.ends, ws.inside, ws.stack, seed)
-    return _cut_by_planes(rng, shape, ws.inside, ws.component, ws.stack, seed)
+    return _cut_by_planes(rng, shape, ws.inside, ws.component, ws.stack, seed, slack)
 
 
 @numba.njit(cache=True)
@@ -120,7 +128,7 @@ def _cut_at_joints(rng, shape, other_starts, inside, stack, seed):
 
 
 @numba.njit(cache=True)
-def _cut_by_planes(rng, shape, inside, within, stack, seed):
+def _cut_by_planes(rng, shape, inside, within, stack, seed, slack):
     """What a half-space, a slab or a box holds, as far as it is connected to `seed`; `within` and `stack` are
     scratch."""
     n = len(shape.types)
@@ -137,7 +145,6 @@ def _cut_by_planes(rng, shape, inside, within, stack, seed):
     for u in range(used):
         axis = axes[(first + u) % 3]
         a, b = _along(axis, shape.translations[seed]), _along(axis, shape.translations[far])
-        slack = 1e-3 * (1.0 + abs(a) + abs(b))
         if kind == HALF_SPACE:
             if rng.random() < 0.5:
                 low[u], high[u] = a - slack, np.inf
@@ -152,7 +159,7 @@ def _cut_by_planes(rng, shape, inside, within, stack, seed):
             if x < low[u] or x > high[u]:
                 within[part] = 0
                 break
-    return _connected(shape.starts, shape.ends, within, inside, stack, seed)
+    return connected(shape.starts, shape.ends, within, inside, stack, seed)
 
 
 @numba.njit(cache=True)
@@ -182,7 +189,7 @@ def _draw_axes(rng, axes):
 
 
 @numba.njit(cache=True)
-def _connected(starts, ends, within, inside, stack, seed):
+def connected(starts, ends, within, inside, stack, seed):
     """The parts that are connected to `seed` by parts `within`."""
     size, count = 0, 1
     stack[0] = seed

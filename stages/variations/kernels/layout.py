@@ -28,6 +28,7 @@ __all__ = [
     "PLANES",
     "REPLACED",
     "TRY",
+    "UNITS",
     "UNKNOWNS",
     "UPRIGHT",
     "Answers",
@@ -158,9 +159,9 @@ Outcome = _Outcomes()
 EDGES, UNKNOWNS, PARTS, BOUNDARY, TRY, PIECE = 0, 1, 2, 3, 4, 5
 """Places in `Workspace.counts`: numbers of edges, unknown pairs, parts of the variant, boundary parts, tries so far
 and parts of the piece."""
-GROWN, PLANES, JOINTS, MEANINGS, NOTHING, REPLACED = 0, 1, 2, 3, 4, 5
+GROWN, PLANES, JOINTS, MEANINGS, NOTHING, REPLACED, UNITS = 0, 1, 2, 3, 4, 5, 6
 """Ways of cutting; by meanings is substitution, no cut of the exchange, and nothing is cut where shapes are grown; what
-is replaced is listed, not cut."""
+is replaced is listed, not cut; by units what repeats in a row of a shape is repeated once more, or removed."""
 NONE, FORBIDDEN, MISSING = -1, -2, -9
 """Contact answers that are no pair of labels: apart, never to be, not asked yet."""
 LABELS = 1 << 20

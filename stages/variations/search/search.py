@@ -25,7 +25,17 @@ from stages.variations.growth.grower import Grower
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.checks import validate
 from stages.variations.kernels.graph_key import graph_key
-from stages.variations.kernels.layout import BOUNDARY, EDGES, MEANINGS, NOTHING, PARTS, REPLACED, UNKNOWNS, Outcome
+from stages.variations.kernels.layout import (
+    BOUNDARY,
+    EDGES,
+    MEANINGS,
+    NOTHING,
+    PARTS,
+    REPLACED,
+    UNITS,
+    UNKNOWNS,
+    Outcome,
+)
 from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.search.steering import BATCH, TRY_WORK, Choice, Steering
@@ -218,12 +228,12 @@ class Search:
             outcome, key = substitute(rng, self.kit, kit, self.answers.dockings, a, b, ws, *limits), 0
             if outcome == Outcome.OK:
                 outcome, key = complete(kit, known, ws, with_labels)
-        elif self.config.matching == "pose":
+        elif self.config.matching == "pose" or choice.way == UNITS:
             outcome, key = attempt(
                 rng, kit, a.tables, b.tables, a is b, known, ws, choice.way, choice.large, *limits, with_labels
             )
         else:
-            outcome, key = cut_piece(rng, a.tables, b.tables, ws, choice.way, choice.large), 0
+            outcome, key = cut_piece(rng, a.tables, b.tables, ws, choice.way, choice.large, kit.limits[0]), 0
             if outcome == Outcome.OK:
                 outcome = match_centroids(rng, kit, a.tables, b.tables, ws)
             if outcome == Outcome.OK:

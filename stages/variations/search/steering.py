@@ -14,13 +14,13 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.variations.archive import Archive
-from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, NOTHING, PLANES, REPLACED
+from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, NOTHING, PLANES, REPLACED, UNITS
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.settings import SearchConfig
 
 __all__ = ["BATCH", "CHOICES", "CUTS", "GROWTH", "PLAIN", "RARE", "Choice", "Steering"]
 
-CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False))
+CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False), (UNITS, False))
 """Ways of cutting, and whether the piece must be large."""
 PLAIN, RARE, FAMILY, CROSSED = range(4)
 """Ways of drawing parents: at random; rare ones likelier; rare ones of a random family; a rare one and, of some, that
@@ -91,7 +91,7 @@ class Steering:
         self._gains *= np.exp(-count / MEMORY)
         self._work *= np.exp(-count / MEMORY)
         return [
-            Choice(number, a, b, *self.choices[number][1:])
+            Choice(number, a, a if self.choices[number][1] == UNITS else b, *self.choices[number][1:])
             for number, a, b in zip(numbers.tolist(), first, second, strict=True)
         ]
 

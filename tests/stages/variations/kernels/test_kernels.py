@@ -30,7 +30,7 @@ def test_a_cut_is_connected_and_its_boundary_are_the_parts_with_a_neighbour_outs
     ws, rng = line._ws, np.random.default_rng(0)
     sizes = set()
     for number in range(300):
-        outcome = cut(rng, shape, shape, ws, number % 3)
+        outcome = cut(rng, shape, shape, ws, number % 3, line.kit.pose_tolerance)
         inside = ws.inside[: len(shape.types)]
         sizes.add(int(inside.sum()))
         boundary = set(ws.boundary[: ws.counts[BOUNDARY]].tolist())
