@@ -48,8 +48,8 @@ Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "compo
 class ReadLimits(StrictModel):
     """What reading one model may take; a model that takes more is refused."""
 
-    cpu_seconds: int = Field(600, ge=1, le=86_400, description="Most CPU seconds of reading one model.")
-    memory_mb: int = Field(8_000, ge=100, description="Most memory of reading one model; unit: MB.")
+    cpu_seconds: int = Field(300, ge=1, le=86_400, description="Most CPU seconds of reading one model.")
+    memory_mb: int = Field(4_000, ge=100, description="Most memory of reading one model; unit: MB.")
     parts: int = Field(20_000, ge=1, description="Most parts of one model.")
     triangles: int = Field(
         5_000_000,
