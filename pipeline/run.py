@@ -16,14 +16,15 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal
 from pipeline.failures import Failures
 from pipeline.finish import finish_stage, publish
-from pipeline.journal import Journal, Standing, span
+from pipeline.journal import Journal, span
 from pipeline.patience import DEFAULT_PATIENCE, Patience
-from pipeline.places import Places, StagePlaces, remove, stops_everything
+from pipeline.places import Places, remove, stops_everything
 from pipeline.reasons import reasons
 from pipeline.registry import upstream
 from pipeline.slices import WHOLE, Slice, locked
-from pipeline.space import byte_size, check_space
+from pipeline.space import check_space
 from pipeline.stage import Shard, Stage
+from pipeline.standing import closing_words, counted, standing
 from pipeline.survey import StageSurvey, Survey
 from pipeline.task import Job, Report
 from pipeline.workers import DIED, Workers
@@ -131,7 +132,7 @@ class _Run:
                 self._journal.say(line)
             remove(surveyed.places.manifest)
             missing = len(self._mine(surveyed))
-            self._journal.say(f"{_shards(missing)} to make, {check_space(surveyed, self._places.out)}")
+            self._journal.say(f"{counted(missing)} to make, {check_space(surveyed, self._places.out)}")
             self._make_missing()
             surveyed = self._survey.stage(self._name)
         if not surveyed.missing:
@@ -273,7 +274,8 @@ class _Run:
                 self._give_up(job, workers, ready)
             if time.monotonic() - self._shown >= _LOOK_EVERY:
                 self._shown = time.monotonic()
-                self._show(surveyed, workers)
+                running = [job.shard.name for job in workers.jobs]
+                self._journal.show(standing(surveyed, running, len(self._result.failed)))
 
     def _take_in(self, job: Job, report: Report | None, ready: deque[Job]) -> None:
         if report is None:
@@ -295,48 +297,12 @@ class _Run:
         self._journal.say(f"shard {job.shard.name}: {message}")
         self._failures.failure(job, Report(job.shard.name, "failed", message), ready)
 
-    def _show(self, surveyed: StageSurvey, workers: Workers | ClusterWorkers) -> None:
-        records = surveyed.records
-        share = {job.shard.name: _how_far(surveyed.places, job.shard.name) for job in workers.jobs}
-        share |= dict.fromkeys(records, 1.0)
-        work = {shard.name: int(shard.params.get("samples", 0)) for shard in surveyed.shards}
-        self._journal.show(
-            Standing(
-                planned=len(surveyed.shards),
-                done=sum(share.values()),
-                failed=len(self._result.failed),
-                work=sum(work.values()),
-                worked=sum(samples * share.get(name, 0.0) for name, samples in work.items()),
-                samples=sum(record.samples for record in records.values()),
-                rejects=sum(sum(record.rejects.values()) for record in records.values()),
-            )
-        )
-
     def _close(self, surveyed: StageSurvey) -> None:
         self._journal.close()
-        result, records = self._result, surveyed.records.values()
+        result = self._result
         result.left = len(surveyed.missing) - len(result.failed)
-        text = f"{len(records):,} of {len(surveyed.shards):,} shards, {sum(each.samples for each in records):,} samples"
-        text += f", {byte_size(sum(each.bytes_on_disk() for each in records))}"
-        text += f", {_shards(result.made)} made now" if result.made else ", nothing to make"
-        text += f" ({span(sum(each.seconds for each in records))} of worker time in all)"
-        if result.failed:
-            text += f"; {len(result.failed)} set aside: {', '.join(result.failed)}"
-        if result.left:
-            text += f"; {result.left} not made"
         # Of a stage that the config has no use for nobody wants to hear.
-        (self._journal.say if surveyed.shards else self._journal.note)(text)
+        say = self._journal.say if surveyed.shards else self._journal.note
+        say(closing_words(surveyed, result.made, result.failed, result.left))
         for line in surveyed.stage.report(surveyed.view):
             self._journal.say(line)
-
-
-def _shards(count: int) -> str:
-    return f"{count:,} shard{'' if count == 1 else 's'}"
-
-
-def _how_far(places: StagePlaces, shard: str) -> float:
-    try:
-        done, total = (places.progress / shard).read_text().split()
-        return min(int(done) / int(total), 1.0)
-    except (OSError, ValueError, ZeroDivisionError):
-        return 0.0
