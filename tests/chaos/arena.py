@@ -72,6 +72,13 @@ class Arena:
     def start(self, stages: Sequence[str], *options: str, prepare: Callable[[], None] | None = None) -> Run:
         """Start `make dataset` from the first of `stages` on; `prepare` runs in the process before it begins."""
         command = [sys.executable, "-m", "tests.chaos.driver", ",".join(stages), "--config", str(self.config)]
+
+        def begin() -> None:
+            # who runs this in the background has it ignore Ctrl-C, and a child inherits that
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            if prepare is not None:
+                prepare()
+
         said = self.folder / f"said-{time.monotonic_ns()}.txt"
         with open(said, "wb") as stream:
             process = subprocess.Popen(
@@ -80,7 +87,7 @@ class Arena:
                 stdout=stream,
                 stderr=stream,
                 start_new_session=True,
-                preexec_fn=prepare,
+                preexec_fn=begin,
             )
         return Run(process, said)
 
