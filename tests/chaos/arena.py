@@ -19,7 +19,7 @@ from pipeline.places import remove
 from pipeline.records import read_record
 from pipeline.shards import json_bytes
 
-__all__ = ["Arena", "Run", "alive"]
+__all__ = ["Arena", "Run", "alive", "seconds_of"]
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -195,6 +195,15 @@ class Run:
 def alive(pid: int) -> bool:
     """Whether there is such a process of Python, and no mere rest of one."""
     return b"python" in _command(pid)
+
+
+def seconds_of(pid: int) -> float:
+    """Processor time that a process has had."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    except OSError:
+        return 0.0
 
 
 def _command(pid: int) -> bytes:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.chaos.arena import Arena, Run
+from tests.chaos.arena import Arena, Run, seconds_of
 
 __all__ = ["BLOWS", "Blow", "Struck"]
 
@@ -47,8 +47,13 @@ class Blow:
     prepare: Callable[[], None] | None = None
 
 
-def _signal_worker(run: Run, rng: np.random.Generator, number: int) -> str:
-    workers = sorted(run.look())
+_BEGUN = 1.5
+"""Seconds of processor time after which a worker has surely asked to die with its run: RELIABILITY.md says what is not
+promised before."""
+
+
+def _signal_worker(run: Run, rng: np.random.Generator, number: int, least: float = 0.0) -> str:
+    workers = sorted(pid for pid in run.look() if seconds_of(pid) >= least)
     if not workers:
         return "no worker there"
     pid = workers[rng.integers(len(workers))]
@@ -70,7 +75,7 @@ def stop_worker(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
 def end_driver(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
     """Every second time with a worker that was stopped before."""
     number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][rng.integers(3)]
-    words = _signal_worker(run, rng, signal.SIGSTOP) + ", " if rng.random() < 0.5 else ""
+    words = _signal_worker(run, rng, signal.SIGSTOP, _BEGUN) + ", " if rng.random() < 0.5 else ""
     run.process.send_signal(number)
     return Struck(f"{words}{signal.Signals(number).name} to the driver")
 
