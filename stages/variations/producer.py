@@ -117,6 +117,12 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "images and motion are then: a recursive rule may be carried out several times",
             }
         ),
+        "bent": Field(
+            {
+                "type": "boolean",
+                "description": "whether each part of the piece was moved by itself; motion is then that of its first",
+            }
+        ),
         "copied": Field(
             {
                 "type": "object",

@@ -103,6 +103,12 @@ class SearchConfig(StrictModel):
         description="Most times that a recursive rule of replaceable substructures, where one of two pieces is part of "
         "the other, is carried out at once: it lets a row of arches grow or shrink by several.",
     )
+    blend: bool = Field(
+        False,
+        description="Whether replaceable substructures bend a piece that does not fit as a whole: each of its parts "
+        "moves as the boundary near it does. Parts between come out of contact where contacts are as exact as those of "
+        "most kits: it finds little beside the time that it takes.",
+    )
     grown: GrownConfig = Field(default_factory=GrownConfig, description="What grown shapes are to be like.")
     growth_share: float = Field(
         0.3,

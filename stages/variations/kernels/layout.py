@@ -153,6 +153,7 @@ class _Outcomes(NamedTuple):
     CLASH: int = 7
     GRAMMAR: int = 8
     UNKNOWN: int = 9
+    ASKEW: int = 10
 
 
 Outcome = _Outcomes()

@@ -23,7 +23,7 @@ from stages.variations.exchange.matches import lies_in
 from stages.variations.features import FeatureTest, material_shares
 from stages.variations.growth.grower import Grower
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.kernels.checks import validate
+from stages.variations.kernels.checks import find_contacts, validate
 from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.layout import (
     BOUNDARY,
@@ -64,8 +64,9 @@ GROWN_REASONS = {
     **{each: f"grown: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
 }
 REPLACED_REASONS = {
-    Outcome.NO_MATCH: "replaced: no rigid embedding",
+    Outcome.NO_MATCH: "replaced: no embedding",
     Outcome.NOTHING_ATTACHED: "replaced: nothing but a gap to close",
+    Outcome.ASKEW: "blended: boundaries stand at other angles",
     **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
 }
 
@@ -272,19 +273,23 @@ class Search:
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
         ws = self._ws
         with_labels = self.config.duplicates == "docking"
-        outcome, key = self._answered(*complete(self.tables, self.answers.table, ws, with_labels))
+        how = "blended" if self._replacer.is_bent else "replaced"
+        outcome = self._answered_by(find_contacts) if self._replacer.is_bent else Outcome.OK
+        if outcome == Outcome.OK:
+            outcome, key = self._answered(*complete(self.tables, self.answers.table, ws, with_labels))
         if outcome != Outcome.OK:
-            return f"replaced: {REASONS[outcome]}"
+            return f"{how}: {REASONS[outcome]}"
         if not self._replacer.is_joined(ws):
-            return "replaced: boundary contact lost"
+            return f"{how}: contact lost"
         if not self._is_connected():
             return APART
-        descent = self._descent("substructures", choice.a, self._replacer.base, self._replacer.times)
-        return self._finished(int(key), *descent)
+        origins, lineage = self._descent("substructures", choice.a, self._replacer.base)
+        lineage |= {"times": self._replacer.times, "bent": self._replacer.is_bent}
+        return self._finished(int(key), origins, lineage)
 
-    def _descent(self, method: str, a: Parent, b: Parent, times: int = 1) -> tuple[np.ndarray, dict[str, Any]]:
+    def _descent(self, method: str, a: Parent, b: Parent) -> tuple[np.ndarray, dict[str, Any]]:
         """The exemplar that each part of the variant in hand came from, int8 (n,), and its lineage, where a piece of A
-        was put into B, or so many one after another."""
+        was put into B as a whole and once."""
         ws = self._ws
         from_b = int((ws.origin[: ws.counts[PARTS]] == 1).sum())
         lineage = {
@@ -294,7 +299,8 @@ class Search:
             "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
             "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
             "motion": np.round(ws.motion, 9).tolist(),
-            "times": times,
+            "times": 1,
+            "bent": False,
         }
         origins = np.empty(int(ws.counts[PARTS]), dtype=np.int8)
         for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
@@ -332,6 +338,7 @@ class Search:
             "images": [0],
             "motion": [*np.eye(3).tolist(), [0.0, 0.0, 0.0]],
             "times": 1,
+            "bent": False,
         }
         return self._finished(int(key), origins, lineage), work
 
@@ -346,7 +353,7 @@ class Search:
             return SUBASSEMBLY
         if self._ground is not None and self._ground.is_lifted(types, self._poses()):
             return LIFTED
-        outcome = self._validate()
+        outcome = self._answered_by(validate)
         if outcome != Outcome.OK:
             return REASONS[outcome]
         if self._slots is not None and self._slots.misfits(self._assembly()):
@@ -366,10 +373,10 @@ class Search:
     def _cell(self, features: Float32Array) -> Cell:
         return cell_of(features, self.config.novelty.axes, self.config.novelty.resolution)
 
-    def _validate(self) -> int:
-        """Compute the shape graph anew, and again after answering the contacts that were not known."""
+    def _answered_by(self, look: Callable[..., int]) -> int:
+        """What a look at all contacts of the variant in hand says, and again after answering those not known."""
         while True:
-            outcome: int = validate(self.tables, self.answers.table, self._ws)
+            outcome = look(self.tables, self.answers.table, self._ws)
             if outcome != Outcome.UNKNOWN:
                 return outcome
             if not self.answers.answer_unknown(self._ws, int(self._ws.counts[UNKNOWNS])):

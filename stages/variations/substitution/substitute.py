@@ -143,7 +143,10 @@ def put_together(
     tables: KitTables, giver: Parent, base: Parent, exchanged: Exchanged, motion: FloatArray, docked: Docked,
     ws: Workspace,
 ) -> None:  # fmt: skip
-    """Fill the workspace with the moved piece and what stays of the base, and the contacts that each brings."""
+    """Fill the workspace with the moved piece and what stays of the base, and the contacts that each brings.
+
+    motion: float64 (4, 4), or (k, 4, 4) where each part of the piece has its own: then the piece brings no contacts.
+    """
     ws.counts[TRY] += 1
     ws.counts[EDGES] = ws.counts[UNKNOWNS] = 0
     parts = 0
@@ -157,12 +160,14 @@ def put_together(
         ws.types[here] = parent.assembly.types[own]
         ws.rotations[here], ws.translations[here] = poses[:, :3, :3], poses[:, :3, 3]
         ws.origin[here] = origin
-        inherit_edges(parent.tables.starts, parent.tables.ends, parent.tables.labels, places, ws)
+        if origin == 1 or motion.ndim == 2:
+            inherit_edges(parent.tables.starts, parent.tables.ends, parent.tables.labels, places, ws)
         parts = here.stop
     ws.counts[PARTS] = parts
     ws.counts[PIECE] = int(exchanged.piece.sum())
     ends = {inner: hold for inner, hold, _ in reversed(docked)}
     ws.counts[BOUNDARY] = len(ends)
     ws.boundary[: len(ends)], ws.images[: len(ends)] = list(ends), list(ends.values())
-    ws.motion[:3], ws.motion[3] = motion[:3, :3], motion[:3, 3]
+    told = motion if motion.ndim == 2 else motion[0]
+    ws.motion[:3], ws.motion[3] = told[:3, :3], told[:3, 3]
     place_boxes(tables.boxes, ws.types, ws.rotations, ws.translations, parts, ws.boxes)

@@ -6,6 +6,7 @@ stays where it is and says where the new piece stands; the new piece says where 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from stages.variations.kernels.layout import UPRIGHT
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.replacement import piece_of
 
-__all__ = ["Embedding", "Side", "embed", "pieces"]
+__all__ = ["Embedding", "Side", "embed", "motions_onto", "pieces"]
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def _best(
 ) -> FloatArray | None:
     """The motion (4, 4) that lays the boundary parts of one shape on those of the other, which `frame` moved before;
     rows int64 (k, 2) are their darts, those of the moved one first."""
-    motions = _motions(kit, moved, still, rows[0], frame)
+    motions = motions_onto(kit, moved, still, rows[0], frame)
     if up >= 0:
         motions = motions[motions[:, up, up] >= UPRIGHT]
     motions = motions[[all(_coincide(kit, each, moved, still, row, frame) for row in rows[1:]) for each in motions]]
@@ -103,8 +104,9 @@ def _best(
     return best
 
 
-def _motions(kit: Kit, moved: Side, still: Side, row: np.ndarray, frame: FloatArray) -> FloatArray:
-    """All motions (s, 4, 4) under which one boundary part looks like the other; none where they are other meshes."""
+def motions_onto(kit: Kit, moved: Side, still: Side, row: Sequence[int] | np.ndarray, frame: FloatArray) -> FloatArray:
+    """All motions (s, 4, 4) under which one boundary part looks like the other, which `frame` moved before; none where
+    they are other meshes. row: their darts, that of the moved one first."""
     own, other = moved.graph.tails[row[0]], still.graph.tails[row[1]]
     if moved.assembly.types[own] != still.assembly.types[other]:
         return np.empty((0, 4, 4))
@@ -115,7 +117,7 @@ def _motions(kit: Kit, moved: Side, still: Side, row: np.ndarray, frame: FloatAr
 
 def _coincide(kit: Kit, motion: FloatArray, moved: Side, still: Side, row: np.ndarray, frame: FloatArray) -> bool:
     """Whether a motion lays one more boundary part upon its image, as one looks."""
-    images = _motions(kit, moved, still, row, frame)
+    images = motions_onto(kit, moved, still, row, frame)
     if not len(images):
         return False
     own = moved.assembly.poses[moved.graph.tails[row[0]]]

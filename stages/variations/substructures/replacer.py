@@ -17,6 +17,7 @@ from stages.variations.search.steering import Choice
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import Exchanged
 from stages.variations.substitution.substitute import Docked, find_motion, put_together
+from stages.variations.substructures.blending import blend, is_oriented_alike
 from stages.variations.substructures.embedding import Side, embed, pieces
 from stages.variations.substructures.operations import Operations, find_operations
 from stages.variations.substructures.ordered import OrderedGraph
@@ -31,7 +32,12 @@ DRAWS = 48
 else as many as take that long."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
+BLENDED = 0.5
+"""How often a piece is bent at once where parts of one label are other meshes, for there most can be docked as a whole
+somehow."""
+
 Found = tuple[FloatArray, FloatArray, Docked]
+"""The motion of the piece (4, 4) or of each of its parts (k, 4, 4), the poses of the base, and what docks to what."""
 DARTS_A_TRY = 4000.0
 """Darts, and pairs of them, that are looked at in the time of one such try."""
 
@@ -72,11 +78,13 @@ class Replacer:
         self.answers, self.tables = answers, tables
         self.smallest, self.largest = smallest, largest
         self.dummies, self.repeats = config.dummies, config.repeats
+        self.blends = config.blend
         kit = answers.kit
         self._by_meaning = len(kit.labels) < len(kit.types)
         self._by_docking = config.matching == "pose" and not self._by_meaning
         self._pair: Pair | None = None
         self._docked: Docked = []
+        self._bent: np.ndarray | None = None
 
     @property
     def choice(self) -> Choice:
@@ -111,15 +119,22 @@ class Replacer:
         if not piece.any() or taken.all():
             return Outcome.NOTHING_ATTACHED, work
         work += EMBEDDING_WORK
-        if self._by_meaning:
-            found = self._by_meanings(rng, pair, Exchanged(taken, piece))
-        else:
-            found = self._rigidly(rng, side, pair.sides[1], boundary, Exchanged(taken, piece))
+        exchanged, found = Exchanged(taken, piece), None
+        if not self._by_meaning:
+            found = self._rigidly(rng, side, pair.sides[1], boundary, exchanged)
+        elif not (self.blends and rng.random() < BLENDED):
+            found = self._by_meanings(rng, pair, exchanged)
+        if found is None and self.blends:
+            work += EMBEDDING_WORK
+            if not is_oriented_alike(self.answers.kit, side, pair.sides[1], boundary):
+                return Outcome.ASKEW, work
+            found = self._blended(side, pair.sides[1], boundary, exchanged)
         if found is None:
             return Outcome.NO_MATCH, work
         motion, poses, self._docked = found
+        self._bent = np.flatnonzero(piece) if motion.ndim == 3 else None
         self.base = replace(self.base, assembly=replace(self.base.assembly, poses=poses))
-        put_together(self.tables, pair.giver, self.base, Exchanged(taken, piece), motion, self._docked, ws)
+        put_together(self.tables, pair.giver, self.base, exchanged, motion, self._docked, ws)
         return Outcome.OK, work
 
     def _times(self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray) -> int:
@@ -174,6 +189,13 @@ class Replacer:
         embedding = embed(rng, kit, up, base, giver, boundary, exchanged.taken) if docked else None
         return None if embedding is None else (embedding.motion, embedding.poses, docked)
 
+    def _blended(self, base: Side, giver: Side, boundary: np.ndarray, exchanged: Exchanged) -> Found | None:
+        """The same where each part of the piece has a motion of its own; the base stays where it is."""
+        docked = _docked(base, giver, boundary, exchanged.piece)
+        if not docked:
+            return None
+        return blend(self.answers.kit, base, giver, boundary, exchanged.piece), base.assembly.poses, docked
+
     def _by_meanings(self, rng: np.random.Generator, pair: Pair, exchanged: Exchanged) -> Found | None:
         """The same where parts of one label are other meshes: a docking of one of them, fitted to all."""
         base, giver, kit, up = pair.base.assembly, pair.giver.assembly, self.answers.kit, self.tables.up
@@ -182,9 +204,19 @@ class Replacer:
             return None
         return found[0], base.poses, found[1]
 
+    @property
+    def is_bent(self) -> bool:
+        """Whether the parts of the piece moved each by itself, so that the contacts between them are to be found."""
+        return self._bent is not None
+
     def is_joined(self, ws: Workspace) -> bool:
-        """Whether, once contacts are found, every boundary part touches its new neighbour (§4.2)."""
-        return all(ws.stamp[ws.from_a[inner], ws.from_b[hold]] == ws.counts[TRY] for inner, hold, _ in self._docked)
+        """Whether, once contacts are found, every boundary part touches its new neighbour (§4.2), and a bent piece
+        holds together as it did."""
+        ends = [(ws.from_a[inner], ws.from_b[hold]) for inner, hold, _ in self._docked]
+        if self._bent is not None:
+            edges = self.choice.a.assembly.edges
+            ends += ws.from_a[edges[np.isin(edges, self._bent).all(axis=1)]].tolist()
+        return all(ws.stamp[i, j] == ws.counts[TRY] for i, j in ends)
 
     def _opened(self, rng: np.random.Generator, choice: Choice) -> tuple[Pair, float]:
         """All operations between two shapes, in random order; and what that cost."""

@@ -98,6 +98,7 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
             "images": [0],
             "motion": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]],
             "times": 1,
+            "bent": False,
             "copied": {"largest": 1.0, "pieces": 1, "exemplar": 0.5, "of": "row"},
             "backdrop": 0,
         }

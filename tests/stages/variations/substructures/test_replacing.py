@@ -53,7 +53,7 @@ def test_what_a_piece_held_together_makes_room_for_a_longer_one() -> None:
 def test_a_ring_that_no_rigid_piece_closes_is_not_made() -> None:
     line, found = replaced(kit_of(ROAD, [ring(1, 1), ring(2, 3)]), 1000, largest=1.6)
     assert found == []
-    assert line.rejects["replaced: no rigid embedding"] > 10
+    assert line.rejects["replaced: no embedding"] > 10
 
 
 def test_the_graphs_and_neighbourhoods_of_results_are_those_that_geometry_has() -> None:
