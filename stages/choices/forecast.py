@@ -12,7 +12,7 @@ from stages.choices.ladder import FEW, is_dull
 from stages.choices.probe import Finds, Probe
 from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.shape.kit import Kit
-from stages.variations.advice import what_keeps
+from stages.variations.advice import another_model, what_keeps
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import DUPLICATE, Variant
 
@@ -84,10 +84,7 @@ def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int
         return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
     if is_dull(finds):
         alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
-        return (
-            f"{count} of {size} that look {alike}; look at the sheet before you make many, and bring a second model of "
-            "the same parts"
-        )
+        return f"{count} of {size} that look {alike}; look at the sheet before you make many, and bring {another_model(kit)}"
     return f"{count} of {size}, {_round(finds.histograms)} or more of them of different parts lists"
 
 

@@ -10,10 +10,15 @@ from stages.exemplars.findings import SMALL, hubs, stand_twice
 from stages.shape.kit import Kit
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
-__all__ = ["what_keeps"]
+__all__ = ["another_model", "what_keeps"]
 
 REGULAR = 0.01
 """Share of tries that give an exemplar again, or a piece of one, from which on a kit is regular."""
+
+
+def another_model(kit: Kit) -> str:
+    """What to bring beside the exemplars that a kit has, in words."""
+    return f"{'a second' if len(kit.exemplars) == 1 else 'one more'} model of the same parts"
 
 
 def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
@@ -23,12 +28,9 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     """
     labelled = [kit.labelled(each.assembly).types for each in kit.exemplars]
     counts = np.bincount(np.concatenate(labelled), minlength=len(kit.labels))
-    used = int((counts > 0).sum())
+    used, another = int((counts > 0).sum()), another_model(kit)
     if counts.max() < 2:
-        return (
-            "every part is its own type; bring a second model of the same parts, or name types by meaning "
-            "(`types: meaning`)"
-        )
+        return f"every part is its own type; bring {another}, or name types by meaning (`types: meaning`)"
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
     twice = sum(len(stand_twice(kit, each)) for each in kit.exemplars)
@@ -37,19 +39,21 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
         return f"{stand} at the very place of another of the same type; remove from the model what stands twice"
     pinned = _hub(kit)
     if pinned:
-        return f"{pinned}; split it into several parts in the model, or bring a second model"
-    if counts.sum() <= SMALL:
-        return f"{counts.sum()} parts are too few to exchange any; bring more models of the same parts"
+        return f"{pinned}; split it into several parts in the model, or bring {another}"
+    most = max(map(len, labelled))
+    if most <= SMALL:
+        by_meaning = "" if len(kit.labels) < len(kit.types) else ", or of parts named alike, with `types: meaning`"
+        return f"of {most} parts hardly any can be exchanged; bring more models of the same parts{by_meaning}"
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
     if known > REGULAR * tries:
         return (
-            "what can be exchanged gives the exemplar again, or a piece of it: it is regular; bring a second model of "
-            "the same parts, or write a program with its counts and sizes as parameters"
+            f"what can be exchanged gives the exemplar again, or a piece of it: it is regular; bring {another}, or write "
+            "a program with its counts and sizes as parameters"
         )
     alone = int((counts == 1).sum())
     if alone > used / 2:
-        return f"{alone} of {used} part types occur once; bring a second model of the same parts"
-    return "no piece fits where it does not stand already; bring a second model of the same parts"
+        return f"{alone} of {used} part types occur once; bring {another}"
+    return f"no piece fits where it does not stand already; bring {another}"
 
 
 def _hub(kit: Kit) -> str:

@@ -10,7 +10,7 @@ import pytest
 from stages.exemplars.build import build_kit
 from stages.shape.kit import Kit
 from stages.variations.advice import what_keeps
-from tests.stages.variations.toy import CHAIN, box, chain, config_of, kit_of, models_of, pose
+from tests.stages.variations.toy import CHAIN, Placed, box, chain, config_of, kit_of, models_of, pose
 
 BLOCKS = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
 ROW = [("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]
@@ -38,3 +38,16 @@ def test_what_stands_twice_is_named_before_anything_else_is_advised() -> None:
         said == "6 parts stand at the very place of another of the same type; remove from the model what stands twice"
     )
     assert "twice" not in what_keeps(kit_of(CHAIN, [chain(4)]), {}, 100)
+
+
+def test_of_small_shapes_more_are_asked_for_and_parts_that_mean_the_same() -> None:
+    said = what_keeps(kit_of(CHAIN, [chain(3), chain(5)]), {}, 100)
+    assert said.startswith("of 7 parts hardly any can be exchanged; bring more models of the same parts")
+    assert "`types: meaning`" in said
+
+
+@pytest.mark.parametrize(
+    ("shapes", "asked"), [([chain(14)], "bring a second"), ([chain(14), chain(15)], "bring one more")]
+)
+def test_models_that_are_there_already_are_not_asked_for(shapes: list[list[Placed]], asked: str) -> None:
+    assert asked in what_keeps(kit_of(CHAIN, shapes), {}, 100)
