@@ -47,8 +47,8 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
     if known > REGULAR * tries:
         return (
-            f"what can be exchanged gives the exemplar again, or a piece of it: it is regular; bring {another}, or write "
-            "a program with its counts and sizes as parameters"
+            f"what can be exchanged gives the exemplar again, or a piece of it: it is regular; bring {another}, or "
+            "write a program with its counts and sizes as parameters"
         )
     alone = int((counts == 1).sum())
     if alone > used / 2:
