@@ -54,7 +54,7 @@ ARENAS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         {"shapeassembly": {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}]}, **_SMALL},
     ),
     "texts": (
-        ("shapeassembly", "strings"),
+        ("shapeassembly", "validity"),
         {"shapeassembly": {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}]}},
     ),
 }
