@@ -393,10 +393,16 @@ class Search:
     def _is_connected(self) -> bool:
         """Whether the variant in hand is in one piece."""
         ws = self._ws
-        leader = np.arange(ws.counts[PARTS])
+        near: list[list[int]] = [[] for _ in range(ws.counts[PARTS])]
         for i, j in ws.edges[: ws.counts[EDGES]].tolist():
-            leader[leader == leader[i]] = leader[j]
-        return bool((leader == leader[0]).all())
+            near[i].append(j)
+            near[j].append(i)
+        reached, waiting = {0}, [0]
+        while waiting:
+            fresh = [each for each in near[waiting.pop()] if each not in reached]
+            reached.update(fresh)
+            waiting += fresh
+        return len(reached) == len(near)
 
     def _assembly(self) -> Assembly:
         """The variant in hand."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
+from stages.variations.substructures.symmetry import cut_off
 
 __all__ = ["Replacement", "piece_of", "replace_piece"]
 
@@ -29,17 +30,7 @@ class Replacement:
 def piece_of(graph: OrderedGraph, cut: np.ndarray) -> np.ndarray:
     """The nodes that the darts `cut` int64 (b,) cut off, bool (n,): what they point to, and all that hangs together
     with it without crossing the cut. Darts of -1 are none."""
-    walls = set(cut[cut >= 0].tolist())
-    inside = np.zeros(len(graph.types), dtype=bool)
-    waiting = [int(graph.tails[graph.twins[dart]]) for dart in sorted(walls) if int(graph.twins[dart]) not in walls]
-    walls |= {int(graph.twins[dart]) for dart in walls}
-    while waiting:
-        node = waiting.pop()
-        if inside[node]:
-            continue
-        inside[node] = True
-        darts = np.arange(graph.starts[node], graph.starts[node + 1])
-        waiting += [int(graph.tails[graph.twins[dart]]) for dart in darts.tolist() if dart not in walls]
+    inside: np.ndarray = cut_off(graph, np.ascontiguousarray(cut))
     return inside
 
 

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import numba
+import numpy as np
 
-__all__ = ["CONFLICTS", "DEFECTS", "find_root", "lay_over", "regions"]
+__all__ = ["CONFLICTS", "DEFECTS", "cut_off", "find_root", "lay_over", "regions"]
 
 CONFLICTS, DEFECTS = 0, 1
 """Places in `counts`: parts that were met again in another place, and pairs of parts that a dummy edge would match."""
@@ -167,3 +168,32 @@ def regions(a, b, by_docking, image, owner, partner, sources, leader, is_cut):
                 _join(leader, here, first + b.tails[t])
             elif sources[t] >= 0 and is_cut[sources[t]]:
                 _join(leader, here, sources[t])
+
+
+@numba.njit(cache=True)
+def cut_off(graph, cut):
+    """What the darts `cut` int64 (b,) point to and what hangs together with it without crossing them, bool (n,)."""
+    inside, is_wall = np.zeros(len(graph.types), dtype=np.bool_), np.zeros(len(graph.tails), dtype=np.bool_)
+    waiting = np.empty(len(cut) + len(graph.tails), dtype=np.int64)
+    count = 0
+    for dart in cut:
+        if dart >= 0:
+            is_wall[dart] = True
+    for dart in cut:
+        if dart >= 0 and not is_wall[graph.twins[dart]]:
+            waiting[count] = graph.tails[graph.twins[dart]]
+            count += 1
+    for dart in cut:
+        if dart >= 0:
+            is_wall[graph.twins[dart]] = True
+    while count > 0:
+        count -= 1
+        node = waiting[count]
+        if inside[node]:
+            continue
+        inside[node] = True
+        for dart in range(graph.starts[node], graph.starts[node + 1]):
+            if not is_wall[dart]:
+                waiting[count] = graph.tails[graph.twins[dart]]
+                count += 1
+    return inside
