@@ -84,10 +84,8 @@ def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int
         return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
     if is_dull(finds):
         alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
-        return (
-            f"{count} of {size} that look {alike}; look at the sheet before you make many, and bring "
-            f"{another_model(kit)}"
-        )
+        looked = f"{count} of {size} that look {alike}; look at the sheet before you make many"
+        return f"{looked}, and bring {another_model(kit)}"
     return f"{count} of {size}, {_round(finds.histograms)} or more of them of different parts lists"
 
 

@@ -46,10 +46,8 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
         return f"of {most} parts hardly any can be exchanged; bring more models of the same parts{by_meaning}"
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
     if known > REGULAR * tries:
-        return (
-            f"what can be exchanged gives the exemplar again, or a piece of it: it is regular; bring {another}, or "
-            "write a program with its counts and sizes as parameters"
-        )
+        regular = "what can be exchanged gives the exemplar again, or a piece of it: it is regular"
+        return f"{regular}; bring {another}, or write a program with its counts and sizes as parameters"
     alone = int((counts == 1).sum())
     if alone > used / 2:
         return f"{alone} of {used} part types occur once; bring {another}"
