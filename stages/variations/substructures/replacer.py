@@ -32,6 +32,8 @@ DRAWS = 48
 else as many as take that long."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
+WITHIN = 0.25
+"""How often a shape is laid upon itself whatever else was drawn: recursive rules are within one shape."""
 BLENDED = 0.5
 """How often a piece is bent at once where parts of one label are other meshes, for there most can be docked as a whole
 somehow."""
@@ -219,7 +221,9 @@ class Replacer:
         return all(ws.stamp[i, j] == ws.counts[TRY] for i, j in ends)
 
     def _opened(self, rng: np.random.Generator, choice: Choice) -> tuple[Pair, float]:
-        """All operations between two shapes, in random order; and what that cost."""
+        """All operations between two shapes, or within the first, in random order; and what that cost."""
+        if rng.random() < WITHIN:
+            choice = replace(choice, b=choice.a)
         kit = self.answers.kit
         sides = _side(kit, choice.b), _side(kit, choice.a)
         first, second = sides[0].graph, (sides[0] if choice.a is choice.b else sides[1]).graph
