@@ -15,6 +15,9 @@ __all__ = ["another_model", "what_keeps"]
 REGULAR = 0.01
 """Share of tries that give an exemplar again, or a piece of one, from which on a kit is regular."""
 
+DOUBLED = 0.1
+"""Share of parts that stand in the place of another from which on nothing else can be judged."""
+
 
 def another_model(kit: Kit) -> str:
     """What to bring beside the exemplars that a kit has, in words."""
@@ -34,7 +37,7 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
     twice = sum(len(stand_twice(kit, each)) for each in kit.exemplars)
-    if twice:
+    if twice > DOUBLED * counts.sum():
         stand = "1 part stands" if twice == 1 else f"{twice} parts stand"
         return f"{stand} at the very place of another of the same type; remove from the model what stands twice"
     pinned = _hub(kit)
