@@ -30,10 +30,16 @@ class Soup:
         return Soup(self.corners[chosen], self.faces[chosen])
 
     @property
+    def areas(self) -> FloatArray:
+        """Area of each triangle, float64 (t,)."""
+        ways = self.corners[:, 1:] - self.corners[:, :1]
+        found: FloatArray = np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1) / 2
+        return found
+
+    @property
     def area(self) -> float:
         """Area of all triangles."""
-        ways = self.corners[:, 1:] - self.corners[:, :1]
-        return float(np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1).sum() / 2)
+        return float(self.areas.sum())
 
 
 def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> tuple[Soup, Soup]:

@@ -9,12 +9,11 @@ import numba
 import numpy as np
 
 from stages.exemplars.symmetry.cells import cell_index, cell_of
-from stages.exemplars.symmetry.matching import eroded, symmetric_cells
 from stages.exemplars.symmetry.places import items_in
 from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["DockingSite", "docking_sites", "slippable_motions"]
+__all__ = ["DockingSite", "docking_sites", "regions_of", "slippable_motions"]
 
 SAME_SET = 0.02
 """Share of a docker by which another may reach beyond it and count as inside: borders of cells do not move with it."""
@@ -44,15 +43,14 @@ class DockingSite:
     slips: int
 
 
-def docking_sites(grid: SurfaceGrid, motion: FloatArray) -> list[DockingSite]:
-    """The elementary docking sites of `motion` (4, 4), in the order of their first cells.
+def docking_sites(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray) -> list[DockingSite]:
+    """The elementary docking sites of `motion` (4, 4), in the order of their first cells; `kept` and `kept_back` are
+    its `r_symmetric_cells`.
 
     Regions that are not r-symmetric, of the surface and of its image, depend on each other where the border of one is
     taken to the border of the other; what depends on each other is one pair of dockers. A pair that takes in all
     regions of both is no operation: it moves the whole surface.
     """
-    forth, back = symmetric_cells(grid, motion)
-    kept, kept_back = eroded(grid, forth), eroded(grid, back)
     regions, regions_back = _regions(~kept, grid.neighbours), _regions(~kept_back, grid.neighbours)
     count, count_back = int(regions.max(initial=-1)) + 1, int(regions_back.max(initial=-1)) + 1
     if not kept.any() or not count or not count_back:
@@ -82,6 +80,12 @@ def docking_sites(grid: SurfaceGrid, motion: FloatArray) -> list[DockingSite]:
             DockingSite(motion, primary, secondary, cells, _kind(primary, secondary), slippable_motions(grid, cells))
         )
     return sites
+
+
+def regions_of(grid: SurfaceGrid, chosen: BoolArray) -> list[IntArray]:
+    """The connected regions of `chosen` cells, bool (n,), int32 each and ascending, in the order of their first."""
+    regions = _regions(chosen, grid.neighbours)
+    return [each.astype(np.int32) for each in _members(regions, int(regions.max(initial=-1)) + 1)]
 
 
 def slippable_motions(grid: SurfaceGrid, cells: IntArray) -> int:

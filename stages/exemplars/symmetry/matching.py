@@ -11,7 +11,7 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert
 
-__all__ = ["eroded", "matched_items", "symmetric_cells"]
+__all__ = ["eroded", "matched_items", "r_symmetric_cells", "symmetric_cells"]
 
 TINY = 1e-9
 
@@ -30,6 +30,12 @@ def symmetric_cells(grid: SurfaceGrid, motion: FloatArray) -> tuple[BoolArray, B
     _mark(forth, grid.points[~back_found], back, grid.origin, grid.size, grid.keys, grid.tolerance)
     _mark(backward, grid.points[~forth_found], motion, grid.origin, grid.size, grid.keys, grid.tolerance)
     return forth, backward
+
+
+def r_symmetric_cells(grid: SurfaceGrid, motion: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """The cells that are r-symmetric under a rigid motion (4, 4), and those that are under its inverse, bool (n,)."""
+    forth, back = symmetric_cells(grid, motion)
+    return eroded(grid, forth), eroded(grid, back)
 
 
 def matched_items(grid: SurfaceGrid, motion: FloatArray, items: np.ndarray | None = None) -> BoolArray:

@@ -6,10 +6,10 @@ import numpy as np
 
 from stages.exemplars.symmetry.cells import cell_keys
 from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["items_in", "items_moved_into", "keys_at"]
+__all__ = ["among", "items_in", "items_moved_into", "keys_at"]
 
 
 def items_in(grid: SurfaceGrid, cells: np.ndarray) -> np.ndarray:
@@ -24,6 +24,14 @@ def keys_at(grid: SurfaceGrid, pose: FloatArray, points: FloatArray) -> np.ndarr
     return cell_keys(np.floor((transform_points(pose, points) - grid.origin) / grid.size).astype(np.int64))
 
 
+def among(keys: np.ndarray, asked: np.ndarray) -> BoolArray:
+    """Which of the keys `asked`, (n,), are among ascending `keys`, bool (n,)."""
+    if not len(keys):
+        return np.zeros(len(asked), dtype=bool)
+    found: BoolArray = keys[np.minimum(np.searchsorted(keys, asked), len(keys) - 1)] == asked
+    return found
+
+
 def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np.ndarray:
     """The items that lie in ascending `cells` moved by `pose` (4, 4), int64 (m,) ascending.
 
@@ -34,5 +42,5 @@ def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np
     home = (middles - grid.origin) / grid.size
     low, high = np.floor(home.min(axis=0)) - 1, np.floor(home.max(axis=0)) + 1
     items = items_in(grid, np.flatnonzero(((grid.cells >= low) & (grid.cells <= high)).all(axis=1)))
-    found: np.ndarray = items[np.isin(keys_at(grid, invert(pose), grid.points[items]), grid.keys[cells])]
+    found: np.ndarray = items[among(grid.keys[cells], keys_at(grid, invert(pose), grid.points[items]))]
     return found

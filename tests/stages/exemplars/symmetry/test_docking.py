@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from stages.exemplars.symmetry.docking import docking_sites, slippable_motions
-from stages.exemplars.symmetry.matching import eroded, matched_items, symmetric_cells
+from stages.exemplars.symmetry.docking import DockingSite, docking_sites, slippable_motions
+from stages.exemplars.symmetry.matching import eroded, matched_items, r_symmetric_cells, symmetric_cells
 from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from tests.stages.exemplars.symmetry.planted import blocks, box, moved, screw, spiral_stair, wall
@@ -18,6 +18,10 @@ def shift(*by: float) -> np.ndarray:
     pose = np.eye(4)
     pose[:3, 3] = by
     return pose
+
+
+def sites_of(grid: SurfaceGrid, motion: np.ndarray) -> list[DockingSite]:
+    return docking_sites(grid, motion, *r_symmetric_cells(grid, motion))
 
 
 def has_motion(motions: np.ndarray, wanted: np.ndarray) -> bool:
@@ -76,7 +80,7 @@ class TestSymmetricCells:
     def test_a_turn_that_maps_a_box_onto_itself_leaves_nothing(self) -> None:
         grid = surface_grid(box((-1, -1, -1), (1, 1, 1)), 0.1)
         assert matched_items(grid, screw(np.pi / 2, 0.0)).all()
-        assert docking_sites(grid, screw(np.pi / 2, 0.0)) == []
+        assert sites_of(grid, screw(np.pi / 2, 0.0)) == []
 
 
 class TestMotions:
@@ -98,7 +102,7 @@ class TestDockingSites:
     @pytest.mark.parametrize("windows", [3, 4, 6])
     def test_a_wall_can_gain_and_lose_a_window(self, windows: int) -> None:
         grid = surface_grid(wall(windows), SHARE)
-        sites = docking_sites(grid, shift(1, 0, 0))
+        sites = sites_of(grid, shift(1, 0, 0))
         assert [each.kind for each in sites] == ["delete", "insert"]
         delete, insert = sites
         for more, less in ((delete.secondary, delete.primary), (insert.primary, insert.secondary)):
@@ -107,7 +111,7 @@ class TestDockingSites:
             assert np.isin(each.border, np.r_[each.primary]).sum() == 0
 
     def test_dockers_under_one_motion_are_disjoint(self, four_windows: SurfaceGrid) -> None:
-        sites = docking_sites(four_windows, shift(1, 0, 0))
+        sites = sites_of(four_windows, shift(1, 0, 0))
         for one, other in itertools.combinations(sites, 2):
             assert not np.intersect1d(one.primary, other.primary).size
             assert not np.intersect1d(one.secondary, other.secondary).size
@@ -118,7 +122,7 @@ class TestDockingSites:
             [0, 1, 2, 5, 6, 7, 9, 10, 11, 14, 15, 16], [0, 1], [0, 1, 3, 4],
             lambda x, _, z: z < 1 or (x in (1.5, 5.5)) or (x in (10.5, 14.5)) or (z > 3 and 10 < x < 15),
         )  # fmt: skip
-        sites = docking_sites(surface_grid(solid, 0.02), shift(9, 0, 0))
+        sites = sites_of(surface_grid(solid, 0.02), shift(9, 0, 0))
         prongs = [each for each in sites if each.kind == "replace"]
         assert len(prongs) == 1
         grid = surface_grid(solid, 0.02)

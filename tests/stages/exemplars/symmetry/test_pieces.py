@@ -8,7 +8,7 @@ from stages.exemplars.segment import pick, segment
 from stages.exemplars.symmetry.carve import Soup, carve
 from stages.exemplars.symmetry.pieces import repeated_pieces
 from stages.exemplars.symmetry.surface import surface_grid
-from tests.stages.exemplars.symmetry.planted import box, screw, spiral_stair, wall
+from tests.stages.exemplars.symmetry.planted import blocks, box, screw, spiral_stair, wall
 
 
 def mesh(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -53,6 +53,16 @@ class TestRepeatedPieces:
         assert sorted(len(each.poses) for each in pieces) == [1, 1, 5]
         bays = next(each for each in pieces if len(each.poses) == 5)
         assert np.allclose(np.sort([pose[0, 3] for pose in bays.poses]) - min(p[0, 3] for p in bays.poses), range(5))
+
+    def test_a_row_is_cut_although_a_rail_runs_along_it_from_end_to_end(self) -> None:
+        """No docking site parts the model, for the rail goes around it, as a crane's ladder does."""
+        rail = blocks(
+            [0.1, 0.2, 4.0, 4.1], [-0.5, -0.4, 0.0], [1.8, 1.9], lambda x, y, _: y < -0.4 or not 0.2 < x < 4.0
+        )  # fmt: skip
+        pieces = repeated_pieces(*mesh(np.concatenate([wall(3), rail])))
+        assert max(len(each.poses) for each in pieces) >= 3
+        bays = max(pieces, key=lambda each: len(each.poses))
+        assert bays.triangles.area == pytest.approx(2 * (2.4 - 0.5) + 0.3 * (2 * 0.5 + 2 * 1.0) + 2 * 0.3, rel=0.15)
 
     def test_two_grids_that_cross_make_nine_pieces(self) -> None:
         """Symmetry figure 7a: the corners once, the borders in one direction, the middle in both."""
