@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.places import among, items_in, items_moved_into, keys_at
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
-from stages.shape.geometry.pose import invert, transform_points
+from stages.shape.geometry.pose import invert, rotation_angle, transform_points
 
 __all__ = ["PART", "Repetition", "repetitions"]
 
@@ -36,6 +37,8 @@ SLIPPERY = 3
 """A site that slips in so many ways lies on a plane or a sphere, where a docker could stand anywhere."""
 STRAIGHT = 1e-4
 """Least eigenvalue of the normals of a region, as a share of the largest, that is no prism: a bar has no copies."""
+TURNED = 1e-2
+"""A pose that turns by more radians is no shift."""
 WHOLE = 0.9
 """A copy of which more than this share of a sample is found counts before all of it is looked at."""
 ALIKE = 0.5
@@ -85,7 +88,7 @@ def repetitions(grid: SurfaceGrid) -> list[Repetition]:
     for cells, ahead in (seeds[each] for each in order.tolist() if promise[each] > 0):
         if not any(_known(grid, cells, ahead, each) for each in found):
             repetition = _repetition(grid, cells, ahead, both)
-            found += [repetition] if repetition is not None else []
+            found += [repetition] if repetition is not None and _goes_on(grid, repetition) else []
     return sorted(found, key=lambda each: -each.saves)
 
 
@@ -133,6 +136,25 @@ def _promise(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None, motio
         if matched_items(grid, pose, items).mean() > WHOLE and not _overlaps(grid, keys, points, pose, poses):
             poses.append(pose)
     return float((len(poses) - 1) * grid.area[cells].sum())
+
+
+def _goes_on(grid: SurfaceGrid, repetition: Repetition) -> bool:
+    """Whether a copy is shifted and not turned, or a row goes on for two steps: the corners of a box, which are equal
+    under turns alone, are no copies that something could be put between."""
+    others = np.array(repetition.poses[1:])
+    if (rotation_angle(others) < TURNED).any():
+        return True
+    if repetition.ahead is None:
+        return False
+    ahead, back = repetition.ahead, invert(repetition.ahead)
+    middle = grid.points[items_in(grid, repetition.cells)].mean(axis=0)
+    there = others[:, :3, :3] @ middle + others[:, :3, 3]
+
+    def stands(pose: FloatArray) -> bool:
+        return bool((np.linalg.norm(there - transform_points(pose, middle), axis=1) < grid.size).any())
+
+    steps = [stands(each) for each in (back @ back, back, ahead, ahead @ ahead)]
+    return any(one and two for one, two in pairwise(steps))
 
 
 def _sample(grid: SurfaceGrid, items: np.ndarray) -> np.ndarray:
