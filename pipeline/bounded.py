@@ -59,19 +59,32 @@ def in_child(
     os.close(writer)
     try:
         reply = _reply(reader, time.monotonic() + seconds)
+        if reply is not None and not _is_whole(reply):
+            _let_end(child)
     finally:
         os.close(reader)
         os.kill(child, signal.SIGKILL)  # one that has ended waits for us all the same, as nobody else
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if reply is None:
         raise Escaped(f"it did not end within {seconds:g} s")
-    kind, size, content = reply[:1], int.from_bytes(reply[1:9], "little"), reply[9:]
-    if len(reply) < 9 or size != len(content):
+    if not _is_whole(reply):
         raise Escaped(_end(status, cpu_seconds, memory_mb))
+    kind, content = reply[:1], reply[9:]
     if kind == _ANSWER:
         return content
     message = str(json.loads(content))
     raise refusal(message) if kind == _REFUSAL else Escaped(message)
+
+
+def _is_whole(reply: bytes) -> bool:
+    return len(reply) >= 9 and int.from_bytes(reply[1:9], "little") == len(reply) - 9
+
+
+def _let_end(child: int) -> None:
+    """Wait a moment for a child that said too little, for the way in which it ends tells why; it may be killed then."""
+    until = time.monotonic() + 1.0
+    while time.monotonic() < until and os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None:
+        time.sleep(0.001)
 
 
 def _reply(reader: int, deadline: float) -> bytes | None:

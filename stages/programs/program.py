@@ -155,4 +155,4 @@ def program_module(name: str) -> str:
         return name
     close = nearest(name, names)
     hint = f"did you mean {close}?" if close else f"programs are {', '.join(names) or 'none'}"
-    raise ConfigError(f"there is no program {name[:200]!r}; {hint}")
+    raise ConfigError(f"there is no program {name[:1000]!r}; {hint}")

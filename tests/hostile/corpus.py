@@ -18,7 +18,7 @@ from tests.hostile.mutate import mutate
 
 __all__ = ["LIMITS", "Outcome", "outcomes"]
 
-LIMITS = ReadLimits(cpu_seconds=20, memory_mb=1000)
+LIMITS = ReadLimits(cpu_seconds=60, memory_mb=1000)
 
 PYTHONS_OWN = (
     "Traceback", "Error:", "object at 0x", "not supported between", "unsupported operand", "has no attribute",
