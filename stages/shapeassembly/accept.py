@@ -45,7 +45,9 @@ def accepted_rows(task: Task, config: ShapeAssemblyConfig, refused: Counter[str]
         places[kind] += 1
         return {"key": f"{kind}-{places[kind] - 1:06d}", "kit": kind, "file": name, "method": method, **row}
 
-    for kind, name, text in _texts(task, config):
+    texts = list(_texts(task, config))
+    for place, (kind, name, text) in enumerate(texts):
+        task.progress(place, len(texts))
         try:
             row = accepted(kind, name, text, "executed")
         except (ProgramError, Rejected) as error:
