@@ -103,7 +103,7 @@ def smoothness(
     """How much changes from step to step on straight ways between random points (§7.2): Chamfer distance as a share of
     the diagonal of the bounding box, edit distance of programs; and the percent of points that gave no program, and are
     passed over. The first two are empty where no two points in a row gave programs."""
-    ends = rng.standard_normal((sequences, 2, model.latent)).astype(np.float32)
+    ends = model.points(2 * sequences, rng).reshape(sequences, 2, model.latent)
     shares = np.linspace(0, 1, steps, dtype=np.float32)[:, None]
     geometry, structure, none = [], [], 0
     for first, last in ends:

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from stages.shapeassembly.program import Program
-from stages.training.checkpoint import load_checkpoint
+from stages.training.checkpoint import CheckpointError, load_checkpoint
 from stages.training.program_vae.batches import Programs, batch_of
 from stages.training.program_vae.lines import node_lines
 from stages.training.program_vae.model import ProgramVae
@@ -51,16 +51,22 @@ class TrainedProgramVae:
             found += write_programs(self.module, points[start : start + AT_ONCE], reject=reject)
         return found
 
+    def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> Points:
+        """Random points, float32 (count, latent), of the Gaussian that the programs of train are spread as, which the
+        prior is not quite: from the prior come crude shapes. temperature: how far from its centre they spread."""
+        noise = temperature * rng.standard_normal((count, self.latent))
+        found: Points = (self.module.centre.numpy() + noise @ self.module.spread.numpy().T).astype(np.float32)
+        return found
+
     def sample(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> tuple[list[Program], int]:
-        """So many programs, and how many random points it took: those that are rejected count too. temperature: their
-        spread. Raises ValueError where nearly all are rejected."""
+        """So many programs of random `points`, and how many it took: those that are rejected count too. Raises
+        ValueError where nearly all are rejected."""
         kept: list[Program] = []
         drawn = 0
         while len(kept) < count:
             if drawn > 50 * (count + AT_ONCE):
                 raise ValueError(f"{len(kept)} of {drawn} random points gave a program; train the model longer")
-            points = temperature * rng.standard_normal((AT_ONCE, self.latent))
-            for each in self.decode(points.astype(np.float32), reject=True):
+            for each in self.decode(self.points(AT_ONCE, rng, temperature), reject=True):
                 if len(kept) < count:
                     drawn += 1
                     kept += [] if each is None else [each]
@@ -77,5 +83,7 @@ def load_program_vae(path: Path, expected: Mapping[str, Any] | None = None) -> T
     module = ProgramVae(
         ProgramVaeEntry.model_validate({"name": "trained", "kind": "program_vae", **header["settings"]})
     )
+    if module.state_dict().keys() != tensors.keys():
+        raise CheckpointError(f"{path} has other tensors than this version of Shapemill: train it again (make train)")
     module.load_state_dict(tensors)
     return TrainedProgramVae(module.eval(), header)

@@ -101,9 +101,14 @@ class ProgramVaeLearner:
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
 
     def validate(self, noise: Generator) -> dict[str, float]:
-        """The same on val."""
+        """The same on val; and the module learns where the programs of train stand."""
         sums: dict[str, float] = {}
         device = next(self.module.parameters()).device
+        codes = []
+        for levels in batches(self.train, self.entry.batch, None):
+            mean, log_variance = self.module.encode([level.to(device) for level in levels])
+            codes.append(torch.stack([mean, log_variance.exp()]).detach().float().cpu().numpy())
+        self.module.stand_at(*np.concatenate(codes, axis=1))
         for levels in batches(self.val, self.entry.batch, None):
             found = self.losses([level.to(device) for level in levels], 0, noise)
             for name, value in found.items():

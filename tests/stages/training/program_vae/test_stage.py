@@ -45,6 +45,11 @@ def test_a_model_of_programs_is_trained_and_read_again(tmp_path: Path) -> None:
     trained = load_program_vae(out / "toy-models/tiny-furniture-0/weights.safetensors", {"kit": "furniture"})
     points = trained.encode([parse(path.read_text()) for path in EXAMPLES[:3]])
     assert points.shape == (3, 8)
+    train = [parse(each.text) for each in read_samples(next((out / ".work/toy/shapeassembly").glob("toy-train-*.tar")))]
+    codes, drawn = trained.encode(train), trained.points(20_000, np.random.default_rng(0))
+    assert np.allclose(drawn.mean(axis=0), codes.mean(axis=0), atol=0.05 * drawn.std())
+    noise = np.linalg.eigvalsh(np.cov(drawn.T) - np.cov(codes.T, bias=True))
+    assert noise.min() > -0.05 * drawn.var(), "they spread further than the means, by what encoding leaves open"
     again = [trained.decode(points, reject=False) for _ in range(2)]
     assert again[0] == again[1]
     assert np.isfinite(points).all()
