@@ -6,7 +6,6 @@ comes back is bytes, which the parent reads as it would read a file: nothing in 
 
 from __future__ import annotations
 
-import ctypes
 import faulthandler
 import fcntl
 import json
@@ -21,10 +20,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
+from pipeline.endings import die_with_parent
+
 __all__ = ["Escaped", "in_child"]
 
 PATIENCE = 10
-_PR_SET_PDEATHSIG = 1
+"""A child is given up after so many times its CPU seconds by the clock, where nobody says."""
 _PIPE = 1 << 20
 _ANSWER, _REFUSAL, _ESCAPE = b"a", b"r", b"e"
 
@@ -130,7 +131,7 @@ def _answer(
 
 def _bind(parent: int, cpu_seconds: int, memory_mb: int) -> None:
     """Set the bounds; print nothing, dump nothing, and die with the parent."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent()
     if os.getppid() != parent:
         os._exit(1)
     signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 
-from pipeline.endings import ends_in_order
+from pipeline.endings import die_with_parent, ends_in_order
 
 __all__ = ["serve"]
-
-_PR_SET_PDEATHSIG = 1
 
 _ENVIRONMENT = {
     # Deaths are counted by the mill, shard by shard: the scheduler's own count blames whatever a dead worker held.
@@ -47,9 +43,5 @@ def serve(workers: int, port: int) -> int:
 
 def _start(module: str, *arguments: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-m", module, *arguments], env={**os.environ, **_ENVIRONMENT}, preexec_fn=_die_with_parent
+        [sys.executable, "-m", module, *arguments], env={**os.environ, **_ENVIRONMENT}, preexec_fn=die_with_parent
     )
-
-
-def _die_with_parent() -> None:
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -1,16 +1,23 @@
-"""How a run ends when the machine wants it to: in order, as with Ctrl-C, so that no worker stays behind."""
+"""How processes end when the machine wants them to: runs in order, as with Ctrl-C, and children with their parent."""
 
 from __future__ import annotations
 
+import ctypes
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-__all__ = ["ends_in_order"]
+__all__ = ["die_with_parent", "ends_in_order"]
 
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+_PR_SET_PDEATHSIG = 1
+
+
+def die_with_parent() -> None:
+    """Let the kernel kill this process when its parent ends, however that ends; for children, as the first they do."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 @contextmanager

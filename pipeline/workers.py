@@ -7,7 +7,6 @@ its own. Each worker of a cluster has such a process, too (`pipeline/cluster.py`
 
 from __future__ import annotations
 
-import ctypes
 import faulthandler
 import os
 import signal
@@ -20,6 +19,7 @@ from typing import Any
 from joblib.externals.loky.backend.utils import kill_process_tree
 from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor, TerminatedWorkerError
 
+from pipeline.endings import die_with_parent
 from pipeline.task import Job, Report, make_shard
 
 __all__ = ["DIED", "Workers"]
@@ -51,8 +51,6 @@ _ENVIRONMENT = {
 }
 """What a worker is started with, whatever the shell says: one thread, and the same arithmetic on every machine."""
 
-_PR_SET_PDEATHSIG = 1
-
 # loky itself gives a worker that has grown by 300 MB a fresh process before its next job, and warns, as if one
 # were lost.
 warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given to the executor")
@@ -60,7 +58,7 @@ warnings.filterwarnings("ignore", message="A worker stopped while some jobs were
 
 def _start_worker(parent: int, output: Path) -> None:
     """Runs first in each worker: dies with its parent, leaves Ctrl-C to it, prints into a file of the dataset."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent()
     if os.getppid() != parent:
         os._exit(1)  # the parent died before it could be watched
     signal.signal(signal.SIGINT, signal.SIG_IGN)
