@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.findings import kit_warnings, pieces, refusals
+from stages.exemplars.findings import kit_warnings, pieces, refusals, some
 from stages.exemplars.fits import fitting_dockings
 from stages.exemplars.formats.scene import UniqueNames
 from stages.exemplars.grammar import observe_contacts, observe_grammar
@@ -147,7 +147,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         kinds=tuple(kinds),
         repairs=identified.repairs,
         aliases={each.name: words for each, words in zip(types, aliases, strict=True) if words},
-        refusals=tuple(refusals(kit, models, identified.empty, left_out, made.tolerance)),
+        refusals=tuple(refusals(kit, models, left_out, made.tolerance)),
         warnings=(*warnings, *kit_warnings(kit)),
     )
 
@@ -163,6 +163,11 @@ def _kept_parts(
     the warnings of the models and of what is left out. Raises ConfigError where nothing is kept of a model."""
     types = identified.types
     warnings = [f"{model.path.name}: {warning}" for model in models for warning in model.warnings]
+    for model in models:
+        left_out = [f"{part} ({why})" for owner, part, why in identified.left_out if owner is model]
+        if left_out:
+            parts = "1 part is" if len(left_out) == 1 else f"{len(left_out)} parts are"
+            warnings.append(f"{model.path.name}: {parts} left out of the model: {some(left_out)}")
     kept = [np.flatnonzero(~np.isin(each.types, hubs)) for each in assemblies]
     for model, each, keep in zip(models, assemblies, kept, strict=True):
         if not len(keep):

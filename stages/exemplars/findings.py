@@ -13,10 +13,9 @@ from stages.exemplars.model import STATED, Model
 from stages.exemplars.settings import LOOSEST
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.pose import pose_vectors, relative_poses
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 
-__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "stand_twice"]
+__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "some"]
 
 LETTERS = 52
 """Part types beyond this number have names in brackets for string tokens, not letters."""
@@ -58,15 +57,11 @@ def hubs(assembly: Assembly) -> list[int]:
 def refusals(
     kit: Kit,
     models: Sequence[Model],
-    empty: Sequence[tuple[Model, str]],
     left_out: Sequence[str],
     tolerance: float,
 ) -> Iterator[str]:
-    """Why a run does not start with `kit`, made of `models`; `empty` are parts without area, by model and name,
-    `left_out` the names of the hub types that are not in its graphs, and `tolerance` is what the kit's contact
-    tolerance is as a share of the median part's diagonal."""
-    for model, part in empty:
-        yield f"{model.path}: part {part!r} has no triangle with area; remove it from the model"
+    """Why a run does not start with `kit`, made of `models`; `left_out` are the names of the hub types not in its
+    graphs, and `tolerance` is what the kit's contact tolerance is as a share of the median part's diagonal."""
     for model, exemplar in zip(models, kit.exemplars, strict=True):
         assembly = exemplar.assembly
         if len(model.parts) < 2:
@@ -76,7 +71,7 @@ def refusals(
                 f"at least 2; {mend}split the model into one scene node a part in the modelling tool"
             )
         elif pieces(assembly).any():
-            without = f" without its hubs {_some(left_out)}" if left_out else ""
+            without = f" without its hubs {some(left_out)}" if left_out else ""
             yield f"{model.path}: the exemplar{without} falls into {_falls_apart(kit, exemplar, tolerance)}"
         elif len(assembly) < 2:
             yield f"{model.path}: only one part of it is connected or has area, an exemplar needs at least 2"
@@ -93,7 +88,6 @@ def refusals(
 def kit_warnings(kit: Kit) -> Iterator[str]:
     """What may disappoint in `kit`, though a run starts with it."""
     for exemplar in kit.exemplars:
-        yield from _twice_warning(kit, exemplar)
         yield from _hub_warning(exemplar)
     if np.bincount(kit.label_of[np.concatenate([each.assembly.types for each in kit.exemplars])]).max() < 2:
         yield (
@@ -119,36 +113,12 @@ def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int,
     return twins
 
 
-def stand_twice(kit: Kit, exemplar: Exemplar) -> list[str]:
-    """The parts of an exemplar that stand in the place of another of their type, each as "b in a"."""
-    assembly = exemplar.assembly
-    edges = assembly.edges[assembly.types[assembly.edges[:, 0]] == assembly.types[assembly.edges[:, 1]]]
-    moved = relative_poses(assembly.poses, edges)
-    twice: dict[str, str] = {}
-    for (first, second), pose in zip(edges.tolist(), moved, strict=True):
-        part_type = kit.types[assembly.types[first]]
-        length = part_type.diagonal / 2
-        gaps = pose_vectors(part_type.symmetries, length) - pose_vectors(pose[None], length)
-        if np.linalg.norm(gaps, axis=1).min() <= kit.pose_tolerance:
-            twice.setdefault(exemplar.part_names[second], exemplar.part_names[first])
-    return [f"{part} in {other}" for part, other in twice.items()]
-
-
-def _twice_warning(kit: Kit, exemplar: Exemplar) -> Iterator[str]:
-    twice = stand_twice(kit, exemplar)
-    if twice:
-        yield (
-            f"{exemplar.name}: {_count(len(twice), 'part')} at the very place of another of its type ({_some(twice)}); "
-            "remove what stands twice, or variants repeat it"
-        )
-
-
 def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
     assembly = exemplar.assembly
     degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
     found = sorted(hubs(assembly), key=lambda part: (-degrees[part], part))
     if found:
-        named = _some([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
+        named = some([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
         yield (
             f"{exemplar.name}: {_count(len(found), 'part')} of {len(assembly)} with very many contacts: {named}; "
             "hardly another shape has the same around them, so variants may keep them as they are; split them in the "
@@ -160,14 +130,14 @@ def _falls_apart(kit: Kit, exemplar: Exemplar, tolerance: float) -> str:
     """The pieces of an exemplar, and of all mends those that help it."""
     piece = pieces(exemplar.assembly)
     sizes = np.bincount(piece).tolist()
-    alone = _some([exemplar.part_names[index] for index in np.flatnonzero(piece).tolist()])
+    alone = some([exemplar.part_names[index] for index in np.flatnonzero(piece).tolist()])
     way = _way_together(kit, exemplar, tolerance)
     mends = [f"set {way}" if way else "no contact tolerance joins them, so move the parts together in the model"]
     if sizes[0] > 1:
         mends.append("keep the largest piece alone with `disconnected: largest`")
     if len(sizes) > 1 and sizes[1] > 1:
         mends.append("export each piece as a model of its own and name them all as shapes of one kit")
-    listed = _some([str(size) for size in sizes], 8)
+    listed = some([str(size) for size in sizes], 8)
     return f"{len(sizes)} pieces of {listed} parts (apart: {alone}); {', or '.join(mends)}"
 
 
@@ -189,7 +159,7 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
-def _some(words: Sequence[str], count: int = NAMED) -> str:
+def some(words: Sequence[str], count: int = NAMED) -> str:
     """The first words of a list, and how many more there are."""
     more = f" and {len(words) - count} more" if len(words) > count else ""
     return ", ".join(words[:count]) + more

@@ -6,9 +6,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.errors import ConfigError
 from stages.exemplars.congruence import ComparableMesh, comparable_mesh, congruences
@@ -17,9 +18,10 @@ from stages.exemplars.model import Model, RawPart
 from stages.exemplars.repair import repair_mesh
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, PartType
 
-__all__ = ["Identified", "identify_parts"]
+__all__ = ["Identified", "identify_parts", "standing_twice"]
 
 
 @dataclass(frozen=True)
@@ -27,15 +29,16 @@ class Identified:
     """The parts of the models by type.
 
     assemblies: one for each model, without edges yet; part_names: the names of their parts; repairs: how often a
-    mesh was changed in what way; empty: model and name of each part that has no triangle with area, left out;
-    aliases: for each type the models' other words for its parts, in order of appearance.
+    mesh was changed in what way; left_out: model, name and reason of each part that is not among them, for it has no
+    triangle with area or stands where another of its type does; aliases: for each type the models' other words for
+    its parts, in order of appearance.
     """
 
     types: tuple[PartType, ...]
     assemblies: tuple[Assembly, ...]
     part_names: tuple[tuple[str, ...], ...]
     repairs: Mapping[str, int]
-    empty: tuple[tuple[Model, str], ...]
+    left_out: tuple[tuple[Model, str, str], ...]
     aliases: tuple[tuple[str, ...], ...]
 
     @property
@@ -58,14 +61,15 @@ class _Type:
 def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
     """Repair the parts of `models` and give each its type, in the order in which types appear.
 
-    Part coordinates have their origin in the part's centroid, so a relative pose's translation is the way from
-    centroid to centroid. Raises ConfigError for a model in which no part has any area.
+    Of parts of one type at one place, as modelling tools leave them behind, the first stays. Part
+    coordinates have their origin in the part's centroid, so a relative pose's translation is the way from centroid to
+    centroid. Raises ConfigError for a model in which no part has any area.
     """
     repairs: Counter[str] = Counter()
     types: list[_Type] = []
     assemblies: list[Assembly] = []
     part_names: list[tuple[str, ...]] = []
-    empty: list[tuple[Model, str]] = []
+    left_out: list[tuple[Model, str, str]] = []
     for model in models:
         seen: dict[tuple[str, str | None], tuple[int, FloatArray] | None] = {}
         names: list[str] = []
@@ -78,7 +82,7 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
                 seen[key] = _identify(part, label, config, types, repairs)
             found = seen[key]
             if found is None:
-                empty.append((model, part.name))
+                left_out.append((model, part.name, "it has no triangle with area"))
                 continue
             if model.segmentation != "components":  # whose names are only numbers
                 types[found[0]].words[_word(part)] = None
@@ -92,9 +96,35 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
         part_names.append(tuple(names))
     part_types = tuple(each.part for each in types)
     aliases = tuple(tuple(each.words)[1:] for each in types)
-    return Identified(
-        part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), tuple(empty), aliases
-    )
+    found = Identified(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases)
+    for index, model in enumerate(models):
+        other = standing_twice(part_types, assemblies[index], config.pose_tolerance * found.median_diagonal)
+        names = part_names[index]
+        left_out += [
+            (model, names[part], f"it stands at the very place of {names[first]}") for part, first in other.items()
+        ]
+        keep = np.setdiff1d(np.arange(len(names)), list(other))
+        assemblies[index], part_names[index] = assemblies[index].select(keep), tuple(names[part] for part in keep)
+    return replace(found, assemblies=tuple(assemblies), part_names=tuple(part_names), left_out=tuple(left_out))
+
+
+def standing_twice(types: Sequence[PartType], assembly: Assembly, tolerance: float) -> dict[int, int]:
+    """The parts at the very place of an earlier one of their type, each with that one.
+
+    tolerance: how far a pose, up to the symmetries of its type, may be from another's to be the same, in units of the
+    models.
+    """
+    twice: dict[int, int] = {}
+    for index in np.unique(assembly.types).tolist():
+        parts, part_type = np.flatnonzero(assembly.types == index), types[index]
+        poses, length = assembly.poses[parts], part_type.diagonal / 2
+        near = cKDTree(poses[:, :3, 3]).query_pairs(tolerance, output_type="ndarray")
+        symmetries = pose_vectors(part_type.symmetries, length)
+        for first, second in near[np.lexsort((near[:, 1], near[:, 0]))].tolist():
+            moved = pose_vectors(invert(poses[first])[None] @ poses[second][None], length)
+            if parts[first] not in twice and np.linalg.norm(symmetries - moved, axis=1).min() <= tolerance:
+                twice.setdefault(int(parts[second]), int(parts[first]))
+    return twice
 
 
 def _identify(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stages.exemplars.findings import SMALL, hubs, stand_twice
+from stages.exemplars.findings import SMALL, hubs
 from stages.shape.kit import Kit
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
@@ -14,9 +14,6 @@ __all__ = ["another_model", "what_keeps"]
 
 REGULAR = 0.01
 """Share of tries that give an exemplar again, or a piece of one, from which on a kit is regular."""
-
-DOUBLED = 0.1
-"""Share of parts that stand in the place of another from which on nothing else can be judged."""
 
 
 def another_model(kit: Kit) -> str:
@@ -36,10 +33,6 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
         return f"every part is its own type; bring {another}, or name types by meaning (`types: meaning`)"
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
-    twice = sum(len(stand_twice(kit, each)) for each in kit.exemplars)
-    if twice > DOUBLED * counts.sum():
-        stand = "1 part stands" if twice == 1 else f"{twice} parts stand"
-        return f"{stand} at the very place of another of the same type; remove from the model what stands twice"
     pinned = _hub(kit)
     if pinned:
         return f"{pinned}; split it into several parts in the model, or bring {another}"

@@ -113,7 +113,7 @@ class TestWhatARunRefuses:
         found = seen(capsys, write_obj(tmp_path / "flat.obj", {"a": box(), "line": flat, "b": box(at=(1, 0, 0))}))
         assert [part["name"] for part in found["parts"]] == ["a", "b"]
         assert found["contacts"] == [[0, 1]]
-        assert "'line' has no triangle with area" in found["warnings"][0]
+        assert "line (it has no triangle with area)" in found["warnings"][0]
 
     def test_nothing_that_repeats_is_pointed_out(self, tmp_path: Path, capsys: Any) -> None:
         found = seen(capsys, write_obj(tmp_path / "ab.obj", {"a": box(), "b": box((1, 1, 2), (1, 0, 0))}))

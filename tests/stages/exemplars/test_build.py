@@ -137,11 +137,6 @@ class TestRefusals:
         assert "slabs.glb: shares no part type" in message
         build_kit(block_config(), [cubes, slabs, model({"a": (SLAB, (0, 0, 0)), "b": (CUBE, (1, 0, 0))}, "both")])
 
-    def test_a_part_without_area_is_refused_by_name(self) -> None:
-        flat = CUBE[0], np.array([[0, 1, 1], [2, 2, 2]], dtype=np.int32)
-        message = refusal(model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "ghost": (flat, (2, 0, 0))}))
-        assert "'ghost' has no triangle with area" in message
-
     def test_a_model_of_nothing_but_triangles_without_area_is_refused(self) -> None:
         line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]]), np.array([[0, 1, 2]], dtype=np.int32)
         assert "no part has a triangle with area" in refusal(model({"a": (line, (0, 0, 0)), "b": (line, (1, 0, 0))}))
@@ -152,15 +147,33 @@ class TestRefusals:
         assert len(seen.kit.types[0].symmetries) == 24
 
 
-class TestWarnings:
-    def test_a_part_in_the_place_of_another_is_named(self) -> None:
+class TestLeftOut:
+    def test_parts_in_the_place_of_another_are_left_out_and_named(self) -> None:
         quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
-        twice = [*ring().parts, raw_part("again", CUBE, placed(1, 0, 0, quarter))]
-        made = Model(Path("twice.glb"), tuple(twice), "nodes", "", ())
+        again = [raw_part(name, CUBE, placed(1, 0, 0, quarter)) for name in ("again", "and again")]
+        made = Model(Path("thrice.glb"), (again[0], *ring().parts, again[1]), "nodes", "", ())
         kit, report = build_kit(block_config(), [made])
-        assert len(kit.exemplars[0].assembly) == 5
-        assert [warning for warning in report.warnings if "again in cube.1" in warning]
+        assert kit.exemplars[0].part_names == ("again", "cube.0", "cube.2", "cube.3")
+        assert len(kit.exemplars[0].assembly.edges) == len(block_kit(ring()).exemplars[0].assembly.edges)
+        (warning,) = (each for each in report.warnings if "left out" in each)
+        assert "thrice.glb: 2 parts are left out of the model: " in warning
+        assert "cube.1 (it stands at the very place of again), and again (it stands at the very" in warning
 
+    def test_parts_that_only_stand_inside_each_other_stay(self) -> None:
+        eighth = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
+        parts = (*ring().parts, raw_part("turned", CUBE, placed(1, 0, 0, eighth)))
+        seen = observe_models(block_config(), [Model(Path("turned.glb"), parts, "nodes", "", ())])
+        assert len(seen.kit.exemplars[0].assembly) == len(ring().parts) + 1
+
+    def test_a_part_without_area_is_left_out_and_named(self) -> None:
+        flat = CUBE[0], np.array([[0, 1, 1], [2, 2, 2]], dtype=np.int32)
+        parts = model({"a": (CUBE, (0, 0, 0)), "ghost": (flat, (2, 0, 0)), "b": (CUBE, (1, 0, 0))})
+        kit, report = build_kit(block_config(), [parts])
+        assert kit.exemplars[0].part_names == ("a", "b")
+        assert [each for each in report.warnings if "1 part is left out of the model: ghost (it has no tri" in each]
+
+
+class TestWarnings:
     def test_a_kit_in_which_nothing_repeats_says_that_nothing_can_be_exchanged(self) -> None:
         _, report = build_kit(block_config(), [model({"a": (CUBE, (0, 0, 0)), "b": (SLAB, (1, 0, 0))})])
         assert any("little or nothing can be exchanged" in warning for warning in report.warnings)

@@ -31,15 +31,6 @@ def test_where_every_part_is_its_own_type_the_key_that_is_advised_changes_that(t
     assert "own type" not in what_keeps(row(advised), {}, 100)
 
 
-def test_what_stands_twice_is_named_before_anything_else_is_advised() -> None:
-    """Doubled parts touch what no other part may touch; without them there are variants."""
-    said = what_keeps(kit_of(CHAIN, [[*chain(4), *chain(4)]]), {}, 100)
-    assert (
-        said == "6 parts stand at the very place of another of the same type; remove from the model what stands twice"
-    )
-    assert "twice" not in what_keeps(kit_of(CHAIN, [chain(4)]), {}, 100)
-
-
 def test_of_small_shapes_more_are_asked_for_and_parts_that_mean_the_same() -> None:
     said = what_keeps(kit_of(CHAIN, [chain(3), chain(5)]), {}, 100)
     assert said.startswith("of 7 parts hardly any can be exchanged; bring more models of the same parts")
