@@ -46,7 +46,7 @@ _NATIVE = {
 }
 """Module to import, and the name under which its version is known."""
 
-_BACKENDS = ("raycast", "egl")
+_BACKENDS = ("raster", "egl")
 """What `sketches.backend` may name: the default, which must work, and what a config may ask for."""
 
 # pyrender looks for NumPy names that are gone; the stages give them back before they import it.
@@ -146,7 +146,7 @@ def _draw(backend: str) -> Finding:
     if code == 0:
         return Finding(f"draw: {backend}", "ok", f"a triangle in {time.perf_counter() - start:.1f} s by {said}")
     if backend == _BACKENDS[0]:
-        return Finding(f"draw: {backend}", "FAILED", said, _mend(said, "open3d"))
+        return Finding(f"draw: {backend}", "FAILED", said, _mend(said, "numba"))
     mend = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri; configs that ask for this backend do not start"
     return Finding(f"draw: {backend}", "warning", said, mend)
 

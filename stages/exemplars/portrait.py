@@ -25,7 +25,7 @@ def kit_sheet(kit: Kit) -> bytes:
     """A PNG of the kit: its exemplars large, and below them one picture for each part type, the commonest first, with
     its name, how often it stands in the exemplars and how many rigid motions map it onto itself.
 
-    Drawn by ray casting, which gives the same bytes on every machine.
+    Drawn by our own rasteriser, which gives the same bytes on every machine.
     """
     used = np.concatenate([each.assembly.types for each in kit.exemplars])
     counts = np.bincount(used, minlength=len(kit.types))

@@ -24,7 +24,7 @@ COLUMNS, WIDE = 8, 15
 
 
 def shape_picture(program: Program, values: Values) -> ByteArray:
-    """A portrait of the shape at `values`, uint8 (CELL, CELL, 3), by ray casting: the same bytes on every machine."""
+    """A portrait of the shape at `values`, uint8 (CELL, CELL, 3), the same bytes on every machine."""
     camera = Camera(azimuth=AZIMUTH, elevation=program.elevation)
     return portrait(scene_of(shape_of(program, values)), camera, (CELL, CELL))
 

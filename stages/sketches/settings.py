@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pipeline.config import StrictModel
 from stages.shape.views.buffers import Backend
@@ -121,11 +121,18 @@ class SketchesConfig(StrictModel):
     strokes: StrokeOptions = Field(StrokeOptions(), description="what is drawn, and how heavily")
     augment: Augmentation = Field(Augmentation(), description="chances of changes after drawing")
     backend: Backend = Field(
-        "raycast",
-        description="what finds the visible surfaces, in sketches and preview; raycast: Embree, at the version that "
-        "set-up installs on every machine; egl: OpenGL, in a third of the time, always by Mesa's llvmpipe, at the "
-        "system's version. Their pictures differ in a few pixels",
+        "raster",
+        description="what finds the visible surfaces, in sketches and preview; raster: our own rasteriser, the "
+        "same everywhere; egl: OpenGL, always by Mesa's llvmpipe, at the system's version. Their pictures differ in a "
+        "few pixels",
     )
+
+    @field_validator("backend", mode="before")
+    @classmethod
+    def _casts_no_rays(cls, backend: object) -> object:
+        if backend == "raycast":
+            raise ValueError("raycast draws no more: write raster, or leave this key out")
+        return backend
 
     @model_validator(mode="after")
     def _names_differ(self) -> SketchesConfig:

@@ -28,7 +28,7 @@ COLUMNS, SIDES = 6, 40
 def bench() -> Iterator[Measure]:
     """Drawings of 224 x 224 with 2 x 2 supersampling, PNG included, by each backend; then the buffers alone."""
     views = [Camera(azimuth, elevation) for azimuth, elevation in ((-40.0, 25.0), (35.0, 15.0), (25.0, 55.0))]
-    backends: list[Backend] = ["egl", "raycast"] if probe("egl") is None else ["raycast"]
+    backends: list[Backend] = ["egl", "raster"] if probe("egl") is None else ["raster"]
     triangles = int(_colonnade().triangle_first[-1])
     note = f"{SIZE}x{SIZE}, {SUPERSAMPLE}x{SUPERSAMPLE}, {triangles:,} triangles, {len(_colonnade())} parts"
     for backend in backends:

@@ -76,7 +76,7 @@ def test_doctor_finds_a_library_that_does_not_load_and_names_the_package(tmp_pat
     assert lines[at + 1] == "mend: apt-get install libgl1"
     assert "igraph FAILED killed by signal 6" in lines
     assert any(line.startswith("numpy ok") for line in lines)
-    assert any(line.startswith("draw: raycast ok") for line in lines)
+    assert any(line.startswith("draw: raster ok") for line in lines)
     assert lines[-1] == "2 of these must be mended"
 
 

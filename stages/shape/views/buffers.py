@@ -15,8 +15,8 @@ from stages.shape.views.scene import Scene
 
 __all__ = ["Backend", "Buffers", "Visible", "drawn_by", "render_buffers", "visible_triangles"]
 
-Backend = Literal["raycast", "egl"]
-"""`raycast`: Embree, which comes with Open3D; `egl`: OpenGL on EGL, rasterised by Mesa's llvmpipe."""
+Backend = Literal["raster", "egl"]
+"""`raster`: our own, whole numbers in compiled code; `egl`: OpenGL on EGL, rasterised by Mesa's llvmpipe."""
 
 RENDERS_A_CONTEXT = 20_000
 """A context is given back and made anew after so many renders: drivers have been seen to go blank or to grow."""
@@ -118,10 +118,10 @@ def _renderer(backend: Backend) -> _Renderer:
 
 
 def _new_renderer(backend: Backend) -> _Renderer:
-    if backend == "raycast":
-        from stages.shape.views.raycast import RaycastRenderer
+    if backend == "raster":
+        from stages.shape.views.raster import RasterRenderer
 
-        return RaycastRenderer()
+        return RasterRenderer()
     from stages.shape.views.opengl import OpenGLRenderer
 
     try:

@@ -33,7 +33,7 @@ def portrait(
     camera: Camera,
     size: tuple[int, int],
     part_colors: ByteArray | None = None,
-    backend: Backend = "raycast",
+    backend: Backend = "raster",
 ) -> ByteArray:
     """A shaded picture of a scene, uint8 (height, width, 3) for `size` (width, height).
 

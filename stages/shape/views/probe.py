@@ -1,4 +1,4 @@
-"""Does a backend draw here? `python -m stages.shape.views.probe raycast|egl` renders and checks one triangle."""
+"""Does a backend draw here? `python -m stages.shape.views.probe raster|egl` renders and checks one triangle."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ SECONDS = 120.0
 def check_backend(backend: Backend, asked: str) -> None:
     """Raises ConfigError, with the mend, where `backend` cannot draw on this machine; `asked` names the config's key.
 
-    Ray casting needs nothing but what is installed for every other use of Open3D, so it is not tried.
+    Our own rasteriser needs nothing but numba, so it is not tried.
     """
-    wrong = None if backend == "raycast" else probe_in_subprocess(backend)
+    wrong = None if backend == "raster" else probe_in_subprocess(backend)
     if wrong is not None:
         raise ConfigError(
             f"{asked}: {backend} cannot draw on this machine: {wrong}; `make doctor` says what is missing, and "
-            "raycast draws everywhere, with a few other pixels"
+            "raster draws everywhere, with a few other pixels"
         )
 
 

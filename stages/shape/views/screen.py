@@ -16,20 +16,20 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.camera import View
 from stages.shape.views.scene import Scene
 
-__all__ = ["clip_at", "eye_depth", "screen_normals", "screen_triangles", "surface_buffers"]
+__all__ = ["clip_at", "eye_depth", "project_triangles", "screen_normals", "screen_triangles", "surface_buffers"]
 
 
 def screen_triangles(scene: Scene, view: View, width: int, height: int) -> FloatArray:
     """The corners of all triangles on the screen, float64 (t, 3, 3)."""
+    return project_triangles(scene, view, view.eye @ scene.placed, width, height)
+
+
+def project_triangles(scene: Scene, view: View, moves: FloatArray, width: int, height: int) -> FloatArray:
+    """The corners of all triangles on the screen, float64 (t, 3, 3), where `moves`, float64 (n, 4, 4), takes the mesh
+    coordinates of each part to eye space."""
+    parts, faces = scene.triangle_part, scene.triangle_face
     screen: FloatArray = _project(
-        scene.meshes.vertices,
-        scene.meshes.faces,
-        scene.triangle_part,
-        scene.triangle_face,
-        view.eye @ scene.placed,
-        view.projection,
-        width,
-        height,
+        scene.meshes.vertices, scene.meshes.faces, parts, faces, moves, view.projection, width, height
     )
     return screen
 

@@ -69,7 +69,7 @@ class Sketch:
 def sketch(view: str, up: str = "y", chances: Augmentation | None = None) -> Sketch:
     shape, rng = lopsided(up), np.random.default_rng(3)
     camera = jittered_camera(VIEWS[view], rng)
-    drawing, seen = draw_sketch(scene_of(shape), camera, SIZE, 2, StrokeOptions(), "raycast")
+    drawing, seen = draw_sketch(scene_of(shape), camera, SIZE, 2, StrokeOptions(), "raster")
     drawing, flipped, thicker = augment(drawing, chances or Augmentation(), rng)
     described = json.loads(json.dumps(camera_fields(seen, SIZE, flipped)))
     return Sketch(drawing, described, glb_bytes(shape), thicker)

@@ -21,7 +21,7 @@ CORNER = Camera(30.0, 25.0)
 AGAIN = """
 import hashlib
 from tests.stages.sketches.test_draw import drawing
-print(hashlib.sha256(drawing("raycast").tobytes()).hexdigest())
+print(hashlib.sha256(drawing("raster").tobytes()).hexdigest())
 """
 
 
@@ -31,7 +31,7 @@ def drawing(backend):
 
 
 def test_a_drawing_is_dark_lines_on_white():
-    drawn = drawing("raycast")
+    drawn = drawing("raster")
     assert drawn.shape == (96, 96)
     assert drawn.dtype == np.uint8
     assert (drawn[:3] == 255).all()
@@ -41,24 +41,24 @@ def test_a_drawing_is_dark_lines_on_white():
 
 def test_another_process_draws_the_same_bytes():
     done = subprocess.run([sys.executable, "-c", AGAIN], capture_output=True, text=True, cwd=ROOT, check=True)
-    assert done.stdout.strip() == hashlib.sha256(drawing("raycast").tobytes()).hexdigest()
+    assert done.stdout.strip() == hashlib.sha256(drawing("raster").tobytes()).hexdigest()
 
 
 @pytest.mark.egl
 @pytest.mark.parametrize("shape", ["blocks", "a05_manor_house"])
 def test_both_backends_draw_the_same_picture(shape):
     if shape == "blocks":
-        one, two = drawing("egl"), drawing("raycast")
+        one, two = drawing("egl"), drawing("raster")
     else:
         scene = exemplar_scene(shape)
-        one, two = (draw_sketch(scene, CORNER, 224, 2, StrokeOptions(), backend)[0] for backend in ("egl", "raycast"))
+        one, two = (draw_sketch(scene, CORNER, 224, 2, StrokeOptions(), backend)[0] for backend in ("egl", "raster"))
     assert (np.abs(one.astype(int) - two) <= 16).mean() > 0.99
 
 
 def test_lines_are_about_as_wide_at_any_supersampling():
     scene = boxes_scene([(0, 0, 0)])
     ink = [
-        (255 - draw_sketch(scene, CORNER, 128, k, StrokeOptions(), "raycast")[0].astype(float)).sum() for k in (1, 2, 4)
+        (255 - draw_sketch(scene, CORNER, 128, k, StrokeOptions(), "raster")[0].astype(float)).sum() for k in (1, 2, 4)
     ]
     assert max(ink) / min(ink) < 1.03
 
@@ -67,9 +67,9 @@ def test_a_shape_without_a_line_is_an_error():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1]])
     scene = mesh_scene(vertices, np.array([[0, 1, 2]], dtype=np.int32), np.zeros((1, 3), dtype=np.uint8), "y")
     with pytest.raises(ShardFailed, match="blank picture"):
-        draw_sketch(scene, Camera(0.0, 0.0), 64, 2, StrokeOptions(), "raycast")
+        draw_sketch(scene, Camera(0.0, 0.0), 64, 2, StrokeOptions(), "raster")
     with pytest.raises(ShardFailed, match="blank drawing"):
-        draw_sketch(scene, Camera(0.0, 90.0), 64, 2, StrokeOptions(outline=0.0), "raycast")
+        draw_sketch(scene, Camera(0.0, 90.0), 64, 2, StrokeOptions(outline=0.0), "raster")
 
 
 def test_jitter_stays_in_its_bounds_and_depends_on_the_stream_alone():
@@ -99,6 +99,11 @@ def test_impossible_settings_are_refused():
         SketchesConfig(views=(SketchView(name="a"), SketchView(name="a")))
     with pytest.raises(ValueError, match="more than 1"):
         SketchesConfig.model_validate({"augment": {"dilate": 0.7, "erode": 0.7}})
+
+
+def test_the_backend_that_is_gone_is_refused_with_the_name_of_the_one_that_draws():
+    with pytest.raises(ValueError, match="raycast draws no more: write raster"):
+        SketchesConfig.model_validate({"backend": "raycast"})
 
 
 def test_views_can_be_a_list_as_yaml_has_it():

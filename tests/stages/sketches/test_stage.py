@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from stages.shape.kit import Assembly
 from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, write_sample
 from stages.shape.views.probe import probe_in_subprocess
+from stages.shape.views.raster import RasterRenderer
 from stages.sketches.image import png_array
 from stages.sketches.settings import Augmentation, SketchesConfig, SketchView
 from stages.sketches.stage import STAGE
@@ -80,7 +80,7 @@ STAGES = named_inputs(
 
 def toys(flat: bool = False, **keys: object) -> Config:
     """The config of a small dataset; `keys` are of the section `sketches`."""
-    sketches = SketchesConfig.model_validate({"size": 48, "backend": "raycast", **keys})
+    sketches = SketchesConfig.model_validate({"size": 48, "backend": "raster", **keys})
     sections = {
         **ABSENT_SECTIONS,
         "exemplars": KitsConfig(),
@@ -143,9 +143,9 @@ def test_the_records_and_the_report_say_what_drew(tmp_path):
     records = [json.loads(path.read_bytes()) for path in tmp_path.rglob("sketches/records/*.json")]
     drawn = {(each["summary"]["backend"], each["summary"]["renderer"]) for each in records}
     assert len(records) == 2
-    assert drawn == {("raycast", f"Embree in Open3D {version('open3d')}")}
+    assert drawn == {("raster", RasterRenderer.name)}
     status = list(status_lines(toys(), STAGES, Places(tmp_path, "toys"), workers=1))
-    assert f"sketches: 2 shards drawn by raycast, Embree in Open3D {version('open3d')}" in status
+    assert f"sketches: 2 shards drawn by raster, {RasterRenderer.name}" in status
 
 
 def test_augmented_drawings_keep_their_members(tmp_path, plain):

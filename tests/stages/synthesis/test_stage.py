@@ -44,7 +44,7 @@ def write_config(folder: Path, per_kit: int = 0, **synthesis: Any) -> Path:
         "variations": {"per_kit": per_kit},
         "synthesis": settings,
         "points": {"uniform": 64},
-        "sketches": {"size": 64, "backend": "raycast", "views": [{"name": "front"}]},
+        "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
         "package": {"previewed": 4},
     }
     path = folder / "dreamt.yaml"

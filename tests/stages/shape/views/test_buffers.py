@@ -15,7 +15,7 @@ from tests.stages.shape.views.solids import box, boxes_scene, cylinder, exemplar
 
 FRONT = Camera(0.0, 0.0, "orthographic", margin=0.25)
 
-EACH = [pytest.param("egl", marks=pytest.mark.egl), "raycast"]
+EACH = [pytest.param("egl", marks=pytest.mark.egl), "raster"]
 
 
 @pytest.mark.parametrize("backend", EACH)
@@ -80,7 +80,7 @@ def test_both_backends_agree_on_99_percent_of_the_pixels(shape, camera):
         scene = mesh_scene(vertices, faces, np.full((len(faces), 3), 9, dtype=np.uint8), "y")
     else:
         scene = exemplar_scene(shape)
-    one, two = (render_buffers(scene, camera, (112, 112), 2, backend) for backend in ("egl", "raycast"))
+    one, two = (render_buffers(scene, camera, (112, 112), 2, backend) for backend in ("egl", "raster"))
     same_depth = np.isclose(one.depth, two.depth, rtol=1e-4) | (one.depth == two.depth)
     same_normal = np.abs(one.normal - two.normal).max(axis=2) < 0.01
     same_part = one.part == two.part

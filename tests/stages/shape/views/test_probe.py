@@ -3,10 +3,10 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
 from stages.shape.views.probe import probe
+from stages.shape.views.raster import RasterRenderer
 
 ROOT = Path(__file__).resolve().parents[4]
 
@@ -17,10 +17,10 @@ def run(*words, **environment):
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False, env=env)
 
 
-def test_ray_casting_draws_everywhere():
-    assert probe("raycast") is None
-    done = run("raycast")
-    assert (done.returncode, done.stdout.strip()) == (0, f"Embree in Open3D {version('open3d')}")
+def test_the_rasteriser_draws_everywhere():
+    assert probe("raster") is None
+    done = run("raster")
+    assert (done.returncode, done.stdout.strip()) == (0, RasterRenderer.name)
 
 
 def test_a_backend_that_cannot_draw_says_why_in_one_line(tmp_path):
@@ -34,4 +34,4 @@ def test_a_backend_that_cannot_draw_says_why_in_one_line(tmp_path):
 def test_an_unknown_backend_is_a_wrong_call():
     done = run("crayons")
     assert done.returncode == 2
-    assert "raycast|egl" in done.stderr
+    assert "raster|egl" in done.stderr

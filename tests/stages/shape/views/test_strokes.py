@@ -17,7 +17,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def strokes_of(scene, camera, crease_angle=35.0, step=0.5, shortest=6.0):
-    return find_strokes(visible_triangles(scene, camera, (SIZE, SIZE), "raycast"), crease_angle, step, shortest)
+    return find_strokes(visible_triangles(scene, camera, (SIZE, SIZE), "raster"), crease_angle, step, shortest)
 
 
 def lengths(strokes):
