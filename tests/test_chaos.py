@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 
 from tests.chaos.arena import Arena
+from tests.chaos.tally import Tally
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.mark.slow
 def test_a_round_of_chaos_ends_as_it_must() -> None:
-    blows = ["end the driver", "spoil a shard"]
+    blows = ["end the driver", "spoil a finished shard"]
     command = [
         sys.executable,
         "-m",
@@ -35,16 +36,29 @@ def test_a_round_of_chaos_ends_as_it_must() -> None:
 
 
 def test_what_is_half_written_under_a_final_name_is_seen(tmp_path: Path) -> None:
-    arena = Arena(tmp_path, "toy", ("first",), {})
-    (arena.work / "first/records").mkdir(parents=True)
+    arena = Arena(tmp_path, "toy", [("toy", "first")], {"toy": {}})
+    (arena.work / "toy/first/records").mkdir(parents=True)
     for name in ("a.tar", "b.tar", "c.tar"):
-        (arena.work / "first" / name).write_bytes(b"whole")
+        (arena.work / "toy/first" / name).write_bytes(b"whole")
     arena.calm = arena.digests()
-    (arena.work / "first/a.tar").write_bytes(b"who")
-    (arena.work / "first/b.tar").unlink()
-    (arena.work / "first/.b.tar.tmp").write_bytes(b"wh")
-    (arena.work / "first/records/a.json").write_bytes(b"{")
-    (arena.work / "log.txt").write_text("a log")
+    (arena.work / "toy/first/a.tar").write_bytes(b"who")
+    (arena.work / "toy/first/b.tar").unlink()
+    (arena.work / "toy/first/.b.tar.tmp").write_bytes(b"wh")
+    (arena.work / "toy/first/records/a.json").write_bytes(b"{")
+    (arena.work / "toy/log.txt").write_text("a log")
     first = ".work/toy/first"
     assert sorted(arena.half_written(set())) == [f"{first}/a.tar", f"{first}/records/a.json"]
     assert arena.half_written({f"{first}/a.tar"}) == [f"{first}/records/a.json"]
+
+
+def test_the_table_counts_rounds_by_blow_arena_and_ending() -> None:
+    tally = Tally()
+    tally.add("kill", "kits", "struck", 0)
+    tally.add("kill", "vases", "late", 0)
+    tally.add("fill", "vases", "struck", 3)
+    tally.add("fill", "vases", "wrong", None)
+    rows = [line.split() for line in tally.lines()]
+    assert rows[0] == ["blow", "kits", "vases", "rounds", "struck", "missed", "late", "wrong", "codes"]
+    assert rows[1] == ["fill", "0/0", "1/2", "2", "1", "0", "0", "1", "3:", "1,", "?:", "1"]
+    assert rows[2] == ["kill", "1/1", "0/1", "2", "1", "0", "1", "0", "0:", "2"]
+    assert rows[3][:8] == ["all", "1/1", "1/3", "4", "2", "0", "1", "1"]

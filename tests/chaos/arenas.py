@@ -1,7 +1,9 @@
-"""The small datasets that chaos is let loose on: one of exemplars, one of a program, one of ShapeAssembly programs."""
+"""The small datasets that chaos is let loose on: together they pass through every stage."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,69 +11,160 @@ from pipeline.check import damaged_shards
 from pipeline.config import load_config
 from pipeline.places import Places
 from pipeline.registry import find_stages
-from tests.chaos.arena import Arena
+from tests.chaos.arena import Arena, Step
 from tests.stated import stated
 
-__all__ = ["ARENAS", "arena_in", "damaged"]
+__all__ = ["ARENAS", "Datasets", "arena_in", "damaged"]
 
-_KIT = {
+
+@dataclass(frozen=True)
+class Datasets:
+    """Sections and stages of each dataset of an arena, in the order in which they are made, and edits of the configs.
+
+    tests: whether it is for the tests alone.
+    """
+
+    made: Mapping[str, tuple[Sequence[str], Mapping[str, Any]]]
+    edited: Sequence[Mapping[str, Mapping[str, Any]]]
+    tests: bool = False
+
+
+_CASTLE = {
     "name": "castle",
     "shapes": ["datasets/exemplars/castle/keep.glb", "datasets/exemplars/castle/ward.glb"],
 }
+_OPEN = {key: value for key, value in stated(_CASTLE).items() if key not in ("grammar", "up")}
+"""Stage `choices` is left two keys."""
 
-_AFTER = ("validity", "abstraction", "strings", "points", "sketches", "package")
+_SAMPLES = ("validity", "points", "sketches", "package")
 
 _SMALL: dict[str, dict[str, Any]] = {
     "points": {"uniform": 128, "farthest": 64},
     "sketches": {"size": 48, "views": [{"name": "front"}]},
     "package": {"previewed": 2},
 }
+_PROGRAMS = {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}], "splits": {"shards": 2}}
+_TINY = {"batch": 4, "steps": 3, "rounds": 2, "hidden": 16, "latent": 8}
 
-ARENAS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
-    "kits": (
-        ("exemplars", "variations", *_AFTER),
+
+def _edits(dataset: str) -> list[dict[str, dict[str, Any]]]:
+    changed = [{"points": {"uniform": 100}}, {"sketches": {"size": 40}}, {"package": {"previewed": 1}}]
+    return [{dataset: each} for each in changed]
+
+
+ARENAS: dict[str, Datasets] = {
+    "kits": Datasets(
         {
-            "exemplars": {"kits": [stated(_KIT)]},
-            "variations": {"per_kit": 24, "splits": {"shards": 2}},
-            "abstraction": {"programs": True},
-            **_SMALL,
+            "castles": (
+                ("choices", "exemplars", "variations", "abstraction", "strings", *_SAMPLES),
+                {
+                    "choices": {"tries": 100},
+                    "exemplars": {"kits": [_OPEN]},
+                    "variations": {"per_kit": 12, "splits": {"shards": 2}},
+                    "abstraction": {"programs": True},
+                    **_SMALL,
+                },
+            )
         },
+        _edits("castles"),
     ),
-    "vases": (
-        ("programs", *_AFTER),
+    "vases": Datasets(
         {
-            "programs": {
-                "program": "vase",
-                "mode": "sweep",
-                "sweep": {"samples": 12, "val": 0.2, "test": 0.2},
-                "splits": {"shards": 2},
-            },
-            **_SMALL,
+            "vases": (
+                ("programs", *_SAMPLES),
+                {
+                    "programs": {
+                        "program": "vase",
+                        "mode": "sweep",
+                        "sweep": {"samples": 12, "val": 0.2, "test": 0.2},
+                        "splits": {"shards": 2},
+                    },
+                    **_SMALL,
+                },
+            )
         },
+        _edits("vases"),
     ),
-    "furniture": (
-        ("shapeassembly", *_AFTER),
-        {"shapeassembly": {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}]}, **_SMALL},
+    "furniture": Datasets(
+        {"furniture": (("shapeassembly", *_SAMPLES), {"shapeassembly": _PROGRAMS, **_SMALL})}, _edits("furniture")
     ),
-    "texts": (
-        ("shapeassembly", "validity"),
-        {"shapeassembly": {"programs": [{"name": "furniture", "path": "datasets/exemplars/programs"}]}},
+    "dreams": Datasets(
+        {
+            "learnt": (
+                ("exemplars", "variations", "strings", "training"),
+                {
+                    "exemplars": {"kits": [stated(_CASTLE)]},
+                    "variations": {"per_kit": 12, "splits": {"shards": 1}},
+                    "training": {"models": [{"name": "tiny", "kind": "string_vae", "embedding": 4, **_TINY}]},
+                },
+            ),
+            "dreamt": (
+                ("exemplars", "synthesis", "validity"),
+                {
+                    "exemplars": {"kits": [stated(_CASTLE)]},
+                    "variations": {"per_kit": 0},
+                    "synthesis": {
+                        "sources": [{"dataset": "learnt", "model": "tiny", "kit": "castle", "samples": 4}],
+                        "draws": 8,
+                        "lanes": 2,
+                        "rounds": 3,
+                        "splits": {"shards": 1},
+                    },
+                },
+            ),
+        },
+        [{"dreamt": {"synthesis": {"draws": 7}}}],
+    ),
+    "scribes": Datasets(
+        {
+            "read": (
+                ("shapeassembly", "training"),
+                {
+                    "shapeassembly": _PROGRAMS,
+                    "training": {"models": [{"name": "tiny", "kind": "program_vae", **_TINY}]},
+                },
+            ),
+            "written": (
+                ("writing", "shapeassembly", "validity"),
+                {
+                    "writing": {"programs_per_shard": 4},
+                    "shapeassembly": {
+                        "written": [
+                            {"name": "stool", "dataset": "read", "model": "tiny", "kit": "furniture", "samples": 12}
+                        ],
+                        "overflow": 100,
+                        "splits": {"shards": 1},
+                    },
+                },
+            ),
+        },
+        [{"written": {"writing": {"programs_per_shard": 5}}}],
+    ),
+    "texts": Datasets(
+        {"texts": (("shapeassembly", "validity"), {"shapeassembly": _PROGRAMS})},
+        [{"texts": {"shapeassembly": {"least_parts": 8}}}],
+        tests=True,
     ),
 }
-"""Stages and config of each. `texts` is for the tests: stages that are quick to start."""
 
 
 def arena_in(folder: Path, name: str) -> Arena:
-    """The dataset `name` made undisturbed in `folder`, without the stages that have nothing to do for it."""
-    stages, sections = ARENAS[name]
-    arena = Arena(folder, name, stages, sections)
+    """The datasets of an arena made undisturbed in `folder`. Raises AssertionError where a stage has nothing to do."""
+    wanted = ARENAS[name]
+    steps: list[Step] = [(dataset, stage) for dataset, (stages, _) in wanted.made.items() for stage in stages]
+    arena = Arena(folder, name, steps, {dataset: sections for dataset, (_, sections) in wanted.made.items()})
+    arena.edited = wanted.edited
     arena.settle()
-    arena.stages = [stage for stage in stages if arena.shards(stage)]
+    idle = [step for step in steps if not arena.shards(step)]
+    assert not idle, f"{name}: nothing to do for {idle}"
     return arena
 
 
 def damaged(arena: Arena) -> list[str]:
     """What the mill's part of `make verify` finds; it withdraws the records of what is damaged."""
     stages = find_stages()
-    config = load_config(arena.config, {name: stage.config for name, stage in stages.items()})
-    return list(damaged_shards(config, stages, Places(arena.out, config.name)))
+    found = []
+    for dataset in arena.sections:
+        config = load_config(arena.config(dataset), {name: stage.config for name, stage in stages.items()})
+        found += list(damaged_shards(config, stages, Places(arena.out, config.name)))
+    return found

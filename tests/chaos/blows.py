@@ -7,25 +7,27 @@ import os
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from tests.chaos.arena import Arena, Run, seconds_of
+from pipeline.records import read_record
+from tests.chaos.arena import Arena
+from tests.chaos.running import Run, seconds_of
 
 __all__ = ["BLOWS", "Blow", "Struck"]
 
-PATIENCE = "0.5"
+PATIENCE = "0.3"
 """Minutes in the rounds where a worker is stopped."""
 
 
 @dataclass
 class Struck:
-    """What a blow has done: in words; files that it has spoilt itself, below `out`; what has to be put right again
-    when the run has ended; and the code and the words of another run that it has started."""
+    """What a blow has done: in words; whether there was anything to strike; files that it has spoilt itself, below
+    `out`; what has to be put right again when the run has ended; and the code and the words of another run that it has
+    started."""
 
     words: str
+    hit: bool = True
     spoilt: set[str] = field(default_factory=set)
     put_right: Callable[[], None] = lambda: None
     other: tuple[int, str] | None = None
@@ -52,30 +54,30 @@ _BEGUN = 1.5
 promised before."""
 
 
-def _signal_worker(run: Run, rng: np.random.Generator, number: int, least: float = 0.0) -> str:
+def _signal_worker(run: Run, rng: np.random.Generator, number: int, least: float = 0.0) -> Struck:
     workers = sorted(pid for pid in run.look() if seconds_of(pid) >= least)
     if not workers:
-        return "no worker there"
+        return Struck("no worker there", hit=False)
     pid = workers[rng.integers(len(workers))]
     try:
         os.kill(pid, number)
     except ProcessLookupError:
-        return "the worker was gone"
-    return f"{signal.Signals(number).name} to a worker"
+        return Struck("the worker was gone", hit=False)
+    return Struck(f"{signal.Signals(number).name} to a worker")
 
 
 def kill_worker(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
-    return Struck(_signal_worker(run, rng, signal.SIGKILL))
+    return _signal_worker(run, rng, signal.SIGKILL)
 
 
 def stop_worker(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
-    return Struck(_signal_worker(run, rng, signal.SIGSTOP))
+    return _signal_worker(run, rng, signal.SIGSTOP)
 
 
 def end_driver(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
     """Every second time with a worker that was stopped before."""
     number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][rng.integers(3)]
-    words = _signal_worker(run, rng, signal.SIGSTOP, _BEGUN) + ", " if rng.random() < 0.5 else ""
+    words = _signal_worker(run, rng, signal.SIGSTOP, _BEGUN).words + ", " if rng.random() < 0.5 else ""
     run.process.send_signal(number)
     return Struck(f"{words}{signal.Signals(number).name} to the driver")
 
@@ -104,16 +106,16 @@ def _obey_permissions() -> None:
     ctypes.CDLL(None).prctl(24, 1)
 
 
-def _some_file(arena: Arena, rng: np.random.Generator, pattern: str) -> Path | None:
-    files = [path for path in sorted(arena.work.glob(pattern)) if path.is_file() and not path.name.startswith(".")]
-    files = [path for path in files if path.stat().st_size]
-    return files[rng.integers(len(files))] if files else None
-
-
 def spoil_shard(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
-    path = _some_file(arena, rng, "*/*.*")
-    if path is None:
-        return Struck("no shard there")
+    """Turn a bit of a file of a finished shard."""
+    files = []
+    for noted in sorted(arena.written()):
+        record = read_record(noted)
+        paths = [noted.parents[1] / file for file in sorted(record.files)] if record else []
+        files += [path for path in paths if path.is_file() and path.stat().st_size]
+    if not files:
+        return Struck("no shard there", hit=False)
+    path = files[rng.integers(len(files))]
     place = int(rng.integers(path.stat().st_size))
     with open(path, "r+b") as stream:
         stream.seek(place)
@@ -121,16 +123,19 @@ def spoil_shard(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
         stream.seek(place)
         stream.write(bytes([byte]))
     linked = [each for each in arena.out.rglob("*") if each.is_file() and each.samefile(path)]
-    return Struck(f"a bit of {path.relative_to(arena.work)}", {str(each.relative_to(arena.out)) for each in linked})
+    return Struck(
+        f"a bit of {path.relative_to(arena.work)}", spoilt={str(each.relative_to(arena.out)) for each in linked}
+    )
 
 
 def cut_record(arena: Arena, _: Run, rng: np.random.Generator) -> Struck:
-    path = _some_file(arena, rng, "*/records/*.json")
-    if path is None:
-        return Struck("no record there")
+    paths = sorted(arena.written())
+    if not paths:
+        return Struck("no record there", hit=False)
+    path = paths[rng.integers(len(paths))]
     size = int(rng.integers(path.stat().st_size))
     os.truncate(path, size)
-    return Struck(f"{path.relative_to(arena.work)} cut to {size} bytes", {str(path.relative_to(arena.out))})
+    return Struck(f"{path.relative_to(arena.work)} cut to {size} bytes", spoilt={str(path.relative_to(arena.out))})
 
 
 def edit_config(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
@@ -141,14 +146,8 @@ def edit_config(_: Arena, run: Run, rng: np.random.Generator) -> Struck:
 
 
 def second_run(arena: Arena, run: Run, _: np.random.Generator) -> Struck:
-    other = arena.start(arena.stages)
+    other = arena.start(arena.steps)
     return Struck("a second run", other=(other.end(), other.said()))
-
-
-def edits(rng: np.random.Generator) -> dict[str, Any]:
-    """Sections with another value somewhere."""
-    choices = [{"points": {"uniform": 100}}, {"sketches": {"size": 40}}, {"package": {"previewed": 1}}]
-    return choices[rng.integers(len(choices))]
 
 
 BLOWS: dict[str, Blow] = {
@@ -157,7 +156,7 @@ BLOWS: dict[str, Blow] = {
     "end the driver": Blow(end_driver, frozenset({0, -9, -2, -15, 130, 143})),
     "fill the disk": Blow(fill_disk, frozenset({0, 2, 3}), needs_disk=True),
     "take rights": Blow(take_rights, frozenset({0, 3}), prepare=_obey_permissions),
-    "spoil a shard": Blow(spoil_shard, frozenset({0})),
+    "spoil a finished shard": Blow(spoil_shard, frozenset({0})),
     "cut a record": Blow(cut_record, frozenset({0})),
     "edit the config": Blow(edit_config, frozenset({0, -9}), edited=True),
     "a second run": Blow(second_run, frozenset({0, 2})),
