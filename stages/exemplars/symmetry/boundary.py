@@ -34,7 +34,7 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
     )
     total = 0
     here, times, bare = np.empty(3, dtype=np.int64), np.empty(64), np.empty((64, 2))
-    spans = np.empty((np.diff(starts).max(), 2))
+    spans, inward = np.empty((np.diff(starts).max(), 2)), _inward(corners, normals)
     for face in range(len(corners)):
         for k in range(3):
             start, way = corners[face, k], corners[face, (k + 1) % 3] - corners[face, k]
@@ -53,7 +53,7 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
                 count = 0
                 if n >= 0:
                     count = _covered(
-                        beyond, way, near, far, normals[face], n, corners, normals, starts, owner,
+                        beyond, way, near, far, normals[face], n, corners, normals, inward, starts, owner,
                         ACROSS / 10 * size, tolerance, spans,
                     )  # fmt: skip
                 bare, filled = _bare(near, far, spans, count, bare, filled)
@@ -81,24 +81,25 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
 
 
 @numba.njit(cache=True)
-def _covered(start, way, near, far, normal, n, corners, normals, starts, owner, slack, tolerance, spans):
+def _covered(start, way, near, far, normal, n, corners, normals, inward, starts, owner, slack, tolerance, spans):
     """Where, between shares `near` and `far` of a line through cell `n`, triangles of this normal lie at the line, into
     `spans` (m, 2); their number."""
     count = 0
+    middle = (near + far) / 2
     for place in range(starts[n], starts[n + 1]):
         face = owner[place]
-        other = normals[face]
-        apart = normal - other
-        if (apart * apart).sum() > SAME_ANGLE**2:
-            continue
-        if abs((other * (start + (near + far) / 2 * way - corners[face, 0])).sum()) > tolerance:
+        apart, off = 0.0, 0.0
+        for d in range(3):
+            apart += (normal[d] - normals[face, d]) ** 2
+            off += normals[face, d] * (start[d] + middle * way[d] - corners[face, 0, d])
+        if apart > SAME_ANGLE**2 or abs(off) > tolerance:
             continue
         low, high = near, far
         for k in range(3):
-            a, edge = corners[face, k], corners[face, (k + 1) % 3] - corners[face, k]
-            inward = np.cross(other, edge)
-            at = (inward * (start - a)).sum() + slack * np.sqrt((edge * edge).sum())
-            rise = (inward * way).sum()
+            at, rise = slack * inward[face, k, 3], 0.0
+            for d in range(3):
+                at += inward[face, k, d] * (start[d] - corners[face, k, d])
+                rise += inward[face, k, d] * way[d]
             if rise == 0.0:
                 if at < 0:
                     high = low
@@ -110,6 +111,18 @@ def _covered(start, way, near, far, normal, n, corners, normals, starts, owner, 
             spans[count, 0], spans[count, 1] = low, high
             count += 1
     return count
+
+
+@numba.njit(cache=True)
+def _inward(corners, normals):
+    """For each side of each triangle the vector into the triangle that is as long as the side, and its length."""
+    found = np.empty((len(corners), 3, 4))
+    for face in range(len(corners)):
+        for k in range(3):
+            edge = corners[face, (k + 1) % 3] - corners[face, k]
+            found[face, k, :3] = np.cross(normals[face], edge)
+            found[face, k, 3] = np.sqrt((edge * edge).sum())
+    return found
 
 
 @numba.njit(cache=True)

@@ -39,7 +39,7 @@ def cell_index(keys, i, j, k):
     """The place of a cell among `keys`, -1 where it is empty."""
     if min(i, j, k) < 0:
         return -1
-    key = (i << 42) | (j << 21) | k
+    key = (i << 2 * BITS) | (j << BITS) | k
     low, high = 0, len(keys)
     while low < high:
         middle = (low + high) // 2
