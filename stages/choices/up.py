@@ -1,14 +1,16 @@
-"""Which axis points up in some models: the files' own word, else where the models stand on the broader foot."""
+"""Which axis points up in some models: the files' own word, else what their shapes and the format's custom say."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from stages.exemplars.identify import Identified
 from stages.exemplars.model import Model
+from stages.points.area_sampling import sample_surface
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import rotation_angle, transform_points
 
@@ -16,8 +18,20 @@ __all__ = ["upward"]
 
 FOOT = 0.01
 """What lies below this share of the height is the foot."""
-SURE = 1.5
-"""A foot so many times as large as the other says which axis is up."""
+STANDS, FOOT_COUNTS, MIRROR_COUNTS = 0.8, 0.27, 0.19
+"""What it counts that a model would fall over along the other axis, that its foot is e times as large as the other, and
+that turning it upside down moves its surface e times as far: log odds by which 286 public models tell their axis."""
+CUSTOM = 1.0
+"""What the custom of a format counts: it says more about household things than their shapes do, of which 73 % tell."""
+CUSTOMS: Mapping[str, Literal["y", "z"]] = {".obj": "y", ".stl": "z"}
+MOST = 3.0
+"""No ratio counts more than this power of e."""
+FLOOR_FOOT, FLOOR_MIRROR = 3e-3, 2e-3
+"""Feet and distances below these shares of a model's size (squared, of feet) are noise."""
+SURE = 0.1
+"""From which sum of the counts on they say which axis is up."""
+LOOKED_AT = 1500
+"""Points of a model that are compared with its mirror image."""
 TURNED = 0.05
 """Radians from which on equal parts count as turned against each other."""
 ALONG = 0.99
@@ -26,30 +40,35 @@ MAJORITY = 0.75
 """So many of the rotations about y or z must agree."""
 
 _AXES: dict[Literal["y", "z"], int] = {"y": 1, "z": 2}
+REASONS = {
+    "stands": "along the other axis the middle of a model is not above its foot",
+    "foot": "the lowest points span more area than along the other axis",
+    "mirror": "along the other axis a model is more like its own mirror image",
+    "custom": "it is the custom of the format, and the shape says little else",
+}
+"""What the axis is told from, each with its sentence."""
 
 
 def upward(models: Sequence[Model], identified: Identified) -> tuple[Literal["y", "z"], str]:
     """The axis that points up in `models`, whose parts are `identified`, and the reason, a sentence.
 
     A format that lets files choose is believed (COLLADA). glTF calls y up whatever stands in it, and other formats
-    say nothing: there it is the axis along which alone the models would not fall over, their middle being above their
-    foot, the hull of their lowest points; else the one along which they stand on the larger foot.
-    Where feet are about alike it is the axis about which equal parts are turned; else y.
+    say nothing: there four things are weighed. Along which axis would the models not fall over, their middle being
+    above their foot, the hull of their lowest points? Along which is the foot larger? Along which are they less
+    like their own mirror image, for things have an upper and a lower side more often than a front and a back? What is
+    the custom of the format? Where these say nothing it is the axis about which equal parts are turned; else y.
     """
     said = {model.up for model in models}
     if len(said) == 1 and None not in said:
         (word,) = said
         if word is not None:
             return word, "the file says so"
-    stood = {axis: [_foot(model, place) for model in models] for axis, place in _AXES.items()}
-    balanced = [axis for axis, each in stood.items() if all(stands for _, stands in each)]
-    if len(balanced) == 1:
-        return balanced[0], "along the other axis the middle of a model is not above its foot"
-    feet = {axis: sum(area for area, _ in each) for axis, each in stood.items()}
-    larger: Literal["y", "z"] = "y" if feet["y"] >= feet["z"] else "z"
-    ratio = feet[larger] / max(feet["z" if larger == "y" else "y"], 1e-3 * feet[larger], 1e-300)
-    if ratio >= SURE:
-        return larger, f"the lowest points span {_times(ratio)} the area that they span along the other axis"
+    counts = {reason: float(np.mean([each[reason] for each in map(_evidence, models)])) for reason in REASONS}
+    total = sum(counts.values())
+    if abs(total) >= SURE:
+        sign = 1.0 if total > 0 else -1.0
+        strongest = max(REASONS, key=lambda reason: sign * counts[reason])
+        return ("y" if sign > 0 else "z"), REASONS[strongest]
     turns = _turns(identified)
     for axis, place in _AXES.items():
         if turns[place] > MAJORITY * (turns[1] + turns[2]):
@@ -57,12 +76,45 @@ def upward(models: Sequence[Model], identified: Identified) -> tuple[Literal["y"
     return "y", "neither the foot nor the turns of equal parts tell, and y is the custom"
 
 
-def _foot(model: Model, axis: int) -> tuple[float, bool]:
+def _evidence(model: Model) -> dict[str, float]:
+    """What each reason counts for y, and if negative for z."""
+    corners = np.concatenate([transform_points(part.pose, part.vertices)[part.faces] for part in model.parts])
+    (y_foot, y_stands), (z_foot, z_stands) = _foot(corners, 1), _foot(corners, 2)
+    y_moved, z_moved = _upside_down(corners)
+    custom = CUSTOMS.get(model.path.suffix.lower())
+    found = (
+        STANDS * (float(y_stands) - float(z_stands)),
+        FOOT_COUNTS * _log_ratio(y_foot, z_foot, FLOOR_FOOT),
+        MIRROR_COUNTS * _log_ratio(y_moved, z_moved, FLOOR_MIRROR),
+        0.0 if custom is None else CUSTOM if custom == "y" else -CUSTOM,
+    )
+    return dict(zip(REASONS, found, strict=True))
+
+
+def _log_ratio(first: float, second: float, floor: float) -> float:
+    return float(np.clip(np.log((first + floor) / (second + floor)), -MOST, MOST))
+
+
+def _upside_down(corners: FloatArray) -> tuple[float, float]:
+    """How far a surface is from its mirror image along y and along z, on average, as shares of the longest side."""
+    triangles = corners.reshape(-1, 3)
+    points, _, _ = sample_surface(
+        triangles, np.arange(len(triangles), dtype=np.int32).reshape(-1, 3), LOOKED_AT, np.random.default_rng(0)
+    )
+    low, high = triangles.min(axis=0), triangles.max(axis=0)
+    tree, moved = cKDTree(points), []
+    for axis in _AXES.values():
+        image = points.copy()
+        image[:, axis] = low[axis] + high[axis] - image[:, axis]
+        moved.append(float(tree.query(image)[0].mean() / (high - low).max()))
+    return moved[0], moved[1]
+
+
+def _foot(corners: FloatArray, axis: int) -> tuple[float, bool]:
     """Area of the hull of the lowest points along an axis, as a share of the box's largest side, and whether the middle
-    of the model's surface is above it."""
+    of the surface of the triangles `corners` (t, 3, 3) is above it."""
     from scipy.spatial import ConvexHull, QhullError
 
-    corners = np.concatenate([transform_points(part.pose, part.vertices)[part.faces] for part in model.parts])
     points = corners.reshape(-1, 3)
     height = points[:, axis]
     low = np.delete(points[height <= height.min() + FOOT * np.ptp(height)], axis, axis=1)
@@ -97,7 +149,3 @@ def _axis(rotation: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh((rotation + rotation.T) / 2)
     axis: FloatArray = vectors[:, int(np.argmax(values))]
     return axis
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.1f} times" if ratio < 100 else "over 100 times"
