@@ -138,7 +138,7 @@ lint: setup  ## Check style and types
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
-bench: setup  ## Measure every piece beside a public peer
+bench: setup  ## Measure the whole way and every piece beside a public peer, and mark what has changed
 	$(PYTHON) -m pip install -q -r tests/bench/peers.txt || echo 'some peers cannot be built here: measured without' >&2
 	$(PYTHON) -m tests.bench
 kits: setup  ## Write the shipped exemplars anew from their source

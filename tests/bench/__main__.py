@@ -1,6 +1,7 @@
-"""`make bench`: measures every piece beside a public peer in the same run, and prints one Markdown table.
+"""`make bench`: measures every piece beside a public peer in the same run, and prints one Markdown table,
+which marks what differs from the last kept report, `tests/bench/report.md`, by more than noise.
 
-python -m tests.bench [--json FILE] [PIECE...]   (a piece is the part of a file name after `bench_`)
+python -m tests.bench [--json FILE] [--keep] [PIECE...]   (a piece is the part of a file name after `bench_`)
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
+from tests.bench.kept import HEADER, figures, keep, row
 from tests.bench.measure import Measure
 
-__all__ = ["measures", "row"]
+__all__ = ["measures"]
 
-HEADER = "| what | ours, a second and core | peer | ratio | note |\n|---|---:|---:|---:|---|"
+KEPT = Path(__file__).parent / "report.json"
 
 
 def measures(pieces: list[str]) -> Iterator[Measure]:
@@ -30,30 +32,25 @@ def measures(pieces: list[str]) -> Iterator[Measure]:
         yield from importlib.import_module(f"tests.bench.bench_{piece}").bench()
 
 
-def row(measure: Measure) -> str:
-    """One measure as a row of the table."""
-    peer = f"{_figure(measure.peer)} ({measure.peer_name})" if measure.peer is not None else "–"
-    ratio = f"{measure.ours / measure.peer:.2g}×" if measure.peer else "–"
-    return f"| {measure.name} | {_figure(measure.ours)} {measure.unit} | {peer} | {ratio} | {measure.note} |"
-
-
-def _figure(value: float) -> str:
-    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
-
-
 def main() -> None:
     """Measure, print the table, write the JSON."""
     parser = argparse.ArgumentParser(prog="python -m tests.bench", description="Measure every piece beside a peer.")
     parser.add_argument("pieces", nargs="*", help="pieces to measure; all if none is named")
     parser.add_argument("--json", type=Path, help="also write the measures to this file")
+    parser.add_argument(
+        "--keep", action="store_true", help="make this the kept report, tests/bench/report.md and .json"
+    )
     asked = parser.parse_args()
     made: list[Measure] = []
+    kept = figures(KEPT)
     print(HEADER, flush=True)
     for measure in measures(asked.pieces):
         made.append(measure)
-        print(row(measure), flush=True)
+        print(row(measure, kept), flush=True)
     if asked.json is not None:
         asked.json.write_text(json.dumps([asdict(measure) for measure in made], indent=1) + "\n")
+    if asked.keep:
+        keep(KEPT, made)
 
 
 if __name__ == "__main__":

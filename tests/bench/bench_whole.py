@@ -1,0 +1,109 @@
+"""Samples a CPU second over the whole way, a stage each: small datasets made by one worker, compiled code at hand.
+
+CPU seconds are those of the run and all its processes, starting included, so a stage that makes little of a small
+dataset mostly shows what starting costs. A second turn over the finished dataset, which finds nothing to do, is what
+the mill takes for itself.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pipeline.registry import find_stages, upstream
+from tests.bench.measure import Measure
+
+__all__ = ["bench"]
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A config and what is smaller in it: `small`, by section; `few` for the turn before that compiles. `needs`: a
+    folder without which it is left out."""
+
+    config: str
+    small: Mapping[str, Any]
+    few: Mapping[str, Any]
+    needs: str = "."
+
+
+DATASETS = (
+    Dataset("default", {"variations": {"per_kit": 40}}, {"variations": {"per_kit": 3}}),
+    Dataset(
+        "castle",
+        {"variations": {"per_kit": 60}},
+        {"variations": {"per_kit": 3}},
+        "../shared/exemplars/a01_castle_tower",
+    ),
+    Dataset(
+        "chairs",
+        {"programs": {"mode": "sweep", "sweep": {"samples": 150}}},
+        {"programs": {"mode": "sweep", "sweep": {"samples": 20}}},
+    ),
+    Dataset("shapeassembly", {}, {}),
+)
+
+
+def bench() -> Iterator[Measure]:
+    """For each dataset the whole way, then its stages."""
+    stages = upstream(find_stages(), "package")
+    for dataset in DATASETS:
+        if not (ROOT / dataset.needs).exists():
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            _seconds(dataset, dataset.few, Path(folder) / "few", stages)
+            out = Path(folder) / "out"
+            seconds = _seconds(dataset, dataset.small, out, stages)
+            again = _seconds(dataset, dataset.small, out, stages)
+            samples = _samples(out)
+        spent = sum(seconds.values())
+        note = f"{samples} samples in {spent:.1f} CPU s; a turn that finds all done: {sum(again.values()):.1f} CPU s"
+        yield Measure(f"{dataset.config}: the whole way", "samples", samples / spent, note=note)
+        yield Measure(f"{dataset.config}: without turns' own cost", "samples", samples / (spent - sum(again.values())))
+        for stage in stages:
+            if seconds[stage] - again[stage] > 0.02 * spent:
+                said = f"{seconds[stage]:.1f} CPU s, {seconds[stage] / spent:.0%}"
+                yield Measure(f"{dataset.config}: {stage}", "samples", samples / seconds[stage], note=said)
+
+
+def _seconds(dataset: Dataset, changes: Mapping[str, Any], out: Path, stages: list[str]) -> dict[str, float]:
+    """CPU seconds of each stage of one turn."""
+    config = yaml.safe_load((ROOT / "configs" / f"{dataset.config}.yaml").read_text())
+    for section, keys in changes.items():
+        config[section] = {**config.get(section, {}), **keys}
+    out.mkdir(parents=True, exist_ok=True)
+    path = out.with_suffix(".yaml")
+    path.write_text(yaml.safe_dump(config))
+    spent = {}
+    for stage in stages:
+        before = _children()
+        command = [sys.executable, "-m", "pipeline", "run", stage, "--config", str(path), "--out", str(out)]
+        done = subprocess.run([*command, "--workers", "1"], cwd=ROOT, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise RuntimeError(f"stage {stage} of {dataset.config} ended with {done.returncode}: {done.stderr[-2000:]}")
+        spent[stage] = _children() - before
+    return spent
+
+
+def _children() -> float:
+    """CPU seconds of all processes that this one has started and that have ended."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
+def _samples(out: Path) -> int:
+    """Samples of the one dataset in a folder."""
+    from pyarrow import parquet
+
+    rows: int = parquet.read_metadata(next(out.glob("*-index/*.parquet"))).num_rows
+    return rows
