@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEMA
+from stages.package.sources import SourceTally
 from stages.package.tables import class_table, member_table, origin_table, reject_table, source_table, split_table
 
 __all__ = ["Story", "card", "citation", "size_category"]
@@ -68,7 +69,7 @@ def card(
     facts: Mapping[str, Any],
     shards: Sequence[Mapping[str, Any]],
     members: Sequence[Mapping[str, Any]],
-    rows: Sequence[Mapping[str, Any]],
+    tallies: Mapping[str, SourceTally],
     sources: Mapping[str, str],
     classes: Sequence[Mapping[str, Any]],
     story: Story,
@@ -76,15 +77,16 @@ def card(
     """The card's text.
 
     facts: name, version, title, description, license, creator, published, tags, task_categories; shards: summaries
-    of the package's shards; members: name, sentence, dtype and shape of each; rows: those of the index; sources: the
-    kits or programs by name, with what there is to say of them in short; classes: the rows of `classes.json`.
+    of the package's shards; members: name, sentence, dtype and shape of each; tallies: what the index
+    says of each kit; sources: the kits or programs by name, with what there is to say of them in short; classes: the
+    rows of `classes.json`.
     """
     splits = list(dict.fromkeys(str(shard["split"]) for shard in shards))
     header = {
         "license": str(facts["license"]).lower(),
         "pretty_name": facts["title"],
         "task_categories": list(facts["task_categories"]),
-        "size_categories": [size_category(len(rows))],
+        "size_categories": [size_category(sum(each.samples for each in tallies.values()))],
         "tags": list(dict.fromkeys([*facts["tags"], *sources])),
         "configs": [
             {
@@ -99,7 +101,7 @@ def card(
         str(facts["description"]),
         "## What is in it",
         split_table(splits, shards),
-        source_table(sources, rows),
+        source_table(sources, tallies),
         "## How the splits are kept apart",
         *story.splits,
         "## Part labels",

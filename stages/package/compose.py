@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
 from stages.package.classes import counted_classes, table_bytes
 from stages.package.croissant import croissant
+from stages.package.hashing import HashingStream
 from stages.package.index import column_kinds, read_rows, write_index
 from stages.package.layout import CARD, CHECKSUMS, CLASSES, CROISSANT, MANIFEST, PREVIEW, SCHEMA, index_path
 from stages.package.manifest import checksums, manifest
+from stages.package.sources import SourceTally
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.declared import language_of
 
@@ -33,24 +34,25 @@ def compose_dataset(task: Task) -> Outcome:
     params = task.shard.params
     shards, facts, members = params["shards"], params["facts"], params["members"]
     rows = read_rows(task.input("package", f"{shard['name']}.jsonl") for shard in shards)
-    index = io.BytesIO()
-    write_index(rows, index)
+    tallies: dict[str, SourceTally] = {}
+    with task.output(f"{task.shard.name}.parquet") as stream:
+        index = HashingStream(stream)
+        write_index(SourceTally.tallied(rows, tallies), cast(BinaryIO, index))
     indexed: dict[str, Any] = {
         "path": f"../{index_path(task.config)}",
-        "bytes": len(index.getvalue()),
-        "sha256": hashlib.sha256(index.getvalue()).hexdigest(),
+        "bytes": index.written,
+        "sha256": index.digest(),
         "columns": column_kinds(),
     }
     known = language_of(params["producer"]).speaker(task).sources
-    tallies = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
-    classes = counted_classes(Classes.of(known), tallies)
+    of_shards = ((shard["split"], _read(task, f"{shard['name']}.classes.json")) for shard in shards)
+    classes = counted_classes(Classes.of(known), of_shards)
     listed = table_bytes(classes)
     counted = {"path": CLASSES, "count": len(classes), "sha256": hashlib.sha256(listed).hexdigest()}
-    used = {row["kit"] for row in rows}
-    sources = {name: each.sentence for name, each in known.items() if name in used}
+    sources = {name: each.sentence for name, each in known.items() if name in tallies}
     story = Story(**params["story"], origins=params["origins"])
     files = {
-        CARD: card(facts, shards, members, rows, sources, classes, story).encode(),
+        CARD: card(facts, shards, members, tallies, sources, classes, story).encode(),
         CROISSANT: _text(croissant(facts, shards, members, indexed, counted, params["origins"], citation(facts))),
         SCHEMA: _text(params["schema"]),
         CLASSES: listed,
@@ -65,10 +67,10 @@ def compose_dataset(task: Task) -> Outcome:
     digests[MANIFEST] = hashlib.sha256(files[MANIFEST]).hexdigest()
     digests.update({shard["path"]: shard["sha256"] for shard in shards})
     files[CHECKSUMS] = checksums(digests).encode()
-    for file, content in {**files, "parquet": index.getvalue()}.items():
+    for file, content in files.items():
         with task.output(f"{task.shard.name}.{file}") as stream:
             stream.write(content)
-    return Outcome(samples=0, summary={"samples": len(rows)})
+    return Outcome(samples=0, summary={"samples": sum(each.samples for each in tallies.values())})
 
 
 def _read(task: Task, file: str) -> Any:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -30,6 +31,9 @@ COLUMNS = {
 PLACE = {"shard": "string", "offset": "int64", "bytes": "int64"}
 """Where a sample stands: `shard` is relative to the dataset's folder; the `bytes` bytes at `offset` of that file are
 the sample's members as a tar."""
+
+GROUP = 65_536
+"""Rows of a row group."""
 
 
 def columns() -> dict[str, Column]:
@@ -58,17 +62,23 @@ def tar_bytes(members: Mapping[str, bytes]) -> int:
     return sum(512 + (len(each) + 511) // 512 * 512 for each in members.values())
 
 
-def read_rows(files: Iterable[Path]) -> list[dict[str, Any]]:
-    """The rows that the shards of the package kept, in order."""
-    return [json.loads(line) for file in files for line in file.read_text().splitlines()]
+def read_rows(files: Iterable[Path]) -> Iterator[dict[str, Any]]:
+    """The rows that the shards of the package kept, in order, one in memory at a time."""
+    for file in files:
+        with open(file, encoding="utf-8") as lines:
+            yield from map(json.loads, lines)
 
 
-def write_index(rows: list[dict[str, Any]] | list[Mapping[str, Any]], stream: BinaryIO) -> None:
-    """Write the rows as Parquet; equal rows give equal bytes."""
+def write_index(rows: Iterable[Mapping[str, Any]], stream: BinaryIO) -> None:
+    """Write the rows as Parquet; equal rows give equal bytes. A group of rows is in memory at a time."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     kinds = column_kinds()
     schema = pa.schema([(name, pa.type_for_alias(kind)) for name, kind in kinds.items()])
-    table = pa.table({name: pa.array([row[name] for row in rows], schema.field(name).type) for name in kinds})
-    pq.write_table(table, stream, compression="zstd", row_group_size=65_536)
+    rest = iter(rows)
+    with pq.ParquetWriter(stream, schema, compression="zstd") as writer:
+        while group := list(islice(rest, GROUP)):
+            columns = {name: pa.array([row[name] for row in group], schema.field(name).type) for name in kinds}
+            group.clear()  # before the next is read
+            writer.write_table(pa.table(columns), row_group_size=GROUP)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,6 +13,7 @@ from pipeline.shards import ShardWriter, json_bytes, read_shard
 from pipeline.stage import Outcome, Task
 from stages.package.classes import ClassTally
 from stages.package.glb import glb_bytes
+from stages.package.hashing import HashingStream
 from stages.package.index import index_row, tar_bytes
 from stages.package.layout import shard_path
 from stages.package.record import describe_sample
@@ -71,29 +71,6 @@ def merge_shard(task: Task) -> Outcome:
         "kits": dict(counts),
     }
     return Outcome(samples=writer.samples, summary=summary)
-
-
-class HashingStream:
-    """What a tar is written to: passes all on to `stream`, and knows its length and SHA-256."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self._hash = hashlib.sha256()
-        self.written = 0
-
-    def write(self, content: bytes) -> int:
-        """Write all of `content`."""
-        self._hash.update(content)
-        self.written += len(content)
-        return self._stream.write(content)
-
-    def tell(self) -> int:
-        """How many bytes have been written."""
-        return self.written
-
-    def digest(self) -> str:
-        """SHA-256 of what has been written, in hexadecimal."""
-        return self._hash.hexdigest()
 
 
 def _samples(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from statistics import median
 from typing import Any
 
 from stages.package.layout import CLASSES
+from stages.package.sources import SPANS, SourceTally
 
 __all__ = ["class_table", "member_table", "origin_table", "reject_table", "source_table", "split_table"]
 
@@ -40,19 +40,18 @@ def class_table(classes: Sequence[Mapping[str, Any]], splits: Sequence[str]) -> 
     return "\n".join([*lines, *([f"\nAnd {more:,} more."] if more > 0 else [])])
 
 
-def source_table(sources: Mapping[str, str], rows: Sequence[Mapping[str, Any]]) -> str:
-    """What the samples of each kit or program are like, from the rows of the index."""
+def source_table(sources: Mapping[str, str], tallies: Mapping[str, SourceTally]) -> str:
+    """What the samples of each kit or program are like; `tallies` counts those that have samples."""
     lines = [
         "| made of | samples | distinct structures | parts | contacts | cycles | rooted | stable |",
         "| --- | ---: | ---: | --- | --- | --- | ---: | ---: |",
     ]
     for name, described in sources.items():
-        own = [row for row in rows if row["kit"] == name]
-        spans = " | ".join(_span([row[each] for row in own]) for each in ("parts", "contacts", "cycles"))
-        structures = len({row["graph"] for row in own})
+        own = tallies[name]
+        spans = " | ".join(own.span(each) for each in SPANS)
         title = f"{name} ({described})" if described else name
-        shares = " | ".join(f"{sum(row[each] for row in own) / len(own):.1%}" for each in ("rooted", "stable"))
-        lines.append(f"| {title} | {len(own):,} | {structures:,} | {spans} | {shares} |")
+        shares = " | ".join(f"{count / own.samples:.1%}" for count in (own.rooted, own.stable))
+        lines.append(f"| {title} | {own.samples:,} | {own.structures:,} | {spans} | {shares} |")
     return (
         "\n".join(lines) + "\n\nParts, contacts and cycles: least / median / most in a shape. Contacts: pairs of parts "
         "that touch. Cycles: independent rings that the contacts close. Rooted: every part is connected to the ground. "
@@ -88,10 +87,6 @@ def reject_table(rejects: Mapping[str, int]) -> str:
     lines = ["| refused because | tries |", "| --- | ---: |"]
     lines += [f"| {reason} | {count:,} |" for reason, count in sorted(rejects.items(), key=lambda each: -each[1])]
     return "\n".join(lines)
-
-
-def _span(numbers: Sequence[int]) -> str:
-    return f"{min(numbers)} / {median(numbers):g} / {max(numbers)}" if numbers else "-"
 
 
 def _cell(text: str) -> str:
