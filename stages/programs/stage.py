@@ -27,6 +27,10 @@ from stages.shape.splits import SPLITS
 __all__ = ["STAGE"]
 
 BYTES_A_SAMPLE = 8192
+TRIED = 8
+"""Samples of a shard of a trial."""
+LEAST_TRIED = 96
+"""Samples of a trial's sweep, where the config asks for so many."""
 
 Found = tuple[dict[str, Value], dict[str, Any]]
 """The values of a shape, and its lineage."""
@@ -179,9 +183,17 @@ def asked(config: Config) -> Sequence[int]:
 
 
 def trial(config: Config) -> ProgramsConfig:
-    """The same shapes in shards of few."""
+    """Few shapes a shard, in about as many shards as the config asks for: each looks through its share of all shapes,
+    and of a million shapes in shards of few the plan alone would take a minute."""
     section = config.section(ProgramsConfig)
-    return section.model_copy(update={"splits": section.splits.model_copy(update={"samples_per_shard": 8})})
+    less = min(TRIED / section.splits.samples_per_shard, 1.0)
+    wanted, every = section.sweep.samples, section.each_value
+    sweep = section.sweep.model_copy(update={"samples": max(round(less * wanted), min(wanted, LEAST_TRIED))})
+    each = {split: max(round(less * getattr(every, split)), 1) for split in SPLITS}
+    splits = section.splits.model_copy(update={"samples_per_shard": TRIED})
+    return section.model_copy(
+        update={"splits": splits, "sweep": sweep, "each_value": every.model_copy(update=each)},
+    )
 
 
 STAGE = Stage(

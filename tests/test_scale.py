@@ -1,0 +1,79 @@
+"""Large datasets as the mill sees them: plans, records and `make status`, without any sample."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from pipeline.config import Config, load_config
+from pipeline.places import Places
+from pipeline.records import ShardRecord
+from pipeline.registry import find_stages
+from pipeline.stage import Shard, Stage
+from pipeline.status import status_lines
+from pipeline.survey import StageSurvey, Survey
+from pipeline.trial import short_config
+
+STAGES = ("programs", "points", "sketches", "validity", "package")
+
+
+def dataset_of(samples: int, folder: Path) -> tuple[Config, Mapping[str, Stage]]:
+    """The config of a sweep of so many chairs."""
+    path, stages = folder / "big.yaml", find_stages()
+    programs = {"program": "chair", "mode": "sweep", "sweep": {"samples": samples}}
+    path.write_text(yaml.safe_dump({"name": "big", "programs": programs}))
+    return load_config(path, {name: stage.config for name, stage in stages.items()}), stages
+
+
+def finish(surveyed: StageSurvey) -> int:
+    """Write the records of all shards that are planned and have none; how many these are."""
+    surveyed.places.make()
+    for shard in surveyed.missing:
+        (surveyed.places.records / f"{shard.name}.json").write_bytes(record_of(surveyed, shard).to_bytes())
+    return len(surveyed.missing)
+
+
+def record_of(surveyed: StageSurvey, shard: Shard) -> ShardRecord:
+    samples, split = int(shard.params.get("samples", 0)), shard.params.get("split")
+    told: dict[str, Any] = {"split": split, "samples": samples, "tried": samples, "backend": "none", "renderer": "none"}
+    told |= {"rooted": samples, "stable": samples, "path": f"{shard.name}.tar", "members": ["glb"], "bytes": 1}
+    return ShardRecord(
+        stage=surveyed.stage.name,
+        shard=shard.name,
+        fingerprint=surveyed.fingerprints[shard.name],
+        recipe=surveyed.recipes[shard.name],
+        inputs={},
+        files={},
+        samples=samples,
+        rejects={},
+        seconds=1.0,
+        peak_bytes=1,
+        summary=told,
+    )
+
+
+@pytest.mark.slow
+def test_status_of_a_hundred_thousand_samples_is_told_from_records_in_seconds(tmp_path: Path) -> None:
+    config, stages = dataset_of(100_000, tmp_path)
+    places = Places(tmp_path, config.name)
+    survey = Survey(config, stages, places)
+    for name in STAGES:
+        while finish(survey.stage(name)):
+            survey.refresh(name)
+    start = time.process_time()
+    rows = {line.split()[0]: line.split() for line in status_lines(config, stages, places, 1)}
+    assert time.process_time() - start < 5
+    assert {name: rows[name][3] for name in STAGES} == dict.fromkeys(STAGES, "100,000")
+    assert rows["points"][1] == "197/197"
+
+
+def test_a_trial_of_a_million_shapes_plans_no_more_shards_than_the_run(tmp_path: Path) -> None:
+    config, stages = dataset_of(1_000_000, tmp_path)
+    tried = stages["programs"].asked(short_config(config, stages))
+    assert len(tried) == len(stages["programs"].asked(config)) == 1955
+    assert max(tried) <= 8
