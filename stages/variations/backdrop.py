@@ -139,9 +139,10 @@ _known: dict[tuple[str, bool], Backdrop] = {}
 def backdrop_of(task: Task, kit: str) -> Backdrop:
     """The backdrop of a kit, kept from shard to shard of one worker: what it remembers never changes a result."""
     upright = task.config.section(VariationsConfig).search.upright
+    read = input_kit(task, kit)  # by every shard, so that its record does not depend on what its worker made before
     made_from = str(task.input("exemplars", f"{kit}.tar")), upright
     if made_from not in _known:
-        _known[made_from] = Backdrop(ContactAnswers(input_kit(task, kit)), upright)
+        _known[made_from] = Backdrop(ContactAnswers(read), upright)
     return _known[made_from]
 
 

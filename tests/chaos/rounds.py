@@ -61,10 +61,9 @@ def play(arena: Arena, blow: Blow, rng: np.random.Generator) -> Ended:
 def _take_away(arena: Arena, rng: np.random.Generator) -> tuple[Step, int]:
     """Take away some shards of a random stage and of one after it, now and then everything; the stage from which on
     there is work, and how many shards are gone."""
-    whole = sum(len(arena.shards(step)) for step in arena.steps)
-    if rng.random() < _ANEW:
+    if rng.random() < _ANEW or not all(arena.shards(step) for step in arena.steps):
         arena.begin_anew()
-        return arena.steps[0], whole
+        return arena.steps[0], sum(Path(path).parent.name == "records" for path in arena.calm)
     chosen = sorted({int(each) for each in rng.integers(len(arena.steps), size=2)})
     taken = 0
     for step in (arena.steps[each] for each in chosen):
