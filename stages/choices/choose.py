@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stages.choices.ladder import FITTED, GRAMMARS, KINDS, Rails, Rung, climb, is_dull
+from stages.choices.ladder import FITTED, GRAMMARS, KINDS, STAY, Rails, Rung, climb, is_dull, peeled
 from stages.choices.probe import Finds
 from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
@@ -90,6 +90,8 @@ def choose(config: KitConfig, models: Sequence[Model], identified: Identified, t
             reasons[key] = _reason(key, chosen, rungs)
     if "hubs.types" in open_keys and one_surface:
         reasons["hubs.types"] = "the parts are pieces of one surface, which has a hole where one is left out"
+    elif "hubs.types" in open_keys and not chosen.gives_enough and not hubs:
+        reasons["hubs.types"] = _without_hub(sight) or reasons["hubs.types"]
     if "disconnected" in open_keys:
         stand = "1 part stands" if left == 1 else f"{left} parts stand"
         reasons["disconnected"] = f"{stand} apart from the largest piece" if left else "nothing stands apart"
@@ -123,6 +125,15 @@ def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str], one_surfac
         hubs=None if peels else chosen_hubs(stated, sight.types),
         largest="disconnected" in open_keys or made.disconnected == "largest",
     )
+
+
+def _without_hub(sight: Sight) -> str:
+    """Why not even the hub that touches most was left out, where too little would stay; else empty."""
+    hub = sight.widest(())
+    stay = sight.parts if hub is None else peeled(sight, (hub,))
+    if hub is None or stay >= STAY * sight.parts:
+        return ""
+    return f"the model falls apart without {sight.types[hub].name}: {stay} of {sight.parts} parts stay in one piece"
 
 
 def _reason(key: str, chosen: Rung, rungs: Sequence[Rung]) -> str:

@@ -15,7 +15,7 @@ from stages.shape.kit import ContactKind, Strictness
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["FEW", "FITTED", "Rails", "Rung", "climb", "is_dull"]
+__all__ = ["FEW", "FITTED", "STAY", "Rails", "Rung", "climb", "is_dull", "peeled"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -94,6 +94,11 @@ def is_dull(finds: Finds) -> bool:
     return finds.distance < DISTANCE or finds.spread < SPREAD or finds.copied >= COPIED
 
 
+def peeled(sight: Sight, hubs: tuple[int, ...]) -> int:
+    """How many parts of all models stay, each model's in one piece, without those of the types `hubs`."""
+    return sum(map(len, sight.staying(Setting(KINDS[0], GRAMMARS[0], hubs))))
+
+
 def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     """The rungs that were tried, the chosen one last.
 
@@ -167,6 +172,6 @@ def _hubs(sight: Sight, rails: Rails) -> Iterator[tuple[int, ...]]:
         if widest is None:
             return
         hubs = tuple(sorted((*hubs, widest)))
-        if sum(map(len, sight.staying(Setting(KINDS[0], GRAMMARS[0], hubs)))) < STAY * sight.parts:
+        if peeled(sight, hubs) < STAY * sight.parts:
             return
         yield hubs

@@ -133,6 +133,13 @@ class TestLadder:
         assert "a hole where one is left out" in pieces.reasons["hubs.types"]
         assert parts.settings > pieces.settings
 
+    def test_a_hub_without_which_the_model_falls_apart_is_named(self) -> None:
+        posts = {"plate": box(20.0, 1.0, 1.0), **{f"post{k}": box(1.0, 1.0 + k, 1.0) for k in range(4)}}
+        shape = [("plate", pose(0, 0, 0)), *((f"post{k}", pose(3 * k, 1 + k / 2, 0)) for k in range(4))]
+        made = chosen([shape], posts)
+        assert made.values["hubs.types"] == "none"
+        assert made.reasons["hubs.types"] == "the model falls apart without plate: 1 of 5 parts stay in one piece"
+
     def test_what_is_told_by_meaning_is_probed_by_meaning(self) -> None:
         models = [table(THIN, SQUARE), table(THICK, ROUND)]
         config = left_open([[], []], types="meaning")
