@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from stages.choices.ladder import COPIED
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 
@@ -18,6 +19,8 @@ MOST = 200
 UNSEEN = 3
 """So many times the layouts of the forecast are asked for: some are far rarer than others, and a short search counts
 those that come again and again."""
+TELLING = 0.25
+"""Share of finds from which on a search that refuses the others still comes to an end."""
 
 
 def dataset_name(models: Sequence[Path]) -> str:
@@ -31,10 +34,17 @@ def dataset_name(models: Sequence[Path]) -> str:
 
 
 def config_text(
-    name: str, config: KitConfig, models: Sequence[Model], reasons: Mapping[str, str], layouts: int | None, said: str
+    name: str,
+    config: KitConfig,
+    models: Sequence[Model],
+    reasons: Mapping[str, str],
+    layouts: int | None,
+    telling: float,
+    said: str,
 ) -> str:
     """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key; `layouts`: about how many
-    there are, None for very many; `said`: the forecast in a sentence."""
+    there are, None for very many; `telling`: share of the finds that are no near copies; `said`: the forecast in a
+    sentence. Where there are very many, and enough of them tell something, near copies are refused."""
     made = config.decided()
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
     why = "; ".join(dict.fromkeys(model.why for model in models))
@@ -73,8 +83,14 @@ def config_text(
         "  search:",
         _line(2, "duplicates", "graph", "distinct shape graphs, not ways to turn a part in its place"),
     ]
+    require = []
     if made.hubs and config.hubs.keep == "backdrop":
-        lines += ["  require:", _line(2, "hubs", 1, "a variant on which none of them fits is refused")]
+        require.append(_line(2, "hubs", 1, "a variant on which none of them fits is refused"))
+    if layouts is None and telling >= TELLING:
+        why = f"refuses copies with little beside them; {telling:.0%} of the finds of a short search are none"
+        require.append(_line(2, "copied", COPIED, why))
+    if require:
+        lines += ["  require:", *require]
     return "\n".join(lines) + "\n"
 
 

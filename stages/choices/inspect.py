@@ -70,11 +70,11 @@ def _written(
     name = dataset_name(paths)
     kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
     yield "picture", write_file(folder / f"{name}.png", kit_sheet(kit))
-    layouts = found.forecast.layouts if found.forecast is not None else 0
+    layouts, telling = (found.forecast.layouts, found.forecast.telling) if found.forecast is not None else (0, 0.0)
     if found.forecast is not None and found.assemblies:
         sheet = forecast_sheet(found.built.kit, found.assemblies, name, found.sentence)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
-    text = config_text(name, found.config, models, found.choices.reasons, layouts, found.sentence)
+    text = config_text(name, found.config, models, found.choices.reasons, layouts, telling, found.sentence)
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
 
 

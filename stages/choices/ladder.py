@@ -15,7 +15,7 @@ from stages.shape.kit import ContactKind, Strictness
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["FEW", "FITTED", "STAY", "Rails", "Rung", "climb", "is_dull", "peeled"]
+__all__ = ["COPIED", "FEW", "FITTED", "STAY", "Rails", "Rung", "climb", "is_dull", "peeled"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""

@@ -164,6 +164,15 @@ class TestForecast:
         assert found.finds.graphs == found.finds.histograms == found.layouts
         assert found.sentence.startswith(f"about {found.layouts} layouts, no dataset")
 
+    def test_finds_tell_something_unless_they_are_copied_but_for_a_tenth(self) -> None:
+        kit = self.kit([chain(3), chain(5)], CHAIN)
+        found = forecast(kit, ContactAnswers(kit), TRIES)
+        assert found.telling == 1.0
+        shares = [0.5, 0.9, 0.95, 1.0]
+        variants = [replace(found.variants[0], lineage={"copied": {"largest": each}}) for each in shares]
+        assert replace(found, variants=variants).telling == 0.5
+        assert replace(found, variants=[]).telling == 0.0
+
     def test_every_part_its_own_type_is_said_with_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
         kit = self.kit([[("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]], meshes)
