@@ -96,16 +96,16 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
         part_names.append(tuple(names))
     part_types = tuple(each.part for each in types)
     aliases = tuple(tuple(each.words)[1:] for each in types)
-    found = Identified(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases)
+    whole = Identified(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases)
     for index, model in enumerate(models):
-        other = standing_twice(part_types, assemblies[index], config.pose_tolerance * found.median_diagonal)
-        names = part_names[index]
+        other = standing_twice(part_types, assemblies[index], config.pose_tolerance * whole.median_diagonal)
+        called = part_names[index]
         left_out += [
-            (model, names[part], f"it stands at the very place of {names[first]}") for part, first in other.items()
+            (model, called[part], f"it stands at the very place of {called[first]}") for part, first in other.items()
         ]
-        keep = np.setdiff1d(np.arange(len(names)), list(other))
-        assemblies[index], part_names[index] = assemblies[index].select(keep), tuple(names[part] for part in keep)
-    return replace(found, assemblies=tuple(assemblies), part_names=tuple(part_names), left_out=tuple(left_out))
+        keep = np.setdiff1d(np.arange(len(called)), list(other))
+        assemblies[index], part_names[index] = assemblies[index].select(keep), tuple(called[part] for part in keep)
+    return replace(whole, assemblies=tuple(assemblies), part_names=tuple(part_names), left_out=tuple(left_out))
 
 
 def standing_twice(types: Sequence[PartType], assembly: Assembly, tolerance: float) -> dict[int, int]:
