@@ -7,12 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from stages.exemplars.formats.scene import Placement, Scene, Surface
+from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.pieces import RADIUS, Piece, repeated_pieces
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, with_area
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
 __all__ = ["by_symmetry", "search_size"]
+
+LEFT_OUT = 1e-5
+"""Share of the surface from which on it is told that it is left out."""
 
 
 def by_symmetry(scene: Scene) -> Scene:
@@ -34,6 +38,10 @@ def by_symmetry(scene: Scene) -> Scene:
         placements += [Placement(f"{name}.{copy}", None, number, pose) for copy, pose in enumerate(piece.poses)]
     flat = len(joined) - int(real.sum())
     warnings = (*scene.warnings, f"{flat} triangles without area are left out") if flat else scene.warnings
+    whole = float(Soup(vertices[joined], np.arange(len(joined), dtype=np.int32)).area)
+    left = 1.0 - sum(len(each.poses) * each.triangles.area for each in pieces) / whole
+    if left > LEFT_OUT:
+        warnings = (*warnings, f"splinters between copies, {left:.2%} of the surface, are left out")
     return replace(scene, kind="nodes", surfaces=tuple(surfaces), placements=tuple(placements), warnings=warnings)
 
 

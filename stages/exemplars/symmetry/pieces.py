@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.exemplars.symmetry.alongside import chunks_along, row_of
 from stages.exemplars.symmetry.carve import Soup, carve, connected_soups, joined
+from stages.exemplars.symmetry.clip import fragments
 from stages.exemplars.symmetry.repetition import PART, Repetition, repetitions
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.geometry.pose import invert
+from stages.shape.geometry.pose import invert, transform_points
 
 __all__ = ["RADIUS", "Piece", "repeated_pieces"]
 
@@ -26,6 +28,12 @@ INSIDE = 0.8
 """Points that are compared lie so far from the middle of a triangle to its corners."""
 SPLINTER = 5e-4
 """A piece that touches no other is a part if it is more than this share of the whole surface."""
+ROUNDS = 3
+"""So many times what is left in one piece is searched again: rows hide others that save less."""
+LOOSE = 0.3
+"""Share of their surface by which chunks of what runs along a row may differ; they lie less than a cell apart."""
+BESIDE = 1.8
+"""Cells whose middles are closer than this are neighbours."""
 CRUMB = 1e-7
 """What is smaller than this share of the surface is rounding."""
 
@@ -53,14 +61,42 @@ def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[Piece]:
     grid = surface_grid(corners, RADIUS)
     whole = Soup(grid.corners, grid.faces)
     pieces, cost = [Piece(whole, (np.eye(4),))], 1.0 + PART
-    for each in repetitions(grid)[:TRIED]:
-        cut = [part for piece in pieces for part in _cut(piece, grid, each)]
-        price = sum(piece.triangles.area for piece in cut) / whole.area + PART * sum(len(piece.poses) for piece in cut)
-        if price < BETTER * cost:
-            pieces, cost = cut, price
+    for turn in range(ROUNDS):
+        left = max(
+            (each for each in pieces if len(each.poses) == 1), key=lambda each: each.triangles.area, default=None
+        )
+        if left is None or not len(left.triangles):
+            break
+        before = cost
+        others = [each for each in pieces if each is not left]
+        pieces, cost = _searched(left, others, grid if turn == 0 else _grid_like(grid, left), whole.area, cost)
+        if cost == before:
+            break
     if len(pieces) == 1:
         return pieces
-    return [part for piece in pieces for part in _apart(piece, grid) if part.triangles.area > CRUMB * whole.area]
+    for place in range(len(pieces)):
+        pieces = _with_what_runs_along(pieces, place, grid)
+    return [part for part in _parts(pieces, grid) if part.triangles.area > CRUMB * whole.area]
+
+
+def _grid_like(grid: SurfaceGrid, piece: Piece) -> SurfaceGrid:
+    """A grid of a piece alone, with cells as large as those of `grid`."""
+    corners = piece.triangles.corners
+    return surface_grid(corners, grid.radius / float(np.ptp(corners.reshape(-1, 3), axis=0).max()))
+
+
+def _searched(
+    left: Piece, others: list[Piece], grid: SurfaceGrid, whole: float, cost: float
+) -> tuple[list[Piece], float]:
+    """`left` cut by what it repeats, with the other pieces, and what they all cost."""
+    pieces = [left]
+    for each in repetitions(grid)[:TRIED]:
+        cut = [part for piece in pieces for part in _cut(piece, grid, each)]
+        every = [*others, *cut]
+        price = sum(piece.triangles.area for piece in every) / whole + PART * sum(len(piece.poses) for piece in every)
+        if price < BETTER * cost:
+            pieces, cost = cut, price
+    return [*others, *pieces], cost
 
 
 def _cut(piece: Piece, grid: SurfaceGrid, repetition: Repetition) -> list[Piece]:
@@ -85,15 +121,16 @@ def _cut(piece: Piece, grid: SurfaceGrid, repetition: Repetition) -> list[Piece]
     return [*found, Piece(rest, piece.poses)] if len(rest) else found
 
 
-def _equal(one: Soup, other: Soup, pose: FloatArray, tolerance: float) -> bool:
-    """Whether `pose` moves one surface onto another, by points of all triangles but the smallest, which are dust."""
+def _equal(one: Soup, other: Soup, pose: FloatArray, tolerance: float, share: float = DUST) -> bool:
+    """Whether `pose` moves one surface onto another, by points of all triangles but the smallest, dust of
+    about this share of the surface."""
     from stages.shape.geometry.triangles import build_tree, points_on_surface
 
-    if abs(one.area - other.area) > DUST * one.area:
+    if abs(one.area - other.area) > share * one.area:
         return False
     for source, target, way in ((one, other, pose), (other, one, invert(pose))):
         order = np.argsort(source.areas, kind="stable")
-        large = source.corners[order[np.cumsum(source.areas[order]) > DUST * source.area]]
+        large = source.corners[order[np.cumsum(source.areas[order]) > share * source.area]]
         middles = large.mean(axis=1, keepdims=True)
         probes = np.concatenate([middles, middles + INSIDE * (large - middles)], axis=1).reshape(-1, 3)
         tree = build_tree(target.corners.reshape(-1, 3), np.arange(3 * len(target)).reshape(-1, 3).astype(np.int32))
@@ -102,10 +139,68 @@ def _equal(one: Soup, other: Soup, pose: FloatArray, tolerance: float) -> bool:
     return True
 
 
-def _apart(piece: Piece, grid: SurfaceGrid) -> list[Piece]:
-    """A piece as the pieces that do not touch each other; those too small to be parts stay with the largest."""
-    found = sorted(connected_soups(piece.triangles, grid), key=lambda each: -each.area)
-    parts = [each for each in found if each.area > SPLINTER * grid.area.sum()] or found[:1]
-    for crumb in found[len(parts) :]:
-        parts[0] = joined(parts[0], crumb)
-    return [Piece(each, piece.poses) for each in parts]
+def _with_what_runs_along(pieces: list[Piece], place: int, grid: SurfaceGrid) -> list[Piece]:
+    """The pieces, where those at `place` make a row with what runs along it; all as they are where it has none, or not
+    about the same at all copies.
+
+    A cable beside a mast hangs as it likes: the chunk of the first copy stands for those that lie within a cell of it.
+    """
+    piece = pieces[place]
+    row = row_of(piece.poses, grid.tolerance)
+    if row is None:
+        return pieces
+    found = list(pieces)
+    gained = piece.triangles
+    for other, single in enumerate(pieces):
+        if other == place or len(single.poses) > 1:
+            continue
+        chunks, rest = chunks_along(piece.triangles, row, single.triangles, grid)
+        first = chunks[0]
+        if not len(first) or not all(
+            len(chunk) and _equal(first, chunk, pose, grid.size / 2, LOOSE)
+            for chunk, pose in zip(chunks, piece.poses, strict=True)
+        ):
+            continue
+        gained, found[other] = joined(gained, first), Piece(rest, single.poses)
+    found[place] = Piece(gained, piece.poses)
+    return found
+
+
+def _parts(pieces: list[Piece], grid: SurfaceGrid) -> list[Piece]:
+    """Each piece as the pieces that do not touch each other, if they are large enough to be parts.
+
+    What is smaller stays with the largest of them, but what lies between copies and is of no copy is left out: it would
+    make a neighbour of all of them of what is left.
+    """
+    copies = [transform_points(pose, each.triangles.corners.reshape(-1, 3))
+              for each in pieces if len(each.poses) > 1 for pose in each.poses]  # fmt: skip
+    beside = _cells(np.concatenate(copies).reshape(-1, 3, 3), grid) if copies else np.empty((0, 3))
+    found: list[Piece] = []
+    for piece in pieces:
+        if not len(piece.triangles):
+            continue
+        soups = sorted(connected_soups(piece.triangles, grid), key=lambda each: -each.area)
+        parts = [each for each in soups if each.area > SPLINTER * grid.area.sum()]
+        if not parts and len(piece.poses) > 1:
+            parts = soups[:1]
+        crumbs = soups[len(parts) :]
+        if len(piece.poses) == 1 and len(beside):
+            crumbs = [each for each in crumbs if not _near(_cells(each.corners, grid), beside)]
+        if not parts:
+            parts, crumbs = crumbs[:1], crumbs[1:]
+        for crumb in crumbs:
+            parts[0] = joined(parts[0], crumb)
+        found += [Piece(each, piece.poses) for each in parts]
+    return found
+
+
+def _cells(corners: FloatArray, grid: SurfaceGrid) -> np.ndarray:
+    """The cells of triangles (t, 3, 3), int64 (n, 3)."""
+    return np.unique(fragments(corners, grid.origin, grid.size)[0], axis=0)
+
+
+def _near(cells: np.ndarray, others: np.ndarray) -> bool:
+    """Whether one of some cells is, or is beside, one of others."""
+    from scipy.spatial import KDTree
+
+    return bool((KDTree(others).query(cells, distance_upper_bound=BESIDE)[0] < BESIDE).any())
