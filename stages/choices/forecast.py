@@ -56,9 +56,9 @@ def forecast(kit: Kit, answers: ContactAnswers, tries: int, known: int = 0) -> F
     """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone. `known`:
     how many graphs a probe has found in it: where there are any, a first search in vain is no answer."""
     probe = Probe(answers, decision_rng(0, "choices", "forecast"))
-    finds = probe.go_on(tries, MANY)
+    finds = probe.go_on(tries, MANY, evenly=True)
     if finds.graphs or known:
-        finds = probe.go_on((LONG - 1) * tries, MANY)
+        finds = probe.go_on((LONG - 1) * tries, MANY, evenly=True)
     layouts = _layouts(finds)
     sizes = [len(each.assembly) for each in probe.variants]
     parts = (min(sizes, default=0), max(sizes, default=0))

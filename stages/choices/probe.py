@@ -85,23 +85,30 @@ class Probe:
             Search(answers, SEARCH.model_copy(update={"method": method}), self._slots) for method in methods
         ]
 
-    def go_on(self, tries: int, wanted: int) -> Finds:
-        """Search on by each method until there are `wanted` variants, or it has had so many more `tries`. Growth, whose
-        shapes are all complete, gives up as soon as the first of them show nothing new."""
-        for search in self._searches:
-            left = tries
-            while left > 0 and len(self.variants) < wanted:
-                asked = max(tries // FIRST, 1) if search.config.method == "growth" and left == tries else left
-                found, used = search.run(
-                    self._rng, asked, wanted - len(self.variants), f"probe-{self._tries}", lambda _: None
-                )
-                self._tries += used
-                left -= used
-                self.variants.extend(each for each in found if each.graph not in self._graphs)
-                self._graphs.update(each.graph for each in found)
-                if not found:
-                    break
+    def go_on(self, tries: int, wanted: int, evenly: bool = False) -> Finds:
+        """Search on by each method until there are `wanted` variants, or it has had so many more `tries`; `evenly`:
+        no method finds more than its share of them while another can. Growth, whose shapes are all complete, gives up
+        as soon as the first of them show nothing new."""
+        left = [tries] * len(self._searches)
+        if evenly:
+            for number in range(len(self._searches)):
+                self._go_on(number, wanted * (number + 1) // len(self._searches), tries, left)
+        for number in range(len(self._searches)):
+            self._go_on(number, wanted, tries, left)
         return self.finds()
+
+    def _go_on(self, number: int, wanted: int, tries: int, left: list[int]) -> None:
+        """Search on by one method, which has so many of its `tries` left; none, once it finds nothing."""
+        search = self._searches[number]
+        while left[number] > 0 and len(self.variants) < wanted:
+            is_first = search.config.method == "growth" and left[number] == tries
+            asked = max(tries // FIRST, 1) if is_first else left[number]
+            missing = wanted - len(self.variants)
+            found, used = search.run(self._rng, asked, missing, f"probe-{self._tries}", lambda _: None)
+            self._tries += used
+            left[number] = left[number] - used if found else 0
+            self.variants.extend(each for each in found if each.graph not in self._graphs)
+            self._graphs.update(each.graph for each in found)
 
     def finds(self) -> Finds:
         """What was found so far."""

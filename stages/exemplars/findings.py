@@ -81,7 +81,8 @@ def refusals(
         if others and not others & set(kit.label_of[assembly.types].tolist()):
             yield (
                 f"{model.path}: shares no part type with the other shapes of its kit, so nothing can be exchanged; "
-                "make it a kit of its own, or raise `congruence_tolerance` if the parts are meant to be alike"
+                "make it a kit of its own, set `types: meaning` if its parts are called as theirs are, or raise "
+                "`congruence_tolerance` if they are meant to be alike"
             )
 
 
