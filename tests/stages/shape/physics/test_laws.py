@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stages.shape.arrays import FloatArray
@@ -62,17 +62,61 @@ def limits(problem: tuple[Patches, FloatArray, FloatArray, FloatArray], friction
     return load_limits(patches, *rest, friction, np.zeros(len(patches.points)), 0.3)
 
 
+def brick_wall(seed: int) -> tuple[Patches, FloatArray, FloatArray, FloatArray]:
+    """Bricks that each stand on two below and press on their neighbours, weights over five orders of magnitude."""
+    rng = np.random.default_rng(seed)
+    rows, columns = rng.integers(3, 9, 2).tolist()
+    first, second, points, normals = [], [], [], []
+    centres = np.array([[column + 0.5 * (row % 2), 0, row + 0.5] for row in range(rows) for column in range(columns)])
+    for brick, (x, _, _) in enumerate(centres.tolist()):
+        row, column = divmod(brick, columns)
+        for aside, below in ((-0.25, column - (row + 1) % 2), (0.25, column + row % 2)):
+            carrier = -1 if row == 0 else brick - column - columns + (below if 0 <= below < columns else column)
+            touching = [(carrier, (x + aside, y, row), (0, 0, 1)) for y in (-0.3, 0.3)]
+            if column:
+                touching += [(brick - 1, (x - 0.5, y, row + 0.5 + aside), (1, 0, 0)) for y in (-0.3, 0.3)]
+            for other, point, normal in touching:
+                first.append(brick)
+                second.append(other)
+                points.append(point)
+                normals.append(normal)
+    weights = 10 ** rng.uniform(-5, 0, len(centres))
+    gravity = np.zeros((len(centres), 6))
+    gravity[:, 2] = -weights
+    pushes = np.zeros((2, len(centres), 6))
+    pushes[0, :, 0] = pushes[1, :, 1] = weights
+    joints = np.arange(len(first))
+    patches = Patches(np.array(first), np.array(second), joints, np.array(points, float), np.array(normals, float))
+    return patches, centres, gravity, pushes
+
+
+def both_ways(
+    problem: tuple[Patches, FloatArray, FloatArray, FloatArray], monkeypatch: pytest.MonkeyPatch
+) -> tuple[FloatArray, FloatArray]:
+    """The factors by the interior point method, with no HiGHS behind it, and by HiGHS."""
+    with monkeypatch.context() as patch:
+        patch.setattr(equilibrium, "SMALL", 0)
+        patch.setattr(equilibrium, "PATIENCE", 0)
+        by_interior = limits(problem).factors
+    with monkeypatch.context() as patch:
+        patch.setattr(equilibrium, "SMALL", 10**9)
+        by_highs = limits(problem).factors
+    return by_interior, by_highs
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(SEEDS)
-def test_interior_point_method_finds_what_highs_finds(seed: int) -> None:
-    problem = random_problem(seed)
-    by_highs = limits(problem)
-    small = equilibrium.SMALL
-    equilibrium.SMALL = 0
-    try:
-        by_interior = limits(problem)
-    finally:
-        equilibrium.SMALL = small
-    np.testing.assert_allclose(by_interior.factors, by_highs.factors, atol=2e-3)
+def test_interior_point_method_finds_what_highs_finds(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    by_interior, by_highs = both_ways(random_problem(seed), monkeypatch)
+    np.testing.assert_allclose(by_interior, by_highs, atol=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_interior_point_method_finds_what_highs_finds_where_bodies_weigh_far_from_alike(
+    monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    by_interior, by_highs = both_ways(brick_wall(seed), monkeypatch)
+    np.testing.assert_allclose(by_interior, by_highs, atol=2e-3)
 
 
 @given(SEEDS)

@@ -36,11 +36,6 @@ def test_masonry_that_stands_is_found_to_stand(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="with its two doubled parts the hall stands by .052; without them it is said to fall, at a column that "
-    "touches neither: the solver or the model, not found out",
-)
 def test_dense_walls_with_tens_of_thousands_of_contact_forces_are_found_to_stand() -> None:
     ((_, shape),) = model_shapes(SHARED / "exemplars" / "a11_spacebase_storage" / "model.glb", "y")
     found = judge_all([shape], MASONRY)[0]
