@@ -16,7 +16,8 @@ __all__ = ["damaged_files", "damaged_shards", "withdraw_damaged"]
 
 def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) -> Iterator[str]:
     """A line for each stage that is unfinished, for each file whose bytes differ from its record, and for each file in
-    the output folder that is not the one that a stage put there.
+    the output folder that is not the one that a stage put there. A stage that publishes parts, as training does its
+    models, is not unfinished because nobody has asked for some of them.
 
     The record of a damaged shard is withdrawn, so that the next run makes that shard again and nothing else; it puts
     published files back, too.
@@ -24,14 +25,14 @@ def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) 
     survey = Survey(config, stages, places)
     for name in stages:
         surveyed = survey.stage(name)
-        if surveyed.missing:
-            missing = surveyed.missing
+        missing = [] if surveyed.stage.publishes_parts else surveyed.missing
+        if missing:
             yield f"{name}: {len(missing)} of {len(surveyed.shards)} shards are not made, first {missing[0].name}"
         for shard, record in surveyed.records.items():
             for file in damaged_files(record, surveyed.places):
                 remove(surveyed.places.records / f"{shard}.json")
                 yield f"{name}: {file} is damaged; the next run makes {shard} again"
-        if not surveyed.missing:
+        if not missing:
             yield from (f"{name}: {path} is not what the stage made" for path in _altered(surveyed, places))
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from pipeline.check import damaged_shards
 from pipeline.config import Config, StrictModel
 from pipeline.errors import ConfigError
 from pipeline.places import Places
@@ -236,8 +237,11 @@ def stage_of(shards: list[Shard], **more: Any) -> dict[str, Stage]:
 
 
 def weave(folder: Path, stages: dict[str, Stage], workers: int = 1, only: str = "", **section: str) -> int:
-    config = Config("mill", "1.0.0", 0, {"looms": LoomsConfig(**section)}, folder / "mill.yaml")
-    return run_stage("looms", stages, config, Places(folder, "mill"), workers, only=only).made
+    return run_stage("looms", stages, woven(folder, **section), Places(folder, "mill"), workers, only=only).made
+
+
+def woven(folder: Path, **section: str) -> Config:
+    return Config("mill", "1.0.0", 0, {"looms": LoomsConfig(**section)}, folder / "mill.yaml")
 
 
 class LoomsConfig(StrictModel):
@@ -272,6 +276,11 @@ def test_stage_may_publish_what_is_whole_before_all_is_made(tmp_path: Path) -> N
     stages = stage_of([Shard("a"), Shard("b")], publish=whole, publishes_parts=True)
     weave(tmp_path, stages, only="a")
     assert [path.name for path in (tmp_path / "woven").iterdir()] == ["a"]
+    places = Places(tmp_path, "mill")
+    assert list(damaged_shards(woven(tmp_path), stages, places)) == [], "what nobody has asked for is no damage"
+    (tmp_path / "woven/a").unlink()
+    (altered,) = damaged_shards(woven(tmp_path), stages, places)
+    assert altered == f"looms: {tmp_path}/woven/a is not what the stage made"
     weave(tmp_path, stages)
     assert sorted(path.name for path in (tmp_path / "woven").iterdir()) == ["a", "b"]
 
