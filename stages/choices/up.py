@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.randomness import decision_rng
 from stages.exemplars.identify import Identified
 from stages.exemplars.model import Model
 from stages.points.area_sampling import sample_surface
@@ -98,9 +99,8 @@ def _log_ratio(first: float, second: float, floor: float) -> float:
 def _upside_down(corners: FloatArray) -> tuple[float, float]:
     """How far a surface is from its mirror image along y and along z, on average, as shares of the longest side."""
     triangles = corners.reshape(-1, 3)
-    points, _, _ = sample_surface(
-        triangles, np.arange(len(triangles), dtype=np.int32).reshape(-1, 3), LOOKED_AT, np.random.default_rng(0)
-    )
+    faces = np.arange(len(triangles), dtype=np.int32).reshape(-1, 3)
+    points, _, _ = sample_surface(triangles, faces, LOOKED_AT, decision_rng(0, "choices", "up"))
     low, high = triangles.min(axis=0), triangles.max(axis=0)
     tree, moved = cKDTree(points), []
     for axis in _AXES.values():
