@@ -52,10 +52,10 @@ def find_strokes(seen: Visible, crease_angle: float, step: float, shortest: floa
     crease_angle: degrees between the normals of two faces above which their edge is drawn. step: smallest jump in
     depth that is a contour; shortest: connected lines shorter in all than this are left out; both in pixels.
     """
-    across, across_kind, down, down_kind = _crossings(
+    crossings = _crossings(
         seen.triangles, _triangles(seen), _parts(seen), _thresholds(seen, crease_angle, step), seen.view.projection
     )
-    ends, kinds, nodes = _join(across, across_kind, down, down_kind)
+    ends, kinds, nodes = _join(*crossings)
     kept = _long_enough(ends, nodes, shortest)
     return Strokes(ends[kept], kinds[kept])
 
@@ -113,7 +113,8 @@ def _thresholds(seen: Visible, crease_angle: float, step: float) -> _Thresholds:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+# What is called for each pair of pixels is inlined: passing arrays on takes half of the time otherwise.
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _side(screen, t, edge, x, y):
     """Twice the signed area of (x, y) and an edge of the triangle `t` on the screen."""
     end = edge + 1 if edge < 2 else 0
@@ -121,13 +122,13 @@ def _side(screen, t, edge, x, y):
     return (screen[t, end, 0] - ax) * (y - ay) - (screen[t, end, 1] - ay) * (x - ax)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _cosine(normals, a, b):
     """Cosine of the angle between the normals of two triangles."""
     return normals[a, 0] * normals[b, 0] + normals[a, 1] * normals[b, 1] + normals[a, 2] * normals[b, 2]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _walk(triangles, shift, crease, start, goal, p, q):
     """Walk on the surface from triangle `start` at the point `p` of the screen straight to the point `q`;
     `shift` is that of its part.
@@ -176,7 +177,7 @@ def _walk(triangles, shift, crease, start, goal, p, q):
     return False, s, triangle, sharp
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _between(triangles, parts, thresholds, projection, a, b, p, q):
     """Kind and place (share of the way from p to q) of the line between the pixels at `p` and `q` of the screen, which
     show the triangles `a` and `b`, one of them perhaps none."""
@@ -220,14 +221,14 @@ def _between(triangles, parts, thresholds, projection, a, b, p, q):
     return 0, 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _gap(screen, projection, a, b, p, q, s):
     """How much farther triangle `a` is than triangle `b` at the share `s` of the way from p to q."""
     x, y = p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])
     return eye_depth(clip_at(screen, a, x, y), projection) - eye_depth(clip_at(screen, b, x, y), projection)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _on_one_surface(normals, rounded, a, b, sharp):
     """Kind and place of the line between two triangles that a walk joins, with `sharp` as the walk says."""
     if sharp >= 0.0:
@@ -237,7 +238,7 @@ def _on_one_surface(normals, rounded, a, b, sharp):
     return 0, 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", inline="always")
 def _runs_on(triangles, crease, a, b):
     """Whether two triangles of one part share an edge that is neither sharp nor one where the surface turns away.
 
@@ -260,12 +261,13 @@ def _runs_on(triangles, crease, a, b):
 def _crossings(shown, triangles, parts, thresholds, projection):
     """The lines between the pixels, of which each shows the triangle `shown` or none (-1).
 
-    Between horizontal neighbours: share (h, w) of the way from pixel (r, c) to (r, c + 1) and kind (h, w);
-    and between vertical neighbours."""
+    Returns the number of the line between pixel (r, c) and (r, c + 1), or -1, int32 (h, w); that of the line between
+    (r, c) and (r + 1, c); and of each line the share of the way at which it lies, (n,), and its kind, (n,)."""
     height, width = shown.shape
-    across, down = np.zeros((height, width)), np.zeros((height, width))
-    across_kind = np.zeros((height, width), dtype=np.uint8)
-    down_kind = np.zeros((height, width), dtype=np.uint8)
+    across, down = np.full((height, width), -1, dtype=np.int32), np.full((height, width), -1, dtype=np.int32)
+    most = _differing(shown)
+    shares, kinds = np.empty(most), np.empty(most, dtype=np.uint8)
+    total = 0
     for r in range(height):
         for c in range(width):
             a = shown[r, c]
@@ -282,28 +284,37 @@ def _crossings(shown, triangles, parts, thresholds, projection):
                 p, q = (c + 0.5, r + 0.5), (c2 + 0.5, r2 + 0.5)
                 kind, s = _between(triangles, parts, thresholds, projection, a, b, p, q)
                 if kind:
+                    shares[total], kinds[total] = s, kind
                     if way == 0:
-                        across[r, c], across_kind[r, c] = s, kind
+                        across[r, c] = total
                     else:
-                        down[r, c], down_kind[r, c] = s, kind
-    return across, across_kind, down, down_kind
+                        down[r, c] = total
+                    total += 1
+    return across, down, shares[:total], kinds[:total]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _join(across, across_kind, down, down_kind):
+def _differing(shown):
+    """How many pairs of neighbouring pixels show different triangles."""
+    height, width = shown.shape
+    total = 0
+    for r in range(height):
+        for c in range(width - 1):
+            total += shown[r, c] != shown[r, c + 1]
+    for r in range(height - 1):
+        for c in range(width):
+            total += shown[r, c] != shown[r + 1, c]
+    return total
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _join(across, down, shares, kinds_of):
     """Join the crossings on the sides of each square of four pixel centres.
 
     Returns segments (n, 2, 2), their kinds (n,) and the numbers of the nodes at their ends (n, 2).
     """
     height, width = across.shape
-    node = 0
-    across_node, down_node = np.empty((height, width), dtype=np.int32), np.empty((height, width), dtype=np.int32)
-    for r in range(height):
-        for c in range(width):
-            across_node[r, c] = node
-            node += across_kind[r, c] > 0
-            down_node[r, c] = node
-            node += down_kind[r, c] > 0
+    node = len(shares)
     # Each crossing lies between two squares.
     ends = np.empty((2 * node, 2, 2))
     kinds = np.empty(2 * node, dtype=np.uint8)
@@ -312,17 +323,21 @@ def _join(across, across_kind, down, down_kind):
     total = 0
     for r in range(height - 1):
         for c in range(width - 1):
+            # A number is -1 or not negative: so all four are -1.
+            if (across[r, c] & across[r + 1, c] & down[r, c] & down[r, c + 1]) == -1:
+                continue
             size = 0
             for side in range(4):
                 row, column = r + (side == 1), c + (side == 3)
-                if side < 2 and across_kind[row, column]:
-                    places[size] = column + 0.5 + across[row, column], row + 0.5
-                    found[size], numbers[size] = across_kind[row, column], across_node[row, column]
-                    size += 1
-                if side >= 2 and down_kind[row, column]:
-                    places[size] = column + 0.5, row + 0.5 + down[row, column]
-                    found[size], numbers[size] = down_kind[row, column], down_node[row, column]
-                    size += 1
+                number = across[row, column] if side < 2 else down[row, column]
+                if number < 0:
+                    continue
+                if side < 2:
+                    places[size] = column + 0.5 + shares[number], row + 0.5
+                else:
+                    places[size] = column + 0.5, row + 0.5 + shares[number]
+                found[size], numbers[size] = kinds_of[number], number
+                size += 1
             if size < 2:
                 continue
             if size == 2:
