@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stages.choices.ladder import FITTED, GRAMMARS, KINDS, STAY, Rails, Rung, climb, is_dull, peeled
+from stages.choices.ladder import FITTED, GRAMMARS, GRAPHS, KINDS, STAY, Rails, Rung, climb, is_dull, peeled
 from stages.choices.probe import Finds
 from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
@@ -16,17 +16,23 @@ from stages.exemplars.hubs import chosen_hubs
 from stages.exemplars.identify import Identified
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, KitConfig
+from stages.variations.dullness import COPIED
+from stages.variations.settings import CHOSEN_COPIED
 
-__all__ = ["Choices", "choose", "found_words"]
+__all__ = ["Choices", "choose", "found_words", "most_copied"]
+
+TELLING = 0.25
+"""Share of finds from which on a search that refuses the others still comes to an end."""
 
 
 @dataclass(frozen=True)
 class Choices:
     """What was chosen for a kit.
 
-    values: of the keys that the config left open, by OPEN_KEYS; reasons: a sentence for each; finds: of the probe under
-    what was chosen, None where there was nothing to probe; kept: share of the parts that stay in the shape graphs;
-    enough: whether the probe promises a pool of some size that is not dull; settings: how many were probed.
+    values: of the keys that the config left open, by OPEN_KEYS and CHOSEN_COPIED; reasons: a sentence for each; finds:
+    of the probe under what was chosen, None where there was nothing to probe; kept: share of the parts that stay in
+    the shape graphs; enough: whether the probe promises a pool of some size that is not dull; settings: how many were
+    probed.
     """
 
     values: Mapping[str, Any]
@@ -51,12 +57,15 @@ class Choices:
         }
 
 
-def choose(config: KitConfig, models: Sequence[Model], identified: Identified, tries: int) -> Choices:
+def choose(
+    config: KitConfig, models: Sequence[Model], identified: Identified, tries: int, copies: bool = True
+) -> Choices:
     """Decide what `config` leaves open for a kit of `models`, whose parts are `identified`; what it states is obeyed.
 
-    In this order: the axis that points up, the contact tolerance, and the first rung of a ladder over kinds of contact,
-    grammar and hubs under which a short search, of `tries` or some times as many, finds enough. All that is random in
-    it depends on the models and on what is stated alone, so every run and `make inspect` choose alike.
+    In this order: the axis that points up, the contact tolerance, the first rung of a ladder over kinds of contact,
+    grammar and hubs under which a short search, of `tries` or some times as many, finds enough; and with `copies`
+    whether what is hardly more than a copy of an exemplar is refused. All that is random in it depends on the models
+    and on what is stated alone, so every run and `make inspect` choose alike.
     Raises ConfigError for stated hubs that are no types.
     """
     open_keys = config.left_open()
@@ -71,6 +80,8 @@ def choose(config: KitConfig, models: Sequence[Model], identified: Identified, t
     sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up)
     one_surface = any(each.segmentation == "symmetry" for each in models)
     rungs = climb(sight, _rails(stated, sight, open_keys, one_surface), tries)
+    if copies:
+        values[CHOSEN_COPIED], reasons[CHOSEN_COPIED] = most_copied(rungs[-1].finds if rungs else None)
     if not rungs:
         return Choices(values, reasons, None, 1.0, False, 0)
     chosen = rungs[-1]
@@ -96,6 +107,17 @@ def choose(config: KitConfig, models: Sequence[Model], identified: Identified, t
         stand = "1 part stands" if left == 1 else f"{left} parts stand"
         reasons["disconnected"] = f"{stand} apart from the largest piece" if left else "nothing stands apart"
     return Choices(values, reasons, chosen.finds, chosen.kept, chosen.gives_enough, len(rungs))
+
+
+def most_copied(finds: Finds | None) -> tuple[float, str]:
+    """The greatest share of a variant that may be copied whole, and why: near copies are refused where a search that
+    found `finds` finds much more, and enough that is none."""
+    if finds is None or finds.graphs < GRAPHS:
+        return 1.0, "a short search finds too little to refuse any of it"
+    if finds.telling < TELLING:
+        return 1.0, f"only {finds.telling:.0%} of the finds of a short search are no near copies"
+    beside = f"{finds.telling:.0%} of the finds of a short search are none"
+    return COPIED, f"refuses copies with little beside them; {beside}"
 
 
 def found_words(finds: Finds) -> str:

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stages.choices.ladder import COPIED
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
+from stages.variations.settings import CHOSEN_COPIED
 
 __all__ = ["config_text", "dataset_name"]
 
@@ -19,8 +19,6 @@ MOST = 200
 UNSEEN = 3
 """So many times the layouts of the forecast are asked for: some are far rarer than others, and a short search counts
 those that come again and again."""
-TELLING = 0.25
-"""Share of finds from which on a search that refuses the others still comes to an end."""
 
 
 def dataset_name(models: Sequence[Path]) -> str:
@@ -38,13 +36,13 @@ def config_text(
     config: KitConfig,
     models: Sequence[Model],
     reasons: Mapping[str, str],
+    copied: float,
     layouts: int | None,
-    telling: float,
     said: str,
 ) -> str:
-    """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key; `layouts`: about how many
-    there are, None for very many; `telling`: share of the finds that are no near copies; `said`: the forecast in a
-    sentence. Where there are very many, and enough of them tell something, near copies are refused."""
+    """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key, of `copied` too, the
+    greatest share that may be copied whole; `layouts`: about how many there are, None for very many; `said`: the
+    forecast in a sentence."""
     made = config.decided()
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
     why = "; ".join(dict.fromkeys(model.why for model in models))
@@ -86,11 +84,8 @@ def config_text(
     require = []
     if made.hubs and config.hubs.keep == "backdrop":
         require.append(_line(2, "hubs", 1, "a variant on which none of them fits is refused"))
-    if layouts is None and telling >= TELLING:
-        why = f"refuses copies with little beside them; {telling:.0%} of the finds of a short search are none"
-        require.append(_line(2, "copied", COPIED, why))
-    if require:
-        lines += ["  require:", *require]
+    require.append(_line(2, "copied", copied, reasons.get(CHOSEN_COPIED, "")))
+    lines += ["  require:", *require]
     return "\n".join(lines) + "\n"
 
 

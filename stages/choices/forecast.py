@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from stages.choices.ladder import COPIED, FEW, is_dull
+from stages.choices.ladder import FEW, is_dull
 from stages.choices.probe import Finds, Probe
 from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.shape.kit import Kit
@@ -44,12 +44,6 @@ class Forecast:
     def chosen(self) -> list[Variant]:
         """The most different finds."""
         return [self.variants[place] for place in self.finds.most_different]
-
-    @property
-    def telling(self) -> float:
-        """Share of the finds that are no copy of an exemplar with little beside it, 0 to 1."""
-        shares: list[float] = [each.lineage["copied"]["largest"] for each in self.variants]
-        return sum(each <= COPIED for each in shares) / max(len(shares), 1)
 
 
 def forecast(kit: Kit, answers: ContactAnswers, tries: int, known: int = 0) -> Forecast:

@@ -26,6 +26,7 @@ from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.shape.kit import ContactKind, Strictness
+from stages.variations.settings import CHOSEN_COPIED
 
 __all__ = ["main"]
 
@@ -70,11 +71,12 @@ def _written(
     name = dataset_name(paths)
     kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
     yield "picture", write_file(folder / f"{name}.png", kit_sheet(kit))
-    layouts, telling = (found.forecast.layouts, found.forecast.telling) if found.forecast is not None else (0, 0.0)
+    layouts = found.forecast.layouts if found.forecast is not None else 0
     if found.forecast is not None and found.assemblies:
         sheet = forecast_sheet(found.built.kit, found.assemblies, name, found.sentence)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
-    text = config_text(name, found.config, models, found.choices.reasons, layouts, telling, found.sentence)
+    copied = found.choices.values[CHOSEN_COPIED]
+    text = config_text(name, found.config, models, found.choices.reasons, copied, layouts, found.sentence)
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
 
 

@@ -13,9 +13,10 @@ from stages.choices.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import ContactKind, Strictness
 from stages.variations.backdrop import Backdrop
+from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["COPIED", "FEW", "FITTED", "STAY", "Rails", "Rung", "climb", "is_dull", "peeled"]
+__all__ = ["FEW", "FITTED", "GRAPHS", "STAY", "Rails", "Rung", "climb", "is_dull", "peeled"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -23,8 +24,6 @@ HISTOGRAMS = 16
 DISTANCE = 0.05
 SPREAD = 0.03
 """Of so many histograms, so far from the exemplars and from each other, is a pool that is not dull."""
-COPIED = 0.9
-"""Median share copied whole from which on a pool is dull."""
 FAMILIAR = 0.85
 """Share of parts with fillings as seen below which a grammar of slots is too loose for a kit."""
 FEW = 20

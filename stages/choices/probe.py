@@ -14,6 +14,7 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
+from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.selection import farthest_first
@@ -23,7 +24,6 @@ __all__ = ["SHOWN", "Finds", "Probe"]
 
 SHOWN = 24
 """So many of the finds, those most different, say how different finds can be."""
-
 
 METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
 """Each has tries of its own, for a grown shape of a large kit costs as much as hundreds of exchanges."""
@@ -41,9 +41,10 @@ class Finds:
 
     tries: how many; graphs, histograms: distinct ones; distance: mean histogram metric E (strings §5.3) of the most
     different finds to their nearest exemplar; spread: median of E between two of them; copied: median of the largest
-    share of a find that stands just so in an exemplar; familiar: with a grammar of slots the share of their parts of
-    which it was seen just so which slots are filled, else 1; most_different: their places among the variants, most
-    different first; rejects: tries that came to nothing, by reason.
+    share of a find that stands just so in an exemplar; telling: share of the finds that are no near copies; familiar:
+    with a grammar of slots the share of their parts of which it was seen just so which slots are filled, else 1;
+    most_different: their places among the variants, most different first; rejects: tries that came to nothing, by
+    reason.
     """
 
     tries: int
@@ -52,6 +53,7 @@ class Finds:
     distance: float
     spread: float
     copied: float = 1.0
+    telling: float = 0.0
     familiar: float = 1.0
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
@@ -65,6 +67,7 @@ class Finds:
             "distance": self.distance,
             "spread": self.spread,
             "copied": self.copied,
+            "telling": self.telling,
         }
 
 
@@ -117,6 +120,7 @@ class Probe:
         exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:
             return Finds(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
+        whole = np.array([each.lineage["copied"]["largest"] for each in self.variants])
         taken = farthest_first(counts, exemplars, min(SHOWN, len(counts)))
         chosen = counts[taken]
         near = histogram_metric(chosen[:, None], exemplars[None]).min(axis=1)
@@ -127,7 +131,8 @@ class Probe:
             histograms=len(np.unique(counts, axis=0)),
             distance=round(float(near.mean()), 4),
             spread=round(float(np.median(apart)), 4) if len(apart) else 0.0,
-            copied=round(float(np.median([each.lineage["copied"]["largest"] for each in self.variants])), 4),
+            copied=round(float(np.median(whole)), 4),
+            telling=round(float(np.mean(whole <= COPIED)), 4),
             familiar=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
             most_different=tuple(taken.tolist()),
             rejects=dict(rejects.most_common()),

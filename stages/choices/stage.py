@@ -15,6 +15,7 @@ from stages.choices.settings import ChoicesConfig
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
+from stages.variations.settings import VariationsConfig
 
 __all__ = ["STAGE"]
 
@@ -22,13 +23,17 @@ BYTES_A_KIT = 4_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard for each kit that leaves a key open; its params hold the kit's config and its models' digests."""
+    """One shard for each kit that leaves a key open; its params hold the kit's config, its models' digests, and whether
+    it is open what may be copied."""
+    variations = plan.config.section(VariationsConfig)
+    copies = variations.per_kit > 0 and variations.require.copied == "auto"
     return [
         Shard(
             kit.name,
             {
                 "kit": kit.model_dump(mode="json"),
                 "digests": [file_digest(shape.path) for shape in kit.shapes],
+                "copies": copies,
             },
         )
         for kit in _open_kits(plan.config)
@@ -41,7 +46,8 @@ def run_shard(task: Task) -> Outcome:
     limits = task.config.section(ExemplarsConfig).limits
     models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
     tries = task.config.section(ChoicesConfig).tries
-    made = choose(config, models, identify_parts(models, config), tries).as_json()
+    identified, copies = identify_parts(models, config), task.shard.params["copies"]
+    made = choose(config, models, identified, tries, copies).as_json()
     with task.output(f"{config.name}.json") as stream:
         stream.write(json_bytes(made))
     return Outcome(samples=0, summary=made)
@@ -70,7 +76,7 @@ STAGE = Stage(
     module=__name__,
     config=ChoicesConfig,
     inputs=(),
-    sections=("exemplars",),
+    sections=("exemplars", "variations"),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=lambda plan: BYTES_A_KIT * len(_open_kits(plan.config)),

@@ -11,10 +11,11 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Kit, Strictness
 
-__all__ = ["dullness", "mutual_distance"]
+__all__ = ["COPIED", "dullness", "mutual_distance"]
 
 COPIED = 0.9
-"""Median share of parts in the largest copied piece from which on a pool is dull."""
+"""Share of parts in the largest copied piece above which a shape is a near copy, and from which on, in the median, a
+pool is dull."""
 NEAR = 0.02
 """Mean distance E to the nearest exemplar under which it is."""
 ALIKE = 0.05

@@ -29,7 +29,7 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search.search import SPARE, Search, Variant
-from stages.variations.settings import VariantRequirements, VariationsConfig
+from stages.variations.settings import CHOSEN_COPIED, VariantRequirements, VariationsConfig
 
 __all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
 
@@ -50,7 +50,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     shards: list[Shard] = []
     found: list[str] = []
     state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], "crossings": {}, "rejects": {}}
-    target = math.ceil(config.selection.oversample * config.per_kit)
+    target, copied = math.ceil(config.selection.oversample * config.per_kit), _most_copied(plan, kit)
     for number in range(config.search.rounds):
         name = f"{kit}-r{number:03d}"
         wanted = max(FEWEST, -(-(target - state["telling"]) * 11 // (10 * config.search.lanes)))
@@ -58,7 +58,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
         lanes = [
             Shard(
                 f"{name}-lane{lane:02d}",
-                {"job": "lane", "kit": kit, "wanted": wanted},
+                {"job": "lane", "kit": kit, "wanted": wanted, "copied": copied},
                 (f"exemplars/{kit}", *found),
                 code=tuple(module_of(each) for each in config.require.constraints),
             )
@@ -126,7 +126,8 @@ def run_lane(task: Task) -> Outcome:
 
 def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequence[Variant]) -> Sequence[Variant]:
     """The variants that are, with their backdrop, what the config requires; the others are refused."""
-    telling = [each for each in variants if each.lineage["copied"]["largest"] <= require.copied]
+    most = task.shard.params["copied"]
+    telling = [each for each in variants if each.lineage["copied"]["largest"] <= most]
     if len(telling) < len(variants):
         task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
     telling = _constrained(task, kit, require, telling)
@@ -157,6 +158,15 @@ def _constrained(task: Task, kit: Kit, require: VariantRequirements, variants: l
         else:
             task.reject(task.shard.name, reason)
     return kept
+
+
+def _most_copied(plan: Plan, kit: str) -> float:
+    """The greatest share of a variant of `kit` that may be copied whole, as stated or as was chosen."""
+    said = plan.config.section(VariationsConfig).require.copied
+    if said != "auto":
+        return said
+    built = plan.summary("exemplars", kit) or {"chosen": {}}
+    return float(built["chosen"].get(CHOSEN_COPIED, 1.0))
 
 
 def _fewest_hubs(config: Config, kit: Kit) -> int:

@@ -10,7 +10,18 @@ from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 from stages.variations.features import Axis
 
-__all__ = ["GrownConfig", "NoveltyConfig", "SearchConfig", "SelectionConfig", "SplitConfig", "VariationsConfig"]
+__all__ = [
+    "CHOSEN_COPIED",
+    "GrownConfig",
+    "NoveltyConfig",
+    "SearchConfig",
+    "SelectionConfig",
+    "SplitConfig",
+    "VariationsConfig",
+]
+
+CHOSEN_COPIED = "require.copied"
+"""What `require.copied` is called among the keys that are chosen for a kit."""
 
 
 class NoveltyConfig(StrictModel):
@@ -189,12 +200,11 @@ class VariantRequirements(Requirements):
         description="Global constraints, by name, with the labels of parts that each speaks of: `support: {}`, "
         "`path: {entries: [...], exits: [...], through: [...]}`, or one in a file of your own.",
     )
-    copied: float = Field(
-        1.0,
-        gt=0,
-        le=1,
+    copied: Literal["auto"] | Annotated[float, Field(gt=0, le=1)] = Field(
+        "auto",
         description="Greatest share of its parts, without its backdrop, that may stand in one piece just so in an "
-        "exemplar; 1 refuses none.",
+        "exemplar; 1 refuses none. `auto`: 0.9 for a kit of which a short search finds enough beside such copies, else "
+        "1; a kit that leaves no key of its own to be chosen is not searched, and none is refused.",
     )
 
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stages.choices.choose import Choices, choose
+from stages.choices.choose import Choices, choose, most_copied
 from stages.choices.forecast import forecast
+from stages.choices.probe import Finds, Probe
 from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
 from stages.exemplars.build import build_kit
@@ -99,12 +100,12 @@ class TestLadder:
         config = KitConfig(name="playground", shapes=tuple(paths))
         models = [read_model(path) for path in paths]
         made = choose(config, models, identify_parts(models, config), 2500)
-        assert (dict(made.values), made.settings, made.enough) == (STRICTEST, 1, True)
+        assert (dict(made.values), made.settings, made.enough) == ({**STRICTEST, "require.copied": 0.9}, 1, True)
 
     def test_what_the_config_states_is_obeyed_and_not_chosen(self) -> None:
         stated = {"up": "z", "grammar": "count_and_set", "disconnected": "error", "hubs": HubConfig(types="none")}
         made = chosen([chain(3), chain(5)], CHAIN, **stated)
-        assert set(made.values) == {"contact.tolerance", "contact.kinds"} == set(made.reasons)
+        assert set(made.values) == {"contact.tolerance", "contact.kinds", "require.copied"} == set(made.reasons)
 
     def test_choices_are_the_same_every_time(self) -> None:
         shapes = [ring(1, 1), ring(2, 3)]
@@ -149,8 +150,35 @@ class TestLadder:
         built, _ = build_kit(config.decide(STRICTEST), models)
         assert probed.grammar.neighbourhoods == built.grammar.neighbourhoods
         made = choose(config, models, identified, TRIES)
-        assert set(made.values) == set(config.left_open())
+        assert set(made.values) == {*config.left_open(), "require.copied"}
         assert made.finds is not None
+
+
+class TestCopies:
+    @pytest.mark.parametrize(
+        ("finds", "most"),
+        [
+            (Finds(5000, 80, 40, 0.1, 0.1, telling=0.6), 0.9),
+            (Finds(5000, 80, 40, 0.1, 0.1, telling=0.1), 1.0),  # the search would refuse nearly all it finds
+            (Finds(5000, 40, 30, 0.1, 0.1, telling=0.6), 1.0),  # there are too few to choose from
+            (None, 1.0),
+        ],
+    )
+    def test_near_copies_are_refused_where_enough_is_left(self, finds: Finds | None, most: float) -> None:
+        assert most_copied(finds)[0] == most
+
+    def test_a_limit_that_is_stated_is_not_chosen(self) -> None:
+        config, models = left_open([ring(1, 1), ring(2, 3)]), models_of(ROAD, [ring(1, 1), ring(2, 3)])
+        made = choose(config, models, identify_parts(models, config), TRIES, copies=False)
+        assert set(made.values) == set(config.left_open())
+
+    def test_finds_tell_something_unless_they_are_copied_but_for_a_tenth(self) -> None:
+        kit, _ = build_kit(config_of([chain(3), chain(5)]), models_of(CHAIN, [chain(3), chain(5)]))
+        probe = Probe(ContactAnswers(kit), np.random.default_rng(1))
+        assert probe.go_on(TRIES, 4).telling == 1.0
+        shares = [0.5, 0.9, 0.95, 1.0]
+        probe.variants[:] = [replace(probe.variants[0], lineage={"copied": {"largest": each}}) for each in shares]
+        assert probe.finds().telling == 0.5
 
 
 class TestForecast:
@@ -163,15 +191,6 @@ class TestForecast:
         # 2.5 to 14 parts, the exemplars' 5 and 7 aside, and no link without a cap: 1 to 12 links
         assert found.finds.graphs == found.finds.histograms == found.layouts
         assert found.sentence.startswith(f"about {found.layouts} layouts, no dataset")
-
-    def test_finds_tell_something_unless_they_are_copied_but_for_a_tenth(self) -> None:
-        kit = self.kit([chain(3), chain(5)], CHAIN)
-        found = forecast(kit, ContactAnswers(kit), TRIES)
-        assert found.telling == 1.0
-        shares = [0.5, 0.9, 0.95, 1.0]
-        variants = [replace(found.variants[0], lineage={"copied": {"largest": each}}) for each in shares]
-        assert replace(found, variants=variants).telling == 0.5
-        assert replace(found, variants=[]).telling == 0.0
 
     def test_every_part_its_own_type_is_said_with_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}

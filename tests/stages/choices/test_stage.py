@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from stages.choices.inspect import main
+from stages.shape.sample import read_samples
 from tests.mill import mill
 from tests.stages.variations.test_stage import write_model
 from tests.stages.variations.toy import ROAD, ring
@@ -18,6 +19,7 @@ from tests.stated import stated
 
 pytestmark = pytest.mark.slow
 
+ROOT = Path(__file__).resolve().parents[3]
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
@@ -66,6 +68,24 @@ def test_the_kit_is_built_as_was_chosen_and_the_record_says_why(made: tuple[Path
 
 def test_people_are_told_what_was_chosen(made: tuple[Path, str]) -> None:
     assert "open: up: z: the lowest points span" in made[1]
+
+
+def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_path: Path) -> None:
+    shapes = sorted(map(str, (ROOT / "datasets" / "exemplars" / "playground").glob("*.glb")))
+    kit = stated({"name": "open", "shapes": shapes, "disconnected": "auto"})
+    variations = {"per_kit": 24, "search": {"tries": 2000}, "splits": {"by": "graph", "shards": 1}}
+    config = {"name": "toy", "exemplars": {"kits": [kit]}, "variations": variations}
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    run(tmp_path, ("choices", "exemplars", "variations"))
+    assert record(tmp_path, "choices", "open")["summary"]["chosen"] == {"disconnected": "error", "require.copied": 0.9}
+    samples = [
+        sample
+        for shard in (tmp_path / "out" / ".work" / "toy" / "variations").glob("toy-t*.tar")
+        for sample in read_samples(shard)
+    ]
+    assert samples
+    assert max(sample.lineage["copied"]["largest"] for sample in samples) <= 0.9
+    assert record(tmp_path, "variations", "open-r000-lane00")["rejects"]["too much copied whole"] > 0
 
 
 def test_inspect_chooses_the_same(made: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
