@@ -17,6 +17,8 @@ __all__ = ["by_symmetry", "search_size"]
 
 LEFT_OUT = 1e-5
 """Share of the surface from which on it is told that it is left out."""
+STRAINED = 0.02
+"""Share of the surface of what runs along a row from which on it is told that one copy stands for others."""
 
 
 def by_symmetry(scene: Scene) -> Scene:
@@ -42,6 +44,9 @@ def by_symmetry(scene: Scene) -> Scene:
     left = 1.0 - sum(len(each.poses) * each.triangles.area for each in pieces) / whole
     if left > LEFT_OUT:
         warnings = (*warnings, f"splinters between copies, {left:.2%} of the surface, are left out")
+    strained = max(each.strained for each in pieces)
+    if strained > STRAINED:
+        warnings = (*warnings, f"what runs along a row is alike at all its copies now; it differed by {strained:.0%}")
     return replace(scene, kind="nodes", surfaces=tuple(surfaces), placements=tuple(placements), warnings=warnings)
 
 

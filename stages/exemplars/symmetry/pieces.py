@@ -42,11 +42,13 @@ CRUMB = 1e-7
 class Piece:
     """A piece of the surface and everywhere it stands.
 
-    triangles: in the world, where it stands at the identity; poses: rigid (4, 4), the identity first.
+    triangles: in the world, where it stands at the identity; poses: rigid (4, 4), the identity first; strained: by what
+    share of its surface what runs along a row, and goes with this piece, was larger or smaller at another pose.
     """
 
     triangles: Soup
     poses: tuple[FloatArray, ...]
+    strained: float = 0.0
 
 
 def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[Piece]:
@@ -122,8 +124,8 @@ def _cut(piece: Piece, grid: SurfaceGrid, repetition: Repetition) -> list[Piece]
 
 
 def _equal(one: Soup, other: Soup, pose: FloatArray, tolerance: float, share: float = DUST) -> bool:
-    """Whether `pose` moves one surface onto another, by points of all triangles but the smallest, dust of
-    about this share of the surface."""
+    """Whether `pose` moves one surface onto another: by their areas, which may differ by `share`, and by points of all
+    triangles but the smallest, dust of about this share of the surface."""
     from stages.shape.geometry.triangles import build_tree, points_on_surface
 
     if abs(one.area - other.area) > share * one.area:
@@ -150,7 +152,7 @@ def _with_what_runs_along(pieces: list[Piece], place: int, grid: SurfaceGrid) ->
     if row is None:
         return pieces
     found = list(pieces)
-    gained = piece.triangles
+    gained, strained = piece.triangles, piece.strained
     for other, single in enumerate(pieces):
         if other == place or len(single.poses) > 1:
             continue
@@ -161,8 +163,9 @@ def _with_what_runs_along(pieces: list[Piece], place: int, grid: SurfaceGrid) ->
             for chunk, pose in zip(chunks, piece.poses, strict=True)
         ):
             continue
+        strained = max(strained, *(abs(chunk.area / first.area - 1) for chunk in chunks))
         gained, found[other] = joined(gained, first), Piece(rest, single.poses)
-    found[place] = Piece(gained, piece.poses)
+    found[place] = Piece(gained, piece.poses, strained)
     return found
 
 
@@ -172,8 +175,12 @@ def _parts(pieces: list[Piece], grid: SurfaceGrid) -> list[Piece]:
     What is smaller stays with the largest of them, but what lies between copies and is of no copy is left out: it would
     make a neighbour of all of them of what is left.
     """
-    copies = [transform_points(pose, each.triangles.corners.reshape(-1, 3))
-              for each in pieces if len(each.poses) > 1 for pose in each.poses]  # fmt: skip
+    copies = [
+        transform_points(pose, each.triangles.corners.reshape(-1, 3))
+        for each in pieces
+        if len(each.poses) > 1
+        for pose in each.poses
+    ]
     beside = _cells(np.concatenate(copies).reshape(-1, 3, 3), grid) if copies else np.empty((0, 3))
     found: list[Piece] = []
     for piece in pieces:
@@ -190,7 +197,7 @@ def _parts(pieces: list[Piece], grid: SurfaceGrid) -> list[Piece]:
             parts, crumbs = crumbs[:1], crumbs[1:]
         for crumb in crumbs:
             parts[0] = joined(parts[0], crumb)
-        found += [Piece(each, piece.poses) for each in parts]
+        found += [Piece(each, piece.poses, piece.strained) for each in parts]
     return found
 
 

@@ -93,6 +93,18 @@ class TestBridge:
         assert len(parts.surfaces) == 3
         assert sorted(np.bincount([each.surface for each in parts.placements]).tolist()) == [1, 1, 4]
 
+    @pytest.mark.parametrize(
+        ("taper", "said"),
+        [(0.0, ()), (0.004, ("what runs along a row is alike at all its copies now; it differed by 13%",))],
+    )
+    def test_what_runs_along_a_row_unevenly_is_told(self, taper: float, said: tuple[str, ...]) -> None:
+        """The far end of a cable is thicker by less than a cell."""
+        cable = box((0.0, -0.031, 1.6), (6.2, -0.001, 1.7))
+        cable[..., 2] += taper * cable[..., 0] * (cable[..., 2] > 1.65)
+        parts = segment(one_object(np.concatenate([wall(5), cable])), "symmetry")
+        assert np.bincount([each.surface for each in parts.placements]).max() == 5
+        assert parts.warnings == said
+
     def test_a_mesh_that_repeats_nothing_is_left_alone(self) -> None:
         source, why, _ = pick(one_object(box((0, 0, 0), (3, 2, 1))))
         assert source == "objects"
