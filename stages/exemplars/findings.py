@@ -123,7 +123,7 @@ def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
         yield (
             f"{exemplar.name}: {_count(len(found), 'part')} of {len(assembly)} with very many contacts: {named}; "
             "hardly another shape has the same around them, so variants may keep them as they are; split them in the "
-            "model, or leave them out with `hubs.types`"
+            "model, or leave them out with `hubs.types` where the rest holds together without them"
         )
 
 
