@@ -21,6 +21,7 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.exemplars.stage import STAGE
 from stages.shape.kit_files import describe_kit, load_kit
+from stages.variations.settings import VariationsConfig
 from tests.stages.exemplars.model_files import box, write_obj
 from tests.stated import stated
 
@@ -38,7 +39,7 @@ def write_config(folder: Path, kits: list[dict[str, Any]]) -> Config:
 
     path = folder / "toy.yaml"
     path.write_text(yaml.safe_dump({"name": "toy", "exemplars": {"kits": [stated(kit) for kit in kits]}}))
-    return load_config(path, {name: stage.config for name, stage in STAGES.items()})
+    return load_config(path, {**{name: stage.config for name, stage in STAGES.items()}, "variations": VariationsConfig})
 
 
 def run(folder: Path, config: Config, out: str = "out") -> tuple[str, ...]:
