@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,12 +37,14 @@ class Struck:
 class Blow:
     """A kind of blow: how it strikes, with which codes the run may end, and which options and config it runs with.
 
-    needs_worker: it is about a worker, so it comes when there is one. needs_disk: `out` is on a small disk of its own.
+    words: what the run must have said that ended with a code. needs_worker: it is about a worker, so it comes when
+    there is one. needs_disk: `out` is on a small disk of its own.
     """
 
     strike: Callable[[Arena, Run, np.random.Generator], Struck]
     codes: frozenset[int]
     options: tuple[str, ...] = ()
+    words: Mapping[int, str] = field(default_factory=lambda: {3: "stopped: "})
     edited: bool = False
     needs_worker: bool = False
     needs_disk: bool = False
@@ -157,7 +159,8 @@ BLOWS: dict[str, Blow] = {
     "fill the disk": Blow(fill_disk, frozenset({0, 2, 3}), needs_disk=True),
     "take rights": Blow(take_rights, frozenset({0, 3}), prepare=_obey_permissions),
     "spoil a finished shard": Blow(spoil_shard, frozenset({0})),
-    "cut a record": Blow(cut_record, frozenset({0})),
+    # cut after its own stage has looked at it and before the one that reads it begins
+    "cut a record": Blow(cut_record, frozenset({0, 2}), words={2: "shards are not made (the first is "}),
     "edit the config": Blow(edit_config, frozenset({0, -9}), edited=True),
     "a second run": Blow(second_run, frozenset({0, 2})),
 }

@@ -97,8 +97,7 @@ def _check(run: Run, struck: Struck, code: int, blow: Blow, arena: Arena) -> Non
     said = run.said()
     assert code in blow.codes or _set_aside(blow, code, said), f"{struck.words}: ended with {code}: {said[-2000:]}"
     _check_words(struck, said)
-    if code == 3:
-        assert "stopped: " in said, f"{struck.words}: no clear word: {said[-2000:]}"
+    assert blow.words.get(code, "") in said, f"{struck.words}: no clear word: {said[-2000:]}"
     if struck.other is not None:
         other, words = struck.other
         assert other in blow.codes, f"{struck.words} ended with {other}: {words[-2000:]}"
