@@ -55,6 +55,8 @@ ifeq ($(value WORKERS),)
 override WORKERS := $(shell nproc 2>/dev/null || echo 1)
 endif
 export $(VARIABLES)
+# Images of containers often ask for no compiled files; every stage and worker would then compile 400 modules anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON  := .venv/bin/python
 READY   := .venv/ready-$(firstword $(shell cat requirements.lock pipeline/setup.sh pipeline/libraries.txt | cksum))

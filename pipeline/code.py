@@ -12,11 +12,14 @@ import ast
 import gc
 import hashlib
 import importlib.util
+import json
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from pipeline.shards import json_bytes
 
@@ -134,14 +137,63 @@ class _House:
                 yield base
 
 
+_Said = tuple[str, tuple[tuple[int, str], ...]]
+"""The digest of a file, and the modules that it may import, each with its number of leading dots."""
+
+
 @cache
-def _read(file: str, modified: int, size: int) -> tuple[str, tuple[tuple[int, str], ...]]:
-    """The digest of a file in one state, and the modules that it may import, each with its number of leading dots."""
+def _read(file: str, modified: int, size: int) -> _Said:
+    """What a file says in one state."""
+    source = Path(file).read_bytes()
+    noted = Path(importlib.util.cache_from_source(file)).with_suffix(".said.json")
+    key = hashlib.sha256(_reader() + source).hexdigest()
+    said = _noted(noted, key)
+    if said is None:
+        said = _parsed(source, file)
+        _note(noted, {"key": key, "digest": said[0], "imports": said[1]})
+    return said
+
+
+def _parsed(source: bytes, file: str) -> _Said:
     with _no_collection():
         words: list[str] = []
         imported: list[tuple[int, str]] = []
-        _describe(ast.parse(Path(file).read_bytes(), file), words.append, imported)
+        _describe(ast.parse(source, file), words.append, imported)
         return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16], tuple(dict.fromkeys(imported))
+
+
+@cache
+def _reader() -> bytes:
+    """What else the answer depends on: this file, which reads. Each version of Python has notes of its own."""
+    return Path(__file__).read_bytes()
+
+
+def _noted(path: Path, key: str) -> _Said | None:
+    """What a note beside Python's own compiled files says of a source with this `key`; None where it says nothing.
+
+    To parse the house takes most of a second, and every start of a stage and every worker wants to know.
+    """
+    try:
+        note = json.loads(path.read_bytes())
+        if note["key"] != key:
+            return None
+        return str(note["digest"]), tuple((int(dots), str(name)) for dots, name in note["imports"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _note(path: Path, note: Mapping[str, Any]) -> None:
+    """Write a note if there is a place for it; a torn one is read as none."""
+    if sys.dont_write_bytecode:
+        return
+    own = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(exist_ok=True)
+        own.write_bytes(json_bytes(note))
+        own.replace(path)
+    except OSError:
+        with suppress(OSError):
+            own.unlink()
 
 
 @contextmanager

@@ -10,10 +10,7 @@ from pipeline.config import Config
 from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.choices.choose import choose
 from stages.choices.settings import ChoicesConfig
-from stages.exemplars.identify import identify_parts
-from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
 from stages.variations.settings import VariationsConfig
 
@@ -42,6 +39,10 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Read the models and decide."""
+    from stages.choices.choose import choose
+    from stages.exemplars.identify import identify_parts
+    from stages.exemplars.read import read_model
+
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
     limits = task.config.section(ExemplarsConfig).limits
     models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]

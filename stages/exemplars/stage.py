@@ -8,13 +8,9 @@ from typing import Any
 
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.exemplars.build import build_kit
 from stages.exemplars.origins import exemplar_origins
-from stages.exemplars.portrait import kit_sheet
-from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.origin import unstated
-from stages.shape.kit_files import write_kit
 
 __all__ = ["STAGE"]
 
@@ -36,6 +32,11 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Read, repair, identify, observe, write."""
+    from stages.exemplars.build import build_kit
+    from stages.exemplars.portrait import kit_sheet
+    from stages.exemplars.read import read_model
+    from stages.shape.kit_files import write_kit
+
     section = task.config.section(ExemplarsConfig)
     config = next(kit for kit in section.kits if kit.name == task.shard.params["kit"])
     chosen: dict[str, Any] = {"chosen": {}, "why": {}}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.code import reached, starts_of
+from pipeline.code import _read, reached, starts_of
 from pipeline.config import Config
 from pipeline.errors import Fatal
 from pipeline.places import Places
@@ -191,3 +191,51 @@ def test_chair_does_not_know_the_vase() -> None:
     chair = names(*starts_of("stages.programs.stage", ["stages.programs.library.chair"]))
     assert library & chair == {"stages.programs.library.chair"}
     assert {"stages.programs.curves.part", "stages.programs.sampling"} <= chair
+
+
+@pytest.mark.usefixtures("write")
+class TestNotes:
+    """What a file says is noted beside Python's compiled files, so that the next process need not parse it."""
+
+    @pytest.fixture
+    def said(self, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], dict[str, str]]:
+        monkeypatch.setattr(sys, "dont_write_bytecode", False)
+
+        def said(text: str) -> dict[str, str]:
+            """The digests that a process finds which sees the file for the first time."""
+            _read.cache_clear()
+            if text:
+                write("house/mill.py", text)
+            return reached(["house.mill"])
+
+        return said
+
+    def note(self, tmp_path: Path) -> Path:
+        (found,) = (tmp_path / "src/house/__pycache__").glob("mill.*.said.json")
+        return found
+
+    def test_says_what_the_file_says(self, said: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
+        first = said("import house.stone\nGRIT = 1")
+        assert self.note(tmp_path).is_file()
+        assert said("") == first
+        assert said("import house.stone\nGRIT = 2") != first
+        assert said("import house.stone\nGRIT = 1") == first
+
+    @pytest.mark.parametrize("spoilt", [b"", b"{", b"[]", b'{"key": 1}', b"\0" * 90])
+    def test_that_are_spoilt_say_nothing(
+        self, said: Callable[[str], dict[str, str]], tmp_path: Path, spoilt: bytes
+    ) -> None:
+        first = said("GRIT = 1")
+        whole = self.note(tmp_path).read_bytes()
+        self.note(tmp_path).write_bytes(spoilt)
+        assert said("") == first
+        assert self.note(tmp_path).read_bytes() == whole
+
+    def test_are_not_needed(self, said: Callable[[str], dict[str, str]], tmp_path: Path) -> None:
+        first = said("GRIT = 1")
+        folder = self.note(tmp_path).parent
+        for each in folder.iterdir():
+            each.unlink()
+        folder.rmdir()
+        folder.write_text("a file stands where the folder would be")
+        assert said("") == first
