@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from stages.shape.arrays import Float32Array, FloatArray
+from stages.shape.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.buffers import Backend, render_buffers
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 
-__all__ = ["KeyLight", "eye_positions", "key_light", "openness", "to_world"]
+__all__ = ["KeyLight", "eye_positions", "ground_seen", "key_light", "openness", "to_world"]
 
 SHADOW_MAP = 1024
 """Side of the shadow map in pixels."""
@@ -63,6 +63,16 @@ def to_world(points: FloatArray, view: View) -> FloatArray:
     return moved
 
 
+def ground_seen(
+    wanted: BoolArray, view: View, axis: int, height: float, middle: FloatArray, reach: float
+) -> tuple[IntArray, FloatArray]:
+    """Where the rays through the `wanted` pixels, bool (h, w), meet the ground, at `height` along `axis`, from above
+    and within `reach` of `middle` (3,): numbers of the pixels, int64 (n,), and points of the world, float64 (n, 3)."""
+    across, upwards = view.projection[0, 0], view.projection[1, 1]
+    rotation, shift = view.eye[:3, :3], view.eye[:3, 3]
+    return _ground_seen(wanted, across, upwards, view.perspective, rotation, shift, axis, height, middle, reach)
+
+
 def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float) -> FloatArray:
     """How much of the half-sphere over each pixel is free of nearby surfaces, float64 (h, w), 1 for background.
 
@@ -76,6 +86,38 @@ def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _ground_seen(wanted, across, upwards, perspective, rotation, shift, axis, height, middle, reach):
+    rows, columns = wanted.shape
+    pixels, points = np.empty(rows * columns, dtype=np.int64), np.empty((rows * columns, 3))
+    found = 0
+    start, ray, point = np.zeros(3), np.zeros(3), np.zeros(3)
+    for row in range(rows):
+        for column in range(columns):
+            if not wanted[row, column]:
+                continue
+            x = ((column + 0.5) * 2 / columns - 1) / across
+            y = (1 - (row + 0.5) * 2 / rows) / upwards
+            for k in range(3):
+                # Through a lens rays leave the eye; else they leave the picture, all the same way.
+                away, beside = -rotation[2, k], rotation[0, k] * x + rotation[1, k] * y
+                origin = -(rotation[0, k] * shift[0] + rotation[1, k] * shift[1] + rotation[2, k] * shift[2])
+                start[k] = origin if perspective else origin + beside
+                ray[k] = away + beside if perspective else away
+            if ray[axis] >= -1e-9:
+                continue
+            long = (height - start[axis]) / ray[axis]
+            distance = 0.0
+            for k in range(3):
+                point[k] = start[k] + long * ray[k]
+                distance += (point[k] - middle[k]) ** 2
+            if distance < reach * reach:
+                pixels[found] = row * columns + column
+                points[found] = point
+                found += 1
+    return pixels[:found], points[:found]
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _filtered(depth, x, y, distance, radius, bias):
     """Share of unshadowed taps of a disc of `radius` pixels around each (x, y)."""
     lit = np.empty(len(x))
@@ -84,7 +126,17 @@ def _filtered(depth, x, y, distance, radius, bias):
     # Taps on a sunflower's spiral cover the disc evenly.
     spread = radius * np.sqrt((np.arange(taps) + 0.5) / taps)
     right, down = spread * np.cos(np.arange(taps) * GOLDEN_ANGLE), spread * np.sin(np.arange(taps) * GOLDEN_ANGLE)
+    top, bottom, first, last = size, -1, size, -1  # of what throws a shadow
+    for row in range(size):
+        for column in range(size):
+            if np.isfinite(depth[row, column]):
+                top, bottom = min(top, row), max(bottom, row)
+                first, last = min(first, column), max(last, column)
     for k in range(len(x)):
+        beside = x[k] < first - radius or x[k] >= last + 1 + radius
+        if beside or y[k] < top - radius or y[k] >= bottom + 1 + radius:
+            lit[k] = 1.0
+            continue
         free = 0
         for tap in range(taps):
             away = spread[tap]

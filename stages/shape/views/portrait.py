@@ -7,10 +7,10 @@ from typing import Literal
 import numba
 import numpy as np
 
-from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from stages.shape.views.buffers import Backend, Visible, visible_triangles
 from stages.shape.views.camera import Camera, View
-from stages.shape.views.light import KeyLight, eye_positions, key_light, openness, to_world
+from stages.shape.views.light import KeyLight, eye_positions, ground_seen, key_light, openness, to_world
 from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
 from stages.shape.views.scene import Scene
 
@@ -52,7 +52,7 @@ def portrait(
     shown = part >= 0
     picture = np.broadcast_to(srgb_to_linear(np.array(PAPER, dtype=np.uint8)), (height, width, 3)).copy()
     if camera.elevation > 0.0:
-        picture *= _ground_light(scene, seen.view, light, (height, width))
+        picture *= _ground_light(scene, seen.view, light, shown)
     world = to_world(eye_positions(depth, seen.view)[shown], seen.view)
     upright = normal[shown] @ seen.view.eye[:3, :3]
     lit = np.clip(upright @ light.direction, 0.0, None) * light.reaches(world, 0.012 * seen.view.radius)
@@ -93,31 +93,23 @@ def points_portrait(
     return linear_to_srgb(_reduced(picture))
 
 
-def _ground_light(scene: Scene, view: View, light: KeyLight, shape: tuple[int, int]) -> FloatArray:
-    """What the shadow on the ground leaves of the light, float64 (h, w, 3); 1 where no ground is seen."""
+def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) -> FloatArray:
+    """What the shadow on the ground leaves of the light, float64 (h, w, 3); 1 where no ground is seen, as where it is
+    `hidden`, bool (h, w)."""
+    height, width = hidden.shape
     axis = 1 if scene.up == "y" else 2
-    low = float(scene.points[:, axis].min())
-    ones = np.ones(shape, dtype=np.float32)
-    near = to_world(eye_positions(ones, view).reshape(-1, 3), view)
-    far = to_world(eye_positions(2 * ones, view).reshape(-1, 3), view)
-    slope = (far - near)[:, axis]
-    left = np.ones(shape[0] * shape[1])
-    down = slope < -1e-9
-    points = near[down] + (far - near)[down] * ((low - near[down, axis]) / slope[down])[:, None]
     middle = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
-    close = np.linalg.norm(points - middle, axis=1) < 4.0 * view.radius
-    found = np.ones(len(points))
-    soft = light.reaches(points[close], 0.05 * view.radius)
-    wide = light.reaches(points[close], 0.22 * view.radius)
-    found[close] = 0.6 * soft + 0.4 * wide
-    left[down] = found
     # Where a shadow would leave the picture it fades out, so that pictures stand side by side without a seam.
-    rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
-    edge = np.minimum(np.minimum(rows, shape[0] - rows)[:, None], np.minimum(columns, shape[1] - columns)[None, :]) / (
-        0.10 * min(shape)
-    )
-    fade = np.clip(edge, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(edge, 0.0, 1.0))
-    shadow = ((1.0 - left.reshape(shape)) * fade)[..., None]
+    rows, columns = np.arange(height) + 0.5, np.arange(width) + 0.5
+    edge = np.minimum(np.minimum(rows, height - rows)[:, None], np.minimum(columns, width - columns)[None, :])
+    inside = np.clip(edge / (0.10 * min(height, width)), 0.0, 1.0)
+    fade = inside**2 * (3.0 - 2.0 * inside)
+    pixels, points = ground_seen(~hidden, view, axis, float(scene.points[:, axis].min()), middle, 4.0 * view.radius)
+    soft = light.reaches(points, 0.05 * view.radius)
+    wide = light.reaches(points, 0.22 * view.radius)
+    left = np.ones(height * width)
+    left[pixels] = 0.6 * soft + 0.4 * wide
+    shadow = ((1.0 - left.reshape(height, width)) * fade)[..., None]
     light_left: FloatArray = 1.0 - shadow * (1.0 - SHADOW)
     return light_left
 
