@@ -70,7 +70,9 @@ def ground_seen(
     and within `reach` of `middle` (3,): numbers of the pixels, int64 (n,), and points of the world, float64 (n, 3)."""
     across, upwards = view.projection[0, 0], view.projection[1, 1]
     rotation, shift = view.eye[:3, :3], view.eye[:3, 3]
-    return _ground_seen(wanted, across, upwards, view.perspective, rotation, shift, axis, height, middle, reach)
+    seen: tuple[IntArray, FloatArray]
+    seen = _ground_seen(wanted, across, upwards, view.perspective, rotation, shift, axis, height, middle, reach)
+    return seen
 
 
 def openness(depth: Float32Array, normal: Float32Array, view: View, reach: float) -> FloatArray:
