@@ -12,6 +12,7 @@ from eval.clusters import Clusters
 from eval.models import Trained, by_group, over_seeds, trained_models
 from eval.subject import Subject
 from eval.table import Cell, Published, Table
+from pipeline.errors import ConfigError
 from stages.shape.arrays import IntArray
 from stages.shape.collection.declared import producers
 from stages.shape.kit import Assembly, Kit
@@ -72,7 +73,10 @@ def category_models(folder: Path, kits: dict[str, Kit]) -> list[Trained[TrainedE
 
 
 def made_shapes(subject: Subject, kit: str, split: str) -> Iterator[Assembly]:
-    """The shapes of a kit in a split, out of the mill's folder, one in memory at a time."""
+    """The shapes of a kit in a split, out of the mill's folder, one in memory at a time. Raises ConfigError where the
+    config lets go of them."""
+    if subject.config.keep == "dataset":
+        raise ConfigError("the shapes were let go of; keep: all in the config, and make dataset")
     for producer in producers():
         folder = subject.places.stage(producer).root
         for shard in sorted(folder.glob(f"{subject.config.name}-{split}-*.tar")):

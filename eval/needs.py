@@ -43,6 +43,8 @@ KITS = Need("kits read by stage exemplars", _kits)
 
 def _search(subject: Subject) -> str:
     records = subject.places.stage("variations").records
+    if subject.config.keep == "dataset":
+        return "what the search found was let go of; keep: all in the config, and make variations"
     return "" if any(records.glob("*-pool.json")) else f"no search has left its records in {records}; make variations"
 
 
@@ -67,6 +69,8 @@ PROGRAM_VAE = _trained("program_vae", "model of ShapeAssembly programs")
 
 
 def _programs(subject: Subject) -> str:
+    if subject.config.keep == "dataset":
+        return "the programs were let go of; keep: all in the config, and make shapeassembly"
     root = subject.places.stage("shapeassembly").root
     return "" if any(root.glob("*-train-*.tar")) else f"the programs are not in {root}; make shapeassembly"
 

@@ -29,7 +29,7 @@ def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) 
         if missing:
             yield f"{name}: {len(missing)} of {len(surveyed.shards)} shards are not made, first {missing[0].name}"
         for shard, record in surveyed.records.items():
-            for file in damaged_files(record, surveyed.places):
+            for file in () if shard in surveyed.let_go else damaged_files(record, surveyed.places):
                 remove(surveyed.places.records / f"{shard}.json")
                 yield f"{name}: {file} is damaged; the next run makes {shard} again"
         if not missing:

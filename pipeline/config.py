@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -49,6 +49,11 @@ class DatasetFacts(StrictModel):
     title: str = Field("", description="title on the dataset's card; the name if empty")
     description: str = Field("", description="what the dataset is, in a sentence or a few, for its card")
     license: str = Field("unknown", min_length=1, description="licence of the dataset, as an SPDX id such as CC-BY-4.0")
+    keep: Literal["all", "dataset"] = Field(
+        "all",
+        description="what stays when the dataset is finished: all; or the dataset alone, and what lies between is "
+        "taken away, to be made again where something else is to be made of it",
+    )
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,7 @@ class Config:
     title: str = ""
     description: str = ""
     license: str = "unknown"
+    keep: Literal["all", "dataset"] = "all"
 
     def section(self, model: type[Section]) -> Section:
         """The section that a stage declared with the config class `model`."""
@@ -144,6 +150,7 @@ def load_config(
         title=header.title or header.name,
         description=header.description,
         license=header.license,
+        keep=header.keep,
     )
 
 

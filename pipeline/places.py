@@ -9,7 +9,8 @@
     OUT/.work/<dataset>/<stage>/progress/          how far running shards are
     OUT/.work/<dataset>/<stage>/mill/              manifest.json (written last: all shards of the finished stage with
                                                    their fingerprints, and the digests of its code), published.json
-                                                   (the files that it has put in OUT itself), locks
+                                                   (the files that it has put in OUT itself), let-go.json (the
+                                                   records whose files were taken away on purpose), locks
 
 A file that begins with a dot and ends in `.tmp` is being written; every other file is whole.
 """
@@ -76,6 +77,10 @@ class StagePlaces:
     @property
     def published(self) -> Path:
         return self.mill / "published.json"
+
+    @property
+    def let_go(self) -> Path:
+        return self.mill / "let-go.json"
 
     def make(self) -> None:
         """Make the folders. Raises Fatal when the disk does not let us."""

@@ -39,9 +39,10 @@ class ShardRecord:
 
     def to_bytes(self) -> bytes:
         """The record as one line of JSON, with a digest of itself: plans are made of what it says."""
-        return json_bytes({**asdict(self), "seal": self._seal()})
+        return json_bytes({**asdict(self), "seal": self.seal()})
 
-    def _seal(self) -> str:
+    def seal(self) -> str:
+        """A digest of all that it says."""
         return hashlib.sha256(json_bytes(json.loads(json_bytes(asdict(self))))).hexdigest()
 
     def bytes_on_disk(self) -> int:
@@ -61,7 +62,7 @@ def read_record(path: Path) -> ShardRecord | None:
     try:
         seal = written.pop("seal")
         record = ShardRecord(**written)
-        return record if record._seal() == seal else None
+        return record if record.seal() == seal else None
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
 

@@ -17,12 +17,13 @@ from pipeline.errors import ConfigError, Fatal
 from pipeline.failures import Failures
 from pipeline.finish import finish_stage, publish
 from pipeline.journal import Journal, span
+from pipeline.let_go import let_go
 from pipeline.patience import DEFAULT_PATIENCE, Patience
 from pipeline.places import Places, remove, stops_everything
 from pipeline.reasons import reasons
 from pipeline.registry import upstream
 from pipeline.slices import WHOLE, Slice, locked
-from pipeline.space import check_space
+from pipeline.space import byte_size, check_space
 from pipeline.stage import Shard, Stage
 from pipeline.standing import closing_words, counted, standing
 from pipeline.survey import StageSurvey, Survey
@@ -138,11 +139,20 @@ class _Run:
         if not surveyed.missing:
             fcntl.flock(lock, fcntl.LOCK_EX)
             finish_stage(self._survey, self._name, self._places)
+            self._let_go()
         elif surveyed.stage.publishes_parts:
             fcntl.flock(lock, fcntl.LOCK_EX)
             publish(surveyed, self._places)
         self._close(surveyed)
         return self._result
+
+    def _let_go(self) -> None:
+        """Where the config says so, take away what the last stage was made of."""
+        last = not any(self._name in stage.inputs for stage in self._stages.values())
+        if last and self._survey.config.keep == "dataset" and not self._stages[self._name].publishes_parts:
+            freed = let_go(self._survey, self._stages, self._name)
+            if freed:
+                self._journal.say(f"{self._name}: {byte_size(freed)} of what lies between taken away")
 
     def _check_upstream(self) -> None:
         if not self._stages[self._name].reads_inputs(self._survey.config, self._only):
@@ -239,7 +249,9 @@ class _Run:
         for source, message in self._damaged.items():
             if not withdraw_damaged(self._places, source):
                 continue  # another run has made it again
-            shard = source.partition("/")[2]
+            stage, _, shard = source.partition("/")
+            if shard in self._survey.stage(stage).let_go:
+                message = f"{source} was let go of"
             if source in self._mended:
                 raise Fatal(f"{message}, and {shard} was made again just now: disk or memory cannot be trusted")
             self._journal.say(f"{message}; {shard} is made again")

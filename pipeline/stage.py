@@ -156,7 +156,8 @@ class Stage:
     `whole_section`: whether the bytes of each shard may depend on all of the stage's section. Where its entries are
     apart, and an edit of one must not make the shards of another anew, say False: tasks then do not see the section,
     and each shard has in its `params` what it needs of it. `publishes_parts`: `publish` is asked while shards are
-    missing, too, and names what is there of whole results. `reads_inputs`: whether shards called so (a name, or the
+    missing, too, and names what is there of whole results. `stays`: its files stay where a config lets go of what lies
+    between, for other commands look at them. `reads_inputs`: whether shards called so (a name, or the
     beginning of one; empty: all) read anything of other stages, which then must be finished before.
     """
 
@@ -176,4 +177,5 @@ class Stage:
     trial: Callable[[Config], StrictModel] | None = None
     whole_section: bool = True
     publishes_parts: bool = False
+    stays: bool = False
     reads_inputs: Callable[[Config, str], bool] = _always

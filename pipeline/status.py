@@ -65,7 +65,7 @@ def _row(surveyed: StageSurvey, failed: int, rejects: int, workers: int) -> tupl
         span(seconds),
         "?" if unknown else span(left),
         byte_size(max((record.peak_bytes for record in records), default=0)),
-        byte_size(sum(record.bytes_on_disk() for record in records)),
+        byte_size(sum(each.bytes_on_disk() for name, each in surveyed.records.items() if name not in surveyed.let_go)),
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from pipeline.code import code_digest, reached, starts_of
 from pipeline.config import Config
-from pipeline.places import Places, StagePlaces
+from pipeline.places import Places, StagePlaces, read_note
 from pipeline.records import ShardRecord, fingerprint, read_record, recipe
 from pipeline.registry import upstream
 from pipeline.stage import Plan, Shard, Stage
@@ -24,7 +24,8 @@ _SHARD_NAME = re.compile(r"[A-Za-z0-9_-]+")
 @dataclass
 class StageSurvey:
     """One stage: its plan as far as it is known, the recipe and the fingerprint of each shard, the records that match
-    and those that do not, and the digest of each module that its code reaches."""
+    and those that do not, the shards with matching records whose files were let go of, and the digest of each module
+    that its code reaches."""
 
     stage: Stage
     config: Config
@@ -34,6 +35,7 @@ class StageSurvey:
     recipes: dict[str, dict[str, str]] = field(default_factory=dict)
     fingerprints: dict[str, str] = field(default_factory=dict)
     records: dict[str, ShardRecord] = field(default_factory=dict)
+    let_go: set[str] = field(default_factory=set)
     outdated: dict[str, ShardRecord] = field(default_factory=dict)
     code: dict[str, str] = field(default_factory=dict)
 
@@ -148,13 +150,20 @@ class Survey:
         before = set(surveyed.records)
         matching: dict[str, ShardRecord] = {}
         surveyed.outdated.clear()
+        surveyed.let_go.clear()
+        seals = read_note(surveyed.places.let_go) if self.config.keep == "dataset" else None
+        seals = seals if isinstance(seals, dict) else {}
         for name, wanted in surveyed.fingerprints.items():
             record = surveyed.records.get(name)
             if record is None or record.fingerprint != wanted:
                 record = read_record(surveyed.places.records / f"{name}.json")
             if record is None:
                 continue
-            whole = record.fingerprint == wanted and record.is_whole(surveyed.places)
+            there = record.is_whole(surveyed.places)
+            gone = not there and seals.get(name) == record.seal()
+            if gone:
+                surveyed.let_go.add(name)
+            whole = record.fingerprint == wanted and (there or gone)
             if whole and self._read_what_is_there(surveyed.stage.name, matching, record):
                 matching[name] = record
             else:

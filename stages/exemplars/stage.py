@@ -89,6 +89,7 @@ def report(plan: Plan) -> Sequence[str]:
 STAGE = Stage(
     name="exemplars",
     module=__name__,
+    stays=True,
     config=ExemplarsConfig,
     inputs=("choices",),
     plan=plan,
