@@ -22,6 +22,7 @@ from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
 __all__ = [
+    "BuildError",
     "Constraint",
     "Program",
     "find_program",
@@ -31,6 +32,10 @@ __all__ = [
     "shape_of_parts",
     "shape_of_text",
 ]
+
+
+class BuildError(ValueError):
+    """A program fails at values that keep its constraints."""
 
 
 @dataclass(frozen=True)
@@ -91,13 +96,14 @@ class Program:
     def parts(self, values: Values) -> Sequence[Part]:
         """The parts at `values`; hidden parameters have no say.
 
-        Raises ValueError where `build` does, and says at which values.
+        Raises BuildError where `build` raises anything, and says at which values.
         """
         settled, _ = self.schema.settled(values)
         try:
             return self.build(settled)
-        except ValueError as error:
-            raise ValueError(f"program {self.name} fails at {self.schema.text(settled)}: {error}") from error
+        except Exception as error:
+            why = f"{type(error).__name__}: {error}"
+            raise BuildError(f"program {self.name} fails at {self.schema.text(settled)}: {why}") from error
 
 
 def shape_of(program: Program, values: Values) -> Shape:

@@ -14,7 +14,7 @@ from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect
 from stages.programs.intersection import intersecting
 from stages.programs.parameters import Value
-from stages.programs.program import Program, shape_of_parts
+from stages.programs.program import BuildError, Program, shape_of_parts
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
@@ -56,7 +56,8 @@ class Sampler:
     """Finds shapes within one share, no two alike.
 
     between: whether continuous parameters may have any value of their range; require: what shapes must be physically.
-    refused: how many draws were refused, by cell's parameter (or `any`) and reason; tried: how many were looked at.
+    refused: how many draws were refused, by cell's parameter (or `any`) and reason; tried: how many were looked at;
+    failure: the last error of the program itself, where its `build` failed.
     """
 
     program: Program
@@ -65,6 +66,7 @@ class Sampler:
     require: Requirements = field(default_factory=Requirements)
     refused: Counter[tuple[str, str]] = field(default_factory=Counter)
     tried: int = 0
+    failure: str = ""
     _known: set[str] = field(default_factory=set)
 
     def find(self, cell: Cell | None, rng: np.random.Generator) -> dict[str, Value]:
@@ -89,7 +91,7 @@ class Sampler:
                 if self._accepts(values, cell):
                     return values
         value = "" if fixed is None else f" with {item} = {fixed[1]:g}"
-        why = _reasons(self.refused - before) or "none of this shard"
+        why = _reasons(self.refused - before, self.failure) or "none of this shard"
         raise NoMoreShapes(
             f"{self.program.name}: no shape{value} in {self.tried - first} tries ({why}); "
             "ask for fewer shapes or shards, or look at the program's constraints"
@@ -105,7 +107,7 @@ class Sampler:
 
     def reasons(self) -> str:
         """What was refused and why, in words."""
-        return _reasons(self.refused)
+        return _reasons(self.refused, self.failure)
 
     def _accepts(self, values: dict[str, Value], cell: Cell | None) -> bool:
         reason = self._refusal(values, cell)
@@ -121,9 +123,13 @@ class Sampler:
         text = self.program.schema.text(values)
         if text in self._known:
             return "alike"
-        parts = self.program.parts(values)
-        if cell is not None and not has_effect(self.program, values, cell[0], parts):
-            return "no effect"
+        try:
+            parts = self.program.parts(values)
+            if cell is not None and not has_effect(self.program, values, cell[0], parts):
+                return "no effect"
+        except BuildError as error:
+            self.failure = str(error)
+            return "fails"
         met = intersecting(self.program, parts)
         if met is not None:
             return f"{met[0]} meets {met[1]}"
@@ -134,5 +140,6 @@ class Sampler:
         return None
 
 
-def _reasons(refused: Counter[tuple[str, str]]) -> str:
-    return ", ".join(f"{count} {reason}" for (_, reason), count in sorted(refused.items()))
+def _reasons(refused: Counter[tuple[str, str]], failure: str) -> str:
+    told = ", ".join(f"{count} {reason}" for (_, reason), count in sorted(refused.items()))
+    return f"{told}; {failure}" if failure else told

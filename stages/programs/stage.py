@@ -87,7 +87,8 @@ def run_shard(task: Task) -> Outcome:
             task.progress(writer.samples, params["samples"])
     for (parameter, reason), count in sorted(sampler.refused.items()):
         task.reject(parameter, reason, count=count)
-    return Outcome(writer.samples, {"split": params["split"], "samples": writer.samples, "tried": sampler.tried})
+    summary = {"split": params["split"], "samples": writer.samples, "tried": sampler.tried}
+    return Outcome(writer.samples, {**summary, "failure": sampler.failure} if sampler.failure else summary)
 
 
 def _each_value(task: Task, sampler: Sampler) -> Iterator[Found]:
@@ -156,9 +157,11 @@ def _each_value_share(sizes: dict[str, int], first: int, start: int, end: int) -
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many draws there were for each sample, why the others were refused, and where a sweep ended early."""
+    """How many draws there were for each sample, why the others were refused, one case in which the program itself
+    failed, and where a sweep ended early."""
     counts: Counter[str] = Counter()
     made: Counter[str] = Counter()
+    failures: list[str] = []
     tried = 0
     shards = planned_shards(plan)
     for shard in shards:
@@ -166,11 +169,12 @@ def report(plan: Plan) -> Sequence[str]:
         if summary is not None:
             tried += summary["tried"]
             made[summary["split"]] += summary["samples"]
+            failures += [summary["failure"]] if "failure" in summary else []
             counts.update(plan.rejects("programs", shard.name))
     if not made:
         return []
     why = ", ".join(f"{100 * count / tried:.1f} % {reason}" for reason, count in counts.most_common())
-    told = [f"{sum(made.values()):,} shapes of {tried:,} tries; refused: {why or 'none'}"]
+    told = [f"{sum(made.values()):,} shapes of {tried:,} tries; refused: {why or 'none'}", *failures[:1]]
     config = plan.config.section(ProgramsConfig)
     if config.mode == "sweep" and all(plan.summary("programs", shard.name) for shard in shards):
         told += plan_sweep(config.program, config.sweep).told(config.sweep, made)

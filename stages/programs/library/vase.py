@@ -20,6 +20,9 @@ GLAZE, KNOB = (120, 146, 148), (72, 92, 104)
 THIN = 0.008
 """The wall of a vase without body thickness."""
 
+ROOM = 1.5
+"""How much higher a neck is for its thickness above the least."""
+
 FIRST, SECOND = "handle_count > 0 and hndl_type == 1", "handle_count > 0 and hndl_type == 2"
 
 
@@ -29,7 +32,7 @@ def build(values: Values) -> Sequence[Part]:
     thickness = values["body_thickness_val"] if values["has_body_thickness"] else THIN
     lift = _base_height(values)
     body = _body(values, lift)
-    neck = _neck(values, body) if values["has_neck"] else body[:0]
+    neck = _neck(values, body, thickness) if values["has_neck"] else body[:0]
     wall = Wall(np.concatenate([body, neck]), thickness, max(thickness, 0.014))
     body_top = float(body[-1, 1])
     parts = []
@@ -59,10 +62,11 @@ def _body(values: Values, lift: float) -> FloatArray:
     return bezier(np.array(controls) * [width, height] + [0.0, lift], 20).points[:, :2]
 
 
-def _neck(values: Values, body: FloatArray) -> FloatArray:
-    """Inner outline of the neck above the mouth of the body, float64 (n, 2)."""
+def _neck(values: Values, body: FloatArray, thickness: float) -> FloatArray:
+    """Inner outline of the neck above the mouth of the body, float64 (n, 2). A thicker one is higher, so that the
+    outside of its waist has room between body and rim."""
     mouth, top = body[-1]
-    height = 0.08 + 0.37 * values["neck_end_z"]
+    height = 0.08 + ROOM * (thickness - THIN) + 0.37 * values["neck_end_z"]
     end = 0.55 * mouth + (values["neck_end_x"] - 0.1) / 0.9 * (0.45 * mouth + 0.4 * values["body_width"])
     slope = (body[-1, 0] - body[-2, 0]) / (body[-1, 1] - body[-2, 1])
     narrow, wide = 0.55 * min(mouth, end), 1.15 * max(mouth, end)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stages.programs.parameters import Parameter, Value
-from stages.programs.program import Program
+from stages.programs.program import BuildError, Program
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.shapes import valid_values
@@ -220,7 +220,11 @@ class _Search:
             return False
         self._known.add(text)
         self.tried += 1
-        distance, target = self.target.compared(self.program.parts(settled))
+        try:
+            parts = self.program.parts(settled)
+        except BuildError:
+            return False
+        distance, target = self.target.compared(parts)
         for name in change if len(change) == 1 else ():
             effect = abs(distance - self.distance) / max(self.distance, TINY)
             self._effects[name] = max(self._effects.get(name, 0.0), effect)

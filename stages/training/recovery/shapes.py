@@ -16,7 +16,7 @@ from stages.programs.curves.part import Part
 from stages.programs.draws import Interval, Share, draw
 from stages.programs.intersection import intersecting
 from stages.programs.parameters import Value
-from stages.programs.program import Program
+from stages.programs.program import BuildError, Program
 from stages.programs.repair import repaired
 from stages.programs.sampling import cells
 from stages.programs.schema import Values
@@ -29,6 +29,7 @@ TEST: Interval = (0.9, 1.0)
 
 AT_ONCE = 64
 """Draws at a time, of which the first that is valid is taken."""
+FAILURES = 100
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,12 @@ class RandomShape:
 
 def random_shapes(program: Program, interval: Interval, rng: np.random.Generator) -> Iterator[RandomShape]:
     """Valid shapes without end, each with one value of one parameter that is visible, all others random: every value
-    of every parameter is fixed as often (geocode §4)."""
+    of every parameter is fixed as often (geocode §4). Where the program fails, the next is taken.
+
+    Raises BuildError where it fails FAILURES times without a shape between."""
     schema, every, share = program.schema, cells(program), Share(shapes=interval)
     rows = {name: row for row, name in enumerate(schema.by_name)}
+    failures = 0
     while True:
         name, value = every[int(rng.integers(len(every)))]
         fixed = (name, float(schema.by_name[name].values[value]))
@@ -55,7 +59,14 @@ def random_shapes(program: Program, interval: Interval, rng: np.random.Generator
             values = schema.from_vector(draws.columns[:, column])
             if program.broken(values):
                 continue
-            parts = tuple(program.parts(values))
+            try:
+                parts = tuple(program.parts(values))
+            except BuildError:
+                failures += 1
+                if failures == FAILURES:
+                    raise
+                continue
+            failures = 0
             if intersecting(program, parts) is None:
                 yield RandomShape(values, schema.classes(values), parts)
                 break

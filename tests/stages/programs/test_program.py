@@ -8,7 +8,7 @@ import pytest
 from pipeline.errors import ConfigError
 from stages.programs.curves import Part, box
 from stages.programs.parameters import ParameterError
-from stages.programs.program import Constraint, find_program, shape_of, shape_of_text
+from stages.programs.program import BuildError, Constraint, find_program, shape_of, shape_of_text
 from stages.programs.rules import Rule
 from stages.shape.geometry.pose import transform_points
 from tests.stages.programs.stool import PROGRAM
@@ -59,6 +59,12 @@ def test_values_at_which_a_program_fails_are_named() -> None:
     flat = replace(PROGRAM, build=lambda values: [Part("seat", box((values["height"] - 0.3, 1, 1)), (9, 9, 9))])
     with pytest.raises(ValueError, match=r'program stool fails at {"height":0\.3,.*: three sizes'):
         flat.parts({**PROGRAM.schema.base, "height": 0.3})
+
+
+def test_whatever_a_program_raises_is_said_with_the_values() -> None:
+    hollow = replace(PROGRAM, build=lambda values: [[][int(values["height"])]])
+    with pytest.raises(BuildError, match=r'stool fails at {"height":0\.3,.*: IndexError: list index out of range'):
+        hollow.parts({**PROGRAM.schema.base, "height": 0.3})
 
 
 def test_a_program_that_speaks_of_what_is_not_there_is_refused() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ShardFailed
-from stages.programs.curves import box, ellipsoid
+from stages.programs.curves import Part, box, ellipsoid
 from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect, same_geometry
 from stages.programs.intersection import meshes_meet
@@ -15,6 +15,7 @@ from stages.programs.program import Constraint, Program
 from stages.programs.repair import repaired
 from stages.programs.rules import Rule
 from stages.programs.sampling import Sampler, cells, structure_digest
+from stages.programs.schema import Values
 from tests.stages.programs.block import PROGRAM as BLOCK
 from tests.stages.programs.stool import PROGRAM
 
@@ -167,6 +168,18 @@ class TestSampler:
             ShardFailed, match=r"stool: no shape with height = 0\.4 in 2\d+ tries \(2\d+ breaks never\)"
         ):
             self.sampler(never).find(("height", 1), np.random.default_rng(1))
+
+    def test_values_at_which_a_program_fails_are_refused(self) -> None:
+        def build(values: Values) -> list[Part]:
+            if values["height"] < 0.5:
+                raise IndexError("no rung")
+            return list(PROGRAM.build(values))
+
+        rickety, rng = self.sampler(replace(PROGRAM, build=build)), np.random.default_rng(6)
+        assert all(rickety.find(None, rng)["height"] >= 0.5 for _ in range(5))
+        assert rickety.refused["any", "fails"] > 0
+        with pytest.raises(ShardFailed, match=r'fails; program stool fails at {"height":0\.3.*: IndexError: no rung'):
+            rickety.find(("height", 0), rng)
 
     def test_a_finite_program_ends_when_all_its_shapes_are_found(self) -> None:
         sampler = self.sampler(BLOCK)

@@ -85,6 +85,13 @@ def test_outer_points_of_a_wall_lie_its_thickness_away(thickness: float) -> None
     assert (distance < 1.02 * thickness + 0.02).all()
 
 
+def test_a_thick_neck_has_room_however_low_it_is() -> None:
+    low = {"has_neck": True, "has_body_thickness": True, "body_thickness_val": 0.07, "neck_end_z": 0.0}
+    for values in random_vases(600):
+        parts = list(PROGRAM.parts({**values, **low, "handle_count": 0, "has_lid": False}))
+        assert part(parts, "neck").mesh.volume > 0.0
+
+
 def test_a_thick_wall_is_seen_under_a_lid() -> None:
     plain, thick = vase(has_lid=True), vase(has_lid=True, has_body_thickness=True)
     assert np.ptp(part(thick, "body").mesh.bounds[:, 0]) > np.ptp(part(plain, "body").mesh.bounds[:, 0]) + 0.05
