@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
+from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
+from eval.registry import find_tables
+from eval.subject import load_subject
 from pipeline.places import Places, file_digest
 from stages.exemplars.language import made_kits
 from stages.shape.graphs.canonical import graph_digest
@@ -154,6 +157,21 @@ def test_dreamt_shapes_go_the_whole_way(dreamt: tuple[Path, str], bare: Path) ->
     card = (folder / "dreamt/README.md").read_text()
     assert "models that have learnt the strings of other shapes write new ones" in card
     assert "learnt/tiny-chain-0 prior" in card
+
+
+def test_dreams_stand_in_a_table_beside_what_they_were_learnt_from(dreamt: tuple[Path, str], bare: Path) -> None:
+    folder, table = dreamt[0], find_tables()["dreams"]
+    assert run(bare / "dreamt.yaml", folder, *SERVED)[0] == 0
+    subject = load_subject(bare / "dreamt.yaml", folder)
+    assert "no finished dataset learnt" in table.missing(subject)
+    for place in (folder, folder / ".work"):  # as if they had been learnt
+        shutil.copytree(place / "dreamt", place / "learnt")
+    assert table.missing(subject) == ""
+    answer = table.answer(subject, Namespace(dreams=100))
+    rows = [dict(zip(answer.tables[0].columns, row, strict=True)) for row in answer.tables[0].rows]
+    assert [(row["shapes of"], row["shapes"]) for row in rows][1] == ("chain, dreamt", 8)
+    assert rows[0]["shapes of"] == "chain, learnt"
+    assert [strip.title for strip in answer.strips] == ["chain, learnt", "chain, dreamt"]
 
 
 def test_a_model_that_is_not_trained_is_named_with_what_trains_it(bare: Path) -> None:
