@@ -50,6 +50,8 @@ def config_text(
     kit: list[tuple[int, str, Any, str]] = [
         (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else ""),
         (3, "types", config.types, "what makes a part type"),
+        *([(3, "meanings", None, "")] if config.meanings else []),
+        *((4, name, list(patterns), "") for name, patterns in config.meanings.items()),
         (3, "up", made.up, reasons.get("up", "")),
         (3, "contact", None, ""),
         (4, "tolerance", made.tolerance, reasons.get("contact.tolerance", "")),

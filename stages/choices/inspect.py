@@ -96,6 +96,7 @@ def _config(asked: argparse.Namespace, paths: Sequence[Path]) -> KitConfig:
             name="inspected",
             shapes=tuple(ShapeFile(path=path) for path in paths),
             parts=asked.parts,
+            meanings=dict(asked.meaning),
             contact=ContactConfig(**{key: value for key, value in contact.items() if value is not None}),
             **{key: value for key, value in settings.items() if value is not None},
         )
@@ -125,6 +126,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     parser.add_argument("--parts", choices=get_args(Segmentation), default="auto", help="what makes a part")
     parser.add_argument("--types", choices=["congruence", "labels", "meaning"], help="what makes a part type")
+    parser.add_argument(
+        "--meaning", type=_meaning, action="append", default=[], metavar="NAME=PATTERN,...",
+        help="what parts mean whose names do not say so, as exemplars.kits[].meanings in a config",
+    )  # fmt: skip
     parser.add_argument("--tolerance", type=float, help="contact tolerance, as a share of the median part's diagonal")
     parser.add_argument("--kinds", type=_kinds, help="kinds of contact that count, such as face or line,face")
     parser.add_argument("--grammar", choices=get_args(Strictness), help="which neighbours a part may have")
@@ -145,3 +150,10 @@ def _kinds(text: str) -> tuple[ContactKind, ...]:
     if not set(asked) <= set(known):
         raise argparse.ArgumentTypeError(f"{text!r} is no list of {', '.join(known)}")
     return tuple(kind for kind in known if kind in asked)
+
+
+def _meaning(text: str) -> tuple[str, tuple[str, ...]]:
+    name, _, patterns = text.partition("=")
+    if not name or not patterns:
+        raise argparse.ArgumentTypeError(f"{text!r} is no NAME=PATTERN,..., such as leg='*leg*,foot*'")
+    return name, tuple(patterns.split(","))

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from pipeline.errors import ConfigError
 from stages.exemplars.congruence import ComparableMesh, comparable_mesh, congruences
 from stages.exemplars.frame import extremal_frame
+from stages.exemplars.meanings import meant
 from stages.exemplars.model import Model, RawPart
 from stages.exemplars.repair import repair_mesh
 from stages.exemplars.settings import KitConfig
@@ -59,23 +60,24 @@ class _Type:
 
 
 def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
-    """Repair the parts of `models` and give each its type, in the order in which types appear.
+    """Repair the parts of `models`, called by what the config says they mean, and give each its type, in the order in
+    which types appear.
 
     Of parts of one type at one place, as modelling tools leave them behind, the first stays. Part
     coordinates have their origin in the part's centroid, so a relative pose's translation is the way from centroid to
-    centroid. Raises ConfigError for a model in which no part has any area.
+    centroid. Raises ConfigError for a model in which no part has any area, and for a meaning of no part.
     """
     repairs: Counter[str] = Counter()
     types: list[_Type] = []
     assemblies: list[Assembly] = []
     part_names: list[tuple[str, ...]] = []
     left_out: list[tuple[Model, str, str]] = []
-    for model in models:
+    for model, parts in zip(models, meant(models, config), strict=True):
         seen: dict[tuple[str, str | None], tuple[int, FloatArray] | None] = {}
         names: list[str] = []
         indices: list[int] = []
         poses: list[FloatArray] = []
-        for part in model.parts:
+        for part in parts:
             label = None if config.types == "congruence" else part.label
             key = (part.mesh_name, label)
             if key not in seen:

@@ -129,6 +129,12 @@ class KitConfig(StrictModel):
         description="What makes a part type: congruent geometry; congruent geometry with the model's own label; or "
         "that label alone, whatever the geometry: parts of one meaning take each other's places where they fit.",
     )
+    meanings: dict[str, Annotated[tuple[str, ...], Field(min_length=1)]] = Field(
+        default_factory=dict,
+        description="With `types: meaning` or `labels` what parts mean whose models do not say so: a meaning, and the "
+        "names or patterns (`leg*`) of the parts, of their labels or of their meshes; `chair/leg*` for those of the "
+        "one model of that file or folder. The first that fits a part counts.",
+    )
     mirror_images_match: bool = Field(False, description="Whether a part and its mirror image are one type.")
     congruence_tolerance: float = Field(
         1e-3, gt=0, le=0.05, description="Largest distance of congruent surfaces, as a share of the part's diagonal."
@@ -176,6 +182,12 @@ class KitConfig(StrictModel):
     def _hubs_are_surfaces(self) -> KitConfig:
         if self.types == "meaning" and isinstance(self.hubs.types, tuple):
             raise ValueError("with `types: meaning` no hubs can be left out; set `hubs.types: none`, or other types")
+        return self
+
+    @model_validator(mode="after")
+    def _meanings_are_asked_for(self) -> KitConfig:
+        if self.meanings and self.types == "congruence":
+            raise ValueError("`meanings` name parts, and types go by congruence; set `types: meaning`, or `labels`")
         return self
 
     def left_open(self) -> tuple[str, ...]:

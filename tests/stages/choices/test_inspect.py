@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
 from stages.choices.inspect import main
@@ -76,6 +77,13 @@ class TestJson:
         )
         assert len(seen(capsys, path)["types"]) == 1
         assert [each["count"] for each in seen(capsys, path, "--types", "labels")["types"]] == [2, 1]
+
+    def test_meanings_that_are_said_make_types_and_go_into_the_config(self, tmp_path: Path, capsys: Any) -> None:
+        said = ("--types", "meaning", "--meaning", "post=cube.00[0-2]", "--meaning", "cap=*.003", "--out", tmp_path)
+        found = seen(capsys, ring(tmp_path), *said)
+        assert [(each["name"], each["count"]) for each in found["types"]] == [("post", 3), ("cap", 1)]
+        kit = yaml.safe_load(Path(found["files"]["config"]).read_text())["exemplars"]["kits"][0]
+        assert kit["meanings"] == {"post": ["cube.00[0-2]"], "cap": ["*.003"]}
 
     def test_mirror_images_are_pointed_out(self, tmp_path: Path, capsys: Any) -> None:
         skew = (
@@ -174,7 +182,9 @@ class TestMistakes:
         assert main([str(path), "--out", str(path), "--tries", "100"]) == 2
         assert "cannot be written" in capsys.readouterr().err
 
-    @pytest.mark.parametrize("arguments", [["--kinds", "edge"], ["--parts", "things"], ["--types", "x"], []])
+    @pytest.mark.parametrize(
+        "arguments", [["--kinds", "edge"], ["--parts", "things"], ["--types", "x"], ["--meaning", "x"], []]
+    )
     def test_a_wrong_option_shows_the_usage(self, arguments: list[str], tmp_path: Path, capsys: Any) -> None:
         models = [str(ring(tmp_path))] if arguments else []
         with pytest.raises(SystemExit) as stopped:
