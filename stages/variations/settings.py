@@ -91,7 +91,11 @@ class SearchConfig(StrictModel):
         0.5, gt=0, le=1, description="Fewest parts of a variant, as a share of the smallest exemplar's."
     )
     largest: float = Field(
-        2.0, ge=1, le=20, description="Most parts of a variant, as a share of the largest exemplar's."
+        2.0,
+        ge=1,
+        le=20,
+        description="Most parts of a variant, as a share of the largest exemplar's of those that have all its part "
+        "types; where none has all, of the largest.",
     )
     method: Literal["both", "exchange", "growth", "substructures", "all"] = Field(
         "both",

@@ -115,6 +115,8 @@ class Search:
         sizes = [len(each.assembly) for each in kit.exemplars]
         self.smallest = max(2, round(config.smallest * min(sizes)))
         self.largest = max(3, round(config.largest * max(sizes)))
+        self._sizes = np.array(sizes)
+        self._has = np.array([np.isin(np.arange(len(kit.types)), each.assembly.types) for each in kit.exemplars])
         self.tables = kit_tables(kit, config.upright)
         self._histogram_weights = multiset_weights(len(kit.types))
         self._ws = workspace(max(self.largest, *sizes))
@@ -348,6 +350,8 @@ class Search:
         types = ws.types[: ws.counts[PARTS]]
         if (self.histogram(types) if self.config.duplicates == "histogram" else int(key)) in self.seen:
             return DUPLICATE
+        if len(types) > self._most(types) and not (lineage["method"] == "growth" and self.config.grown.parts):
+            return REASONS[Outcome.TOO_LARGE]
         pieces_count = self.config.sub_assemblies
         if not pieces_count and any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
@@ -359,6 +363,12 @@ class Search:
         if self._slots is not None and self._slots.misfits(self._assembly()):
             return REASONS[Outcome.GRAMMAR]
         return self._variant(origins, lineage, *self._graph_keys())
+
+    def _most(self, types: np.ndarray) -> int:
+        """The most parts of a shape of parts of the types (n,): what the largest exemplar sets that has all of them,
+        for a row of one exemplar's parts looks no better for another that is large; where none has, `largest`."""
+        whole = self._has[:, np.unique(types)].all(axis=1)
+        return max(3, round(self.config.largest * self._sizes[whole].max())) if whole.any() else self.largest
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""

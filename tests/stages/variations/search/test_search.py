@@ -18,7 +18,7 @@ from stages.shape.kit import Kit
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, ring
+from tests.stages.variations.toy import CHAIN, ROAD, box, chain, kit_of, ring, with_arrow
 
 SHIPPED = sorted({shape.parent for shape in Path("datasets/exemplars").glob("*/*.glb")})
 
@@ -174,3 +174,18 @@ def test_a_variant_says_where_its_parts_came_from() -> None:
         for parent in lineage["parents"]:
             known = {"shape0", "shape1", *(f"test-{earlier}" for earlier in range(number))}
             assert parent in known
+
+
+@pytest.mark.parametrize("method", ["exchange", "growth"])
+def test_an_exemplar_of_its_own_types_is_not_run_on_to_the_size_of_a_larger_one(method: str) -> None:
+    meshes = {**CHAIN, "rung": with_arrow(box(1.0, 0.2, 0.3))}
+    ladder = [(name.replace("link", "rung"), at) for name, at in chain(9)]
+    kit = kit_of(meshes, [chain(3), ladder])
+    _, found = search(kit, method=method)
+    lengths = {name: [0] for name in meshes}
+    for variant in found:
+        inside = {kit.types[index].name for index in variant.assembly.types.tolist()} - {"cap"}
+        assert len(inside) == 1
+        lengths[inside.pop()].append(len(variant.assembly))
+    assert 5 < max(lengths["link"]) <= 10
+    assert 11 < max(lengths["rung"]) <= 22
