@@ -10,7 +10,7 @@ from typing import Any
 
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
-from stages.variations.settings import CHOSEN_COPIED
+from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS
 
 __all__ = ["config_text", "dataset_name"]
 
@@ -85,7 +85,9 @@ def config_text(
     ]
     require = []
     if made.hubs and config.hubs.keep == "backdrop":
-        require.append(_line(2, "hubs", 1, "a variant on which none of them fits is refused"))
+        require.append(
+            _line(2, "hubs", CHOSEN_HUBS, "a variant with a smaller share of what the exemplars have is refused")
+        )
     require.append(_line(2, "copied", copied, reasons.get(CHOSEN_COPIED, "")))
     lines += ["  require:", *require]
     return "\n".join(lines) + "\n"

@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.kit import Kit
+from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
@@ -29,9 +29,9 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search.search import SPARE, Search, Variant
-from stages.variations.settings import CHOSEN_COPIED, VariantRequirements, VariationsConfig
+from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS, VariantRequirements, VariationsConfig
 
-__all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
+__all__ = ["has_hubs", "last_pool", "run_lane", "run_pool", "search_shards"]
 
 ROUND_FIND = 400
 """Most variants that one lane finds in a round before the lanes exchange what they have."""
@@ -131,14 +131,13 @@ def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequ
     if len(telling) < len(variants):
         task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
     telling = _constrained(task, kit, require, telling)
-    fewest = _fewest_hubs(task.config, kit)
-    if not (require.rooted or require.stable or fewest):
+    hubs = _hubs_required(task.config, kit)
+    if not (require.rooted or require.stable or hubs):
         return telling
     backdrop, kept = backdrop_of(task, kit.name), []
     for variant in telling:
         whole = backdrop.fit(variant.assembly)
-        fitted = len(whole) - len(variant.assembly)
-        weak = unmet(require, kit_shape(kit, whole)) if fitted >= fewest else "no backdrop"
+        weak = unmet(require, kit_shape(kit, whole)) if has_hubs(kit, hubs, whole) else "no backdrop"
         if weak is None:
             kept.append(variant)
         else:
@@ -169,13 +168,30 @@ def _most_copied(plan: Plan, kit: str) -> float:
     return float(built["chosen"].get(CHOSEN_COPIED, 1.0))
 
 
-def _fewest_hubs(config: Config, kit: Kit) -> int:
-    """How many hub parts a variant of `kit` must get back."""
+def _hubs_required(config: Config, kit: Kit) -> float:
+    """How many hub parts a variant of `kit` must get back, or, below 1, the share of what exemplars have."""
     said = config.section(VariationsConfig).require.hubs
     if said != "auto":
         return said
     asked = next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name)
-    return int(asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs))
+    chosen = asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs)
+    return CHOSEN_HUBS if chosen else 0
+
+
+def has_hubs(kit: Kit, required: float, whole: Assembly) -> bool:
+    """Whether a variant with its backdrop has the hub parts that are required: so many, or, below 1, of the type that
+    touches most that share of what so many parts have in the exemplars, and one."""
+    fitted = whole.types[np.isin(whole.types, kit.grammar.hubs)]
+    if not 0 < required < 1:
+        return len(fitted) >= required
+    touching = {
+        hub: max(sum(count for _, count in seen) for seen in kit.grammar.neighbourhoods[hub])
+        for hub in kit.grammar.hubs
+    }
+    widest = max(touching, key=lambda hub: touching[hub])
+    there = sum(int((each.backdrop.types == widest).sum()) for each in kit.exemplars)
+    share = there / sum(len(each.whole) for each in kit.exemplars)
+    return int((fitted == widest).sum()) >= max(1.0, required * share * len(whole))
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:

@@ -12,6 +12,7 @@ from stages.variations.features import Axis
 
 __all__ = [
     "CHOSEN_COPIED",
+    "CHOSEN_HUBS",
     "GrownConfig",
     "NoveltyConfig",
     "SearchConfig",
@@ -20,6 +21,9 @@ __all__ = [
     "VariationsConfig",
 ]
 
+CHOSEN_HUBS = 0.5
+"""What is required of hubs that were chosen and not stated: a bridge with its road may end in a rail, and a mile of
+rail on which one brick of the road fits is no bridge."""
 CHOSEN_COPIED = "require.copied"
 """What `require.copied` is called among the keys that are chosen for a kit."""
 
@@ -194,10 +198,11 @@ class SplitConfig(StrictModel):
 class VariantRequirements(Requirements):
     """What a variant must be, its backdrop included, so that it is kept; what is not named is not required."""
 
-    hubs: Literal["auto"] | Annotated[int, Field(ge=0)] = Field(
+    hubs: Literal["auto"] | Annotated[int, Field(ge=0)] | Annotated[float, Field(gt=0, lt=1)] = Field(
         "auto",
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
-        "no bridge. `auto`: one, of a kit whose hubs were chosen and not stated.",
+        "no bridge. Below 1: of the type that touches most, the share of what so many parts have of it in the "
+        "exemplars. `auto`: 0.5, of a kit whose hubs were chosen and not stated.",
     )
     constraints: dict[str, dict[str, tuple[str, ...]]] = Field(
         default_factory=dict,

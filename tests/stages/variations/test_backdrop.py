@@ -20,6 +20,7 @@ from stages.strings.grammar import check
 from stages.strings.tokens import StringError
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.rounds import has_hubs
 from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
@@ -103,3 +104,15 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
     link, plate = (alphabet.tokens[kit.type_names().index(name)] for name in ("link", "plate"))
     with pytest.raises(StringError, match="never neighbours"):
         check(f"{link}{plate}", alphabet, kit.grammar)
+
+
+def test_hubs_are_required_by_number_or_by_their_share_in_the_exemplars(kit: Kit) -> None:
+    def has(required: float, hubs: int, others: int) -> bool:
+        types = np.array([kit.grammar.hubs[0]] * hubs + [kit.exemplars[0].assembly.types[0]] * others)
+        poses, edges = np.tile(np.eye(4), (len(types), 1, 1)), np.empty((0, 2), np.int32)
+        return has_hubs(kit, required, Assembly(types, poses, edges))
+
+    # the exemplar has one hub part of six
+    assert [has(0.5, hubs, 24 - hubs) for hubs in (0, 1, 2)] == [False, False, True]
+    assert [has(0.5, hubs, 3) for hubs in (0, 1)] == [False, True]
+    assert [has(required, 1, 30) for required in (0, 1, 2)] == [True, True, False]
