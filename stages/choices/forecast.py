@@ -82,6 +82,8 @@ def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int
     count = "hundreds of layouts" if layouts is None else f"about {_round(layouts)} layout{'s'[: layouts != 1]}"
     if layouts is not None and layouts < FEW:
         return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
+    if layouts is not None:  # at least: some are far rarer than others, and a long search builds on what it found
+        count = f"{_round(layouts)} or more layouts"
     if is_dull(finds):
         alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
         looked = f"{count} of {size} that look {alike}; look at the sheet before you make many"

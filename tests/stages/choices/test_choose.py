@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -191,6 +192,13 @@ class TestForecast:
         # 2.5 to 14 parts, the exemplars' 5 and 7 aside, and no link without a cap: 1 to 12 links
         assert found.finds.graphs == found.finds.histograms == found.layouts
         assert found.sentence.startswith(f"about {found.layouts} layouts, no dataset")
+
+    def test_as_many_as_are_in_sight_are_said_to_be_no_more_than_the_fewest(self) -> None:
+        kit = self.kit([chain(13), chain(15)], CHAIN)
+        found = forecast(kit, ContactAnswers(kit), 2000)
+        assert found.layouts is not None
+        assert 20 <= found.finds.graphs <= found.layouts <= 32
+        assert re.match(r"[23]0 or more layouts of \d+ to \d+ parts", found.sentence)
 
     def test_every_part_its_own_type_is_said_with_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
