@@ -4,8 +4,9 @@ python -m tests.bench.exemplars [--out FOLDER] [--minutes 10] [--template] MODEL
 
 A MODEL is a file, some files of one kit with spaces between them, as in MESH="a.glb b.glb", or a folder of models.
 Each goes through inspect, then through choices, exemplars and variations, with one worker, as a user would run them.
-Prints a row of a Markdown table for each, as soon as it has ended, and leaves in FOLDER the configs, what inspect drew,
-and a sheet of the most different variants, which somebody has to look at: no figure tells a good shape.
+Prints a row of a Markdown table for each, as soon as it has ended, and leaves in a folder of FOLDER for each the config,
+what inspect drew, and a sheet of the most different variants, which somebody has to look at: no figure tells a good
+shape.
 """
 
 from __future__ import annotations
@@ -83,6 +84,7 @@ def run(arguments: Sequence[str], minutes: float) -> Ended:
 def measured(models: Sequence[Path], folder: Path, minutes: float, template: bool) -> str:
     """The row of one kit of models."""
     name = "-".join(dict.fromkeys(dataset_name([each]) for each in models))[:60]
+    folder /= name  # a family is called as its first model is, and must not take its place
     inspected = run(["pipeline", "inspect", "--json", "--out", str(folder / "inspect"), *map(str, models)], minutes)
     if not inspected.said:
         why = "took too long" if inspected.late else inspected.complained.strip().splitlines()[-1]
