@@ -4,9 +4,9 @@ python -m tests.bench.exemplars [--out FOLDER] [--minutes 10] [--template] MODEL
 
 A MODEL is a file, some files of one kit with spaces between them, as in MESH="a.glb b.glb", or a folder of models.
 Each goes through inspect, then through choices, exemplars and variations, with one worker, as a user would run them.
-Prints a row of a Markdown table for each, as soon as it has ended, and leaves in a folder of FOLDER for each the config,
-what inspect drew, and a sheet of the most different variants, which somebody has to look at: no figure tells a good
-shape.
+Prints a row of a Markdown table for each, as soon as it has ended, and leaves in a folder of FOLDER for each the
+config, what inspect drew, and a sheet of the most different variants, which somebody has to look at: no figure tells a
+good shape.
 """
 
 from __future__ import annotations
