@@ -13,7 +13,7 @@ __all__ = [
     "FINISHED",
     "KITS",
     "PROGRAMS",
-    "PROGRAM_VAE",
+    "PROGRAM_WRITERS",
     "RECOVERY",
     "SEARCH",
     "STRING_VAE",
@@ -54,9 +54,14 @@ SEARCH = Need("the records of a search", _search)
 
 def _trained(kind: str, what: str) -> Need:
     """The need of weights of a kind in `Subject.models`."""
+    return _trained_of((kind,), what)
+
+
+def _trained_of(kinds: tuple[str, ...], what: str) -> Need:
+    """The need of weights of any of some kinds."""
 
     def missing(subject: Subject) -> str:
-        there = weights_of_kind(subject.models, kind)
+        there = any(weights_of_kind(subject.models, kind) for kind in kinds)
         return "" if there else f"no trained {what} in {subject.models}; make train"
 
     return Need(f"a trained {what}", missing)
@@ -65,7 +70,7 @@ def _trained(kind: str, what: str) -> Need:
 STRING_VAE = _trained("string_vae", "string VAE")
 EDGE_CATEGORIES = _trained("edge_categories", "model of edge categories")
 RECOVERY = _trained("recovery", "recovery model")
-PROGRAM_VAE = _trained("program_vae", "model of ShapeAssembly programs")
+PROGRAM_WRITERS = _trained_of(("program_vae", "program_lm"), "model of ShapeAssembly programs")
 
 
 def _programs(subject: Subject) -> str:

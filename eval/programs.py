@@ -136,7 +136,7 @@ def quality_table(rows: Mapping[str, Physics], realisms: Mapping[str, Realism], 
     )
     notes = (
         "Rooted and stable: as in App. E; stability by settling on the convex hull and a push of a tenth of the weight "
-        "instead of a simulation. Rejected: random points that gave no program.",
+        "instead of a simulation. Rejected: programs that were begun and given up.",
         "Fool: percent of shapes, none of which it has learnt from, that a PointNet takes for real. FD: Fréchet "
         "distance to train, of features of the encoder that comes with Shapemill for clouds of chairs. Both depend on "
         "the networks: compare them with the row of val, not with the paper's.",

@@ -12,7 +12,10 @@ from stages.shape.physics.settings import Requirements
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles, NamedFiles
 from stages.shapeassembly.sources import existing_programs
 
-__all__ = ["ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig", "WrittenPrograms"]
+__all__ = ["NUCLEUS", "ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig", "WrittenPrograms"]
+
+NUCLEUS = 0.8
+"""Of 192 chairs that a language model wrote 90 % stay up, of the real ones 92 %; with 0.9 it is 80 %."""
 
 
 class ProgramFiles(NamedFiles):
@@ -61,7 +64,17 @@ class WrittenPrograms(NamedFiles):
         ge=1, le=10_000_000, description="Programs that it writes; those that it writes twice count once."
     )
     temperature: float = Field(
-        1.0, gt=0, le=10, description="Spread of the points of the latent space that are drawn; 1: that of the prior."
+        1.0,
+        gt=0,
+        le=10,
+        description="Of a VAE the spread of the points of its latent space, 1 being that of the programs it has learnt "
+        "of; of a language model how evenly it draws words, 1 being as it says.",
+    )
+    nucleus: float = Field(
+        NUCLEUS,
+        gt=0,
+        le=1,
+        description="A language model draws among the likeliest words that have this share together.",
     )
 
     @property

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
+from stages.training.program_lm.settings import ProgramLmEntry
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.string_vae.settings import StringVaeEntry
@@ -15,7 +16,8 @@ from stages.training.string_vae.settings import StringVaeEntry
 __all__ = ["AnyEntry", "TrainingConfig"]
 
 AnyEntry = Annotated[
-    StringVaeEntry | EdgeCategoriesEntry | RecoveryEntry | ProgramVaeEntry, Field(discriminator="kind")
+    StringVaeEntry | EdgeCategoriesEntry | RecoveryEntry | ProgramVaeEntry | ProgramLmEntry,
+    Field(discriminator="kind"),
 ]
 """An entry of any kind, which its key `kind` tells."""
 

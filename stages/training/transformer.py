@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor, cat, nn
 from torch.nn.functional import scaled_dot_product_attention
 
@@ -31,7 +32,24 @@ class Block(nn.Module):
         queries, keys, values = self.projections(self.attention_norm(seen)).chunk(3, dim=-1)
         if before is not None:
             keys, values = cat([before[0], keys], dim=1), cat([before[1], values], dim=1)
+        return self._after(seen, queries, keys, values, None, before is None), keys, values
+
+    def step(self, seen: Tensor, keys: Tensor, values: Tensor, places: Tensor) -> Tensor:
+        """What follows from one token of each sequence, float (n, width), which stands at its place, int64 (n,), each
+        at another; its key and value are put there into `keys` and `values`, float (n, most, width), of which those
+        behind it do not count."""
+        query, key, value = self.projections(self.attention_norm(seen)).chunk(3, dim=-1)
+        rows, longest = torch.arange(len(seen), device=seen.device), int(places.max()) + 1
+        keys[rows, places], values[rows, places] = key.to(keys.dtype), value.to(values.dtype)
+        there = torch.arange(longest, device=seen.device) <= places[:, None]
+        before = keys[:, :longest], values[:, :longest]
+        return self._after(seen[:, None], query[:, None], *before, there[:, None, None], False)[:, 0]
+
+    def _after(
+        self, seen: Tensor, queries: Tensor, keys: Tensor, values: Tensor, there: Tensor | None, causal: bool
+    ) -> Tensor:
         heads = [each.unflatten(-1, (self.heads, -1)).transpose(1, 2) for each in (queries, keys, values)]
-        mixed = scaled_dot_product_attention(heads[0], heads[1], heads[2], is_causal=before is None)
+        mixed = scaled_dot_product_attention(heads[0], heads[1], heads[2], attn_mask=there, is_causal=causal)
         seen = seen + self.joined(mixed.transpose(1, 2).flatten(2))
-        return seen + self.feed(self.feed_norm(seen)), keys, values
+        found: Tensor = seen + self.feed(self.feed_norm(seen))
+        return found

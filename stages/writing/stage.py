@@ -35,6 +35,7 @@ def plan(plan: Plan) -> list[Shard]:
                 "digest": digest,
                 "kit": source.kit,
                 "temperature": source.temperature,
+                "nucleus": source.nucleus,
                 "first": first,
                 "samples": min(most, source.samples - first),
             }
@@ -53,25 +54,25 @@ def _weights(plan: Plan, source: WrittenPrograms) -> Path:
 
 
 def run_shard(task: Task) -> Outcome:
-    """Programs of random points of the latent space; points that give none are refused.
+    """Programs that a model writes; those that it begins and gives up are refused.
 
-    Raises Rejected for weights that are none of a model of programs of this kit, and for a model of which nearly all
-    points give no program; ShardFailed for weights that are others than when the run began.
+    Raises Rejected for weights that are none of a model of programs of this kit, and for a model that gives up nearly
+    all; ShardFailed for weights that are others than when the run began.
     """
     from stages.training.checkpoint import CheckpointError
-    from stages.training.program_vae.trained import load_program_vae
+    from stages.training.program_writers import load_program_writer
 
     params = task.shard.params
     path = task.published(f"{params['folder']}/weights.safetensors")
     if file_digest(path) != params["digest"]:
         raise ShardFailed(f"{path} has changed since the run began")
     try:
-        model = load_program_vae(path, {"kit": params["kit"]})
+        model = load_program_writer(path, {"kit": params["kit"]}, params["nucleus"])
         programs, drawn = model.sample(params["samples"], task.rng("points"), params["temperature"])
     except (CheckpointError, ValueError) as error:
         raise Rejected(f"{path}: {error}") from error
     if drawn > len(programs):
-        task.reject(params["folder"], "the point gives no program", count=drawn - len(programs))
+        task.reject(params["folder"], "given up while it was written", count=drawn - len(programs))
     with task.output(f"{task.shard.name}.jsonl") as stream:
         for number, program in enumerate(programs, params["first"]):
             name = f"{params['folder']}/{number:06d}"
@@ -80,7 +81,7 @@ def run_shard(task: Task) -> Outcome:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """How many points each model needed for its programs."""
+    """How many programs each model has begun for those that it wrote."""
     lines = []
     for source in plan.config.section(ShapeAssemblyConfig).written:
         found = [
@@ -89,7 +90,7 @@ def report(plan: Plan) -> Sequence[str]:
         done = [each for each in found if each is not None]
         if done:
             written, drawn = (sum(each[name] for each in done) for name in ("programs", "drawn"))
-            lines.append(f"{source.folder}: {written:,} programs of {drawn:,} points")
+            lines.append(f"{source.folder}: {written:,} programs of {drawn:,} begun")
     return lines
 
 

@@ -9,13 +9,14 @@ from typing import Any
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
-from stages.shape.sample import Sample, read_samples
+from stages.shape.sample import read_samples
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.parser import parse
+from stages.shapeassembly.program import Program
 from stages.training.program_vae.batches import Programs
 from stages.training.program_vae.lines import NodeLines, node_lines
 
-__all__ = ["prepare_corpus", "read_corpus"]
+__all__ = ["category_programs", "prepare_corpus", "read_corpus"]
 
 
 def prepare_corpus(task: Task) -> Outcome:
@@ -30,14 +31,14 @@ def prepare_corpus(task: Task) -> Outcome:
     counts: dict[str, dict[str, int]] = {}
     for split in ("train", "val"):
         kept: list[list[NodeLines]] = []
-        for sample in _samples(task, split):
+        for key, program in category_programs(task, split):
             try:
-                nodes = node_lines(parse(sample.text))
+                nodes = node_lines(program)
             except ProgramError as error:
-                task.reject(sample.key, error.reason, str(error))
+                task.reject(key, error.reason, str(error))
                 continue
             if sum(len(node.numbers) for node in nodes) > params["longest"]:
-                task.reject(sample.key, "longer than training.longest")
+                task.reject(key, "longer than training.longest")
                 continue
             kept.append(nodes)
         if not kept:
@@ -60,12 +61,12 @@ def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], dict[str, Progra
     return described, {split: Programs.of_arrays(load_file(path)) for split, path in paths.items()}
 
 
-def _samples(task: Task, split: str) -> Iterator[Sample]:
-    """The samples of the category in a split."""
+def category_programs(task: Task, split: str) -> Iterator[tuple[str, Program]]:
+    """The programs of the category in a split, with the keys of their samples."""
     params = task.shard.params
     shards = [shard for shard, of in params["splits"].items() if of == split]
     for done, shard in enumerate(shards):
         for sample in read_samples(task.input(params["producer"], f"{shard}.tar")):
             if sample.kit == params["kit"]:
-                yield sample
+                yield sample.key, parse(sample.text)
         task.progress(done + 1, len(shards))

@@ -9,6 +9,7 @@ bounding box than by a tenth of its size. What is not grounded in the end is lef
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.checks import SIDE, reaching_out
 from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.limits import MIN_SIZE
 from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.program import (
@@ -27,13 +29,17 @@ from stages.shapeassembly.program import (
     Cuboid,
     Line,
     Point,
+    Program,
     Reflect,
     Squeeze,
     Translate,
 )
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOTS, SQUEEZE, STOP, TRANSLATE
 
-__all__ = ["MOST_LINES", "Choice", "Draft", "Numbers"]
+__all__ = ["MOST_COPIES", "MOST_DEPTH", "MOST_LINES", "Choice", "Draft", "Joint", "Numbers", "Written", "joints_of"]
+
+MOST_DEPTH = 4
+"""Levels of a program; the real ones have three."""
 
 MOST_LINES = 60
 """Lines after which an assembly ends; those of the real programs end before."""
@@ -48,6 +54,13 @@ _PHASES = {CUBOID: 0, ATTACH: 1, SQUEEZE: 1, TRANSLATE: 2, REFLECT: 2}
 
 Choice = tuple[int, ...]
 """A command, and the slots of the cuboids that it names."""
+
+Joint = tuple[int, ...]
+"""What an assembly may have once: a cuboid on another, on the bottom or the top of the bounding box, or copied along an
+axis by a command."""
+
+Written = Attach | Squeeze | Translate | Reflect
+"""A line behind the declarations."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +88,7 @@ class Draft:
     written: int = 0
     _phase: int = 0
     _grounded: set[int] = field(default_factory=lambda: {0})
-    _joined: set[tuple[int, ...]] = field(default_factory=set)
+    _joined: set[Joint] = field(default_factory=set)
 
     def commands(self) -> np.ndarray:
         """Which commands may follow, bool (7,)."""
@@ -96,13 +109,21 @@ class Draft:
         found: list[Choice] = []
         for command in np.argsort(-logits, kind="stable").tolist():
             if allowed[command] and logits[command] >= least:
-                found += self._named(command, indices[command])[:most]
+                found += self._likeliest(command, indices[command])[:most]
         return found
 
-    def _named(self, command: int, logits: FloatArray) -> list[Choice]:
+    def _likeliest(self, command: int, logits: FloatArray) -> list[Choice]:
         """The lines of one command, the likeliest first."""
+        score = {
+            each: sum(float(logits[place, slot]) for place, slot in enumerate(each)) for each in self.named(command)
+        }
+        return [(command, *each) for each in sorted(score, key=lambda each: (-score[each], each))]
+
+    def named(self, command: int) -> list[tuple[int, ...]]:
+        """The slots that a line of this command may name, in their order; whether they are joined already in all ways
+        that there are, its numbers say."""
         if command in (STOP, CUBOID):
-            return [(command,)]
+            return [()]
         declared, grounded = range(1, len(self.sizes) + 1), sorted(self._grounded)
         named: list[tuple[int, ...]]
         if command == ATTACH:
@@ -112,8 +133,11 @@ class Draft:
             named = [(a, b, c) for a in declared for b in free[a] for c in free[a] if b != c or b == 0]
         else:
             named = [(a,) for a in grounded if a]
-        score = {each: sum(float(logits[place, slot]) for place, slot in enumerate(each)) for each in named}
-        return [(command, *each) for each in sorted(named, key=lambda each: (-score[each], each))]
+        return named
+
+    def free(self, joints: Sequence[Joint]) -> bool:
+        """Whether the assembly has none of them yet."""
+        return not any(each in self._joined for each in joints)
 
     def declare(self, sizes: FloatArray, aligned: bool, below: Draft | None) -> None:
         """A cuboid, its sizes clamped."""
@@ -126,40 +150,51 @@ class Draft:
 
     def add(self, choice: Choice, numbers: Numbers) -> bool:
         """Writes a line, if it keeps the rules; whether it does."""
+        found = self.line(choice, numbers)
+        if found is None or not self.fits(found[0], choice[1]):
+            return False
+        self.put(choice, *found)
+        return True
+
+    def line(self, choice: Choice, numbers: Numbers) -> tuple[Written, list[Joint]] | None:
+        """The line, its numbers to three decimals, with its joints; None where it breaks a rule that can be told$
+        without executing it."""
         command, moved, *others = choice
-        joints: list[tuple[int, ...]] = []
+        line: Written
         if command == ATTACH:
             points = np.round(np.clip(numbers.points.astype(float), 0, 1), 3).tolist()
             if others[0] == 0 and SIDE < points[4] < 1 - SIDE:
-                return False
-            joints = [_joint(moved, others[0], points[4] > 0.5)]
+                return None
+            joints = joints_of(choice, 2 if points[4] > 0.5 else 3)
             source, goal = points[:3], points[3:]
-            line: Line = Attach(_name(moved), _name(others[0]), (*source,), (*goal,))
+            line = Attach(_name(moved), _name(others[0]), (*source,), (*goal,))
         elif command == SQUEEZE:
             face = FACES[numbers.face]
             if 0 in others and face not in ("top", "bot"):
-                return False
+                return None
             u, v = np.round(np.clip(numbers.uv.astype(float), 0, 1), 3).tolist()
             first, second = others
-            joints = [_joint(moved, first, face == "top"), _joint(moved, second, face == "bot")]
+            joints = joints_of(choice, numbers.face)
             line = Squeeze(_name(moved), _name(first), _name(second), face, u, v)
         elif command == REFLECT:
-            joints = [(moved, -1, numbers.axis)]
+            joints = joints_of(choice, numbers.axis)
             line = Reflect(_name(moved), AXES[numbers.axis])
         else:
-            joints = [(moved, -2, numbers.axis)]
+            joints = joints_of(choice, numbers.axis)
             copies = min(max(numbers.copies, 1), MOST_COPIES)
             line = Translate(_name(moved), AXES[numbers.axis], copies, round(min(max(numbers.distance, 0.0), 1.0), 3))
-        if any(each in self._joined for each in joints) or not self._fits(line, moved):
-            return False
+        return (line, joints) if self.free(joints) else None
+
+    def put(self, choice: Choice, line: Written, joints: Sequence[Joint]) -> None:
+        """Writes a line."""
+        command, moved, *_ = choice
         self._joined.update(joints)
         self._grounded.add(moved)
         self._phase = max(self._phase, _PHASES[command])
         self.lines.append(line)
         self.written += 1
-        return True
 
-    def _fits(self, line: Line, moved: int) -> bool:
+    def fits(self, line: Written, moved: int) -> bool:
         """Whether what is grounded with the line stays within the bounding box."""
         drafted = replace(self, lines=[*self.lines, line], _grounded={*self._grounded, moved})
         try:
@@ -180,8 +215,42 @@ class Draft:
         """The slots of the cuboids that are grounded."""
         return sorted(self._grounded - {0})
 
+    def program(self) -> Program | None:
+        """The program whose root is this assembly, its assemblies named in breadth-first order; a cuboid whose
+        sub-program has no cuboid is one. None where it cannot be executed: each of its assemblies could be, and copies
+        of copies may still be too many."""
+        ahead: list[Draft] = [self]
+        blocks: list[Block] = []
+        while len(blocks) < len(ahead):
+            draft = ahead[len(blocks)]
+            names = {}
+            for slot in draft.grounded:
+                below = draft.below[slot - 1]
+                if below is not None and below.grounded:
+                    names[slot] = f"Program_{len(ahead)}"
+                    ahead.append(below)
+            blocks.append(draft.block(f"Program_{len(blocks)}", names))
+        program = Program(tuple(blocks))
+        try:
+            execute(program)
+        except ProgramError:
+            return None
+        return program
 
-def _joint(moved: int, target: int, top: bool) -> tuple[int, ...]:
+
+def joints_of(choice: Choice, way: int) -> list[Joint]:
+    """The joints of a line. way: of a copy the axis, of a squeeze the face, of an attach the face of the target that is
+    attached to, of which only top and bottom count, and only of the bounding box."""
+    command, moved, *others = choice
+    if command == ATTACH:
+        return [_joint(moved, others[0], FACES[way] == "top")]
+    if command == SQUEEZE:
+        first, second = others
+        return [_joint(moved, first, FACES[way] == "top"), _joint(moved, second, FACES[way] == "bot")]
+    return [(moved, -1 if command == REFLECT else -2, way)]
+
+
+def _joint(moved: int, target: int, top: bool) -> Joint:
     return (moved, 0, int(top)) if target == 0 else (moved, target)
 
 

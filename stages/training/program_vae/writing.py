@@ -12,11 +12,9 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.parameters import SMALLEST
-from stages.shapeassembly.program import AXES, FACES, Attach, Block, Program, Reflect, Squeeze, Translate
-from stages.training.program_vae.draft import Choice, Draft, Numbers
+from stages.shapeassembly.program import AXES, FACES, Attach, Program, Reflect, Squeeze, Translate
+from stages.training.program_vae.draft import MOST_DEPTH, Choice, Draft, Numbers
 from stages.training.program_vae.lines import (
     ALIGNED,
     AXIS,
@@ -35,13 +33,11 @@ from stages.training.program_vae.lines import (
 )
 from stages.training.program_vae.model import ProgramVae
 
-__all__ = ["MOST_DEPTH", "Points", "write_programs"]
+__all__ = ["Points", "write_programs"]
 
 Points = npt.NDArray[np.float32]
 """Points of the latent space, float32 (n, latent)."""
 
-MOST_DEPTH = 4
-"""Levels of a program; the real ones have three."""
 TRIES = 4
 """Lines of each command that are tried where one breaks a rule."""
 
@@ -87,7 +83,7 @@ def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[
                     below.append(_Node(draft, code, node.shape))
         level = below
     return [
-        None if (reject and shape in failed) or not root.grounded else _executable(_assembled(root))
+        None if (reject and shape in failed) or not root.grounded else root.program()
         for shape, root in enumerate(roots)
     ]
 
@@ -210,29 +206,3 @@ def _one_hot(command: int) -> Tensor:
     row = torch.zeros(WIDTH)
     row[command] = 1
     return row
-
-
-def _executable(program: Program) -> Program | None:
-    """The program, or None: each of its assemblies could be executed, and copies of copies may still be too many."""
-    try:
-        execute(program)
-    except ProgramError:
-        return None
-    return program
-
-
-def _assembled(root: Draft) -> Program:
-    """The program of a draft, its assemblies named in breadth-first order; a cuboid whose sub-program has no cuboid is
-    one."""
-    ahead = [root]
-    blocks: list[Block] = []
-    while len(blocks) < len(ahead):
-        draft = ahead[len(blocks)]
-        names = {}
-        for slot in draft.grounded:
-            below = draft.below[slot - 1]
-            if below is not None and below.grounded:
-                names[slot] = f"Program_{len(ahead)}"
-                ahead.append(below)
-        blocks.append(draft.block(f"Program_{len(blocks)}", names))
-    return Program(tuple(blocks))

@@ -13,6 +13,8 @@ import yaml
 from eval.__main__ import main as evaluate
 from stages.shape.sample import read_samples
 from stages.shapeassembly import parse
+from stages.training.checkpoint import CheckpointError
+from stages.training.program_lm.trained import load_program_lm
 from stages.training.program_vae.trained import load_program_vae
 from tests.mill import mill
 
@@ -20,19 +22,20 @@ EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 
 
 @pytest.mark.slow
-def test_a_model_of_programs_is_trained_and_read_again(tmp_path: Path) -> None:
+def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
     (tmp_path / "programs").mkdir()
     for path in EXAMPLES:
         for number in range(2):
             text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
             (tmp_path / "programs" / f"{path.stem}-{number}.txt").write_text(text)
     model = {"name": "tiny", "kind": "program_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 30, "rounds": 2}
+    words = {"name": "words", "kind": "program_lm", "width": 16, "layers": 1, "batch": 4, "steps": 20, "rounds": 2}
     sections = {
         "shapeassembly": {
             "programs": [{"name": "furniture", "path": str(tmp_path / "programs")}],
             "splits": {"shards": 1, "val": 0.2, "test": 0.2},
         },
-        "training": {"models": [model]},
+        "training": {"longest": 1000, "models": [model, words]},
     }
     config = tmp_path / "toy.yaml"
     config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, **sections}))
@@ -53,16 +56,25 @@ def test_a_model_of_programs_is_trained_and_read_again(tmp_path: Path) -> None:
     again = [trained.decode(points, reject=False) for _ in range(2)]
     assert again[0] == again[1]
     assert np.isfinite(points).all()
+    language = load_program_lm(out / "toy-models/words-furniture-0/weights.safetensors", {"kit": "furniture"})
+    found = [language.sample(3, np.random.default_rng(seed))[0] for seed in (0, 0, 1)]
+    assert found[0] == found[1] != found[2]
+    with pytest.raises(CheckpointError, match="another kit"):
+        load_program_lm(out / "toy-models/words-furniture-0/weights.safetensors", {"kit": "chair"})
     asked = ["--config", str(config), "--out", str(out), "--samples", "2", "--sequences", "1", "--steps", "4"]
     assert evaluate(["shapeassembly", *asked]) == 0
     table = (out / "toy-eval/shapeassembly.md").read_text()
-    assert all(row in table for row in ("tiny-furniture-0", "furniture, val", "storage, ShapeAssembly"))
-    dreamt(tmp_path, out)
+    assert all(
+        row in table for row in ("tiny-furniture-0", "words-furniture-0", "furniture, val", "storage, ShapeAssembly")
+    )
+    for name, workers in {"tiny": (1, 2), "words": (1,)}.items():
+        (tmp_path / name).mkdir()
+        dreamt(tmp_path / name, out, name, workers)
 
 
-def dreamt(folder: Path, out: Path) -> None:
-    """What the model writes becomes samples, the same ones however they are shared out among shards and workers."""
-    source = {"name": "stool", "dataset": "toy", "model": "tiny", "kit": "furniture", "samples": 12}
+def dreamt(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
+    """What a model writes becomes samples, the same ones however they are shared out among shards and workers."""
+    source = {"name": "stool", "dataset": "toy", "model": model, "kit": "furniture", "samples": 12}
     sections = {
         "shapeassembly": {"written": [source], "overflow": 100, "splits": {"shards": 1}},
         "writing": {"programs_per_shard": 5},
@@ -70,7 +82,7 @@ def dreamt(folder: Path, out: Path) -> None:
     config = folder / "dreamt.yaml"
     config.write_text(yaml.safe_dump({"name": "dreamt", "seed": 5, **sections}))
     found = []
-    for workers in (1, 2):
+    for workers in asked:
         made = folder / f"out{workers}"
         shutil.copytree(out / "toy-models", made / "toy-models")
         for stage in ("writing", "shapeassembly"):
@@ -78,10 +90,10 @@ def dreamt(folder: Path, out: Path) -> None:
             assert code == 0, printed
         work = made / ".work/dreamt"
         written = [json.loads(line) for path in sorted((work / "writing").glob("*.jsonl")) for line in path.open()]
-        assert [row["name"] for row in written] == [f"toy-models/tiny-furniture-0/{n:06d}" for n in range(12)]
+        assert [row["name"] for row in written] == [f"toy-models/{model}-furniture-0/{n:06d}" for n in range(12)]
         texts = {row["name"]: row["text"] for row in written}
         samples = [each for path in sorted((work / "shapeassembly").glob("*.tar")) for each in read_samples(path)]
         assert samples
         assert all(texts[each.lineage["parents"][0]] == each.text for each in samples)
         found.append([(each.key, each.split, each.text) for each in samples])
-    assert found[0] == found[1]
+    assert all(each == found[0] for each in found)

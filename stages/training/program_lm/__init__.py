@@ -1,0 +1,1 @@
+"""Models that write ShapeAssembly programs word by word: a language model whose mask is the grammar."""

@@ -1,0 +1,96 @@
+"""The programs that a language model learns from, as words, and the batches of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from stages.training.pooling import pooled
+from stages.training.program_lm.grammar import SEEN
+from stages.training.program_vae.lines import START
+
+__all__ = ["Batch", "Texts", "Written", "batches"]
+
+
+@dataclass(frozen=True)
+class Written:
+    """One program. words: its words, int64 (k,); cues: what is known of each before it is written, int64 (k, 4); seen:
+    float32 (k, SEEN), as `Text` says them."""
+
+    words: npt.NDArray[np.int64]
+    cues: npt.NDArray[np.int64]
+    seen: npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Texts:
+    """Programs of one category and split behind each other.
+
+    words: int16 (w,); cues: int8 (w, 4); seen: float32 (w, SEEN); first: int64 (programs + 1,), where each begins.
+    """
+
+    words: npt.NDArray[np.int16]
+    cues: npt.NDArray[np.int8]
+    seen: npt.NDArray[np.float32]
+    first: npt.NDArray[np.int64]
+
+    @classmethod
+    def of(cls, programs: Sequence[Written]) -> Texts:
+        """At least one program."""
+        return cls(
+            words=np.concatenate([each.words for each in programs]).astype(np.int16),
+            cues=np.concatenate([each.cues for each in programs]).astype(np.int8),
+            seen=np.concatenate([each.seen for each in programs]),
+            first=np.cumsum([0, *(len(each.words) for each in programs)]),
+        )
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> Texts:
+        return cls(**{name: arrays[name] for name in cls.__dataclass_fields__})
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The arrays by name."""
+        return dict(vars(self))
+
+    def __len__(self) -> int:
+        return len(self.first) - 1
+
+
+@dataclass(frozen=True)
+class Batch:
+    """words: int64 (n, longest); cues: int64 (n, longest, 4); seen: float (n, longest, SEEN); there: which words are,
+    bool (n, longest)."""
+
+    words: Tensor
+    cues: Tensor
+    seen: Tensor
+    there: Tensor
+
+    def to(self, device: torch.device) -> Batch:
+        return Batch(**{name: tensor.to(device) for name, tensor in vars(self).items()})
+
+    @property
+    def before(self) -> Tensor:
+        """The word before each, at first START; int64 (n, longest)."""
+        return torch.cat([torch.full_like(self.words[:, :1], START), self.words[:, :-1]], dim=1)
+
+
+def batches(texts: Texts, size: int, rng: np.random.Generator | None) -> Iterator[Batch]:
+    """All programs once, in random order and in batches of programs of like length; with no `rng`, in their order."""
+    for rows in pooled(np.diff(texts.first), size, rng):
+        lengths = np.diff(texts.first)[rows]
+        place = np.arange(lengths.max())
+        there = place < lengths[:, None]
+        at = np.where(there, texts.first[rows][:, None] + place, 0)
+        yield Batch(
+            words=torch.from_numpy(texts.words[at].astype(np.int64)),
+            cues=torch.from_numpy(texts.cues[at].astype(np.int64)),
+            seen=torch.from_numpy(texts.seen[at]).view(*at.shape, SEEN),
+            there=torch.from_numpy(there),
+        )

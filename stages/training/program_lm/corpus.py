@@ -1,0 +1,100 @@
+"""The programs of a category, made ready for a language model: read once from the collection, as words."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import Rejected
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Task
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.program import Program
+from stages.training.program_lm.batches import Texts, Written
+from stages.training.program_lm.grammar import Text
+from stages.training.program_lm.tokens import Word, middles, words_of
+from stages.training.program_vae.corpus import category_programs
+
+__all__ = ["Corpus", "prepare_corpus", "read_corpus", "written"]
+
+Corpus = tuple[dict[str, Any], FloatArray, dict[str, Texts]]
+
+
+def prepare_corpus(task: Task) -> Outcome:
+    """Files of the shard: `.<split>.safetensors`, the `Texts` of train and val; `.values.safetensors`, what steps of
+    numbers stand for; `.json`, how many there are, the unit of length and the longest.
+
+    Programs of more than `longest` words, and those that break a rule, are refused. Raises Rejected where train or val
+    keeps no program.
+    """
+    from safetensors.numpy import save
+
+    params, name = task.shard.params, task.shard.name
+    read = {split: list(category_programs(task, split)) for split in ("train", "val")}
+    unit = max((max(program.root.bbox.dims) for _, program in read["train"]), default=1.0)
+    worded = {split: _worded(task, programs, unit) for split, programs in read.items()}
+    values = middles([words for _, words in worded["train"]])
+    counts: dict[str, dict[str, int]] = {}
+    longest = 0
+    for split, programs in worded.items():
+        kept: list[Written] = []
+        for key, words in programs:
+            found = written(words, values, unit)
+            if found is None:
+                task.reject(key, "breaks a rule of the language")
+            else:
+                kept.append(found)
+        if not kept:
+            raise Rejected(f"{params['kit']} has no programs of at most {params['longest']} words in split {split}")
+        texts = Texts.of(kept)
+        counts[split] = {"programs": len(texts), "words": len(texts.words)}
+        longest = max(longest, int(np.diff(texts.first).max()))
+        with task.output(f"{name}.{split}.safetensors") as stream:
+            stream.write(save(texts.arrays()))
+    with task.output(f"{name}.values.safetensors") as stream:
+        stream.write(save({"values": values}))
+    with task.output(f"{name}.json") as stream:
+        stream.write(json_bytes({"counts": counts, "unit": unit, "longest": longest}))
+    return Outcome(samples=0, summary=counts)
+
+
+def read_corpus(task: Task, data: str) -> Corpus:
+    """What `prepare_corpus` wrote in shard `data`: what it says of itself, values, the programs of train and val."""
+    from safetensors.numpy import load_file
+
+    described = json.loads(task.input("training", f"{data}.json").read_bytes())
+    paths = {part: task.input("training", f"{data}.{part}.safetensors") for part in ("values", "train", "val")}
+    values: FloatArray = load_file(paths.pop("values"))["values"]
+    return described, values, {split: Texts.of_arrays(load_file(path)) for split, path in paths.items()}
+
+
+def written(words: list[Word], values: FloatArray, unit: float) -> Written | None:
+    """A program as it is written, word by word; None where a word is not allowed."""
+    text = Text(values, unit)
+    cues, seen = [], []
+    for _, word, _ in words:
+        if not text.allowed()[word]:
+            return None
+        cues.append(text.cue)
+        seen.append(text.seen())
+        text.take(word, fit=False)
+    return Written(np.array([word for _, word, _ in words]), np.array(cues), np.array(seen, np.float32))
+
+
+def _worded(task: Task, programs: list[tuple[str, Program]], unit: float) -> list[tuple[str, list[Word]]]:
+    """The words of programs, by their keys."""
+    found = []
+    for key, program in programs:
+        try:
+            words = words_of(program, unit)
+        except ProgramError as error:
+            task.reject(key, error.reason, str(error))
+            continue
+        if len(words) > task.shard.params["longest"]:
+            task.reject(key, "longer than training.longest")
+            continue
+        found.append((key, words))
+    return found

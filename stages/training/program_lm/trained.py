@@ -1,0 +1,62 @@
+"""A trained language model of ShapeAssembly programs, read from its published weights alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stages.shapeassembly.program import Program
+from stages.shapeassembly.settings import NUCLEUS
+from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.program_lm.model import ProgramLm
+from stages.training.program_lm.settings import ProgramLmEntry
+from stages.training.program_lm.writing import Drawing, write_texts
+
+__all__ = ["TrainedProgramLm", "load_program_lm"]
+
+
+@dataclass(frozen=True)
+class TrainedProgramLm:
+    """header: what the weights say of themselves; nucleus: share of the likeliest words that are drawn from."""
+
+    module: ProgramLm
+    header: Mapping[str, Any]
+    nucleus: float = NUCLEUS
+
+    def sample(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> tuple[list[Program], int]:
+        """So many programs, and how many were begun for them: those that are given up count too. Raises ValueError
+        where nearly all are given up.
+
+        Each is written to its end, so that long ones are not passed over for being slow.
+        """
+        kept: list[Program] = []
+        begun = 0
+        while len(kept) < count:
+            if begun > 50 * count + 200:
+                raise ValueError(f"{len(kept)} of {begun} programs were written to an end; train the model longer")
+            more = count - len(kept)
+            found = write_texts(self.module, self.header["unit"], more, Drawing(temperature, self.nucleus), rng)
+            kept += [each for each in found if each is not None]
+            begun += more
+        return kept, begun
+
+
+def load_program_lm(
+    path: Path, expected: Mapping[str, Any] | None = None, nucleus: float = NUCLEUS
+) -> TrainedProgramLm:
+    """The model in a file of weights, on the CPU.
+
+    Raises CheckpointError for whatever is not one, or says something else of itself than `expected`, such as
+    `{"kit": "chair"}`.
+    """
+    tensors, header = load_checkpoint(path, {"kind": "program_lm", **(expected or {})})
+    entry = ProgramLmEntry.model_validate({"name": "trained", "kind": "program_lm", **header["settings"]})
+    module = ProgramLm(entry, header["longest"])
+    if module.state_dict().keys() != tensors.keys():
+        raise CheckpointError(f"{path} has other tensors than this version of Shapemill: train it again (make train)")
+    module.load_state_dict(tensors)
+    return TrainedProgramLm(module.eval(), header, nucleus)

@@ -1,0 +1,103 @@
+"""How a language model of programs learns: the nats of each word after those before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Generator, Tensor
+from torch.nn.functional import cross_entropy
+
+from pipeline.places import file_digest
+from pipeline.stage import Outcome, Task
+from stages.shape.arrays import FloatArray
+from stages.training.loop import device_of
+from stages.training.program_lm.batches import Batch, Texts, batches
+from stages.training.program_lm.corpus import prepare_corpus, read_corpus
+from stages.training.program_lm.model import ProgramLm
+from stages.training.program_lm.settings import ProgramLmEntry
+from stages.training.program_lm.tokens import STEPS, WORDS
+
+__all__ = ["ProgramLmLearner", "entry", "learner", "new_model", "prepare"]
+
+FIRST_NUMBER = WORDS - STEPS - 1
+
+
+def prepare(task: Task) -> Outcome:
+    """The programs of a category, as words."""
+    return prepare_corpus(task)
+
+
+def entry(settings: Mapping[str, Any]) -> ProgramLmEntry:
+    """The entry whose JSON is `settings`."""
+    return ProgramLmEntry.model_validate(settings)
+
+
+def learner(task: Task, entry: ProgramLmEntry, seed: int) -> ProgramLmLearner:
+    """A model with fresh weights beside the programs of its category."""
+    data = task.shard.params["data"]
+    described, values, texts = read_corpus(task, data)
+    sources = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
+    header = {**described, "data": {split: file_digest(path) for split, path in sources.items()}}
+    module = new_model(entry, values, described["longest"], seed).to(device_of(entry.device))
+    return ProgramLmLearner(module, header, entry, texts["train"], texts["val"])
+
+
+def new_model(entry: ProgramLmEntry, values: FloatArray, longest: int, seed: int) -> ProgramLm:
+    """A model with random weights, by its seed alone, of programs of at most `longest` words."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        module = ProgramLm(entry, longest)
+    module.values.copy_(torch.from_numpy(values))
+    return module
+
+
+@dataclass(frozen=True)
+class ProgramLmLearner:
+    """The `Learner` of a language model of programs."""
+
+    module: ProgramLm
+    header: Mapping[str, Any]
+    entry: ProgramLmEntry
+    train: Texts
+    val: Texts
+
+    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+        """Random batches of train, one pass after another."""
+        device = next(self.module.parameters()).device
+        while True:
+            for batch in batches(self.train, self.entry.batch, rng):
+                yield batch.to(device)
+
+    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+        """Nats of a program, in the mean; of them those of its numbers."""
+        return self._nats(batch, jittered(batch.before, self.entry.jitter, noise))
+
+    def validate(self, noise: Generator) -> dict[str, float]:
+        """The same on val, nothing jittered."""
+        sums: dict[str, float] = {}
+        device = next(self.module.parameters()).device
+        for batch in batches(self.val, self.entry.batch, None):
+            found = self._nats(batch.to(device), batch.before.to(device))
+            for name, value in found.items():
+                sums[name] = sums.get(name, 0.0) + float(value) * len(batch.words) / len(self.val)
+        return sums
+
+    def _nats(self, batch: Batch, before: Tensor) -> dict[str, Tensor]:
+        logits = self.module(before, batch.cues, batch.seen, batch.there)
+        words = batch.words[batch.there]
+        nats = cross_entropy(logits, words, reduction="none")
+        loss = nats.sum() / len(batch.words)
+        return {"loss": loss, "numbers": nats[words >= FIRST_NUMBER].sum() / len(batch.words)}
+
+
+def jittered(before: Tensor, share: float, noise: Generator) -> Tensor:
+    """Words before each, int64 (n, longest), of whose numbers a share is a step lower or higher: what is written later
+    is seldom just what was read."""
+    drawn = torch.rand(before.shape, generator=noise, device=before.device)
+    moved = before + torch.where(drawn < share / 2, -1, 1)
+    numbers = (before >= FIRST_NUMBER) & (drawn < share)
+    return torch.where(numbers, moved.clamp(FIRST_NUMBER, WORDS - 1), before)
