@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from eval.evaluation import Answer, Curve, Evaluation, Strip
 from eval.needs import PROGRAM_WRITERS, PROGRAMS
@@ -21,7 +21,7 @@ SHOWN = 16
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.models import trained_models, training_curve
+    from eval.models import Trained, trained_models, training_curve
     from eval.programs import (
         clouds_of,
         editability_table,
@@ -38,7 +38,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.training.program_lm.trained import load_program_lm
     from stages.training.program_vae.trained import TrainedProgramVae, load_program_vae
 
-    models = [
+    models: list[Trained[Any]] = [
         *trained_models(subject.models, "program_vae", load_program_vae),
         *trained_models(subject.models, "program_lm", partial(load_program_lm, nucleus=asked.nucleus)),
     ]

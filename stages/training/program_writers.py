@@ -24,8 +24,8 @@ class ProgramWriter(Protocol):
 
 
 def load_program_writer(path: Path, expected: Mapping[str, Any], nucleus: float) -> ProgramWriter:
-    """The model in a file of weights, of either kind. nucleus: share of the likeliest words that a language model draws
-    from. Raises CheckpointError as the loaders of the kinds."""
+    """The model in a file of weights, of either kind. nucleus: share of the likeliest numbers that a language model
+    draws from. Raises CheckpointError as the loaders of the kinds."""
     if weights_header(path).get("kind") == "program_lm":
         return load_program_lm(path, expected, nucleus)
     return load_program_vae(path, expected)

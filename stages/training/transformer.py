@@ -48,7 +48,7 @@ class Block(nn.Module):
     def _after(
         self, seen: Tensor, queries: Tensor, keys: Tensor, values: Tensor, there: Tensor | None, causal: bool
     ) -> Tensor:
-        heads = [each.unflatten(-1, (self.heads, -1)).transpose(1, 2) for each in (queries, keys, values)]
+        heads = [each.view(*each.shape[:2], self.heads, -1).transpose(1, 2) for each in (queries, keys, values)]
         mixed = scaled_dot_product_attention(heads[0], heads[1], heads[2], attn_mask=there, is_causal=causal)
         seen = seen + self.joined(mixed.transpose(1, 2).flatten(2))
         found: Tensor = seen + self.feed(self.feed_norm(seen))

@@ -80,13 +80,11 @@ class Text:
     def allowed(self) -> BoolArray:
         """Which words may come next, bool (WORDS,); at least one may, until the end."""
         now = self._fields[len(self._said)]
-        if now in (Field.SIZE_X, Field.SIZE_Y, Field.SIZE_Z) or now <= Field.ROOT_Z:
-            return _OF_FIELD[now]
+        found: BoolArray = _OF_FIELD[now]
         places = self._places(now)
-        if places is None:
-            return _OF_FIELD[now]
-        found = np.zeros(_OF_FIELD.shape[1], np.bool_)
-        found[first_word(now) + np.array(places)] = True
+        if places is not None:
+            found = np.zeros(len(found), np.bool_)
+            found[first_word(now) + np.array(places)] = True
         return found
 
     def _places(self, now: Field) -> list[int] | None:

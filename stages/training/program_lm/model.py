@@ -56,6 +56,7 @@ class ProgramLm(nn.Module):
         """Logits float (n, WORDS) of words at these places, int64 (n,); what is cached behind them does not count."""
         states = self._embedded(before, cues, seen, places)
         for block, (keys, values) in zip(self.blocks, cache, strict=True):
+            assert isinstance(block, Block)
             states = block.step(states, keys, values, places)
         return self._said(states, cues)
 

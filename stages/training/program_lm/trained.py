@@ -21,7 +21,7 @@ __all__ = ["TrainedProgramLm", "load_program_lm"]
 
 @dataclass(frozen=True)
 class TrainedProgramLm:
-    """header: what the weights say of themselves; nucleus: share of the likeliest words that are drawn from."""
+    """header: what the weights say of themselves; nucleus: share of the likeliest numbers that are drawn from."""
 
     module: ProgramLm
     header: Mapping[str, Any]

@@ -13,7 +13,7 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shapeassembly.program import Program
 from stages.training.program_lm.grammar import Text
 from stages.training.program_lm.model import ProgramLm
-from stages.training.program_lm.tokens import Field
+from stages.training.program_lm.tokens import NUMBERS, Field
 from stages.training.program_vae.lines import START
 
 __all__ = ["Drawing", "write_texts"]
@@ -28,8 +28,9 @@ MOST_TRIES = 32
 
 @dataclass(frozen=True)
 class Drawing:
-    """How words are drawn: the logits divided by `temperature`, among the likeliest that have a share of `nucleus`
-    together."""
+    """How words are drawn: the logits divided by `temperature`; numbers among the likeliest that have a share of
+    `nucleus` together, all else among whatever is allowed: what is improbable there is variety, in numbers it falls
+    over."""
 
     temperature: float
     nucleus: float
@@ -116,19 +117,23 @@ def _write_words(
     places = torch.tensor([len(page.words) for page in pages])
     logits = module.step(before, cues, seen, places, cache).double().numpy()
     allowed = np.stack([page.text.allowed() for page in pages])
-    for page, word in zip(pages, drawn(logits, allowed, drawing, rng).tolist(), strict=True):
+    nucleus = np.where(np.isin(cues[:, 0].numpy(), NUMBERS), drawing.nucleus, 1.0)
+    for page, word in zip(pages, drawn(logits, allowed, drawing.temperature, nucleus, rng).tolist(), strict=True):
         page.take(word)
 
 
-def drawn(logits: FloatArray, allowed: BoolArray, drawing: Drawing, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-    """A word for each row of logits (n, words), among those allowed, bool (n, words); int64 (n,)."""
-    scores = np.where(allowed, logits / drawing.temperature, -np.inf)
+def drawn(
+    logits: FloatArray, allowed: BoolArray, temperature: float, nucleus: FloatArray, rng: np.random.Generator
+) -> npt.NDArray[np.int64]:
+    """A word for each row of logits (n, words), among those allowed, bool (n, words), that have its share of nucleus
+    (n,) together; int64 (n,)."""
+    scores = np.where(allowed, logits / temperature, -np.inf)
     shares = np.exp(scores - scores.max(axis=1, keepdims=True))
     order = np.argsort(-shares, axis=1, kind="stable")
     shares = np.take_along_axis(shares, order, axis=1)
     sums = np.cumsum(shares, axis=1)
     # The likeliest word counts whatever its share is.
-    last = np.argmax(sums >= drawing.nucleus * sums[:, -1:], axis=1)
+    last = np.argmax(sums >= nucleus[:, None] * sums[:, -1:], axis=1)
     asked = rng.random(len(sums)) * np.take_along_axis(sums, last[:, None], axis=1)[:, 0]
     place = np.argmax(sums > asked[:, None], axis=1)
     found: npt.NDArray[np.int64] = np.take_along_axis(order, place[:, None], axis=1)[:, 0]

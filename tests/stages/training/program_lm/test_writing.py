@@ -16,7 +16,7 @@ from stages.training.program_lm.settings import ProgramLmEntry
 from stages.training.program_lm.tokens import STEPS, WORDS, middles, words_of
 from stages.training.program_lm.trained import TrainedProgramLm
 from stages.training.program_lm.training import FIRST_NUMBER, ProgramLmLearner, jittered, new_model
-from stages.training.program_lm.writing import Drawing, drawn
+from stages.training.program_lm.writing import drawn
 from stages.training.program_vae.lines import START
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
@@ -80,7 +80,9 @@ def test_words_are_drawn_by_their_shares_among_those_allowed_and_the_likeliest()
 
     def found(nucleus: float, temperature: float, allowed: np.ndarray) -> np.ndarray:
         logits = np.tile(np.log(shares), (rows, 1))
-        words = drawn(logits, np.tile(allowed, (rows, 1)), Drawing(temperature, nucleus), np.random.default_rng(0))
+        words = drawn(
+            logits, np.tile(allowed, (rows, 1)), temperature, np.full(rows, nucleus), np.random.default_rng(0)
+        )
         return np.bincount(words, minlength=4) / rows
 
     np.testing.assert_allclose(found(1.0, 1.0, allowed), shares, atol=0.01)
