@@ -15,8 +15,8 @@ from stages.shapeassembly.sources import existing_programs
 __all__ = ["NUCLEUS", "ProgramFiles", "ShapeAssemblyConfig", "ShapeAssemblySplitConfig", "WrittenPrograms"]
 
 NUCLEUS = 0.8
-"""Of 160 chairs that a language model wrote 81 % stay up, of the real ones 92 %; with 0.7 it is 88 %, and half of them
-have one structure."""
+"""Of 360 chairs that a language model wrote 83 % stay up, of the real ones 92 %, and about 29 % have the commonest
+structure, of the real ones 8 %; with 0.7 it is 88 % of 160, and half of them have one structure."""
 
 
 class ProgramFiles(NamedFiles):
