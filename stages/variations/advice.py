@@ -10,7 +10,7 @@ from stages.exemplars.findings import SMALL, hubs
 from stages.shape.kit import Kit
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
-__all__ = ["another_model", "what_keeps"]
+__all__ = ["another_model", "what_keeps", "what_was_left"]
 
 REGULAR = 0.01
 """Share of tries that give an exemplar again, or a piece of one, from which on a kit is regular."""
@@ -48,6 +48,20 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     if alone > used / 2:
         return f"{alone} of {used} part types occur once; bring {another}"
     return f"no piece fits where it does not stand already; bring {another}"
+
+
+def what_was_left(lists: Mapping[str, int]) -> str:
+    """What the search has not looked at, in words, and what would help; empty where it was nothing.
+
+    lists: how many lists of replacements were made, by whether each was `whole` or `cut short`.
+    """
+    short, whole = lists.get("cut short", 0), lists.get("whole", 0)
+    if not short:
+        return ""
+    return (
+        f"{short:,} of {short + whole:,} lists of replacements ended at their limit of work: those without dummy edges "
+        "are all there, of those with them the nearest; fewer `variations.search.dummies` make lists whole"
+    )
 
 
 def _hub(kit: Kit) -> str:

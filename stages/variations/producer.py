@@ -40,6 +40,7 @@ def _endings(plan: Plan) -> Sequence[str]:
     ended = [
         f"- {each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
         + (f" What limits it: {each['advice']}." if each["advice"] else "")
+        + (f" What was left out: {each['left']}." if each["left"] else "")
         for each in summaries
         if each.get("why")
     ]

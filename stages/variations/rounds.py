@@ -21,7 +21,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
-from stages.variations.advice import what_keeps
+from stages.variations.advice import what_keeps, what_was_left
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import backdrop_of
 from stages.variations.constraint import made_test, module_of
@@ -40,6 +40,8 @@ ROUND_SHARE = 40
 PATIENCE, LEAST_PATIENCE = 200_000, 40_000
 PATIENT_PARTS = 100
 """A try takes the longer the more parts there are: exemplars of more than so many have less than PATIENCE tries."""
+COUNTED = ("crossings", "lists", "rejects")
+"""What lanes count, by name, and pools add up."""
 FEWEST = 32
 """A lane looks for at least so many variants, so that the last rounds are not mere starts and stops."""
 
@@ -49,7 +51,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     config = plan.config.section(VariationsConfig)
     shards: list[Shard] = []
     found: list[str] = []
-    state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], "crossings": {}, "rejects": {}}
+    state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], **{key: {} for key in COUNTED}}
     target, copied = math.ceil(config.selection.oversample * config.per_kit), _most_copied(plan, kit)
     for number in range(config.search.rounds):
         name = f"{kit}-r{number:03d}"
@@ -75,10 +77,9 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
             "kit": kit,
             "tried": sum(each["tries"] for each in done),
             "spares": sum(each["spares"] for each in done),
-            "crossed": _added(*(each["crossings"] for each in done)),
-            "refused": _added(*(each["rejects"] for each in done)),
+            "counted": {key: _added(*(each[key] for each in done)) for key in COUNTED},
             "last": number == config.search.rounds - 1,
-            **{key: state[key] for key in ("telling", "tries", "idle", "curve", "crossings", "rejects")},
+            **{key: state[key] for key in ("telling", "tries", "idle", "curve", *COUNTED)},
         }
         pool = Shard(f"{name}-pool", params, (f"exemplars/{kit}", *found))
         shards.append(pool)
@@ -119,8 +120,9 @@ def run_lane(task: Task) -> Outcome:
     rejects = dict(sorted(search.rejects.items()))
     for reason, count in rejects.items():
         task.reject(task.shard.name, reason, count=count)
-    crossings = dict(sorted(search.crossings.items()))
-    summary = {"found": len(kept), "tries": tries, "spares": search.spares, "crossings": crossings, "rejects": rejects}
+    summary = {"found": len(kept), "tries": tries, "spares": search.spares, "rejects": rejects}
+    for key, counts in (("crossings", search.crossings), ("lists", search.lists)):
+        summary[key] = dict(sorted(counts.items()))
     return Outcome(0, summary)
 
 
@@ -200,7 +202,7 @@ def _archive(pool: PoolIndex, search: Search) -> np.ndarray:
     places = []
     for counts, features, keys in zip(pool.counts, pool.features, pool.keys, strict=True):
         types = np.repeat(np.arange(len(counts)), counts)
-        search.seen.add(search.key(types, *keys.tolist()))
+        search.remember(types, *keys.tolist())
         cell = cell_of(features, novelty.axes, novelty.resolution)
         places.append(search.archive.add(cell, search.histogram(types)))
     return np.array(places, dtype=np.int64).reshape(-1, 2)
@@ -244,7 +246,7 @@ def run_pool(task: Task) -> Outcome:
     telling = params["telling"] + max(len(kept) - params["spares"], 0)
     target = math.ceil(config.selection.oversample * config.per_kit)
     ended = telling >= target or total >= SPARE * target or idle >= _patience(kit, config) or params["last"]
-    rejects = _added(params["rejects"], params["refused"])
+    counted = {key: _added(params[key], params["counted"][key]) for key in COUNTED}
     poor = ended and total < config.per_kit
     return Outcome(
         0,
@@ -256,9 +258,9 @@ def run_pool(task: Task) -> Outcome:
             "telling": telling,
             **measures,
             "curve": [*params["curve"], [tries, total, measures["histograms"]]],
-            "crossings": _added(params["crossings"], params["crossed"]),
-            "rejects": rejects,
-            "advice": what_keeps(kit, rejects, tries) if poor else "",
+            **counted,
+            "left": what_was_left(counted["lists"]),
+            "advice": what_keeps(kit, counted["rejects"], tries) if poor else "",
             "ended": ended,
             "why": _why(kit, config, total, tries, idle) if ended else "",
         },

@@ -113,7 +113,8 @@ class SearchConfig(StrictModel):
         ge=0,
         le=3,
         description="Dummy edges of replaceable substructures: places where the boundaries of two pieces may differ by "
-        "a docking site or by a part. What is looked at grows exponentially with it, up to a limit in dense graphs.",
+        "a docking site or by an arc of parts between. What is looked at grows exponentially with it, up to a limit in "
+        "dense graphs, which status and card then tell.",
     )
     repeats: int = Field(
         3,

@@ -59,6 +59,8 @@ def report(plan: Plan) -> Sequence[str]:
             lines.append(f"{why}; {counts}")
             if state["advice"]:
                 lines.append(f"{kit}: {state['advice']}")
+            if state["left"]:
+                lines.append(f"{kit}: {state['left']}")
             lines.append(f"{kit}: growth of histograms: {growth(state['curve'])}")
     assignment = plan.summary("variations", f"{plan.config.name}-assignment") or {"kits": {}}
     for kit, chosen in assignment["kits"].items():

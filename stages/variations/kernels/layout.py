@@ -154,6 +154,7 @@ class _Outcomes(NamedTuple):
     GRAMMAR: int = 8
     UNKNOWN: int = 9
     ASKEW: int = 10
+    KNOWN: int = 11
 
 
 Outcome = _Outcomes()

@@ -49,6 +49,7 @@ __all__ = ["SPARE", "Search", "Variant"]
 SPARE = 4
 """A search ends at so many times the variants that it looks for, if few of them add to the archive."""
 
+DUPLICATE = "duplicate"
 REASONS = {
     Outcome.WHOLE: "cut took the whole shape",
     Outcome.NO_SUCH_PART: "boundary part missing in the other shape",
@@ -66,11 +67,11 @@ GROWN_REASONS = {
 REPLACED_REASONS = {
     Outcome.NO_MATCH: "replaced: no embedding",
     Outcome.NOTHING_ATTACHED: "replaced: nothing but a gap to close",
+    Outcome.KNOWN: DUPLICATE,
     Outcome.ASKEW: "blended: boundaries stand at other angles",
     **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
 }
 
-DUPLICATE = "duplicate"
 SUBASSEMBLY = "nothing but a piece of an exemplar"
 APART = "falls apart"
 LIFTED = "lifted off the ground"
@@ -131,7 +132,9 @@ class Search:
         self._features = FeatureTest(kit)
         self._copies = CopyTest(kit, answers.dockings)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
-        self.seen: set[int] = {self.key(each.assembly.types, *self.keys_of(each)) for each in self.parents.exemplars}
+        self.seen: set[int] = set()
+        for each in self.parents.exemplars:
+            self.remember(each.assembly.types, *self.keys_of(each))
         self.spares = 0
         self.rejects: Counter[str] = Counter()
         self.crossings: Counter[str] = Counter()
@@ -206,7 +209,7 @@ class Search:
 
     def _keep(self, rng: np.random.Generator, variant: Variant, choice: Choice, work: float, name: str) -> bool:
         """Count a find, and make it a parent where it adds to the archive; whether it does."""
-        self.seen.add(self.key(variant.assembly.types, variant.graph, variant.docked))
+        self.remember(variant.assembly.types, variant.graph, variant.docked)
         spare = self.archive.is_full(variant.cell, variant.histogram)
         gain = KNOWN_GAIN if self.archive.has_histogram(variant.histogram) else 1.0
         self.steering.learn(choice, 0.0 if spare else gain, work)
@@ -369,6 +372,17 @@ class Search:
         for a row of one exemplar's parts looks no better for another that is large; where none has, `largest`."""
         whole = self._has[:, np.unique(types)].all(axis=1)
         return max(3, round(self.config.largest * self._sizes[whole].max())) if whole.any() else self.largest
+
+    def remember(self, types: np.ndarray, graph: int, docked: int) -> None:
+        """Let a shape of these types and keys be known, so that it is a duplicate when it is found again."""
+        self.seen.add(self.key(types, graph, docked))
+        if self._replacer is not None:
+            self._replacer.known.add(docked)
+
+    @property
+    def lists(self) -> Counter[str]:
+        """How many lists of replacements were made, by whether each was whole or cut short."""
+        return Counter() if self._replacer is None else self._replacer.lists
 
     def key(self, types: np.ndarray, graph: int, docked: int) -> int:
         """What two shapes have in common when they count as the same."""

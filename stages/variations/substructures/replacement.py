@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
-from stages.variations.substructures.symmetry import cut_off
+from stages.variations.substructures.regions import cut_off
 
 __all__ = ["Replacement", "piece_of", "replace_piece"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -23,6 +24,7 @@ from stages.variations.substructures.operations import Operations, find_operatio
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.recursion import cut_again, cut_farther, growth_of
 from stages.variations.substructures.replacement import replace_piece
+from stages.variations.substructures.result_key import result_key
 from stages.variations.substructures.sites import docking_graph
 
 __all__ = ["Replacer"]
@@ -30,6 +32,8 @@ __all__ = ["Replacer"]
 DRAWS = 48
 """Operations between two shapes that are carried out before it is another pair's turn, if listing them took no longer:
 else as many as take that long."""
+MOST_OPEN = 16
+"""Pairs of shapes whose lists are kept, so that a pair that is drawn again goes on where it was left."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
 WITHIN = 0.25
@@ -68,7 +72,9 @@ class Replacer:
     keeps rigid what is laid upon each other; else, and where types go by meaning, by the types at their ends alone.
 
     After a try that is OK, `base` is what the piece was put into: the shape that was chosen, or what all times but the
-    last of a recursive rule have made of it; `times` is how often the operation was carried out.
+    last of a recursive rule have made of it; `times` is how often the operation was carried out. `lists` counts the
+    lists of operations that were made, by whether each was whole or cut short. `known` are keys of shapes, by graph and
+    dockings, that need not be put together again.
     """
 
     base: Parent
@@ -84,6 +90,10 @@ class Replacer:
         kit = answers.kit
         self._by_meaning = len(kit.labels) < len(kit.types)
         self._by_docking = config.matching == "pose" and not self._by_meaning
+        self.lists: Counter[str] = Counter()
+        self.known: set[int] = set()
+        self._open: dict[tuple[str, str], Pair] = {}
+        self._turns = 0
         self._pair: Pair | None = None
         self._docked: Docked = []
         self._bent: np.ndarray | None = None
@@ -99,7 +109,7 @@ class Replacer:
         is left of it, in the workspace: the outcome and the work. After OK the contacts between the two are to be found
         by `connect`."""
         work = 1.0
-        number = None if self._pair is None else next(self._pair.left, None)
+        number = next(self._pair.left, None) if self._pair is not None and self._turns > 0 else None
         if self._pair is None or number is None:
             self._pair, cost = self._opened(rng, choice)
             work += cost
@@ -120,6 +130,12 @@ class Replacer:
             return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, work
         if not piece.any() or taken.all():
             return Outcome.NOTHING_ATTACHED, work
+        if not (self._by_meaning or self.blends):
+            key = int(result_key(side.graph, pair.sides[1].graph, taken, piece, boundary))
+            if key in self.known:
+                return Outcome.KNOWN, work
+            self.known.add(key)
+        self._turns -= 1
         work += EMBEDDING_WORK
         exchanged, found = Exchanged(taken, piece), None
         if not self._by_meaning:
@@ -221,17 +237,37 @@ class Replacer:
         return all(ws.stamp[i, j] == ws.counts[TRY] for i, j in ends)
 
     def _opened(self, rng: np.random.Generator, choice: Choice) -> tuple[Pair, float]:
-        """All operations between two shapes, or within the first, in random order; and what that cost."""
+        """All operations between two shapes, or within the first, in random order; what is left of them where the pair
+        was drawn before; and what that cost."""
         if rng.random() < WITHIN:
             choice = replace(choice, b=choice.a)
+        name = choice.b.name, choice.a.name
+        if name in self._open:
+            known = self._open.pop(name)
+            self._open[name] = replace(known, choice=choice)
+            self._turns = DRAWS
+            return self._open[name], 0.0
         kit = self.answers.kit
         sides = _side(kit, choice.b), _side(kit, choice.a)
         first, second = sides[0].graph, (sides[0] if choice.a is choice.b else sides[1]).graph
         operations = find_operations(first, second, self.dummies, self._by_docking)
         ways = len(operations) * (2 if first is second else 1)
         work = operations.work / DARTS_A_TRY
-        order = rng.permutation(ways)[: max(DRAWS, round(work / EMBEDDING_WORK))].tolist()
-        return Pair(choice, sides, operations, iter(order)), work
+        self.lists["whole" if operations.is_whole else "cut short"] += 1
+        self._turns = max(DRAWS, round(work / EMBEDDING_WORK))
+        self._open[name] = Pair(choice, sides, operations, iter(_order(rng, operations, ways)))
+        if len(self._open) > MOST_OPEN:
+            del self._open[next(iter(self._open))]
+        return self._open[name], work
+
+
+def _order(rng: np.random.Generator, operations: Operations, ways: int) -> list[int]:
+    """The numbers of a pair in random order, those without dummy edges, which are few, and the others by turns."""
+    numbers = rng.permutation(ways)
+    is_plain = numbers % max(len(operations), 1) < operations.plain
+    rank = np.where(is_plain, 2 * np.cumsum(is_plain), 2 * np.cumsum(~is_plain) + 1)
+    order: list[int] = numbers[np.argsort(rank, kind="stable")].tolist()
+    return order
 
 
 def _side(kit: Kit, parent: Parent) -> Side:

@@ -1,199 +1,198 @@
 """Partial symmetries: two graphs laid upon each other from a pair of darts on, as far as they agree (substructures
-§4.3.1, §4.3.2), and the regions in which they do not."""
+§4.3.1, §4.3.2).
+
+Kernels see the two as one graph: the nodes and darts of the second are counted on from those of the first.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
-__all__ = ["CONFLICTS", "DEFECTS", "cut_off", "find_root", "lay_over", "regions"]
+from stages.variations.kernels.lookup import mix
+from stages.variations.substructures.ordered import OrderedGraph
 
-CONFLICTS, DEFECTS = 0, 1
-"""Places in `counts`: parts that were met again in another place, and pairs of parts that a dummy edge would match."""
+__all__ = [
+    "CONFLICTS",
+    "DEFECTS",
+    "MATCHED",
+    "MOST_DEFECTS",
+    "ROWS",
+    "WORK",
+    "Overlay",
+    "agree",
+    "lay_over",
+    "lift",
+    "overlay",
+    "pair_hash",
+    "side_by_side",
+]
+
+CONFLICTS, DEFECTS, MATCHED, ROWS, WORK = range(5)
+"""Places in `counts`: parts that were met again in another place; pairs of parts that a dummy edge would match; matched
+parts; rows of the boundary; darts looked at, which nobody sets back."""
+MOST_DEFECTS = 64
+"""Defects of one partial symmetry that dummy edges are tried on."""
+
+
+class Overlay(NamedTuple):
+    """What one partial symmetry is laid out in; all but `counts` is as it was after `lift`, so that none costs more
+    than it is large. Of n nodes and m darts of both graphs:
+
+    image int64 (n,) and partner (m,): the node or dart of the other graph, or -1; queue (n,): the matched nodes of the
+    first in the order in which they were met; defects (d, 2); counts (5,). For `find_regions`: rows (m, 2), the
+    boundary; row_of (m,), the row of a dart, or -1; lines (m, 4), of each row the first row of its region, the first
+    and the last node that wait in it, and a row where some do; marks (n, 3), of each node the row that it was reached
+    from, or -1, and the node that waits after it, and the nodes that were reached.
+    """
+
+    image: np.ndarray
+    partner: np.ndarray
+    queue: np.ndarray
+    defects: np.ndarray
+    counts: np.ndarray
+    rows: np.ndarray
+    row_of: np.ndarray
+    lines: np.ndarray
+    marks: np.ndarray
+
+
+def side_by_side(a: OrderedGraph, b: OrderedGraph) -> OrderedGraph:
+    """Two graphs as one, the nodes and darts of the second counted on from those of the first."""
+    nodes, darts = len(a.types), len(a.tails)
+    return OrderedGraph(
+        np.concatenate([a.types, b.types]),
+        np.concatenate([a.starts, b.starts[1:] + darts]),
+        np.concatenate([a.tails, b.tails + nodes]),
+        np.concatenate([a.twins, b.twins + darts]),
+        np.concatenate([a.labels, b.labels]),
+    )
 
 
 @numba.njit(cache=True)
-def _agree(a, b, d, e, by_docking):
-    """Whether the edges of darts d and e are of one kind, as far as dockings tell."""
-    return not by_docking or (a.labels[d] == b.labels[e] and a.labels[a.twins[d]] == b.labels[b.twins[e]])
+def overlay(nodes, darts):
+    """Room for the partial symmetries of two graphs of so many nodes and darts, none laid out."""
+    return Overlay(
+        np.full(nodes, -1, dtype=np.int64),
+        np.full(darts, -1, dtype=np.int64),
+        np.empty(nodes, dtype=np.int64),
+        np.empty((MOST_DEFECTS, 2), dtype=np.int64),
+        np.zeros(5, dtype=np.int64),
+        np.empty((darts, 2), dtype=np.int64),
+        np.full(darts, -1, dtype=np.int64),
+        np.empty((darts, 4), dtype=np.int64),
+        np.full((nodes, 3), -1, dtype=np.int64),
+    )
 
 
 @numba.njit(cache=True)
-def _match(a, b, d, e, dummies, image, owner, partner, sources, defects, counts):
+def pair_hash(x, y):
+    """A hash of a pair of darts, or of one and -1."""
+    return mix(np.uint64(x + 1) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y + 2))
+
+
+@numba.njit(cache=True)
+def agree(graph, d, e, by_docking):
+    """Whether the edges of two darts are of one kind, as far as dockings tell."""
+    labels, twins = graph.labels, graph.twins
+    return not by_docking or (labels[d] == labels[e] and labels[twins[d]] == labels[twins[e]])
+
+
+@numba.njit(cache=True)
+def _match(graph, d, e, dummies, over):
     """Lay the tail of dart e upon that of d, dart upon dart in their order; whether that could be done.
 
     A row (d, e, side, place) of `dummies` says that, arriving there, one dart is passed over.
     """
-    v, w = a.tails[d], b.tails[e]
-    first, second = a.starts[v + 1] - a.starts[v], b.starts[w + 1] - b.starts[w]
-    if a.types[v] != b.types[w]:
+    v, w = graph.tails[d], graph.tails[e]
+    if graph.types[v] != graph.types[w]:
         return False
-    if image[v] >= 0 or owner[w] >= 0:
-        counts[CONFLICTS] += 1
+    if over.image[v] >= 0 or over.image[w] >= 0:
+        over.counts[CONFLICTS] += 1
         return False
+    start, end, start_there, end_there = graph.starts[v], graph.starts[v + 1], graph.starts[w], graph.starts[w + 1]
+    first, second = end - start, end_there - start_there
     side, place = -1, -1
     if first != second:
         for k in range(len(dummies)):
             if dummies[k, 0] == d and dummies[k, 1] == e:
                 side, place = dummies[k, 2], dummies[k, 3]
         if side < 0:
-            if abs(first - second) == 1 and counts[DEFECTS] < len(defects):
-                defects[counts[DEFECTS], 0] = d
-                defects[counts[DEFECTS], 1] = e
-                counts[DEFECTS] += 1
+            if abs(first - second) == 1 and over.counts[DEFECTS] < MOST_DEFECTS:
+                over.defects[over.counts[DEFECTS], 0] = d
+                over.defects[over.counts[DEFECTS], 1] = e
+                over.counts[DEFECTS] += 1
             return False
-    image[v] = w
-    owner[w] = v
-    i, j = 0, 0
-    while i < first and j < second:
-        if side == 0 and i == place:
-            i += 1
-            side = -1
-            continue
-        if side == 1 and j == place:
-            j += 1
-            side = -1
-            continue
-        x = a.starts[v] + (d - a.starts[v] + i) % first
-        y = b.starts[w] + (e - b.starts[w] + j) % second
-        partner[x] = y
-        sources[y] = x
-        i += 1
-        j += 1
+    over.image[v] = w
+    over.image[w] = v
+    over.queue[over.counts[MATCHED]] = v
+    over.counts[MATCHED] += 1
+    over.counts[WORK] += first
+    x, y = d, e
+    for turned in range(min(first, second)):
+        if turned == place and side == 0:
+            x = x + 1 if x + 1 < end else start
+        elif turned == place and side == 1:
+            y = y + 1 if y + 1 < end_there else start_there
+        over.partner[x] = y
+        over.partner[y] = x
+        x = x + 1 if x + 1 < end else start
+        y = y + 1 if y + 1 < end_there else start_there
     return True
 
 
 @numba.njit(cache=True)
-def lay_over(a, b, d, e, by_docking, dummies, image, owner, partner, sources, queue, defects, counts):
-    """The greatest partial symmetry of graphs a and b that lays dart e of b upon dart d of a; how many parts it has.
+def lay_over(graph, d, e, by_docking, dummies, over):
+    """The greatest partial symmetry of two graphs side by side that lays dart e of the second upon dart d of the first;
+    a hash of it, 0 where it has no part at all.
 
     dummies int64 (q, 4): dummy edges of the dual (§4.4), which pass over what does not agree. Either (d, e, 0 or 1,
-    place), where the order of docking sites has one more in a or in b, or (x, y, -1, 0), darts beyond an unmatched
-    region, from which the symmetry goes on; it has no part at all where it cannot.
-
-    Fills image (a.n,) and owner (b.n,), nodes of the other graph or -1, partner (2 a.m,) and sources (2 b.m,), darts of
-    the other graph or -1. Breadth-first, so that where a way round leads elsewhere the nearer match stands.
+    place), where the order of docking sites has one more in the first or in the second, or (x, y, -1, 0), darts beyond
+    an unmatched region, from which the symmetry goes on; it has no part at all where it cannot. `over` is as `lift`
+    leaves it. Breadth-first, so that where a way round leads elsewhere the nearer match stands.
     """
-    image[:] = -1
-    owner[:] = -1
-    partner[:] = -1
-    sources[:] = -1
-    counts[:] = 0
-    if not _match(a, b, d, e, dummies, image, owner, partner, sources, defects, counts):
-        return 0
-    queue[0] = a.tails[d]
-    tail = _spread(a, b, 0, 1, by_docking, dummies, image, owner, partner, sources, queue, defects, counts)
+    over.counts[CONFLICTS] = over.counts[DEFECTS] = over.counts[MATCHED] = 0
+    if not _match(graph, d, e, dummies, over):
+        return np.uint64(0)
+    _spread(graph, 0, by_docking, dummies, over)
+    total = np.uint64(0)
     for k in range(len(dummies)):
         if dummies[k, 2] >= 0:
+            total += pair_hash(dummies[k, 0], dummies[k, 3])
             continue
-        x, y = dummies[k, 0], dummies[k, 1]
-        if not _match(a, b, x, y, dummies, image, owner, partner, sources, defects, counts):
-            return 0
-        queue[tail] = a.tails[x]
-        tail = _spread(
-            a, b, tail, tail + 1, by_docking, dummies, image, owner, partner, sources, queue, defects, counts
-        )
-    return tail
+        begin = over.counts[MATCHED]
+        if not _match(graph, dummies[k, 0], dummies[k, 1], dummies, over):
+            return np.uint64(0)
+        _spread(graph, begin, by_docking, dummies, over)
+    for k in range(over.counts[MATCHED]):
+        x = graph.starts[over.queue[k]]
+        total += pair_hash(x, over.partner[x])
+    return mix(total) | np.uint64(1)
 
 
 @numba.njit(cache=True)
-def _spread(a, b, head, tail, by_docking, dummies, image, owner, partner, sources, queue, defects, counts):
-    """Go on from the matched nodes `queue[head:tail]` of a to all that they lead to; the new end of the queue."""
-    while head < tail:
-        v = queue[head]
+def _spread(graph, head, by_docking, dummies, over):
+    """Go on from the matched nodes, from place `head` of the queue on, to all that they lead to."""
+    while head < over.counts[MATCHED]:
+        v = over.queue[head]
         head += 1
-        for x in range(a.starts[v], a.starts[v + 1]):
-            y = partner[x]
-            if y < 0 or not _agree(a, b, x, y, by_docking):
+        for x in range(graph.starts[v], graph.starts[v + 1]):
+            y = over.partner[x]
+            if y < 0 or not agree(graph, x, y, by_docking):
                 continue
-            back, ahead = a.twins[x], b.twins[y]
-            if partner[back] == ahead:
-                continue
-            if _match(a, b, back, ahead, dummies, image, owner, partner, sources, defects, counts):
-                queue[tail] = a.tails[back]
-                tail += 1
-    return tail
+            back, ahead = graph.twins[x], graph.twins[y]
+            if over.partner[back] != ahead:
+                _match(graph, back, ahead, dummies, over)
 
 
 @numba.njit(cache=True)
-def find_root(leader, i):
-    """The leader of an item's region."""
-    while leader[i] != i:
-        leader[i] = leader[leader[i]]
-        i = leader[i]
-    return i
-
-
-@numba.njit(cache=True)
-def _join(leader, i, j):
-    i, j = find_root(leader, i), find_root(leader, j)
-    leader[max(i, j)] = min(i, j)
-
-
-@numba.njit(cache=True)
-def regions(a, b, by_docking, image, owner, partner, sources, leader, is_cut):
-    """The unmatched regions of a partial symmetry, as sets of what hangs together in either graph.
-
-    Items of `leader` (2 a.m + 2 b.m + a.n + b.n,) are the darts of a, the darts of b, the nodes of a and those of b; it
-    comes out with one leader for each region. is_cut (2 a.m,) comes out true for the darts of a along which regions are
-    cut off: those that are matched and whose edges are not.
-    """
-    darts, other = len(a.tails), len(b.tails)
-    nodes = darts + other
-    for i in range(len(leader)):
-        leader[i] = i
-    for x in range(darts):
-        y = partner[x]
-        is_cut[x] = y >= 0 and not (partner[a.twins[x]] == b.twins[y] and _agree(a, b, x, y, by_docking))
-    for x in range(darts):
-        v, t = a.tails[x], a.twins[x]
-        if image[v] < 0:
-            if image[a.tails[t]] < 0:
-                _join(leader, nodes + v, nodes + a.tails[t])
-        elif is_cut[x] or partner[x] < 0:
-            if image[a.tails[t]] < 0:
-                _join(leader, x, nodes + a.tails[t])
-            elif is_cut[t]:
-                _join(leader, x, t)
-    first = nodes + len(a.types)
-    for y in range(other):
-        w, t = b.tails[y], b.twins[y]
-        x = sources[y]
-        if owner[w] < 0:
-            if owner[b.tails[t]] < 0:
-                _join(leader, first + w, first + b.tails[t])
-        elif x < 0 or is_cut[x]:
-            here = darts + y if x < 0 else x
-            if owner[b.tails[t]] < 0:
-                _join(leader, here, first + b.tails[t])
-            elif sources[t] >= 0 and is_cut[sources[t]]:
-                _join(leader, here, sources[t])
-
-
-@numba.njit(cache=True)
-def cut_off(graph, cut):
-    """What the darts `cut` int64 (b,) point to and what hangs together with it without crossing them, bool (n,)."""
-    inside, is_wall = np.zeros(len(graph.types), dtype=np.bool_), np.zeros(len(graph.tails), dtype=np.bool_)
-    waiting = np.empty(len(cut) + len(graph.tails), dtype=np.int64)
-    count = 0
-    for dart in cut:
-        if dart >= 0:
-            is_wall[dart] = True
-    for dart in cut:
-        if dart >= 0 and not is_wall[graph.twins[dart]]:
-            waiting[count] = graph.tails[graph.twins[dart]]
-            count += 1
-    for dart in cut:
-        if dart >= 0:
-            is_wall[graph.twins[dart]] = True
-    while count > 0:
-        count -= 1
-        node = waiting[count]
-        if inside[node]:
-            continue
-        inside[node] = True
-        for dart in range(graph.starts[node], graph.starts[node + 1]):
-            if not is_wall[dart]:
-                waiting[count] = graph.tails[graph.twins[dart]]
-                count += 1
-    return inside
+def lift(graph, over):
+    """Take up what was laid out, so that the next symmetry can be."""
+    for k in range(over.counts[MATCHED]):
+        v = over.queue[k]
+        for node in (v, over.image[v]):
+            over.image[node] = -1
+            for x in range(graph.starts[node], graph.starts[node + 1]):
+                over.partner[x] = -1

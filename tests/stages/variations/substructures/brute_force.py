@@ -3,6 +3,10 @@
 A piece is a connected set of nodes whose cut edges follow each other in one cycle, walking round its border. Two can
 take each other's place if, walking round both outsides at once, from cut edge to cut edge, the same is met: nodes of
 the same types with as many docking sites. Less is asked where only the nodes at the cut must be the same.
+
+Then both outsides may lie upon each other in two ways at once: a closed ring of parts all alike takes one more,
+turned by none at one end of it and by one at the other. No partial symmetry, which lays each part upon one, has such
+a boundary; `lies_one_way` tells it.
 """
 
 from __future__ import annotations
@@ -34,7 +38,9 @@ def orders_of(graph: OrderedGraph) -> Orders:
     return [graph.neighbours(node) for node in range(len(graph.types))]
 
 
-def results(graph: OrderedGraph, giver: OrderedGraph, *, same_outside: bool) -> set[tuple[tuple[int, ...], ...]]:
+def results(
+    graph: OrderedGraph, giver: OrderedGraph, *, same_outside: bool, one_way: bool = False
+) -> set[tuple[tuple[int, ...], ...]]:
     """The codes of all that comes of replacing a piece of the graph by one of the giver, where that is simple."""
     found = set()
     theirs = list(pieces(giver))
@@ -44,7 +50,9 @@ def results(graph: OrderedGraph, giver: OrderedGraph, *, same_outside: bool) -> 
                 for turn in range(len(piece.cuts)):
                     if matches(graph, giver, piece, other, turn, same_outside=same_outside):
                         made = replaced(graph, giver, piece, other, turn)
-                        if made is not None:
+                        if made is None or code(made) in found:
+                            continue
+                        if not one_way or lies_one_way(graph, giver, piece, other, turn):
                             found.add(code(made))
     return found
 
@@ -129,6 +137,32 @@ def matches(
         if stands_for.setdefault(node, (node_there, shift)) != (node_there, shift):
             return False
     return len({there for there, _ in stands_for.values()}) == len(stands_for)
+
+
+def lies_one_way(graph: OrderedGraph, giver: OrderedGraph, piece: Piece, other: Piece, turn: int) -> bool:
+    """Whether no part is laid upon two, nor two upon one, where the parts outside the cuts are laid upon each other and
+    all that is alike around them, and so on."""
+    waiting: list[tuple[int, int, int]] = []
+    for place, (inner, node) in enumerate(piece.cuts):
+        inner_there, there = other.cuts[(place + turn) % len(piece.cuts)]
+        shift = giver.neighbours(there).index(inner_there) - graph.neighbours(node).index(inner)
+        waiting.append((node, there, shift % len(graph.neighbours(node))))
+    stands_for: dict[int, tuple[int, int]] = {}
+    stands_there: dict[int, int] = {}
+    while waiting:
+        node, there, shift = waiting.pop(0)
+        if stands_for.get(node) == (there, shift):
+            continue
+        if node in stands_for or there in stands_there:
+            return False
+        stands_for[node], stands_there[there] = (there, shift), node
+        around, around_there = graph.neighbours(node), giver.neighbours(there)
+        for place, near in enumerate(around):
+            near_there = around_there[(place + shift) % len(around)]
+            own, theirs = graph.neighbours(near), giver.neighbours(near_there)
+            if graph.types[near] == giver.types[near_there] and len(own) == len(theirs):
+                waiting.append((near, near_there, (theirs.index(there) - own.index(node)) % len(own)))
+    return True
 
 
 def replaced(graph: OrderedGraph, giver: OrderedGraph, piece: Piece, other: Piece, turn: int) -> OrderedGraph | None:

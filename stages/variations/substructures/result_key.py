@@ -1,0 +1,93 @@
+"""The key of what an operation makes, from the graphs alone: what is known need not be put together (substructures
+§4.3.1)."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from stages.variations.kernels.lookup import mix
+
+__all__ = ["result_key"]
+
+GOLDEN, ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
+
+
+@numba.njit(cache=True)
+def result_key(base, giver, taken, piece, boundary):
+    """The key of the result by colour refinement of its graph with its docking labels, uint64: that which
+    `graph_key` gives the shape, where it has no contacts beside those that are brought along.
+
+    taken bool (a.n,) leaves the base, piece bool (b.n,) of the giver comes, along `boundary` int64 (b, 2).
+    """
+    stays = len(base.types)
+    place, outer = np.full(stays + len(giver.types), -1, dtype=np.int64), np.full(len(base.tails), -1, dtype=np.int64)
+    source, is_wall = np.full(len(giver.tails), -1, dtype=np.int64), np.zeros(len(base.tails), dtype=np.bool_)
+    for d, e in boundary:
+        if d >= 0:
+            is_wall[d] = True
+        if d >= 0 and e >= 0:
+            outer[d] = e
+            source[e] = d
+    count = 0
+    for node in range(len(place)):
+        if not taken[node] if node < stays else piece[node - stays]:
+            place[node] = count
+            count += 1
+    edges, labels = (
+        np.empty((len(base.tails) + len(giver.tails), 2), dtype=np.int64),
+        np.empty(len(base.tails) + len(giver.tails), dtype=np.uint64),
+    )
+    colours, filled = np.empty(count, dtype=np.uint64), 0
+    for node in range(len(place)):
+        if place[node] < 0:
+            continue
+        graph, own = (base, node) if node < stays else (giver, node - stays)
+        colours[place[node]] = mix(np.uint64(graph.types[own]) + np.uint64(0x51ED270B))
+        for dart in range(graph.starts[own], graph.starts[own + 1]):
+            end, label = np.int64(-1), graph.labels[dart]
+            if node >= stays:
+                end = _beyond(base, giver, dart, place, source)
+            elif outer[dart] >= 0:
+                end, label = _beyond(base, giver, outer[dart], place, source), giver.labels[outer[dart]]
+            elif not is_wall[dart] and not is_wall[base.twins[dart]]:
+                end = place[base.tails[base.twins[dart]]]
+            if end >= 0:
+                edges[filled, 0], edges[filled, 1], labels[filled] = place[node], end, np.uint64(label - 1)
+                filled += 1
+    return _refined(colours, edges[:filled], labels)
+
+
+@numba.njit(cache=True)
+def _beyond(base, giver, dart, place, source):
+    """The place of the node that the giver's dart leads to, or -1."""
+    ahead = giver.twins[dart]
+    own = place[len(base.types) + giver.tails[ahead]]
+    if own >= 0:
+        return own
+    return place[base.tails[source[ahead]]] if source[ahead] >= 0 else np.int64(-1)
+
+
+@numba.njit(cache=True)
+def _refined(colours, edges, labels):
+    """The hash of a graph by colour refinement, as `graph_key` reckons it, from its edges in both directions."""
+    classes = 0
+    for _ in range(len(colours)):
+        fresh = np.empty_like(colours)
+        for i in range(len(colours)):
+            fresh[i] = mix(colours[i])
+        for k in range(len(edges)):
+            fresh[edges[k, 0]] += mix(colours[edges[k, 1]] + labels[k] * GOLDEN + ODD)
+        colours = fresh
+        ranked = np.sort(colours)
+        found = 1
+        for i in range(1, len(ranked)):
+            if ranked[i] != ranked[i - 1]:
+                found += 1
+        if found == classes:
+            break
+        classes = found
+    total = np.uint64(len(colours))
+    for i in range(len(colours)):
+        total += mix(colours[i])
+    return mix(total)
