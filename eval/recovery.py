@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import islice
 from pathlib import Path
 
@@ -13,13 +14,14 @@ import numpy as np
 
 from eval.table import Cell, Published, Table
 from pipeline.errors import ConfigError
+from stages.programs.movement import STEP, moved
 from stages.programs.program import Program
 from stages.programs.schema import Values
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import drawn
 from stages.training.recovery.reading import Input
-from stages.training.recovery.recover import Models, find_models, recover_input
+from stages.training.recovery.recover import SHIPPED, Models, Recovered, find_models, recover_input
 from stages.training.recovery.shapes import TEST, TRAIN, RandomShape, random_shapes
 from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
 from stages.training.recovery.trained import TrainedRecovery
@@ -28,9 +30,12 @@ __all__ = [
     "PUBLISHED",
     "Found",
     "accuracy_chart",
+    "alike",
+    "baselines_table",
     "floor",
     "held_out",
     "methods",
+    "parameters_table",
     "published_chamfer",
     "recovery_table",
     "tried",
@@ -67,16 +72,18 @@ PUBLISHED = (
 )
 
 
-Method = Callable[[Input], Values]
+Method = Callable[[Input], Recovered]
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a method made of some inputs. distances: as published, float64 (n,); exact, near: bool (n, parameters),
-    right and within one class; visible: bool (n, parameters), what is seen in the truth; seconds: for an input."""
+    """What a method made of some inputs. results: of each; distances: as published, float64 (n,); exact, near: bool
+    (n, parameters), right and within one class; visible: bool (n, parameters), what is seen in the truth; seconds: for
+    an input."""
 
     label: str
     program: Program
+    results: tuple[Recovered, ...]
     distances: FloatArray
     exact: BoolArray
     near: BoolArray
@@ -93,38 +100,50 @@ def published_chamfer(first: FloatArray, second: FloatArray) -> float:
 def held_out(
     model: TrainedRecovery, count: int, rng: np.random.Generator
 ) -> Iterator[tuple[str, list[RandomShape], list[Input]]]:
-    """`count` shapes that no model has learnt from, as clouds, or as drawings from each view by itself."""
+    """`count` shapes that no model has learnt from, as clouds; or as drawings from the views that the model has learnt,
+    in turns, and once more from those that it has not."""
     shapes = list(islice(random_shapes(model.program, TEST, rng), count))
     names = [f"{number:03}" for number in range(count)]
     if model.entry.input == "points":
         clouds = [sampled_points(each.parts, GIVEN, rng) for each in shapes]
         yield "points", shapes, [Input(name, points=each) for name, each in zip(names, clouds, strict=True)]
         return
-    for view in model.sketches.views:
-        inks = [drawn(model.program, each.parts, view, model.sketches, rng) for each in shapes]
-        angle = "trained" if not model.entry.views or view.name in model.entry.views else "novel"
-        inputs = [Input(name, ink=each) for name, each in zip(names, inks, strict=True)]
-        yield f"sketch, {angle} angle ({view.name})", shapes, inputs
+    learnt = [each for each in model.sketches.views if not model.entry.views or each.name in model.entry.views]
+    novel = [each for each in model.sketches.views if each not in learnt]
+    for angle, views in (("trained angles", learnt), ("novel angle", novel)):
+        if views:
+            inks = [
+                drawn(model.program, each.parts, views[place % len(views)], model.sketches, rng)
+                for place, each in enumerate(shapes)
+            ]
+            yield (
+                f"sketch, {angle}",
+                shapes,
+                [Input(name, ink=each) for name, each in zip(names, inks, strict=True)],
+            )
 
 
-def usable_models(folder: Path) -> Models:
-    """The recovery models in a folder of published models. Raises ConfigError where none can be used."""
-    models, wrong = find_models(folder)
-    if not models:
-        raise ConfigError(f"{wrong[0]}; make train")
-    return models
+def usable_models(folder: Path, programs: Collection[str]) -> Models:
+    """The recovery models in a folder of published models, and of those that come with Shapemill where it has none; of
+    `programs`, if any are named. Raises ConfigError where that leaves none."""
+    models, wrong = find_models(folder, SHIPPED)
+    asked = {key: model for key, model in models.items() if not programs or model.program.name in programs}
+    if not asked:
+        told = f"no recovery model of {', '.join(programs)}" if programs else "; ".join(wrong)
+        raise ConfigError(f"{told}; make train")
+    return asked
 
 
 def methods(model: TrainedRecovery, budget: int, seed: int) -> dict[str, Method]:
-    """The ways from an upright input to values, by name."""
+    """The ways from an upright input to a shape, by name; the nearest training shape for clouds alone."""
     program, kind = model.program, model.entry.input
     key = (model.header["program"], kind)
 
     def recovered(models: Models, shapes: int) -> Method:
-        return lambda given: recover_input(given, key[0], models, "y", shapes, seed, turned=False).values
+        return lambda given: recover_input(given, key[0], models, "y", shapes, seed, turned=False)
 
     found = {
-        "base shape": lambda _: program.schema.base,
+        "base shape": recovered({}, 1),
         "base shape, refined": recovered({}, budget),
         "network": recovered({key: model}, 1),
         "network, refined": recovered({key: model}, budget),
@@ -139,12 +158,13 @@ def tried(
 ) -> Found:
     """What a method makes of inputs, against the shapes that they are of."""
     counts = np.array([len(each.values) for each in program.parameters])
-    distances, classes = [], []
+    distances, classes, results = [], [], []
     seconds = 0.0
     for shape, given in zip(shapes, inputs, strict=True):
-        began = time.perf_counter()
-        values = method(given)
-        seconds += time.perf_counter() - began
+        began = time.process_time()
+        results.append(method(given))
+        values = results[-1].values
+        seconds += time.process_time() - began
         clouds = [
             sampled_points(parts, MEASURED, np.random.default_rng(side))
             for side, parts in enumerate((shape.parts, program.parts(values)))
@@ -153,7 +173,8 @@ def tried(
         classes.append(program.schema.classes(values))
     found, truth = np.array(classes), np.array([each.classes for each in shapes])
     near = (np.abs(found - truth) <= 1) & (found < counts)
-    return Found(label, program, np.array(distances), found == truth, near, truth < counts, seconds / len(inputs))
+    shares = np.array(distances), found == truth, near, truth < counts
+    return Found(label, program, tuple(results), *shares, seconds / len(inputs))
 
 
 def floor(program: Program, shapes: Sequence[RandomShape]) -> FloatArray:
@@ -170,28 +191,32 @@ def recovery_table(found: Sequence[Found], floors: Mapping[str, float], budget: 
     first = {each.label.partition(": ")[0]: each for each in found if each.label.endswith(": network")}
     for each in found:
         guess = first[each.label.partition(": ")[0]]
+        many = len(each.distances)
         rows.append(
             (
                 each.label,
+                many,
                 float(each.distances.mean()),
                 float(np.median(each.distances)),
                 100.0 * float(each.exact[each.visible].mean()),
                 100.0 * float(each.near[each.visible].mean()),
-                "" if each is guess else _significance(each.distances, guess.distances),
+                "" if each is guess else _significance(each.distances, guess.distances[:many]),
+                float(guess.distances[:many].mean()),
                 each.seconds,
             )
         )
-    rows += [(name, value) + ("",) * 5 for name, value in floors.items()]
+    rows += [(name, "", value) + ("",) * 6 for name, value in floors.items()]
     return Table(
-        f"Shapes recovered from shapes that were not learnt from, {len(found[0].distances)} of each kind",
-        ("input", "chamfer", "median", "exact %", "near %", "p", "seconds"),
+        "Shapes recovered from shapes that were not learnt from",
+        ("input", "shapes", "chamfer", "median", "exact %", "near %", "p", "network on these", "seconds"),
         tuple(rows),
         notes=(
             f"chamfer: mean squared distance to the nearest of {MEASURED:,} points, the mean of both ways, each shape "
             "in the unit sphere around the middle of its box, as the published code measures. exact, near: of the "
             "parameters that are seen in the true shape, those that are right, and those within one class. p: of a "
-            "paired t-test against the network's first guess. Refined: a search with "
-            f"{budget} shapes at most. True shape: what is left where two samples of one shape are compared.",
+            "paired t-test against the network's first guess of the same shapes, whose mean stands beside it. Seconds: "
+            f"of one core. Refined: a search with {budget} shapes at most, for the first few of them. True shape: what "
+            "is left where two samples of one shape are compared.",
             "Published figures are of the published programs, shapes and drawings; ours of ours. The published sets "
             "out of the distribution (AmateurSketch, ProSketch, ScanNet, ShapeNet) are not to be had here.",
         ),
@@ -199,9 +224,67 @@ def recovery_table(found: Sequence[Found], floors: Mapping[str, float], budget: 
     )
 
 
-def accuracy_chart(found: Sequence[Found]) -> bytes:
+def baselines_table(found: Sequence[Found], steps: Mapping[str, int]) -> Table:
+    """One row a model, the first being what the others are compared with; steps: of its training, by label."""
+    rows: list[tuple[Cell, ...]] = [
+        (
+            each.label,
+            steps[each.label],
+            float(each.distances.mean()),
+            float(np.median(each.distances)),
+            100.0 * float(each.exact[each.visible].mean()),
+            100.0 * float(each.near[each.visible].mean()),
+            _significance(each.distances, found[0].distances),
+        )
+        for each in found
+    ]
+    notes = (
+        f"First guesses, without search, of {len(found[0].distances)} held-out shapes, the same for all models. "
+        "chamfer, exact, near: as in the table of recovery. p: of a paired t-test against the first row. classes: a "
+        "class for each value; values: continuous parameters are regressed; apart: and by a network of their own "
+        "(Huang et al. 2017); unmarked: nothing is learnt of what is hidden, there is no existence label.",
+    )
+    published = [each for each in PUBLISHED if "Table 3" in each.source]
+    columns = ("model", "steps", "chamfer", "median", "exact %", "near %", "p")
+    return Table("Ways to answer, at equal training", columns, tuple(rows), notes, published)
+
+
+def alike(found: Found, shapes: Sequence[RandomShape]) -> BoolArray:
+    """Which parameters of the first of the inputs, those of `shapes`, are as good as right, bool (shapes, parameters):
+    in the true shape the value that was found moves the surface by no more than a quarter of a percent of the diagonal.
+    """
+    same = found.exact[: len(shapes)].copy()
+    for row, shape in enumerate(shapes):
+        asked = np.flatnonzero(found.visible[row] & ~same[row])
+        names = [found.program.parameters[place].name for place in asked.tolist()]
+        changes = [{name: found.results[row].values[name]} for name in names]
+        same[row, asked] = moved(found.program, shape.values, changes) <= STEP
+    return same
+
+
+def parameters_table(found: Mapping[str, tuple[Found, BoolArray]]) -> Table:
+    """One row a kind of input: `found` by its name, with what `alike` says of its first shapes."""
+    rows: list[tuple[Cell, ...]] = []
+    for name, (each, same) in found.items():
+        seen = each.visible[: len(same)]
+        shown = seen.sum(axis=0)
+        wrong = (seen & ~same).sum(axis=0) / np.maximum(shown, 1) * (shown > 1)
+        worst = [each.program.parameters[place].name for place in np.argsort(-wrong, kind="stable")[:4].tolist()]
+        shares = (100.0 * float(right[: len(same)][seen].mean()) for right in (each.exact, each.near, same))
+        rows.append((name, len(same), *shares, ", ".join(worst)))
+    notes = (
+        "Of the network alone; of the parameters that are seen in the true shape. alike: right, or wrong by so little "
+        f"that in the true shape it moves no point of the surface by more than {STEP:.2%} of the diagonal, which no "
+        "cloud or drawing tells. Most often unlike: the parameters of which that is rarest.",
+    )
+    columns = ("input", "shapes", "exact %", "near %", "alike %", "most often unlike")
+    return Table("Parameters that are right, or as good as right", columns, tuple(rows), notes)
+
+
+def accuracy_chart(found: Sequence[Found], same: BoolArray) -> bytes:
     """A bar a parameter, as PNG: the share that is right where it is seen, dark, and that within one class, light; a
-    panel for each of `found`, which are of one program."""
+    panel for each of `found`, which are of one program. In the first a mark says which share is as good as right:
+    `same` is what `alike` says of it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -215,8 +298,13 @@ def accuracy_chart(found: Sequence[Found]) -> bytes:
         for right, color in ((each.near, "#b7cbe0"), (each.exact, "#2f5f8f")):
             share = np.where(seen > 0, (right & each.visible).sum(axis=0) / np.maximum(seen, 1), 0.0)
             panel.barh(places, 100.0 * share, color=color)
-        panel.set(title=each.label, xlabel="% right, and within one class", xlim=(0, 100))
+        panel.set(xlabel="% right, within one class, | alike", xlim=(0, 100))
+        panel.set_title(each.label, fontsize=7)
         panel.spines[["top", "right"]].set_visible(False)
+    seen = found[0].visible[: len(same)]
+    shown = np.flatnonzero(seen.any(axis=0))
+    share = (same & seen).sum(axis=0)[shown] / seen.sum(axis=0)[shown]
+    panels[0].plot(100.0 * share, places[shown], "|", color="#b04a2f", markersize=5)
     panels[0].set_yticks(places, names, fontsize=6)
     panels[0].invert_yaxis()
     stream = io.BytesIO()
@@ -226,16 +314,19 @@ def accuracy_chart(found: Sequence[Found]) -> bytes:
 
 def _nearest(program: Program, rng: np.random.Generator) -> Method:
     """The values of that of some training shapes whose points are nearest."""
-    known = [
-        (each.values, frame_of(points).normalized(points))
-        for each in islice(random_shapes(program, TRAIN, rng), NEIGHBORS)
-        for points in (shape_points(each.parts, GLIMPSE),)
-    ]
 
-    def method(given: Input) -> Values:
+    @cache
+    def known() -> list[tuple[Values, FloatArray]]:
+        made = islice(random_shapes(program, TRAIN, rng), NEIGHBORS)
+        pairs = ((each.values, shape_points(each.parts, GLIMPSE)) for each in made)
+        return [(values, frame_of(points).normalized(points)) for values, points in pairs]
+
+    def method(given: Input) -> Recovered:
         assert given.points is not None
         points = frame_of(given.points).normalized(given.points[:GLIMPSE])
-        return min(known, key=lambda each: chamfer_distance(points, each[1]))[0]
+        distances = [chamfer_distance(points, each) for _, each in known()]
+        values, _ = known()[int(np.argmin(distances))]
+        return Recovered(program, values, min(distances), min(distances), None, None, "y", NEIGHBORS, ())
 
     return method
 

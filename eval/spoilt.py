@@ -13,12 +13,23 @@ from eval.table import Cell, Table
 from pipeline.errors import ConfigError
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.recovery.clouds import frame_of, taken
+from stages.training.recovery.drawings import drawn
 from stages.training.recovery.reading import Input, InputError, read_inputs
 from stages.training.recovery.recover import Models, Recovered, recover_input
+from stages.training.recovery.shapes import RandomShape
 from stages.training.recovery.surface import sampled_points
 from stages.training.recovery.trained import TrainedRecovery
 
-__all__ = ["SPOILS", "WAYS", "foreign_inputs", "foreign_rows", "foreign_table", "spoilt_inputs", "spoilt_table"]
+__all__ = [
+    "SPOILS",
+    "WAYS",
+    "foreign_inputs",
+    "foreign_rows",
+    "foreign_table",
+    "other_views",
+    "spoilt_inputs",
+    "spoilt_table",
+]
 
 WAYS = ("network", "network, refined")
 
@@ -121,6 +132,21 @@ def spoilt_inputs(kind: str, inputs: Sequence[Input], seed: int) -> Mapping[str,
         name: [spoil(given, np.random.default_rng((seed, place))) for place, given in enumerate(inputs)]
         for name, spoil in SPOILS[kind].items()
     }
+
+
+def other_views(model: TrainedRecovery, shapes: Sequence[RandomShape], seed: int) -> Mapping[str, list[Input]]:
+    """For a model of drawings, shapes as they are seen from elsewhere than it has learnt: nearly from the front, and
+    from the other side and above."""
+    if model.entry.input == "points":
+        return {}
+    base, side = model.sketches.views[0], 1.0 if model.program.elevation > 0 else -1.0
+    found = {}
+    for name, azimuth, elevation in (("nearly from the front", 8.0, 15.0), ("other side, from above", -50.0, 50.0)):
+        view = base.model_copy(update={"azimuth": azimuth, "elevation": side * elevation})
+        rng = np.random.default_rng(seed)
+        inks = [drawn(model.program, each.parts, view, model.sketches, rng) for each in shapes]
+        found[name] = [Input(f"{place:03}", ink=ink) for place, ink in enumerate(inks)]
+    return found
 
 
 def spoilt_table(found: Sequence[Found]) -> Table:

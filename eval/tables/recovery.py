@@ -5,51 +5,76 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from eval.evaluation import Answer, Evaluation, Strip
-from eval.needs import RECOVERY
 from eval.subject import Subject
-from stages.training.checkpoint import weights_of_kind
 
 __all__ = ["TABLE"]
 
-SHOWN = 8
+SHOWN = 16
 """Recoveries of each kind of input that the report shows."""
+LOOKED_AT = 8
+"""Shapes whose parameters are changed one by one, to see how much each error is."""
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.recovery import accuracy_chart, floor, held_out, methods, recovery_table, tried, usable_models
+    from eval.recovery import (
+        Found,
+        accuracy_chart,
+        alike,
+        floor,
+        held_out,
+        methods,
+        parameters_table,
+        recovery_table,
+        tried,
+        usable_models,
+    )
     from pipeline.randomness import decision_rng
     from stages.shape.views.sheet import picture_png
     from stages.training.recovery.files import recovery_picture
-    from stages.training.recovery.recover import recover_input
 
-    models = usable_models(subject.models)
-    rows, floors, strips, seed = [], {}, [], subject.config.seed
+    models = usable_models(subject.models, asked.programs)
+    rows: list[Found] = []
+    floors, strips, shares, seed = {}, [], {}, subject.config.seed
     for (program, kind), model in sorted(models.items()):
         ways = methods(model, asked.budget, seed)
         for name, shapes, inputs in held_out(model, asked.shapes, decision_rng(seed, "recovery", program)):
             of_input = f"{model.program.name}, {name}"
-            found = [tried(f"{of_input}: {way}", model.program, ways[way], shapes, inputs) for way in ways]
-            rows += found
-            charts = [each for each in found if ": network" in each.label]
-            strips.append(Strip(f"Parameters that are right, {of_input}", [("", accuracy_chart(charts))]))
-            pictures = []
-            for given in inputs[:SHOWN]:
-                recovered = recover_input(given, program, {(program, kind): model}, "y", asked.budget, seed, False)
-                pictures.append((given.name, picture_png(recovery_picture(given, recovered))))
+            found = {}
+            for way, method in ways.items():
+                # searching from the base shape is as long for drawings of any angle
+                if way == "base shape, refined" and "novel" in name:
+                    continue
+                many = asked.refined if way.endswith("refined") else asked.shapes
+                found[way] = tried(f"{of_input}: {way}", model.program, method, shapes[:many], inputs[:many])
+            rows += found.values()
+            guessed, refined = found["network"], found["network, refined"]
+            shares[of_input] = guessed, alike(guessed, shapes[:LOOKED_AT])
+            chart = accuracy_chart([guessed, refined], shares[of_input][1])
+            strips.append(Strip(f"Parameters that are right, {of_input}", [("", chart)]))
+            best = [*refined.results, *guessed.results[len(refined.results) :]]
+            captions = [
+                f"{each.name}, {'refined' if at < asked.refined else 'network'}" for at, each in enumerate(inputs)
+            ]
+            pictures = [
+                (caption, picture_png(recovery_picture(given, result)))
+                for caption, given, result in zip(captions[:SHOWN], inputs, best, strict=False)
+            ]
             strips.append(Strip(f"Input and result, {of_input}", pictures))
         floors[f"{model.program.name}, {kind}: true shape"] = float(floor(model.program, shapes).mean())
-    return Answer([recovery_table(rows, floors, asked.budget)], strips=strips)
+    return Answer([recovery_table(rows, floors, asked.budget), parameters_table(shares)], strips=strips)
 
 
 def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--shapes", type=int, default=30, help="shapes that are recovered, of each kind of input")
-    parser.add_argument("--budget", type=int, default=600, help="shapes that a refinement makes at most")
+    parser.add_argument("--programs", nargs="*", default=[], metavar="PROGRAM", help="which; all unless you say")
+    parser.add_argument("--shapes", type=int, default=16, help="shapes that are recovered, of each kind of input")
+    parser.add_argument("--refined", type=int, default=4, help="of these, how many by search")
+    parser.add_argument("--budget", type=int, default=300, help="shapes that a refinement makes at most")
 
 
 TABLE = Evaluation(
     question="How near do shapes come that are recovered from clouds and drawings, and which parameters are right?",
-    needs=(RECOVERY,),
-    seconds=lambda subject: 400.0 * len(weights_of_kind(subject.models, "recovery")),
+    needs=(),
+    seconds=lambda subject: 750.0,
     answer=_answer,
     options=_options,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -14,11 +14,11 @@ from stages.points.area_sampling import sample_surface
 from stages.programs.curves import QuadMesh
 from stages.programs.draws import Share
 from stages.programs.parameters import Parameter, Value
-from stages.programs.program import Program
+from stages.programs.program import BuildError, Program
 from stages.programs.sampling import NoMoreShapes, Sampler
 from stages.shape.arrays import FloatArray
 
-__all__ = ["FAINT", "STEP", "Movement", "movement_table", "movements"]
+__all__ = ["FAINT", "STEP", "Movement", "moved", "movement_table", "movements"]
 
 FAINT, STEP = 0.005, 0.0025
 """What is moved less by its whole range, and by one class, as shares of the diagonal, is hard to read."""
@@ -72,6 +72,22 @@ def movements(program: Program, count: int, seed: int) -> Iterator[Movement]:
         yield Movement(parameter, far, step)
 
 
+def moved(program: Program, values: Mapping[str, Value], changes: Sequence[Mapping[str, Value]]) -> FloatArray:
+    """By how much each of some changes moves the surface of the shape at `values`: the greatest distance of a point of
+    either surface from the other, as a share of the shape's diagonal, float64 (changes,).
+
+    A change that breaks a constraint, or at which the program fails, moves it infinitely far."""
+    own = _surface(program, values)
+    found = []
+    for change in changes:
+        changed = {**values, **change}
+        try:
+            found.append(float("inf") if program.broken(changed) else own.apart(_surface(program, changed)))
+        except BuildError:
+            found.append(float("inf"))
+    return np.array(found)
+
+
 def movement_table(found: Sequence[Movement]) -> str:
     """The movements as a Markdown table, a line a parameter. Ends with a newline."""
     lines = [
@@ -119,8 +135,7 @@ class _Base:
         return [(moved[0], moved[-1])] if moved else []
 
     def _moved(self, values: dict[str, Value]) -> float:
-        other = _surface(self.program, values)
-        return max(self.surface.greatest(other), other.greatest(self.surface)) / self.surface.diagonal
+        return self.surface.apart(_surface(self.program, values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +146,16 @@ class _Surface:
     casting: Any
     diagonal: float
 
+    def apart(self, other: _Surface) -> float:
+        """The greatest distance of a point of either surface from the other one, as a share of this one's diagonal."""
+        return max(self.greatest(other), other.greatest(self)) / self.diagonal
+
     def greatest(self, other: _Surface) -> float:
         """The greatest distance of a point of the other surface from this one."""
         return float(self.casting.compute_distance(other.points, nthreads=1).numpy().max())
 
 
-def _surface(program: Program, values: dict[str, Value]) -> _Surface:
+def _surface(program: Program, values: Mapping[str, Value]) -> _Surface:
     import open3d as o3d
 
     mesh = QuadMesh.joined(part.mesh for part in program.parts(values))

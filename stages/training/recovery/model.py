@@ -11,6 +11,8 @@ from torch import Generator, Tensor, nn
 from torch.nn.functional import leaky_relu
 from torch.nn.utils import convert_conv2d_weight_memory_format
 
+from stages.programs.parameters import Parameter
+from stages.training.recovery.answers import regressed
 from stages.training.recovery.drawings import SIDE
 from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
 from stages.training.recovery.settings import RecoveryEntry
@@ -21,21 +23,32 @@ SLOPE = 0.2
 
 
 class RecoveryNet(nn.Module):
-    """Inputs to logits float (n, parameters, most classes) of the classes of each parameter.
+    """Inputs to outputs float (n, parameters, most classes): of each parameter the logits of its classes, the hidden
+    one the last, or what `Answers` says. Outputs beyond the classes of a parameter are minus infinity.
 
-    classes: how many each parameter has, the hidden class among them; logits of further ones are minus infinity.
+    With answers `apart` an encoder of its own sees for the parameters that are regressed: but for the step they share,
+    two networks (Huang et al. 2017).
     """
 
-    def __init__(self, entry: RecoveryEntry, classes: Sequence[int]) -> None:
+    continuous: Tensor
+
+    def __init__(self, entry: RecoveryEntry, parameters: Sequence[Parameter]) -> None:
         super().__init__()
-        self.encoder: nn.Module = Dgcnn(entry) if entry.input == "points" else Vgg(entry)
+        encoder = Dgcnn if entry.input == "points" else Vgg
+        self.encoder: nn.Module = encoder(entry)
+        self.other: nn.Module | None = encoder(entry) if entry.answers == "apart" else None
+        classes = [each.classes for each in parameters]
         self.decoders = Decoders(classes, 2 * entry.embedding, entry.decoder, entry.dropout)
+        self.register_buffer("continuous", torch.tensor(regressed(entry, parameters)), persistent=False)
 
     def forward(self, inputs: Tensor, noise: Generator | None = None) -> Tensor:
         """Of clouds float (n, points, 3), normalised, or drawings float (n, 1, SIDE, SIDE), ink 1 on 0; `noise` says
         what is dropped, and nothing is without."""
-        logits: Tensor = self.decoders(self.encoder(inputs), noise)
-        return logits
+        embeddings = self.encoder(inputs)[None]
+        if self.other is not None:
+            embeddings = torch.where(self.continuous[:, None, None], self.other(inputs), embeddings)
+        outputs: Tensor = self.decoders(embeddings, noise)
+        return outputs
 
 
 class Dgcnn(nn.Module):
@@ -79,21 +92,25 @@ class EdgeConvolution(nn.Module):
 
 
 class Vgg(nn.Module):
-    """Drawings float (n, 1, SIDE, SIDE) to embeddings (n, 2 embedding): VGG-11 with few features."""
+    """Drawings float (n, 1, SIDE, SIDE) to embeddings (n, 2 embedding): a VGG with few features, whose first
+    convolution reads squares of PATCH by PATCH pixels, each pixel a feature.
 
-    POOLED = (0, 1, 3, 5, 7)
-    """The convolutions after which each two by two pixels become one."""
+    Published are convolutions of single pixels from the start. With few features nearly all of the time goes there,
+    for lines that no more than a few pixels tell: at equal time this learns more.
+    """
+
+    PATCH = 4
 
     def __init__(self, entry: RecoveryEntry) -> None:
         super().__init__()
-        layers: list[nn.Module] = []
-        for place, (before, after) in enumerate(pairwise((1, *entry.channels))):
+        layers: list[nn.Module] = [nn.PixelUnshuffle(self.PATCH)]
+        for place, (before, after) in enumerate(pairwise((self.PATCH**2, *entry.channels))):
             layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after), nn.ReLU()]
-            if place in self.POOLED:
+            if place % 2:
                 layers.append(nn.MaxPool2d(2))
         # twice as fast with so few features
         self.layers = convert_conv2d_weight_memory_format(nn.Sequential(*layers), torch.channels_last)
-        side = SIDE // 2 ** len(self.POOLED)
+        side = SIDE // self.PATCH // 2 ** (len(entry.channels) // 2)
         self.embedding = nn.Linear(entry.channels[-1] * side * side, 2 * entry.embedding)
 
     def forward(self, drawings: Tensor) -> Tensor:
@@ -103,8 +120,8 @@ class Vgg(nn.Module):
 
 
 class Decoders(nn.Module):
-    """One perceptron of three layers for each parameter, all of them at once: embeddings (n, before) to logits (n,
-    parameters, most classes)."""
+    """One perceptron of three layers for each parameter, all of them at once: embeddings (1 or parameters, n, before)
+    to outputs (n, parameters, most classes)."""
 
     there: Tensor
 
@@ -118,7 +135,7 @@ class Decoders(nn.Module):
         self.register_buffer("there", there, persistent=False)
 
     def forward(self, embeddings: Tensor, noise: Generator | None) -> Tensor:
-        features = embeddings.expand(len(self.weights[0]), *embeddings.shape)
+        features = embeddings.expand(len(self.weights[0]), *embeddings.shape[1:])
         last = len(self.weights) - 1
         for place, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             features = torch.baddbmm(bias, features, weight)

@@ -130,7 +130,7 @@ def find_models(*folders: Path) -> tuple[dict[tuple[str, str], TrainedRecovery],
     wrong with others, in words.
 
     Of several for one program and input those of the folder that was named first, and of these the one that validated
-    best: with SHIPPED last, weights that come with Shapemill serve where a user has trained none.
+    best, and no baseline: with SHIPPED last, weights that come with Shapemill serve where a user has trained none.
     """
     found: dict[tuple[str, str], TrainedRecovery] = {}
     wrong: list[str] = []
@@ -147,6 +147,8 @@ def _models_in(folder: Path, wrong: list[str]) -> dict[tuple[str, str], TrainedR
     for path in chain.from_iterable(weights_of_kind(each, KIND) for each in (folder, *sorted(folder.glob("*-models")))):
         try:
             model = load_recovery(path)
+            if model.entry.is_baseline:
+                continue
             key, loss = (model.header["program"], model.entry.input), float(model.header["figures"]["val_loss"])
         except CheckpointError as error:
             wrong.append(str(error))

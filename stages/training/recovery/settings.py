@@ -25,6 +25,12 @@ class RecoveryEntry(ModelEntry):
     input: Literal["points", "sketch"] = Field(
         "points", description="`points`: a DGCNN reads clouds; `sketch`: a small VGG reads line drawings"
     )
+    answers: Literal["classes", "values", "apart"] = Field(
+        "classes",
+        description="`classes`: the network tells classes of all parameters apart; for comparison, `values`: "
+        "continuous ones are regressed, `apart`: and by an encoder of their own",
+    )
+    existence: bool = Field(True, description="whether that a parameter is hidden is a class that is learnt, too")
     views: tuple[str, ...] = Field(
         (),
         strict=False,
@@ -40,11 +46,11 @@ class RecoveryEntry(ModelEntry):
         (16, 16, 32, 64), min_length=1, strict=False, description="features of each edge convolution"
     )
     channels: tuple[Size, ...] = Field(
-        (8, 16, 32, 32, 64, 64, 64, 64),
-        min_length=8,
-        max_length=8,
+        (32, 32, 64, 64, 128, 64),
+        min_length=2,
+        max_length=10,
         strict=False,
-        description="features of each convolution of the VGG",
+        description="features of each convolution of the VGG; after each two of them four pixels become one",
     )
     embedding: int = Field(
         64, ge=1, le=4096, description="features that are pooled over the points: their greatest and their mean"
@@ -64,3 +70,8 @@ class RecoveryEntry(ModelEntry):
     pool: int = Field(
         4000, ge=1, le=1_000_000, description="drawings that a model of drawings learns from; unit: drawings"
     )
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether it is there to be compared with alone (geocode Table 3)."""
+        return self.answers != "classes" or not self.existence

@@ -13,25 +13,32 @@ from pathlib import Path
 from pipeline.places import write_file
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
 from stages.training.recovery.recover import SHIPPED
-from stages.training.recovery.trained import KIND, load_recovery
+from stages.training.recovery.trained import KIND, in_bytes, load_recovery
 
 __all__ = ["MOST", "main", "slim_bytes"]
 
 MOST = 4_000_000
 """Bytes of a model that comes with a clone."""
+MOST_OF_BYTES = 2
+"""So many tensors may become bytes, which are coarser than halves."""
 
 
 def slim_bytes(path: Path) -> bytes:
-    """The file of weights `path` with numbers of half precision, which answers nearly the same.
+    """The file of weights `path` with numbers of half precision, which answers nearly the same; where that is too
+    large, the largest of its tensors, one after the other, as bytes.
 
     Raises CheckpointError for weights that are not of a recovery model that can be used now, or too large still.
     """
     load_recovery(path)
     tensors, header = load_checkpoint(path, {"kind": KIND})
-    halves = {name: each.half() if each.is_floating_point() else each for name, each in tensors.items()}
-    content = checkpoint_bytes(halves, header)
+    slim = {name: each.half() if each.is_floating_point() else each for name, each in tensors.items()}
+    content = checkpoint_bytes(slim, header)
+    for name in sorted(slim, key=lambda each: -slim[each].numel())[:MOST_OF_BYTES]:
+        if len(content) > MOST:
+            slim |= in_bytes(name, tensors[name])
+            content = checkpoint_bytes(slim, header)
     if len(content) > MOST:
-        raise CheckpointError(f"{path} takes {len(content):,} bytes in half precision, more than {MOST:,}: train less")
+        raise CheckpointError(f"{path} takes {len(content):,} bytes at least, more than {MOST:,}: train a smaller one")
     return content
 
 

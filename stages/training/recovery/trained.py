@@ -16,17 +16,20 @@ from stages.programs.program import Program, find_program
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.sketches.settings import SketchesConfig
 from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.recovery.answers import Answers
 from stages.training.recovery.clouds import frame_of, taken
 from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.refinement import Guess
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.training import described_parameters
 
-__all__ = ["KIND", "TrainedRecovery", "load_recovery"]
+__all__ = ["KIND", "TrainedRecovery", "in_bytes", "load_recovery"]
 
 KIND = "recovery"
 """What weights say of their kind."""
 
+STEP = ".step"
+"""Behind the name of a tensor of bytes: that of the sizes of their steps."""
 LOOKS = 4
 """A cloud is looked at so often, each time at other points of it."""
 
@@ -63,12 +66,22 @@ class TrainedRecovery:
     @torch.no_grad()
     def _guess(self, inputs: Tensor) -> Guess:
         device = next(self.module.parameters()).device
-        chances = torch.softmax(self.module(inputs.to(device)), dim=-1).mean(dim=0).double().cpu().numpy()
+        outputs, answers = self.module(inputs.to(device)), Answers.of(self.entry, self.program.parameters)
+        chances = answers.chances(outputs).mean(dim=0).double().cpu().numpy()
         probabilities = {}
         for parameter, row in zip(self.program.parameters, chances, strict=True):
             shown = row[: len(parameter.values)]
             probabilities[parameter.name] = shown / max(float(shown.sum()), 1e-300)
-        return Guess(probabilities)
+        guess = Guess(probabilities)
+        if not answers.regressed.any():
+            return guess
+        places = answers.places(outputs).mean(dim=0).cpu().tolist()
+        start = guess.values(self.program)
+        for parameter, place, number in zip(self.program.parameters, places, answers.regressed.tolist(), strict=True):
+            if number:
+                values = np.array(parameter.values, dtype=np.float64)
+                start[parameter.name] = float(np.interp(place, np.arange(len(values)), values))
+        return Guess(probabilities, start)
 
 
 def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedRecovery:
@@ -82,6 +95,23 @@ def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> Trai
     if header["parameters"] != described_parameters(program):
         raise CheckpointError(f"{path} is of a {program.name} with other parameters than it has now: train it anew")
     entry = RecoveryEntry.model_validate({"name": "trained", **header["settings"]})
-    module = RecoveryNet(entry, [each.classes for each in program.parameters])
-    module.load_state_dict({name: each.float() if each.is_floating_point() else each for name, each in tensors.items()})
+    module = RecoveryNet(entry, program.parameters)
+    module.load_state_dict(_in_floats(tensors))
     return TrainedRecovery(module.eval(), program, entry, header)
+
+
+def in_bytes(name: str, tensor: Tensor) -> dict[str, Tensor]:
+    """A tensor of weights, float (..., before, after), as int8 with the size of a step for each column."""
+    step = (tensor.float().abs().amax(dim=-2, keepdim=True) / 127.0).clamp(min=1e-12)
+    return {name: (tensor.float() / step).round().to(torch.int8), f"{name}{STEP}": step}
+
+
+def _in_floats(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The state of a module from tensors of any precision."""
+    found = {}
+    for name, each in tensors.items():
+        if f"{name}{STEP}" in tensors:
+            found[name] = each.float() * tensors[f"{name}{STEP}"]
+        elif not name.endswith(STEP):
+            found[name] = each.float() if each.is_floating_point() else each
+    return found

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Generator, Tensor
-from torch.nn.functional import cross_entropy, max_pool2d
+from torch.nn.functional import max_pool2d
 
 from pipeline.places import file_digest
 from pipeline.shards import json_bytes
@@ -21,6 +21,7 @@ from stages.programs.program import Program, find_program
 from stages.shape.arrays import Float32Array
 from stages.sketches.settings import SketchesConfig
 from stages.training.loop import device_of
+from stages.training.recovery.answers import Answers
 from stages.training.recovery.clouds import frame_of, spoilt, taken
 from stages.training.recovery.drawings import SIDE, drawn
 from stages.training.recovery.model import RecoveryNet
@@ -116,7 +117,7 @@ def new_model(entry: RecoveryEntry, program: Program, seed: int) -> RecoveryNet:
     """A network for a program with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return RecoveryNet(entry, [each.classes for each in program.parameters])
+        return RecoveryNet(entry, program.parameters)
 
 
 def described_parameters(program: Program) -> list[list[Any]]:
@@ -135,6 +136,11 @@ class RecoveryLearner:
     splits: Mapping[str, Mapping[str, npt.NDArray[Any]]]
     texts: Sequence[str]
 
+    @property
+    def answers(self) -> Answers:
+        """What the outputs of the network say."""
+        return Answers.of(self.entry, self.program.parameters)
+
     def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
         """Clouds of shapes that are made meanwhile, or drawings of the pool, changed at random."""
         device = next(self.module.parameters()).device
@@ -142,9 +148,9 @@ class RecoveryLearner:
         return ((inputs.to(device), classes.to(device)) for inputs, classes in batches)
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
-        """The cross-entropy of all parameters together, in nats of an input."""
+        """That of all parameters together, in nats of an input."""
         inputs, classes = batch
-        return {"loss": _nats(self.module(inputs, noise), classes)}
+        return {"loss": self.answers.nats(self.module(inputs, noise), classes)}
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """On shapes that are never learnt from: nats; of the parameters that are visible, the share that is right and
@@ -152,19 +158,19 @@ class RecoveryLearner:
         true ones, squared, in sides of their boxes."""
         device = next(self.module.parameters()).device
         val = self.splits["val"]
-        logits = []
+        outputs = []
         for start in range(0, len(val["classes"]), self.entry.batch):
             inputs = val["inputs"][start : start + self.entry.batch]
-            logits.append(self.module(_input_tensor(inputs, self.entry.input).to(device)).cpu())
-        found, classes = torch.cat(logits), torch.from_numpy(val["classes"].astype(np.int64))
-        counts = torch.tensor([len(each.values) for each in self.program.parameters])
-        best, visible = found.argmax(dim=-1), classes < counts
+            outputs.append(self.module(_input_tensor(inputs, self.entry.input).to(device)).cpu())
+        found, classes = torch.cat(outputs), torch.from_numpy(val["classes"].astype(np.int64))
+        counts = self.answers.counts
+        best, visible = self.answers.chances(found).argmax(dim=-1), classes < counts
         near = (best - classes).abs() <= 1
         distances = [
             self._distance(chosen, text) for chosen, text in zip(best[:JUDGED].tolist(), self.texts, strict=False)
         ]
         return {
-            "loss": float(_nats(found, classes)),
+            "loss": float(self.answers.nats(found, classes)),
             "right": float((best == classes)[visible].float().mean()),
             "near": float((near & (best < counts))[visible].float().mean()),
             "chamfer": float(np.mean(distances)),
@@ -219,11 +225,6 @@ class RecoveryLearner:
                 elif morphology < self.entry.noise:
                     drawings[row] *= torch.from_numpy(rng.random(drawings[row].shape) < 0.9)
             yield drawings, torch.from_numpy(train["classes"][chosen].astype(np.int64))
-
-
-def _nats(logits: Tensor, classes: Tensor) -> Tensor:
-    """Cross-entropy summed over the parameters, mean over the inputs."""
-    return cross_entropy(logits.flatten(0, 1), classes.flatten(), reduction="sum") / len(classes)
 
 
 def _input_tensor(inputs: npt.NDArray[Any], kind: str) -> Tensor:

@@ -1,0 +1,42 @@
+"""`make eval TABLE=recovery_baselines`: ways in which a network may answer, at equal training (geocode Table 3)."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from eval.evaluation import Answer, Evaluation
+from eval.needs import RECOVERY
+from eval.subject import Subject
+from stages.training.checkpoint import weights_of_kind
+
+__all__ = ["TABLE"]
+
+
+def _answer(subject: Subject, asked: Namespace) -> Answer:
+    from eval.recovery import baselines_table, held_out, methods, tried
+    from pipeline.randomness import decision_rng
+    from stages.training.recovery.trained import load_recovery
+
+    rows, steps, seed = [], {}, subject.config.seed
+    paths = {path: load_recovery(path) for path in weights_of_kind(subject.models, "recovery")}
+    # what is no baseline first, with which the others are compared
+    for path, model in sorted(paths.items(), key=lambda each: each[1].entry.is_baseline):
+        guess = methods(model, 1, seed)["network"]
+        for name, shapes, inputs in held_out(model, asked.compared, decision_rng(seed, "recovery", model.program.name)):
+            label = f"{path.parent.name}, {name}"
+            rows.append(tried(label, model.program, guess, shapes, inputs))
+            steps[label] = model.entry.steps * model.entry.rounds
+    return Answer([baselines_table(rows, steps)])
+
+
+def _options(parser: ArgumentParser) -> None:
+    parser.add_argument("--compared", type=int, default=100, help="shapes that are recovered by each model")
+
+
+TABLE = Evaluation(
+    question="Do classes recover better than values, with the existence label than without, one network than two?",
+    needs=(RECOVERY,),
+    seconds=lambda subject: 60.0 * len(weights_of_kind(subject.models, "recovery")),
+    answer=_answer,
+    options=_options,
+)

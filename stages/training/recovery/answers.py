@@ -1,0 +1,67 @@
+"""What a network says of each parameter, and what it is told of the truth (geocode §3.3, Table 3).
+
+A parameter that is classified has a logit a class. One that is regressed has its place among the classes, a number:
+that of the first value is 0, and only the first of its outputs is looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import cross_entropy
+
+from stages.programs.parameters import Parameter
+from stages.training.recovery.settings import RecoveryEntry
+
+__all__ = ["Answers", "regressed"]
+
+
+def regressed(entry: RecoveryEntry, parameters: Sequence[Parameter]) -> list[bool]:
+    """Which parameters are regressed: the continuous ones, if any."""
+    return [entry.answers != "classes" and each.kind == "continuous" for each in parameters]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """counts: int64 (parameters,), values of each, after which comes the class of what is hidden; regressed: bool
+    (parameters,); existence: whether the class of what is hidden is learnt, too."""
+
+    counts: Tensor
+    regressed: Tensor
+    existence: bool
+
+    @classmethod
+    def of(cls, entry: RecoveryEntry, parameters: Sequence[Parameter]) -> Answers:
+        counts = torch.tensor([len(each.values) for each in parameters])
+        return cls(counts, torch.tensor(regressed(entry, parameters)), entry.existence)
+
+    def nats(self, outputs: Tensor, classes: Tensor) -> Tensor:
+        """The loss, summed over the parameters, mean over the inputs: cross-entropies, and of what is regressed half
+        the squared distance in classes, the nats of a normal distribution as wide as a class. Outputs float (n,
+        parameters, most classes); classes int64 (n, parameters)."""
+        counts, numbers = self.counts.to(classes.device), self.regressed.to(classes.device)
+        seen = classes < counts
+        learnt = ~numbers & (seen | self.existence)
+        entropies = cross_entropy(outputs[learnt], classes[learnt], reduction="sum")
+        told = numbers & seen
+        squares = (self.places(outputs)[told] - classes[told]) ** 2
+        return (entropies + 0.5 * squares.sum()) / len(classes)
+
+    def places(self, outputs: Tensor) -> Tensor:
+        """Where each parameter lies among its classes, were it regressed, float (n, parameters)."""
+        middle = (self.counts.to(outputs.device) - 1) / 2.0
+        return middle * (1.0 + outputs[..., 0].float())
+
+    def chances(self, outputs: Tensor) -> Tensor:
+        """The probability of each class, float (n, parameters, most classes); of what is regressed, of the two that it
+        lies between."""
+        places = self.places(outputs).clamp(min=0.0)
+        places = torch.minimum(places, (self.counts.to(outputs.device) - 1).float())
+        between = (1.0 - (torch.arange(outputs.shape[-1], device=outputs.device) - places[..., None]).abs()).clamp(
+            min=0
+        )
+        numbers = self.regressed.to(outputs.device)[:, None]
+        return torch.where(numbers, between, torch.softmax(outputs.float(), dim=-1))
