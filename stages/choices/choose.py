@@ -78,7 +78,7 @@ def choose(
         values["contact.tolerance"], reasons["contact.tolerance"] = found
     stated = config.decide(values)
     sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up)
-    one_surface = any(each.segmentation == "symmetry" for each in models)
+    one_surface = any(each.segmentation in ("symmetry", "sections") for each in models)
     rungs = climb(sight, _rails(stated, sight, open_keys, one_surface), tries)
     if copies:
         values[CHOSEN_COPIED], reasons[CHOSEN_COPIED] = most_copied(rungs[-1].finds if rungs else None)

@@ -68,7 +68,7 @@ def parse_model(path: Path, segmentation: Segmentation, limits: ReadLimits) -> M
         source, why, parted = pick(scene)
     else:
         source, why = segmentation, STATED
-        if source not in (scene.kind, "symmetry") and source not in (counts := count_parts(scene)):
+        if source not in (scene.kind, "symmetry", "sections") and source not in (counts := count_parts(scene)):
             offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
             raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
         parted = segment(scene, source)

@@ -1,4 +1,5 @@
-"""What is a part: scene nodes, named objects, or the pieces of a mesh by material, colour, connection or symmetry."""
+"""What is a part: scene nodes, named objects, or the pieces of a mesh by material, colour, connection, symmetry or
+sections."""
 
 from __future__ import annotations
 
@@ -9,11 +10,11 @@ import numpy as np
 
 from stages.exemplars.components import connected_faces
 from stages.exemplars.formats.scene import Placement, Scene, Surface, UniqueNames
-from stages.exemplars.symmetry.parts import by_symmetry, search_size
+from stages.exemplars.symmetry.parts import by_sections, by_symmetry, search_size
 
 __all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
 
-Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry"]
+Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")
 
 PALETTE = 64
@@ -90,6 +91,8 @@ def segment(scene: Scene, source: Segmentation) -> Scene:
         return scene
     if source == "symmetry":
         return by_symmetry(scene)
+    if source == "sections":
+        return by_sections(scene)
     alone = len(scene.placements) == 1
     surfaces: list[Surface] = []
     cut: list[list[tuple[str, str | None, int]]] = []

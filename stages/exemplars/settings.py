@@ -42,7 +42,7 @@ STRICTEST: Mapping[str, Any] = {
 LOOSEST = 0.05
 """The greatest contact tolerance, as a share of the median part's diagonal."""
 
-Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry"]
+Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 
 
 class ReadLimits(StrictModel):
@@ -122,7 +122,7 @@ class KitConfig(StrictModel):
     parts: Segmentation = Field(
         "auto",
         description="What makes a part; `auto` picks and says what it picked. `symmetry` cuts one mesh between copies "
-        "of what it repeats.",
+        "of what it repeats, `sections` between parallel planes whose sections are alike.",
     )
     types: Literal["congruence", "labels", "meaning"] = Field(
         "congruence",

@@ -74,15 +74,16 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
     return joined(soup.select(within), pieces.select(side)), joined(soup.select(untouched), pieces.select(~side))
 
 
-def connected_soups(soup: Soup, grid: SurfaceGrid) -> list[Soup]:
-    """The pieces of a soup that occupy no neighbouring cells, in the order of their first triangles."""
+def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
+    """The pieces of a soup that occupy no neighbouring cells of the lattice with a corner at `origin` (3,) and cells of
+    `size`, in the order of their first triangles."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
     if not len(soup):
         return []
-    where, owner, _ = fragments(soup.corners, grid.origin, grid.size)
+    where, owner, _ = fragments(soup.corners, origin, size)
     cells, place = np.unique(where, axis=0, return_inverse=True)
     beside = KDTree(cells).query_pairs(1.8, output_type="ndarray")
     graph = coo_array((np.ones(len(beside), dtype=bool), beside.T), shape=(len(cells), len(cells)))

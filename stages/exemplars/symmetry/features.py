@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["CornerFrames", "corner_frames"]
+__all__ = ["CornerFrames", "corner_frames", "creases", "welded"]
 
 CREASE = 0.4
 """Radians between the normals at an edge from which on it is a feature line."""
@@ -37,10 +37,10 @@ def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
 
     Of each corner those frames are taken whose kind is the first in order, all of them where several are equal.
     """
-    places, vertices = _welded(corners, tolerance)
+    places, vertices = welded(corners, tolerance)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    edges, turns, outwards = _creases(places, normals)
+    edges, turns, outwards = creases(places, normals)
     ends = np.concatenate([edges, edges[:, ::-1]])
     turns, outwards = np.concatenate([turns, turns]), np.concatenate([outwards, outwards])
     ways = vertices[ends[:, 1]] - vertices[ends[:, 0]]
@@ -72,14 +72,14 @@ def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
     return CornerFrames(frames[chosen], kinds[chosen], np.column_stack([lengths[first], lengths[second]])[chosen])
 
 
-def _welded(corners: FloatArray, tolerance: float) -> tuple[np.ndarray, FloatArray]:
+def welded(corners: FloatArray, tolerance: float) -> tuple[np.ndarray, FloatArray]:
     """The vertex of each corner of each triangle, int64 (f, 3), and the vertices, float64 (v, 3)."""
     points = corners.reshape(-1, 3)
     _, first, place = np.unique(np.round(points / tolerance), axis=0, return_index=True, return_inverse=True)
     return place.reshape(-1, 3), points[first]
 
 
-def _creases(places: np.ndarray, normals: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
+def creases(places: np.ndarray, normals: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
     """Edges at which the surface turns or ends, int64 (e, 2), how far it turns, in radians, -1 where it ends or more
     than two triangles meet, and the sum of the normals there, float64 (e, 3)."""
     sides = np.concatenate([places[:, [k, (k + 1) % 3]] for k in range(3)])

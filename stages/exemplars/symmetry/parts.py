@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +10,12 @@ import numpy as np
 from stages.exemplars.formats.scene import Placement, Scene, Surface
 from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.pieces import RADIUS, Piece, repeated_pieces
+from stages.exemplars.symmetry.slabs import slab_pieces
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, with_area
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
-__all__ = ["by_symmetry", "search_size"]
+__all__ = ["by_sections", "by_symmetry", "search_size"]
 
 LEFT_OUT = 1e-5
 """Share of the surface from which on it is told that it is left out."""
@@ -25,12 +27,21 @@ def by_symmetry(scene: Scene) -> Scene:
     """The scene as one mesh in the world, cut into `repeated_pieces`: a surface for each of them, `piece-00` and so on,
     with a placement for each of its poses. Triangles without area are left out, with a warning that counts them; where
     there are no others, the scene stays as it is."""
+    return _parted(scene, repeated_pieces)
+
+
+def by_sections(scene: Scene) -> Scene:
+    """The scene as one mesh in the world, cut into `slab_pieces`; as `by_symmetry`."""
+    return _parted(scene, slab_pieces)
+
+
+def _parted(scene: Scene, pieces_of: Callable[[FloatArray, IntArray], list[Piece]]) -> Scene:
     vertices, joined = _in_the_world(scene)
     real = with_area(vertices[joined])
     if not real.any():
         return scene
     colors = np.concatenate([scene.surfaces[placement.surface].face_colors for placement in scene.placements])
-    pieces = repeated_pieces(vertices, joined)
+    pieces = pieces_of(vertices, joined)
     width = max(2, len(str(len(pieces))))
     surfaces: list[Surface] = []
     placements: list[Placement] = []

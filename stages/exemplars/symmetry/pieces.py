@@ -9,6 +9,7 @@ import numpy as np
 from stages.exemplars.symmetry.alongside import chunks_along, row_of
 from stages.exemplars.symmetry.carve import Soup, carve, connected_soups, joined
 from stages.exemplars.symmetry.clip import fragments
+from stages.exemplars.symmetry.equality import equal_soups
 from stages.exemplars.symmetry.repetition import PART, Repetition, repetitions
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from stages.shape.arrays import FloatArray, IntArray
@@ -22,10 +23,6 @@ TRIED = 10
 """So many repetitions are tried, those that save most first."""
 BETTER = 0.98
 """Cuts must lower the cost at least by this factor."""
-DUST = 1e-3
-"""Share of their surface by which pieces that are equal may differ: slivers where borders of cells meet old seams."""
-INSIDE = 0.8
-"""Points that are compared lie so far from the middle of a triangle to its corners."""
 SPLINTER = 5e-4
 """A piece that touches no other is a part if it is more than this share of the whole surface."""
 ROUNDS = 3
@@ -114,31 +111,13 @@ def _cut(piece: Piece, grid: SurfaceGrid, repetition: Repetition) -> list[Piece]
             continue
         for place, (known, first) in enumerate(cut):
             way = pose @ invert(first)
-            if _equal(known.triangles, inside, way, grid.tolerance):
+            if equal_soups(known.triangles, inside, way, grid.tolerance):
                 cut[place] = Piece(known.triangles, (*known.poses, *(pose @ way for pose in piece.poses))), first
                 break
         else:
             cut.append((Piece(inside, piece.poses), pose))
     found = [each for each, _ in cut]
     return [*found, Piece(rest, piece.poses)] if len(rest) else found
-
-
-def _equal(one: Soup, other: Soup, pose: FloatArray, tolerance: float, share: float = DUST) -> bool:
-    """Whether `pose` moves one surface onto another: by their areas, which may differ by `share`, and by points of all
-    triangles but the smallest, dust of about this share of the surface."""
-    from stages.shape.geometry.triangles import build_tree, points_on_surface
-
-    if abs(one.area - other.area) > share * one.area:
-        return False
-    for source, target, way in ((one, other, pose), (other, one, invert(pose))):
-        order = np.argsort(source.areas, kind="stable")
-        large = source.corners[order[np.cumsum(source.areas[order]) > share * source.area]]
-        middles = large.mean(axis=1, keepdims=True)
-        probes = np.concatenate([middles, middles + INSIDE * (large - middles)], axis=1).reshape(-1, 3)
-        tree = build_tree(target.corners.reshape(-1, 3), np.arange(3 * len(target)).reshape(-1, 3).astype(np.int32))
-        if not points_on_surface(*tree, probes @ way[:3, :3].T + way[:3, 3], 2 * tolerance):
-            return False
-    return True
 
 
 def _with_what_runs_along(pieces: list[Piece], place: int, grid: SurfaceGrid) -> list[Piece]:
@@ -159,7 +138,7 @@ def _with_what_runs_along(pieces: list[Piece], place: int, grid: SurfaceGrid) ->
         chunks, rest = chunks_along(piece.triangles, row, single.triangles, grid)
         first = chunks[0]
         if not len(first) or not all(
-            len(chunk) and _equal(first, chunk, pose, grid.size / 2, LOOSE)
+            len(chunk) and equal_soups(first, chunk, pose, grid.size / 2, LOOSE)
             for chunk, pose in zip(chunks, piece.poses, strict=True)
         ):
             continue
@@ -186,7 +165,7 @@ def _parts(pieces: list[Piece], grid: SurfaceGrid) -> list[Piece]:
     for piece in pieces:
         if not len(piece.triangles):
             continue
-        soups = sorted(connected_soups(piece.triangles, grid), key=lambda each: -each.area)
+        soups = sorted(connected_soups(piece.triangles, grid.origin, grid.size), key=lambda each: -each.area)
         parts = [each for each in soups if each.area > SPLINTER * grid.area.sum()]
         if not parts and len(piece.poses) > 1:
             parts = soups[:1]

@@ -1,0 +1,123 @@
+"""Parallel planes with like sections cut a mesh into slabs, with all that passes there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.exemplars.formats.scene import Placement, Scene, Surface
+from stages.exemplars.segment import segment
+from stages.exemplars.symmetry.planes import parallel_cuts
+from stages.exemplars.symmetry.sections import alike, section
+from stages.exemplars.symmetry.slabs import slab_pieces
+from tests.stages.exemplars.symmetry.planted import blocks, box, wall
+
+
+def mesh(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    vertices, place = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return vertices, place.reshape(-1, 3).astype(np.int32)
+
+
+def one_object(triangles: np.ndarray) -> Scene:
+    vertices, faces = mesh(triangles)
+    grey = np.full((len(faces), 3), 160, dtype=np.uint8)
+    return Scene("objects", (Surface("all", vertices, faces, grey),), (Placement("all", None, 0, np.eye(4)),))
+
+
+def truss(bays: int) -> np.ndarray:
+    """Plates that lean so far over each other that no plane stands between them, on a beam, a bay one unit long."""
+    plates = []
+    for bay in range(bays):
+        plate = box((bay, 0.0, 0.0), (bay + 0.2, 0.4, 1.0))
+        plate[..., 0] += 1.5 * plate[..., 2]
+        plates.append(plate)
+    return np.concatenate([box((-0.5, 0.0, -0.2), (bays + 1.5, 0.4, 0.05)), *plates])
+
+
+def tetrahedron() -> np.ndarray:
+    """A block of which no two sections are alike."""
+    corners = np.array([[0.0, 0.1, 0.2], [3.0, 0.5, 0.0], [1.0, 2.0, 0.3], [1.2, 0.9, 1.7]])
+    return corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]]
+
+
+def normals_of(triangles: np.ndarray) -> np.ndarray:
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+
+
+class TestSections:
+    def test_a_section_of_a_box_is_as_long_as_the_way_around_it(self) -> None:
+        corners = box((0, 0, 0), (4, 2, 3))
+        found = section(corners, normals_of(corners), np.array([1.0, 0, 0]), 1.7, 0.01)
+        assert found.length == pytest.approx(10.0)
+        assert np.allclose(found.points[:, 0], 1.7)
+
+    def test_sections_are_alike_by_the_share_of_both_that_they_have_in_common(self) -> None:
+        corners = np.concatenate([box((0, 0, 0), (4, 2, 3)), box((2, 5, 0), (4, 6, 1.5))])
+        way = np.array([1.0, 0, 0])
+        alone, both = (section(corners, normals_of(corners), way, offset, 0.01) for offset in (1.0, 3.0))
+        assert alike(alone, alone, np.zeros(3), 0.01) == 1.0
+        assert alike(alone, both, 2 * way, 0.01) == pytest.approx(10 / 15, abs=0.01)
+        assert alike(alone, both, np.zeros(3), 0.01) == 0.0
+
+    def test_the_two_sides_of_a_plate_are_not_one(self) -> None:
+        corners = box((0, 0, 0), (4, 1, 1))
+        way = np.array([1.0, 0, 0])
+        one = section(corners, normals_of(corners), way, 1.0, 0.01)
+        inside_out = section(corners[:, ::-1], -normals_of(corners), way, 1.0, 0.01)
+        assert alike(one, inside_out, np.zeros(3), 0.01) == 0.0
+
+
+class TestCuts:
+    def test_stretches_of_one_kind_get_a_joint_each(self) -> None:
+        """Between its windows a wall is plain, six times, and it is at each of its five windows."""
+        family = next(each for each in parallel_cuts(wall(5)) if each.way[0] == 1)
+        assert family.planes == 11
+        begin, end = family.offsets[::2], family.offsets[1::2]
+        assert np.allclose(end - begin, 0.25, atol=1e-4)
+        assert np.allclose((begin + end)[1:10] / 2, np.arange(1.1, 5.6, 0.5), atol=1e-4)
+
+    def test_a_row_without_a_plane_between_its_bays_is_found_by_its_shift(self) -> None:
+        family = next(each for each in parallel_cuts(truss(8)) if each.way[0] == 1)
+        assert np.allclose(np.diff(family.offsets), 1.0)
+        assert family.planes >= 6
+
+    def test_a_lone_block_has_no_kind_of_section_twice(self) -> None:
+        assert parallel_cuts(tetrahedron()) == []
+
+
+class TestSlabs:
+    def test_equal_bays_are_one_piece_and_all_pieces_make_the_surface(self) -> None:
+        pieces = slab_pieces(*mesh(truss(8)))
+        assert max(len(each.poses) for each in pieces) >= 5
+        area = sum(len(each.poses) * each.triangles.area for each in pieces)
+        corners = truss(8)
+        ways = corners[:, 1:] - corners[:, :1]
+        assert area == pytest.approx(np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1).sum() / 2, rel=1e-6)
+
+    def test_what_runs_through_all_bays_is_cut_with_them(self) -> None:
+        """No piece is longer than a bay, though the beam is as long as the row."""
+        pieces = slab_pieces(*mesh(truss(8)))
+        bays = max(pieces, key=lambda each: len(each.poses))
+        assert np.ptp(bays.triangles.corners[..., 0]) == pytest.approx(1.0)
+
+    def test_windows_that_differ_stand_between_equal_joints(self) -> None:
+        x = [0.0, 1.0, 1.6, 2.6, 3.5, 4.5, 4.8, 6.0]
+        holes = ((1.0, 1.6), (2.6, 3.5), (4.5, 4.8))
+        corners = blocks(
+            x, [0.0, 0.3], [0.0, 0.5, 1.5, 2.0],
+            lambda a, _, c: not (0.5 < c < 1.5 and any(low < a < high for low, high in holes)),
+        )  # fmt: skip
+        across = [each for each in parallel_cuts(corners) if each.way[0] == 1]
+        joints = across[0].offsets
+        assert across[0].planes == 7
+        assert np.allclose(joints[1::2] - joints[::2], [0.5, 0.15, 0.5, 0.15, 0.5, 0.15, 0.5], atol=1e-4)
+
+
+class TestBridge:
+    def test_a_beam_that_all_bays_stand_on_is_cut_with_them(self) -> None:
+        parted = segment(one_object(truss(8)), "sections")
+        assert np.bincount([each.surface for each in parted.placements]).max() >= 5
+
+    def test_what_has_no_like_sections_stays_whole(self) -> None:
+        assert len(segment(one_object(tetrahedron()), "sections").placements) == 1
