@@ -1,8 +1,10 @@
-"""A contact sheet of each kit of a collection: the variants that differ most, and some at random.
+"""A contact sheet of each kit of a collection: the variants that differ most, and some at random; and one of what took
+the place of what, where pieces of exemplars were replaced.
 
 python -m stages.variations.sheet --config configs/castle.yaml [--out datasets]
 
-Reads the finished variations from the work folder and writes `OUT/sheets/<dataset>-<kit>.png`.
+Reads the finished variations from the work folder and writes `OUT/sheets/<dataset>-<kit>.png` and
+`OUT/sheets/<dataset>-<kit>-replaced.png`.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from stages.shape.views.paint import part_paint
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
+from stages.variations.substructures.sheet import replacements_sheet
 
 __all__ = ["kit_variants_sheet", "main"]
 
@@ -101,6 +104,9 @@ def main() -> None:
         own = [each for each in samples if each.kit == name]
         sheet = kit_variants_sheet(kit, own, measures[name]["dull"], decision_rng(config.seed, "sheet", name))
         print(write_file(asked.out / "sheets" / f"{config.name}-{name}.png", sheet))
+        replaced = replacements_sheet(kit, own)
+        if replaced is not None:
+            print(write_file(asked.out / "sheets" / f"{config.name}-{name}-replaced.png", replaced))
 
 
 if __name__ == "__main__":
