@@ -92,7 +92,7 @@ class Replacer:
         self._by_docking = config.matching == "pose" and not self._by_meaning
         self.lists: Counter[str] = Counter()
         self.known: set[int] = set()
-        self._open: dict[tuple[str, str], Pair] = {}
+        self._open: dict[tuple[int, int], Pair] = {}
         self._turns = 0
         self._pair: Pair | None = None
         self._docked: Docked = []
@@ -241,12 +241,12 @@ class Replacer:
         was drawn before; and what that cost."""
         if rng.random() < WITHIN:
             choice = replace(choice, b=choice.a)
-        name = choice.b.name, choice.a.name
-        if name in self._open:
-            known = self._open.pop(name)
-            self._open[name] = replace(known, choice=choice)
+        key = id(choice.b), id(choice.a)  # of shapes that the pair itself keeps
+        if key in self._open:
+            known = self._open.pop(key)
+            self._open[key] = replace(known, choice=choice)
             self._turns = DRAWS
-            return self._open[name], 0.0
+            return self._open[key], 0.0
         kit = self.answers.kit
         sides = _side(kit, choice.b), _side(kit, choice.a)
         first, second = sides[0].graph, (sides[0] if choice.a is choice.b else sides[1]).graph
@@ -255,10 +255,10 @@ class Replacer:
         work = operations.work / DARTS_A_TRY
         self.lists["whole" if operations.is_whole else "cut short"] += 1
         self._turns = max(DRAWS, round(work / EMBEDDING_WORK))
-        self._open[name] = Pair(choice, sides, operations, iter(_order(rng, operations, ways)))
+        self._open[key] = Pair(choice, sides, operations, iter(_order(rng, operations, ways)))
         if len(self._open) > MOST_OPEN:
             del self._open[next(iter(self._open))]
-        return self._open[name], work
+        return self._open[key], work
 
 
 def _order(rng: np.random.Generator, operations: Operations, ways: int) -> list[int]:

@@ -92,6 +92,16 @@ def test_replacement_feeds_one_pool_with_the_other_methods() -> None:
     assert len(methods) > 1
 
 
+def test_shapes_of_one_name_are_told_apart() -> None:
+    """A search that goes on in several runs of one name, in each of which it calls other variants alike."""
+    line = Search(
+        ContactAnswers(kit_of(CHAIN, [chain(3), chain(5)])), SearchConfig(method="substructures", largest=3.0)
+    )
+    rng = np.random.default_rng(0)
+    found = [each for _ in range(12) for each in line.run(rng, 60, 10**9, "test", lambda count: None)[0]]
+    assert len({len(each.assembly) for each in found}) > 4
+
+
 def test_what_a_pair_of_shapes_brings_is_owed_to_the_choice_that_drew_it() -> None:
     """Fewer tries than a pair has operations: all are of one pair, whatever else was chosen meanwhile."""
     line, _ = replaced(kit_of(CHAIN, [chain(9), chain(12)]), 30)
