@@ -78,8 +78,8 @@ def listing(subject: Subject, tables: Mapping[str, Evaluation]) -> str:
     for name, each in tables.items():
         missing = each.missing(subject)
         state = f"missing: {missing}" if missing else f"can be made, takes about {_duration(each.seconds(subject))}"
-        lines += [f"  {name:<17}{each.question}", f"  {'':<17}{state}"]
-        lines += [f"  {'':<17}needs {', '.join(need.what for need in each.needs)}", ""]
+        lines += [f"  {name:<20}{each.question}", f"  {'':<20}{state}"]
+        lines += [f"  {'':<20}needs {', '.join(need.what for need in each.needs)}", ""]
     lines.append(f"make eval TABLE=<name> prints one; TABLE={ALL} makes all that can be made, and {REPORT}")
     return "\n".join(lines) + "\n"
 

@@ -9,6 +9,7 @@ from stages.training.checkpoint import weights_of_kind
 
 __all__ = [
     "CORPUS",
+    "CURVE_PROGRAM",
     "EDGE_CATEGORIES",
     "FINISHED",
     "KITS",
@@ -71,6 +72,16 @@ STRING_VAE = _trained("string_vae", "string VAE")
 EDGE_CATEGORIES = _trained("edge_categories", "model of edge categories")
 RECOVERY = _trained("recovery", "recovery model")
 PROGRAM_WRITERS = _trained_of(("program_vae", "program_lm"), "model of ShapeAssembly programs")
+
+
+def _program(subject: Subject) -> str:
+    if producers()["programs"].asked(subject.config):
+        return ""
+    return f"{subject.config.name} is not made of a curve program; take configs/chairs.yaml, or another of a program"
+
+
+CURVE_PROGRAM = Need("a dataset of a curve program", _program)
+"""The config asks for shapes of a curve program; nothing need be made yet."""
 
 
 def _programs(subject: Subject) -> str:

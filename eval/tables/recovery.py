@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from eval.evaluation import Answer, Evaluation, Strip
+from eval.needs import CURVE_PROGRAM
 from eval.subject import Subject
 
 __all__ = ["TABLE"]
@@ -73,7 +74,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="How near do shapes come that are recovered from clouds and drawings, and which parameters are right?",
-    needs=(),
+    needs=(CURVE_PROGRAM,),
     seconds=lambda subject: 750.0,
     answer=_answer,
     options=_options,

@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from eval.evaluation import Answer, Evaluation, Strip
+from eval.needs import CURVE_PROGRAM
 from eval.subject import Subject
 
 __all__ = ["TABLE"]
@@ -67,7 +68,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="How near does recovery come where inputs are noisy, torn, drawn otherwise, or of no program at all?",
-    needs=(),
+    needs=(CURVE_PROGRAM,),
     seconds=lambda subject: 900.0,
     answer=_answer,
     options=_options,
