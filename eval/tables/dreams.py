@@ -42,16 +42,15 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     learnt: dict[str, list[Dream]] = {}
     for parent in _parents(subject):
         for name, each in finished_shapes(subject.out / parent, Places(subject.out, parent), ("train",)):
-            learnt.setdefault(name, []).append(each)
+            if len(known := learnt.setdefault(name, [])) < asked.dreams:
+                known.append(each)
     dreamt: dict[str, list[Dream]] = {}
     for name, each in finished_shapes(subject.folder, subject.places, ("train", "val", "test")):
-        dreamt.setdefault(name, []).append(each)
+        if len(made := dreamt.setdefault(name, [])) < asked.dreams:
+            made.append(each)
     rows, strips = [], []
     for name, kit in made_kits(subject.places).items():
-        groups = {
-            f"{name}, learnt": learnt.get(name, [])[: asked.dreams],
-            f"{name}, dreamt": dreamt.get(name, [])[: asked.dreams],
-        }
+        groups = {f"{name}, learnt": learnt.get(name, []), f"{name}, dreamt": dreamt.get(name, [])}
         base = groups[f"{name}, learnt"]
         for title, shapes in groups.items():
             if shapes:

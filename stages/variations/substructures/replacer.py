@@ -114,8 +114,8 @@ class Replacer:
             self._pair, cost = self._opened(rng, choice)
             work += cost
             number = next(self._pair.left, None)
-            if number is None:
-                return Outcome.NO_MATCH, work
+            if number is None:  # nothing can be replaced, or all has been
+                return Outcome.KNOWN if len(self._pair.operations) else Outcome.NO_MATCH, work
         pair = self._pair
         count = len(pair.operations)
         boundary = pair.operations.boundary(number % count)[:, :: 1 if number < count else -1]

@@ -6,7 +6,22 @@ from collections.abc import Callable
 
 import numpy as np
 
+from stages.exemplars.formats.scene import Placement, Scene, Surface
+
 Ticks = list[float]
+
+
+def mesh(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v, 3) and faces (f, 3) of triangles (f, 3, 3)."""
+    vertices, place = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return vertices, place.reshape(-1, 3).astype(np.int32)
+
+
+def one_object(triangles: np.ndarray) -> Scene:
+    """A grey object of triangles (f, 3, 3)."""
+    vertices, faces = mesh(triangles)
+    grey = np.full((len(faces), 3), 160, dtype=np.uint8)
+    return Scene("objects", (Surface("all", vertices, faces, grey),), (Placement("all", None, 0, np.eye(4)),))
 
 
 def blocks(x: Ticks, y: Ticks, z: Ticks, solid: Callable[[float, float, float], bool]) -> np.ndarray:

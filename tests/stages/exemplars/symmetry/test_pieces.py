@@ -3,23 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.exemplars.formats.scene import Placement, Scene, Surface
 from stages.exemplars.segment import pick, segment
 from stages.exemplars.symmetry.carve import Soup, carve
 from stages.exemplars.symmetry.pieces import repeated_pieces
 from stages.exemplars.symmetry.surface import surface_grid
-from tests.stages.exemplars.symmetry.planted import blocks, box, screw, spiral_stair, wall
-
-
-def mesh(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    vertices, place = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    return vertices, place.reshape(-1, 3).astype(np.int32)
-
-
-def one_object(triangles: np.ndarray) -> Scene:
-    vertices, faces = mesh(triangles)
-    grey = np.full((len(faces), 3), 160, dtype=np.uint8)
-    return Scene("objects", (Surface("all", vertices, faces, grey),), (Placement("all", None, 0, np.eye(4)),))
+from tests.stages.exemplars.symmetry.planted import blocks, box, mesh, one_object, screw, spiral_stair, wall
 
 
 def counts(triangles: np.ndarray) -> list[int]:

@@ -5,23 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.exemplars.formats.scene import Placement, Scene, Surface
 from stages.exemplars.segment import segment
 from stages.exemplars.symmetry.planes import parallel_cuts
 from stages.exemplars.symmetry.sections import alike, section
 from stages.exemplars.symmetry.slabs import slab_pieces
-from tests.stages.exemplars.symmetry.planted import blocks, box, wall
-
-
-def mesh(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    vertices, place = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    return vertices, place.reshape(-1, 3).astype(np.int32)
-
-
-def one_object(triangles: np.ndarray) -> Scene:
-    vertices, faces = mesh(triangles)
-    grey = np.full((len(faces), 3), 160, dtype=np.uint8)
-    return Scene("objects", (Surface("all", vertices, faces, grey),), (Placement("all", None, 0, np.eye(4)),))
+from tests.stages.exemplars.symmetry.planted import blocks, box, mesh, one_object, wall
 
 
 def truss(bays: int) -> np.ndarray:

@@ -41,6 +41,12 @@ def test_replacement_finds_chains_that_are_shorter_and_longer_up_to_the_limits()
     assert {2, 4, 6, 8} <= {len(each.assembly) - 2 for each in found}
 
 
+def test_a_pair_that_is_used_up_brings_nothing_new_and_not_no_place() -> None:
+    line, _ = replaced(kit_of(CHAIN, [chain(3), chain(4)]), 3000, dummies=0, largest=1.0)
+    assert line.rejects["replaced: no embedding"] < 50
+    assert line.rejects["duplicate"] > 1000
+
+
 def test_what_a_piece_held_together_makes_room_for_a_longer_one() -> None:
     shapes = [row("cap", "link", "plate", "link", "link", "cap"), row("cap", "link", "link", "block", "link", "cap")]
     kit = kit_of(LINKS, shapes)
