@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from stages.exemplars.parse import parse_model
 from stages.exemplars.segment import segment
+from stages.exemplars.settings import ReadLimits
 from stages.exemplars.symmetry.planes import parallel_cuts
 from stages.exemplars.symmetry.sections import alike, section
 from stages.exemplars.symmetry.slabs import slab_pieces
 from tests.stages.exemplars.symmetry.planted import blocks, box, mesh, one_object, wall
+
+CRANE = Path(__file__).resolve().parents[5] / "shared/exemplars/u04_tower_crane/model.glb"
 
 
 def truss(bays: int) -> np.ndarray:
@@ -109,3 +116,11 @@ class TestBridge:
 
     def test_what_has_no_like_sections_stays_whole(self) -> None:
         assert len(segment(one_object(tetrahedron()), "sections").placements) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not CRANE.is_file(), reason="no real exemplars beside this folder")
+def test_a_real_mast_is_one_bay_twenty_one_times() -> None:
+    """A shift that is nearly that of its bays hardly shows from one to the next; it adds up, and no bays are equal."""
+    crane = parse_model(CRANE, "sections", ReadLimits())
+    assert max(Counter(each.mesh_name for each in crane.parts).values()) == 21
