@@ -24,3 +24,8 @@ class ProgramVaeEntry(KitModelEntry):
         50.0, ge=0, le=10_000, description="weight of the absolute error of numbers, beside the nats of choices"
     )
     kl_weight: float = Field(0.1, ge=0, le=10, description="weight of the divergence from the prior, in nats")
+    precision: Literal["auto", "float32", "bfloat16"] = Field(
+        "float32",
+        description="numbers of the forward pass; its many small layers gain nothing from bfloat16 and lose by turning "
+        "numbers into it; `auto`: bfloat16 where the processor or the GPU reckons with it",
+    )
