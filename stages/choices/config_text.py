@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS
@@ -51,7 +53,7 @@ def config_text(
         (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else ""),
         (3, "types", config.types, "what makes a part type"),
         *([(3, "meanings", None, "")] if config.meanings else []),
-        *((4, name, list(patterns), "") for name, patterns in config.meanings.items()),
+        *((4, _value(name), list(patterns), "") for name, patterns in config.meanings.items()),
         (3, "up", made.up, reasons.get("up", "")),
         (3, "contact", None, ""),
         (4, "tolerance", made.tolerance, reasons.get("contact.tolerance", "")),
@@ -99,8 +101,9 @@ def _line(depth: int, key: str, value: Any, comment: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """A value as YAML: lists in one line, text in quotes where it could be read as a number."""
+    """A value as YAML: lists in one line, text in quotes where it would be read as something else."""
     if isinstance(value, list):
         return "[" + ", ".join(_value(each) for each in value) + "]"
     text = str(value)
-    return text if not isinstance(value, str) or re.fullmatch(r"[A-Za-z_][A-Za-z_-]*", text) else json.dumps(text)
+    plain = re.fullmatch(r"[A-Za-z_][A-Za-z_-]*", text) and yaml.safe_load(text) == text  # `no` is false
+    return text if not isinstance(value, str) or plain else json.dumps(text)

@@ -16,3 +16,12 @@ def test_what_was_chosen_of_near_copies_is_typed_out_with_its_reason(copied: flo
     text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), reasons, copied, None, "hundreds")
     assert yaml.safe_load(text)["variations"]["require"] == {"copied": copied}
     assert f"copied: {copied}   # because" in text
+
+
+def test_names_that_yaml_reads_as_something_else_come_back_as_they_are() -> None:
+    shapes = [ring(1, 1), ring(2, 3)]
+    meanings = {"no": ("yes", "12", "leg*"), "3: top": ("null",)}
+    config = config_of(shapes).model_copy(update={"types": "meaning", "meanings": meanings})
+    text = config_text("toy", config, models_of(ROAD, shapes), {}, 1.0, None, "hundreds")
+    (kit,) = yaml.safe_load(text)["exemplars"]["kits"]
+    assert kit["meanings"] == {name: list(patterns) for name, patterns in meanings.items()}
