@@ -16,7 +16,7 @@ from eval.table import Cell, Published, Table
 from pipeline.randomness import decision_rng
 from stages.shape.graphs.canonical import graph_digest
 from stages.strings.decoder import decode
-from stages.training.string_vae.sampling import sample
+from stages.training.string_vae.sampling import TEMPERATURE, sample
 from stages.training.string_vae.structuring import PathFigures, naive_graph, path_figures, search_graph
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 
@@ -173,9 +173,10 @@ def sampling_table(found: Iterable[tuple[Trained[TrainedStringVae], str, Samplin
         for (group, way), each in groups.items()
     ]
     notes = (
-        "Ways of strings §5.2, each as published; prior: points drawn from the prior, decoded once, each token drawn "
-        "by its probability. Valid: of all strings that were decoded. Found: searches that end with a valid string "
-        "other than where they began. Unique: distinct shape graphs of what was found; novel: of these not in train. "
+        "Ways of strings §5.2, each as published; prior, gaussian: points drawn from the prior, or from the Gaussian "
+        f"of the training strings, decoded once, tokens drawn at a temperature of {TEMPERATURE}. Valid: of all strings "
+        "that were decoded. Found: searches that end with a valid string other than where they began. Unique: distinct "
+        "shape graphs of what was found; novel: of these not in train. "
         "The paper has no figures; its order is path, linear, perturbation.",
     )
     return Table("String VAE: new shapes by way of sampling", columns, tuple(rows), notes)

@@ -39,7 +39,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.strings.alphabet import make_alphabet
     from stages.strings.decoder import decode
     from stages.synthesis.instantiation.instantiate import Instantiator
-    from stages.training.string_vae.sampling import prior
+    from stages.training.string_vae.sampling import sample
     from stages.variations.kernels.answers import ContactAnswers
 
     outcomes: list[tuple[str, Sequence[Attempt]]] = []
@@ -63,7 +63,9 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             compared.append((name, f"all steps, guided by {learnt.name}", found))
         known = {graph_digest(each.types, each.edges) for each in (decode(line, alphabet) for line in train)}
         for trained in [each for each in models if each.kit == name]:
-            drawn = prior(trained.model, DRAWS * asked.instantiated, 1.0, dream_rng(seed, trained.folder))
+            learnt_from = [line for line in train if trained.model.is_valid(line)]
+            rng = dream_rng(seed, trained.folder)
+            drawn = sample(trained.model, "gaussian", learnt_from, DRAWS * asked.instantiated, rng)
             written = [each.string for each in drawn if each.string is not None]
             dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
             if not dreamt:

@@ -122,13 +122,9 @@ def _dreams(
 
 def _drawn(task: Task, config: SynthesisConfig, asked: SourceConfig, source: Source) -> list[str | None]:
     """What each draw of a lane answers: a string of the grammar, or None."""
-    from stages.training.string_vae.sampling import prior, sample
+    from stages.training.string_vae.sampling import sample
 
-    rng = task.rng("strings")
-    if asked.way == "prior":
-        found = prior(source.model, config.draws, asked.temperature, rng)
-    else:
-        found = sample(source.model, asked.way, source.strings, config.draws, rng)
+    found = sample(source.model, asked.way, source.strings, config.draws, task.rng("strings"), asked.temperature)
     return [each.string for each in found]
 
 

@@ -29,13 +29,18 @@ class SourceConfig(StrictModel):
     seed: int = Field(0, ge=0, lt=100, description="Which of its trainings, if it has several seeds.")
     kit: str = Field(description="The kit that it has learnt; the same must stand under exemplars.kits.")
     samples: int = Field(ge=1, le=1_000_000_000, description="Shapes wanted.")
-    way: Literal["prior", "perturbation", "linear", "path"] = Field(
-        "prior",
-        description="How points of its latent space are found: drawn from the prior, or by a search around training "
-        "strings, on lines between them or on paths along them (strings §5.2).",
+    way: Literal["gaussian", "prior", "perturbation", "linear", "path"] = Field(
+        "gaussian",
+        description="How points of its latent space are found: drawn where the training strings stand, as a Gaussian, "
+        "or from the prior, or by a search around training strings, on lines between them or on paths along them "
+        "(strings §5.2).",
     )
     temperature: float = Field(
-        1.0, gt=0, le=10, description="Spread of the points that are drawn from the prior; 1: that of the prior."
+        0.7,
+        gt=0,
+        le=10,
+        description="Of the tokens that are written where points are drawn: 1 as the model says how likely they are, "
+        "less for likelier ones, and shapes that are more alike.",
     )
 
 

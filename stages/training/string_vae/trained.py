@@ -76,13 +76,13 @@ class TrainedStringVae:
             means.append(mean.cpu().numpy())
         return np.concatenate(means)
 
-    def decode(self, points: Points, rng: np.random.Generator | None) -> list[str]:
-        """A string for each point: each token drawn by its probability, or, without `rng`, the likeliest.
+    def decode(self, points: Points, rng: np.random.Generator | None, temperature: float = 1.0) -> list[str]:
+        """A string for each point: each token drawn at a temperature, or, without `rng`, the likeliest.
 
         A plain decoder may answer what is no string; a masked one does so only if no string of the grammar is a tree.
         """
         rules = self.rules if self.is_masked else None
-        written = write_codes(self.module, points, self.header["most"], rules, self.vocabulary.cycles, rng)
+        written = write_codes(self.module, points, self.header["most"], rules, self.vocabulary.cycles, rng, temperature)
         return [self.vocabulary.string(each) for each in written]
 
     def is_valid(self, string: str) -> bool:

@@ -68,12 +68,13 @@ def write_codes(
     rules: Rules | None,
     cycles: int,
     rng: np.random.Generator | None,
+    temperature: float,
 ) -> list[list[int]]:
     """The tokens of a string for each point, float32 (n, latent), at most `most`, without an end.
 
-    Each token is drawn by its probability, or, without an `rng`, is the likeliest. With `rules`, only tokens that can
-    still lead to a string of the grammar are taken; where none is left, the string goes back and on by another way, so
-    that all are strings of the grammar, if some of its strings are trees.
+    Each token is drawn by its probability, at a temperature, or, without an `rng`, is the likeliest. With `rules`, only
+    tokens that can still lead to a string of the grammar are taken; where none is left, the string goes back and on by
+    another way, so that all are strings of the grammar, if some of its strings are trees.
     """
     module.eval()
     found: list[list[int]] = []
@@ -82,7 +83,9 @@ def write_codes(
         drafts = [_Draft() for _ in range(len(here))]
         waiting = list(range(len(drafts)))
         for _ in range(TRIES + 1 if rules is not None else 1):
-            ended = _write(module, here[waiting], [drafts[row] for row in waiting], most, rules, cycles, rng)
+            ended = _write(
+                module, here[waiting], [drafts[row] for row in waiting], most, rules, cycles, rng, temperature
+            )
             waiting = [row for row, has_ended in zip(waiting, ended, strict=True) if not has_ended]
             if not waiting:
                 break
@@ -101,6 +104,7 @@ def _write(
     rules: Rules | None,
     cycles: int,
     rng: np.random.Generator | None,
+    temperature: float,
 ) -> list[bool]:
     """Write each draft on from where it was cut; which have come to an end."""
     from stages.strings.acceptor import NONE, Acceptor
@@ -117,7 +121,7 @@ def _write(
         logits, state = module.decoder.step(shown, points, state)
         scores = logits.double().cpu().numpy()
         if rng is not None:
-            scores += rng.gumbel(size=scores.shape)
+            scores += temperature * rng.gumbel(size=scores.shape)
         if acceptor is None:
             tokens = scores.argmax(axis=1)
         else:

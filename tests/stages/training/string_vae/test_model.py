@@ -173,3 +173,15 @@ def test_published_weights_are_read_alone_and_others_refused(tmp_path: Path) -> 
     np.testing.assert_array_equal(read.encode(toy_strings()[:3]), model.encode(toy_strings()[:3]))
     with pytest.raises(CheckpointError, match="of another kit: 'toy', and 'castle' is asked for"):
         load_string_vae(path, {"kit": "castle"})
+
+
+def test_low_temperature_writes_the_likeliest_string_and_a_higher_one_others_more_often() -> None:
+    model = random_vae("masked")
+    points = np.random.default_rng(3).standard_normal((64, 8)).astype(np.float32)
+    likeliest = model.decode(points, None)
+    same = [
+        sum(a == b for a, b in zip(likeliest, model.decode(points, np.random.default_rng(0), each), strict=True))
+        for each in (1e-9, 0.1, 1.0)
+    ]
+    assert same[0] == 64
+    assert same[0] > same[1] > same[2]

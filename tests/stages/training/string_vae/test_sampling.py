@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.training.string_vae.sampling import WAYS, linear_points, path_points, perturb, sample
+from stages.training.string_vae.sampling import WAYS, gaussian_points, linear_points, path_points, perturb, sample
 from tests.stages.training.string_vae.models import random_vae, toy_strings
 
 
@@ -29,6 +29,16 @@ def test_path_passes_no_sample_twice_and_ends_where_samples_do() -> None:
     assert path.shape == (33, 3)
     assert len(np.unique(path, axis=0)) == 33
     assert len(path_points(samples[3], samples[7], samples[:9], 32)) == 9
+
+
+def test_gaussian_has_the_mean_and_the_covariance_of_its_samples() -> None:
+    rng = np.random.default_rng(1)
+    samples = (rng.standard_normal((50, 3)) @ [[2, 1, 0], [0, 1, 0], [0, 0, 0]] + [7, 0, -3]).astype(np.float32)
+    drawn = gaussian_points(samples, 40_000, rng)
+    assert drawn.dtype == np.float32
+    np.testing.assert_allclose(drawn.mean(axis=0), samples.mean(axis=0), atol=0.05)
+    np.testing.assert_allclose(np.cov(drawn.T), np.cov(samples.T, bias=True), atol=0.1)
+    assert np.unique(drawn[:, 2]).tolist() == [-3], "nothing where the samples do not spread"
 
 
 class Asked:
