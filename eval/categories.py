@@ -73,14 +73,15 @@ def category_models(folder: Path, kits: dict[str, Kit]) -> list[Trained[TrainedE
 
 
 def made_shapes(subject: Subject, kit: str, split: str) -> Iterator[Assembly]:
-    """The shapes of a kit in a split, out of the mill's folder, one in memory at a time. Raises ConfigError where the
-    config lets go of them."""
+    """The shapes of a kit in a split, out of the mill's folder, one in memory at a time; none with stretched parts.
+    Raises ConfigError where the config lets go of them."""
     if subject.config.keep == "dataset":
         raise ConfigError("the shapes were let go of; keep: all in the config, and make dataset")
     for producer in producers():
         folder = subject.places.stage(producer).root
         for shard in sorted(folder.glob(f"{subject.config.name}-{split}-*.tar")):
-            yield from (sample.assembly for sample in read_samples(shard) if sample.kit == kit)
+            found = (sample.assembly for sample in read_samples(shard) if sample.kit == kit)
+            yield from (each for each in found if each.stretches is None)
 
 
 def judge(

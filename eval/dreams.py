@@ -61,15 +61,17 @@ class Dream:
 
 def finished_shapes(folder: Path, places: Places, splits: Sequence[str]) -> Iterator[tuple[str, Dream]]:
     """The kit's name and the shape of each sample of these splits of a finished dataset of kits in `folder`, whose
-    mill's folders are `places`."""
+    mill's folders are `places`; of those whose parts are all as the kit has them."""
     anew = LANGUAGE.anew(places)
     for split in splits:
         for shard in sorted((folder / "data" / split).glob("*.tar")):
             for _key, members in read_shard(shard):
                 record: Mapping[str, Any] = json.loads(members["json"])
                 physics = record["physics"]
-                assembly = anew(record, pairs_of(members[CONTACTS])).assembly
-                yield record["kit"], Dream(assembly, physics["rooted"], physics["stable"], physics["margin"])
+                shape = anew(record, pairs_of(members[CONTACTS]))
+                if not shape.is_stretched:
+                    found = Dream(shape.assembly, physics["rooted"], physics["stable"], physics["margin"])
+                    yield record["kit"], found
 
 
 def dream_row(name: str, kit: Kit, dreams: Sequence[Dream], learnt: Sequence[Dream]) -> tuple[Cell, ...]:

@@ -28,8 +28,9 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
     for shard in sorted((subject.folder / "data").glob("*/*.tar")):
         for _key, members in read_shard(shard):
             record = json.loads(members["json"])
-            assembly = anew(record, pairs_of(members[CONTACTS])).assembly
-            samples.setdefault(record["kit"], []).append(Stored(assembly, members["json"], members["glb"]))
+            shape = anew(record, pairs_of(members[CONTACTS]))
+            if not shape.is_stretched:
+                samples.setdefault(record["kit"], []).append(Stored(shape.assembly, members["json"], members["glb"]))
     rows, pictures = [], []
     for name, kit in made_kits(subject.places).items():
         stored = samples.get(name, [])

@@ -24,7 +24,8 @@ from stages.shape.graphs.patterns import SAME_UP
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.stability import components
-from stages.shape.shape import mesh_name
+from stages.shape.shape import Shape, kit_shape, mesh_name
+from stages.shape.stretch import STRETCHED_DEPTH, StretchedMesh, split
 
 __all__ = ["assembly_faults", "geometry_faults"]
 
@@ -37,14 +38,16 @@ def geometry_faults(kit: Kit, members: Mapping[str, bytes]) -> list[str]:
     """What is wrong with the sample whose `members` these are; an empty list where nothing is.
 
     Contacts equal the record's, every neighbourhood is in the grammar, every pair in contact was observed, and no
-    pair of parts reaches deeper into each other than any pair of its types does in the exemplars.
+    pair of parts reaches deeper into each other than any pair of its types does in the exemplars, or, where one of them
+    is stretched, by STRETCHED_DEPTH more.
     """
     record = json.loads(members["json"])
     names = [part["name"] for part in record["parts"]]
     places = {name: place for place, name in enumerate(kit.type_names())}
     types = np.array([places[mesh_name(name)] for name in names], dtype=np.int16)
     meshes, poses = _parts_of(members["glb"], names)
-    return _faults(kit, Assembly(types, poses, pairs_of(members[CONTACTS])), meshes, names)
+    _, stretches = split(np.array([part["pose"] for part in record["parts"]], dtype=np.float64))
+    return _faults(kit, Assembly(types, poses, pairs_of(members[CONTACTS]), stretches), meshes, names)
 
 
 def assembly_faults(kit: Kit, assembly: Assembly, upright: bool = True) -> list[str]:
@@ -98,12 +101,13 @@ def _fallen(kit: Kit, assembly: Assembly) -> list[int]:
 
 
 def _faults(kit: Kit, assembly: Assembly, meshes: Sequence[Any], names: Sequence[str]) -> list[str]:
-    types, poses = assembly.types, assembly.poses
+    shape = kit_shape(kit, assembly)
+    types, poses = shape.assembly.types, assembly.poses
     boxes = np.stack([_world_box(mesh, pose) for mesh, pose in zip(meshes, poses, strict=True)])
     pairs = overlapping_boxes(boxes, 1.1 * kit.contact_tolerance)
     stored = {(i, j) for i, j in assembly.edges.tolist()}
     found, doubtful = _contacts(meshes, poses, pairs, kit.contact_tolerance)
-    contact = ContactTest(kit.types, kit.contact_tolerance)
+    contact = ContactTest(shape.meshes, kit.contact_tolerance)
     faults: list[str] = []
     for i, j in sorted(stored - found - doubtful):
         faults.append(f"{names[i]} and {names[j]} are recorded as neighbours and do not touch")
@@ -111,7 +115,7 @@ def _faults(kit: Kit, assembly: Assembly, meshes: Sequence[Any], names: Sequence
         if contact.kind(int(types[i]), int(types[j]), invert(poses[i]) @ poses[j]) in kit.contact_kinds:
             faults.append(f"{names[i]} and {names[j]} touch and are not recorded as neighbours")
     faults.extend(_grammar_faults(kit, assembly, names))
-    faults.extend(_penetration_faults(kit, types, poses, boxes, pairs, names))
+    faults.extend(_penetration_faults(kit, assembly, shape, boxes, pairs, names))
     return faults
 
 
@@ -184,24 +188,23 @@ def _slot_misfits(kit: Kit, assembly: Assembly) -> list[int]:
 
 
 def _penetration_faults(
-    kit: Kit, types: np.ndarray, poses: FloatArray, boxes: FloatArray, pairs: IntArray, names: Sequence[str]
+    kit: Kit, assembly: Assembly, shape: Shape, boxes: FloatArray, pairs: IntArray, names: Sequence[str]
 ) -> list[str]:
-    deepest: dict[tuple[int, int], float] = dict(kit.grammar.nested)
-    for docking in kit.grammar.dockings:
-        deepest[docking.a, docking.b] = max(deepest.get((docking.a, docking.b), 0.0), docking.depth)
-    test = PenetrationTest(kit.types)
+    meshes, drawn, poses = shape.meshes, shape.assembly.types, assembly.poses
+    test = PenetrationTest(meshes)
     slack = kit.contact_tolerance + kit.pose_tolerance
     faults = []
     for i, j in pairs.tolist():
-        if types[i] > types[j]:
+        if assembly.types[i] > assembly.types[j]:
             i, j = j, i
-        a, b = int(types[i]), int(types[j])
-        allowed = deepest.get((a, b), 0.0) + slack
+        seen = kit.grammar.depths.get((int(assembly.types[i]), int(assembly.types[j])), 0.0)
+        both = meshes[drawn[i]], meshes[drawn[j]]
+        if any(isinstance(each, StretchedMesh) for each in both):
+            seen += STRETCHED_DEPTH * min(each.diagonal for each in both)
+        allowed = seen + slack
         if depth_bound(boxes[i], boxes[j]) <= allowed:
             continue
-        depth = test.depth(a, b, invert(poses[i]) @ poses[j])
+        depth = test.depth(int(drawn[i]), int(drawn[j]), invert(poses[i]) @ poses[j])
         if depth > allowed:
-            faults.append(
-                f"{names[i]} and {names[j]} reach {depth:.4g} into each other, {allowed - slack:.4g} in the exemplars"
-            )
+            faults.append(f"{names[i]} and {names[j]} reach {depth:.4g} into each other, {seen:.4g} in the exemplars")
     return faults

@@ -1,4 +1,5 @@
-"""The language of kits: a sample is an assembly of a kit's parts, and its shape is those parts at their poses."""
+"""The language of kits: a sample is an assembly of a kit's parts, and its shape is those parts, stretched where it says
+so, at their poses."""
 
 from __future__ import annotations
 
@@ -16,6 +17,7 @@ from stages.shape.kit_files import load_kit
 from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, mesh_name, part_count
+from stages.shape.stretch import bake, split
 
 __all__ = ["LANGUAGE", "Kits", "made_kits"]
 
@@ -96,7 +98,9 @@ def _anew(places: Places) -> Anew:
         if unknown:
             raise ValueError(f"kit {kit.name} has no part type {', '.join(unknown)}")
         types = np.array([places[each] for each in meshes], dtype=np.int16)
-        return Shape(kit.types, Assembly(types, np.array(poses, dtype=np.float64), contacts), "y", kit.labels)
+        rigid, stretches = split(np.array(poses, dtype=np.float64))
+        meshes_in_use, assembly = bake(kit.types, Assembly(types, rigid, contacts, stretches))
+        return Shape(meshes_in_use, assembly, "y", kit.labels)
 
     return shape
 

@@ -42,7 +42,7 @@ def describe_sample(
                     shape.part_names,
                     shape.part_labels.tolist(),
                     shape.part_classes.tolist(),
-                    parts.poses.tolist(),
+                    shape.placements.tolist(),
                     strict=True,
                 )
             )

@@ -90,7 +90,8 @@ def _own_fields() -> dict[str, dict[str, Any]]:
                     "pose": {
                         **_numbers(4, 4),
                         "description": "moves the part's mesh from its own coordinates into those of the shape; a "
-                        "4x4 matrix, row by row, for column vectors",
+                        "4x4 matrix, row by row, for column vectors; rigid, but of a part that was stretched "
+                        "(lineage.bent)",
                     },
                 }
             ),

@@ -165,7 +165,8 @@ def _part_faults(record: Mapping[str, Any], shape: Shape) -> Iterator[str]:
             yield f"its json calls part {place} {found}, and its source {(name, shape.labels[label], number, place)}"
             return
     poses = np.array([part["pose"] for part in parts])
-    if poses.shape != shape.assembly.poses.shape or np.abs(poses - rounded(shape.assembly.poses)).max() > 1e-9:
+    placed = shape.placements
+    if poses.shape != placed.shape or np.abs(poses - rounded(placed)).max() > 1e-9:
         yield "its json has other poses than its source makes"
 
 

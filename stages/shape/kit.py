@@ -110,12 +110,15 @@ class Assembly:
     """Parts put together, with their shape graph.
 
     types: int16 (n,) indices into the types of a kit, or into the meshes of a shape; poses: float64 (n, 4, 4) rigid;
-    edges: int32 (m, 2), contacts as pairs i < j in lexicographic order.
+    edges: int32 (m, 2), contacts as pairs i < j in lexicographic order; stretches: float64 (n, 3, 3), symmetric, by
+    which each part's mesh is multiplied in its own coordinates before its pose moves it (substructures §5.2, §5.3), or
+    None where all are as they are.
     """
 
     types: TypeArray
     poses: FloatArray
     edges: IntArray
+    stretches: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.types)
@@ -133,7 +136,18 @@ class Assembly:
         place = np.full(len(self), -1, dtype=np.int32)
         place[parts] = np.arange(len(parts))
         edges = place[self.edges]
-        return Assembly(self.types[parts], self.poses[parts], edges[(edges >= 0).all(axis=1)])
+        stretches = None if self.stretches is None else self.stretches[parts]
+        return Assembly(self.types[parts], self.poses[parts], edges[(edges >= 0).all(axis=1)], stretches)
+
+    @property
+    def placements(self) -> FloatArray:
+        """What moves the mesh of each part as it is into the world, float64 (n, 4, 4): its pose, which is rigid, after
+        its stretch."""
+        if self.stretches is None:
+            return self.poses
+        placed = self.poses.copy()
+        placed[:, :3, :3] = self.poses[:, :3, :3] @ self.stretches
+        return placed
 
     def multiset(self, neighbours: list[int]) -> Multiset:
         """The multiset of the types of the parts `neighbours`."""
@@ -181,6 +195,14 @@ class Grammar:
     nested: Mapping[tuple[int, int], float]
     strictness: Strictness = "multiset"
     hubs: tuple[int, ...] = ()
+
+    @cached_property
+    def depths(self) -> Mapping[tuple[int, int], float]:
+        """For pairs of types (a <= b) how deep parts of them reached into each other in the exemplars at most."""
+        deepest = dict(self.nested)
+        for each in self.dockings:
+            deepest[each.a, each.b] = max(deepest.get((each.a, each.b), 0.0), each.depth)
+        return deepest
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,8 @@ class Sample:
 
 
 def write_sample(writer: ShardWriter, sample: Sample) -> None:
-    """Append `sample` to a shard: members `json`, `types.npy`, `poses.npy`, `edges.npy`."""
+    """Append `sample` to a shard: members `json`, `types.npy`, `poses.npy`, `edges.npy`, and `stretches.npy` where some
+    of its parts are stretched."""
     described = {
         "key": sample.key,
         "split": sample.split,
@@ -50,15 +51,15 @@ def write_sample(writer: ShardWriter, sample: Sample) -> None:
         "lineage": dict(sample.lineage),
         "text": sample.text,
     }
-    writer.write(
-        sample.key,
-        {
-            "json": json_bytes(described),
-            "types.npy": array_bytes(sample.assembly.types),
-            "poses.npy": array_bytes(sample.assembly.poses),
-            "edges.npy": array_bytes(sample.assembly.edges),
-        },
-    )
+    members = {
+        "json": json_bytes(described),
+        "types.npy": array_bytes(sample.assembly.types),
+        "poses.npy": array_bytes(sample.assembly.poses),
+        "edges.npy": array_bytes(sample.assembly.edges),
+    }
+    if sample.assembly.stretches is not None:
+        members["stretches.npy"] = array_bytes(sample.assembly.stretches)
+    writer.write(sample.key, members)
 
 
 def read_samples(path: Path) -> Iterator[Sample]:
@@ -68,5 +69,6 @@ def read_samples(path: Path) -> Iterator[Sample]:
             types=bytes_array(members["types.npy"]),
             poses=bytes_array(members["poses.npy"]),
             edges=bytes_array(members["edges.npy"]),
+            stretches=bytes_array(members["stretches.npy"]) if "stretches.npy" in members else None,
         )
         yield Sample(assembly=assembly, **json.loads(members["json"]))

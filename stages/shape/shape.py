@@ -9,8 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from stages.shape.arrays import TypeArray
+from stages.shape.arrays import FloatArray, TypeArray
 from stages.shape.kit import Assembly, Kit, PartMesh
+from stages.shape.stretch import StretchedMesh, bake, placements
 
 __all__ = ["Shape", "kit_shape", "mesh_name", "part_count", "upright"]
 
@@ -21,7 +22,8 @@ Z_TO_Y = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 
 class Shape:
     """Parts with meshes, poses and labels.
 
-    meshes: what `assembly.types` counts into; of a kit all its types, of a program the meshes of this one shape.
+    meshes: what `assembly.types` counts into; of a kit all its types, of a program, or where parts are stretched, the
+    meshes of this one shape.
     assembly: which mesh stands where, and which parts touch; its edges are empty where nobody has asked yet.
     up: the axis that points up, `"y"` or `"z"`; labels: the vocabulary of part labels, the same for every shape of
     one kit or program, in a fixed order. The label of each mesh is one of them.
@@ -66,13 +68,24 @@ class Shape:
             counts[name] += 1
         return tuple(names)
 
+    @property
+    def placements(self) -> FloatArray:
+        """What moves each part's mesh as its kit has it, float64 (n, 4, 4): its pose, but of a stretched part."""
+        return placements(self.meshes, self.assembly)
+
+    @property
+    def is_stretched(self) -> bool:
+        """Whether parts of it are stretched, so that its meshes are not those of its kit."""
+        return any(isinstance(each, StretchedMesh) for each in self.meshes)
+
     def __len__(self) -> int:
         return len(self.assembly)
 
 
 def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
-    """The shape of an assembly of the kit's types."""
-    return Shape(kit.types, assembly, kit.up, kit.labels)
+    """The shape of an assembly of the kit's types; parts that are stretched have meshes of their own."""
+    meshes, baked = bake(kit.types, assembly)
+    return Shape(meshes, baked, kit.up, kit.labels)
 
 
 def mesh_name(part_name: str) -> str:

@@ -55,8 +55,8 @@ def string_faults(sample: Packaged) -> Iterator[str]:
 
 
 def _anew(sample: Packaged, places: Places) -> Iterator[str]:
-    """Which contacts are faces is asked of the kit again."""
-    if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces":
+    """Which contacts are faces is asked of the kit again, but of stretched parts it does not know."""
+    if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces" or sample.shape.is_stretched:
         return
     path = places.stage("exemplars").root / f"{sample.record['kit']}.json"
     kit = KitStrings(load_kit(path, path.with_suffix(".tar")), "faces")

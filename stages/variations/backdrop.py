@@ -43,9 +43,11 @@ class Backdrop:
         Places are those that parts of the assembly had a hub at in an exemplar; the places that most parts agree on
         come first. A hub fits where it has most of the neighbours that one of its type had in an exemplar, and
         touches all that it touches, hubs before it too, in an observed docking; parts too near each other are refused
-        as in the search.
+        as in the search. A shape with stretched parts gets none: how a hub stands to these nobody has seen.
         """
         kit = self.kit
+        if assembly.stretches is not None:
+            return assembly
         types, poses = assembly.types, assembly.poses
         edges = [assembly.edges]
         boxes = world_boxes(kit.types, types, poses)

@@ -14,23 +14,39 @@ from pkgutil import iter_modules
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
+from stages.variations.resizing import Resizer
+from stages.variations.stretched import contact_fault
 
-__all__ = ["Constraint", "Labels", "Test", "find_constraints", "made_test", "module_of", "unknown_in"]
+__all__ = [
+    "Constraint",
+    "Labels",
+    "Mend",
+    "Test",
+    "find_constraints",
+    "made_mend",
+    "made_test",
+    "module_of",
+    "unknown_in",
+]
 
 Labels = Mapping[str, Sequence[str]]
 """What a config says of a constraint: labels of parts, by what they are to it."""
 Test = Callable[[Assembly], str | None]
 """The reason why an assembly is refused, None if it is not."""
+Mend = Callable[[Assembly], Assembly | None]
+"""An assembly of which parts are resized so that it is not refused; None where there is none."""
 
 
 @dataclass(frozen=True)
 class Constraint:
     """needs: the names of the lists of labels without which it says nothing; may: those that may be left out; test:
-    makes the test of a kit's assemblies, with what is known of its exemplars."""
+    makes the test of a kit's assemblies, with what is known of its exemplars; mend: where resizing parts may help,
+    makes what tries it."""
 
     needs: tuple[str, ...]
     may: tuple[str, ...]
     test: Callable[[Kit, Labels], Test]
+    mend: Callable[[Kit, Labels, Resizer], Mend] | None = None
 
 
 def find_constraints(package: str = "stages.variations.constraints") -> dict[str, Constraint]:
@@ -84,3 +100,20 @@ def made_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
         return next((reason for reason in (test(assembly) for test in tests) if reason is not None), None)
 
     return unmet
+
+
+def made_mend(kit: Kit, asked: Mapping[str, Labels], most: float, rigid: Sequence[str]) -> Mend:
+    """What resizes parts of an assembly, each by `most` times at most and those labelled `rigid` never, until it meets
+    all constraints that are asked for; None for what cannot be mended so, or whose contacts would not hold."""
+    known, unmet, resizer = find_constraints(), made_test(kit, asked), Resizer(kit, most, rigid)
+    mends = [mend(kit, labels, resizer) for name, labels in asked.items() if (mend := known[name].mend) is not None]
+
+    def mended(assembly: Assembly) -> Assembly | None:
+        found: Assembly | None = assembly
+        for mend in mends:
+            found = None if found is None else mend(found)
+        if found is None or unmet(found) is not None or contact_fault(kit, found) is not None:
+            return None
+        return found
+
+    return mended

@@ -50,7 +50,7 @@ class FeatureTest:
         shares: `material_shares` of the assembly; marks: int8 (n,) of `marks`; copied: `Copied.largest`.
         """
         centres = self._centres[assembly.types]
-        turns, places = assembly.poses[:, :3, :3], assembly.poses[:, :3, 3]
+        turns, places = assembly.placements[:, :3, :3], assembly.poses[:, :3, 3]
         middles = np.einsum("nij,nj->ni", turns, centres) + places
         reach = np.einsum("nij,nj->ni", np.abs(turns), self._halves[assembly.types])
         spans = (middles + reach).max(axis=0) - (middles - reach).min(axis=0)

@@ -2,7 +2,8 @@
 the index of what the pool shards kept of it, which is small and held in memory.
 
 Files of a lane: `types.npy` int16 (N,), `origins.npy` int8 (N,) the exemplar of each part, `poses.npy` float64
-(N, 4, 4), `edges.npy` int32 (M, 2), `labels.npy` int32 (M, 2), `offsets.npy` int64 (k + 1, 2) into the former for k
+(N, 4, 4), `stretched.npy` int64 (s,) the parts of variants with stretched ones and `stretches.npy` float64 (s, 3, 3)
+theirs, `edges.npy` int32 (M, 2), `labels.npy` int32 (M, 2), `offsets.npy` int64 (k + 1, 2) into the former for k
 variants, `features.npy` float32 (k, 10), `keys.npy` uint64 (k, 2) of refinement, `digests.npy` uint8 (k, 2, 32) of the
 canonical graph without and with docking labels, `lineage.jsonl`.
 
@@ -33,7 +34,7 @@ from stages.variations.search.search import Variant
 __all__ = ["FoundVariants", "PoolIndex", "write_kept", "write_variants"]
 
 _INDEX = ("counts", "features", "keys", "digests")
-_LANE = ("types", "origins", "poses", "edges", "labels", "offsets", *_INDEX[1:])
+_LANE = ("types", "origins", "poses", "stretched", "stretches", "edges", "labels", "offsets", *_INDEX[1:])
 
 
 def write_variants(task: Task, kit: Kit, variants: Sequence[Variant]) -> None:
@@ -48,10 +49,16 @@ def write_variants(task: Task, kit: Kit, variants: Sequence[Variant]) -> None:
         )
         for each in variants
     ]
+    first = np.concatenate([np.zeros(1, np.int64), sizes[:, 0].cumsum()])
+    bent = [
+        (start, each.stretches) for start, each in zip(first, assemblies, strict=False) if each.stretches is not None
+    ]
     arrays = {
         "types": np.concatenate([np.empty(0, np.int16), *(each.types for each in assemblies)]),
         "origins": np.concatenate([np.empty(0, np.int8), *(each.origins for each in variants)]),
         "poses": np.concatenate([np.empty((0, 4, 4)), *(each.poses for each in assemblies)]),
+        "stretched": np.concatenate([np.empty(0, np.int64), *(start + np.arange(len(each)) for start, each in bent)]),
+        "stretches": np.concatenate([np.empty((0, 3, 3)), *(each for _, each in bent)]),
         "edges": np.concatenate([np.empty((0, 2), np.int32), *(each.edges for each in assemblies)]),
         "labels": np.concatenate([np.empty((0, 2), np.int32), *(each.labels for each in variants)]),
         "offsets": np.concatenate([np.zeros((1, 2), np.int64), sizes.cumsum(axis=0)]),
@@ -75,6 +82,8 @@ class FoundVariants:
     types: np.ndarray
     origins: np.ndarray
     poses: np.ndarray
+    stretched: np.ndarray
+    stretches: np.ndarray
     edges: np.ndarray
     labels: np.ndarray
     offsets: np.ndarray
@@ -95,10 +104,12 @@ class FoundVariants:
     def assembly(self, index: int) -> tuple[Assembly, IntArray]:
         """One variant and the docking labels of its edges."""
         (part, edge), (last_part, last_edge) = self.offsets[index].tolist(), self.offsets[index + 1].tolist()
+        first, last = np.searchsorted(self.stretched, [part, last_part]).tolist()
         assembly = Assembly(
             np.array(self.types[part:last_part]),
             np.array(self.poses[part:last_part]),
             np.array(self.edges[edge:last_edge]),
+            np.array(self.stretches[first:last]) if last > first else None,
         )
         return assembly, np.array(self.labels[edge:last_edge])
 

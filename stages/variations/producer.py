@@ -41,10 +41,15 @@ def _endings(plan: Plan) -> Sequence[str]:
         f"- {each['why']}; {each['graphs']:,} distinct graphs, {each['histograms']:,} distinct histograms."
         + (f" What limits it: {each['advice']}." if each["advice"] else "")
         + (f" What was left out: {each['left']}." if each["left"] else "")
+        + (f" Resized: {_listed(each['resized'])}." if each["resized"] else "")
         for each in summaries
         if each.get("why")
     ]
     return ["\n".join(ended)] if ended else []
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count:,} ({reason})" for reason, count in counts.items())
 
 
 def _made(plan: Plan) -> Sequence[str]:
@@ -121,7 +126,8 @@ def _lineage(_: Config) -> Mapping[str, Field]:
         "bent": Field(
             {
                 "type": "boolean",
-                "description": "whether each part of the piece was moved by itself; motion is then that of its first",
+                "description": "whether parts of it were moved by themselves, or are no longer as long, wide or high "
+                "as in the exemplars; where the piece was, motion is that of its first part",
             }
         ),
         "copied": Field(

@@ -10,6 +10,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,12 @@ from stages.shape.shape import kit_shape
 from stages.variations.advice import what_keeps, what_was_left
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import backdrop_of
-from stages.variations.constraint import made_test, module_of
+from stages.variations.constraint import made_mend, made_test, module_of
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search.search import SPARE, Search, Variant
-from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS, VariantRequirements, VariationsConfig
+from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS, VariationsConfig
 
 __all__ = ["has_hubs", "last_pool", "run_lane", "run_pool", "search_shards"]
 
@@ -40,7 +41,7 @@ ROUND_SHARE = 40
 PATIENCE, LEAST_PATIENCE = 200_000, 40_000
 PATIENT_PARTS = 100
 """A try takes the longer the more parts there are: exemplars of more than so many have less than PATIENCE tries."""
-COUNTED = ("crossings", "lists", "rejects")
+COUNTED = ("crossings", "lists", "rejects", "resized")
 """What lanes count, by name, and pools add up."""
 FEWEST = 32
 """A lane looks for at least so many variants, so that the last rounds are not mere starts and stops."""
@@ -112,30 +113,35 @@ def run_lane(task: Task) -> Outcome:
     chosen = _parents(rng, search.archive.crowds(places), config.parents, config.novelty.guided)
     for place, (found, index) in zip(places[chosen].tolist(), pool.variants(task, chosen), strict=True):
         (assembly, labels), origins = found.assembly(index), found.origins_of(index)
+        if assembly.stretches is not None:  # how stretched parts dock nobody has seen
+            continue
         search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, origins, (place[0], place[1]), labels))
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
-    kept = _required(task, kit, section.require, variants)
+    kept, resized = _required(task, kit, section, variants)
     write_variants(task, kit, kept)
     rejects = dict(sorted(search.rejects.items()))
     for reason, count in rejects.items():
         task.reject(task.shard.name, reason, count=count)
     summary = {"found": len(kept), "tries": tries, "spares": search.spares, "rejects": rejects}
-    for key, counts in (("crossings", search.crossings), ("lists", search.lists)):
+    for key, counts in (("crossings", search.crossings), ("lists", search.lists), ("resized", resized)):
         summary[key] = dict(sorted(counts.items()))
     return Outcome(0, summary)
 
 
-def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequence[Variant]) -> Sequence[Variant]:
-    """The variants that are, with their backdrop, what the config requires; the others are refused."""
-    most = task.shard.params["copied"]
+def _required(
+    task: Task, kit: Kit, section: VariationsConfig, variants: Sequence[Variant]
+) -> tuple[Sequence[Variant], Counter[str]]:
+    """The variants that are, with their backdrop, what the config requires, the others being refused; and how many of
+    them were resized so that they are, by the reason for which they would have been refused."""
+    require, most = section.require, task.shard.params["copied"]
     telling = [each for each in variants if each.lineage["copied"]["largest"] <= most]
     if len(telling) < len(variants):
         task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
-    telling = _constrained(task, kit, require, telling)
+    telling, resized = _constrained(task, kit, section, telling)
     hubs = _hubs_required(task.config, kit)
     if not (require.rooted or require.stable or hubs):
-        return telling
+        return telling, resized
     backdrop, kept = backdrop_of(task, kit.name), []
     for variant in telling:
         whole = backdrop.fit(variant.assembly)
@@ -144,21 +150,31 @@ def _required(task: Task, kit: Kit, require: VariantRequirements, variants: Sequ
             kept.append(variant)
         else:
             task.reject(task.shard.name, weak)
-    return kept
+    return kept, resized
 
 
-def _constrained(task: Task, kit: Kit, require: VariantRequirements, variants: list[Variant]) -> list[Variant]:
-    """The variants that meet the global constraints; the others are refused."""
-    if not require.constraints:
-        return variants
-    test, kept = made_test(kit, require.constraints), []
+def _constrained(
+    task: Task, kit: Kit, section: VariationsConfig, variants: list[Variant]
+) -> tuple[list[Variant], Counter[str]]:
+    """The variants that meet the global constraints, resized where that helps and the config allows it, and how many
+    were; the others are refused."""
+    asked, stretch, resized = section.require.constraints, section.search.stretch, Counter[str]()
+    if not asked:
+        return variants, resized
+    test, kept = made_test(kit, asked), []
+    mend = made_mend(kit, asked, stretch.most, stretch.rigid) if stretch.most > 1 else None
     for variant in variants:
         reason = test(variant.assembly)
         if reason is None:
             kept.append(variant)
-        else:
+            continue
+        mended = None if mend is None else mend(variant.assembly)
+        if mended is None:
             task.reject(task.shard.name, reason)
-    return kept
+            continue
+        kept.append(replace(variant, assembly=mended, lineage={**variant.lineage, "bent": True}))
+        resized[reason] += 1
+    return kept, resized
 
 
 def _most_copied(plan: Plan, kit: str) -> float:

@@ -71,6 +71,19 @@ class GrownConfig(StrictModel):
     )
 
 
+class StretchConfig(StrictModel):
+    """How far a part may be made another size than it has in the exemplars."""
+
+    most: float = Field(
+        1.0,
+        ge=1,
+        le=4,
+        description="How many times longer or shorter than it is a part may be made in any direction; 1: none is. "
+        "Where a piece fits as it is, or a constraint holds, nothing is stretched.",
+    )
+    rigid: tuple[str, ...] = Field((), description="Labels of parts that are never stretched.")
+
+
 class SearchConfig(StrictModel):
     """How variants are searched for."""
 
@@ -128,6 +141,11 @@ class SearchConfig(StrictModel):
         description="Whether replaceable substructures bend a piece that does not fit as a whole: each of its parts "
         "moves as the boundary near it does. Parts between come out of contact where contacts are as exact as those of "
         "most kits: it finds little beside the time that it takes.",
+    )
+    stretch: StretchConfig = Field(
+        default_factory=StretchConfig,
+        description="Whether replaceable substructures stretch a piece as a whole until it fits its place, edges then "
+        "being matched by types alone; and whether parts are resized in height until `require.constraints` are met.",
     )
     grown: GrownConfig = Field(default_factory=GrownConfig, description="What grown shapes are to be like.")
     growth_share: float = Field(

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, transform_points
-from stages.shape.kit import PartType
+from stages.shape.kit import PartMesh
 
 __all__ = ["PenetrationTest", "depth_bound"]
 
@@ -41,7 +41,7 @@ def depth_bound(first: FloatArray, second: FloatArray) -> float:
 class PenetrationTest:
     """Penetration depth of posed parts of given types."""
 
-    def __init__(self, types: Sequence[PartType]) -> None:
+    def __init__(self, types: Sequence[PartMesh]) -> None:
         self.types = tuple(types)
         self._scenes: dict[int, Any] = {}
         self._probes: dict[int, FloatArray] = {}

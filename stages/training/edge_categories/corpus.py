@@ -99,12 +99,13 @@ def described_space(space: CategorySpace) -> dict[str, Any]:
 
 
 def _shapes(task: Task, split: str) -> Iterator[tuple[str, Assembly]]:
-    """The key and the assembly of each shape of the kit in a split."""
+    """The key and the assembly of each shape of the kit in a split, but those with stretched parts, whose contacts are
+    of no category."""
     params = task.shard.params
     shards = [shard for shard, of in params["splits"].items() if of == split]
     for done, shard in enumerate(shards):
         for sample in read_samples(task.input(params["producer"], f"{shard}.tar")):
-            if sample.kit == params["kit"]:
+            if sample.kit == params["kit"] and sample.assembly.stretches is None:
                 yield sample.key, sample.assembly
         task.progress(done + 1, len(shards))
 

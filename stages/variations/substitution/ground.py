@@ -26,9 +26,13 @@ class GroundTest:
         self._grounded = grounded
 
     def is_lifted(self, types: np.ndarray, poses: FloatArray) -> bool:
-        """Whether a part of types int (n,) at poses (n, 4, 4) is off the ground and never was before."""
+        """Whether a part of types int (n,) at placements (n, 4, 4) is off the ground and never was before."""
+        return bool(len(self.lifted(types, poses)))
+
+    def lifted(self, types: np.ndarray, poses: FloatArray) -> np.ndarray:
+        """The parts that are, int64 (k,)."""
         bottoms = self._bottoms(types, poses)
-        return bool((bottoms[self._grounded[types]] > bottoms.min() + self.tolerance).any())
+        return np.flatnonzero(self._grounded[types] & (bottoms > bottoms.min() + self.tolerance))
 
     def _bottoms(self, types: np.ndarray, poses: FloatArray) -> FloatArray:
         """The height of the lowest point of each part, float64 (n,)."""

@@ -21,9 +21,10 @@ def kit() -> Kit:
 
 
 def faults(kit: Kit, assembly: Assembly) -> list[str]:
+    placed = assembly.placements.tolist()
     parts = [
-        {"name": name, "label": kit.types[index].name}
-        for name, index in zip(kit_shape(kit, assembly).part_names, assembly.types.tolist(), strict=True)
+        {"name": name, "label": kit.types[index].name, "pose": pose}
+        for name, index, pose in zip(kit_shape(kit, assembly).part_names, assembly.types.tolist(), placed, strict=True)
     ]
     record, contacts = json.dumps({"parts": parts}).encode(), pair_bytes(assembly.edges)
     return geometry_faults(kit, {"json": record, CONTACTS: contacts, "glb": glb_bytes(kit_shape(kit, assembly))})

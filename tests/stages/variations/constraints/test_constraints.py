@@ -13,7 +13,9 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
-from stages.variations.constraint import made_test, unknown_in
+from stages.shape.stretch import moved_by
+from stages.variations.constraint import made_mend, made_test, unknown_in
+from stages.variations.resizing import heights_of, spans_of
 from tests.stages.variations.toy import Placed, box, kit_of, pose
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -128,3 +130,76 @@ def test_a_constraint_in_a_file_of_the_users_own_is_found_and_its_code_counts(tm
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[:3] == ["path", "small", "support"]
     assert any("small" in each for each in done.stdout.split()[3:])
+
+
+def dropped(kit: Kit, *, bump: float = 0.0, lift: float = 0.0) -> Assembly:
+    """The chute with its second slide so much higher, and all that has no pillar below it lifted; it still touches."""
+    assembly = kit.exemplars[0].assembly
+    poses = assembly.poses.copy()
+    slides = np.flatnonzero(assembly.types == kit.type_names().index("slide"))
+    poses[slides[assembly.poses[slides, 0, 3] > 1.5], 1, 3] += bump
+    poses[place_of(kit, assembly, "end"), 1, 3] += lift
+    return replace(assembly, poses=poses)
+
+
+def test_a_path_that_rises_is_made_lower_where_it_does_and_what_hangs_on_it_moves_along(kit: Kit) -> None:
+    asked = {"path": LABELS}
+    risen = dropped(kit, bump=0.15)
+    assert made_test(kit, asked)(risen) == "a path leads upwards"
+    mended = made_mend(kit, asked, 3.0, ())(risen)
+    assert mended is not None
+    assert made_test(kit, asked)(mended) is None
+    assert mended.stretches is not None
+    bent = np.flatnonzero(np.abs(mended.stretches - np.eye(3)).max(axis=(1, 2)) > 1e-6)
+    assert [kit.type_names()[each] for each in mended.types[bent]] == ["slide"]
+    heights = heights_of(kit, mended)
+    others = [place for place in range(len(mended)) if place not in bent]
+    kept = [place for place in others if kit.type_names()[mended.types[place]] != "end"]
+    np.testing.assert_allclose(heights[kept], heights_of(kit, risen)[kept], atol=1e-9)
+    assert made_mend(kit, asked, 1.05, ())(risen) is None
+    assert made_mend(kit, asked, 3.0, ("slide",))(risen) is None
+
+
+def test_an_exit_over_the_ground_is_lowered_along_its_path(kit: Kit) -> None:
+    """The end always stood on the ground here; one that hangs over it is reached by its slides, which grow taller."""
+    low = kit_of(CHUTE, [[("top", pose(0, 0, 0)), ("slide", pose(1, -0.1, 0)), ("end", pose(2, -0.2, 0))]])
+    assembly = low.exemplars[0].assembly
+    poses = np.concatenate([assembly.poses, pose(0, -0.2, 3)[None]])
+    hung = Assembly(np.append(assembly.types, assembly.types[place_of(low, assembly, "end")]), poses, assembly.edges)
+    hung.poses[-1, 1, 3] -= 0.3
+    asked = {"path": {**LABELS, "entries": ("top",)}}
+    mended = made_mend(low, asked, 3.0, ())(hung)
+    assert mended is not None
+    end = place_of(low, assembly, "end")
+    spans = spans_of(low, mended)
+    assert spans[end, 0] == pytest.approx(spans[:, 0].min(), abs=low.contact_tolerance)
+    assert spans_of(low, hung)[end, 0] == pytest.approx(spans[:, 0].min() + 0.3)
+
+
+def test_a_leg_is_made_longer_until_it_reaches_the_ground(kit: Kit) -> None:
+    legs = {"plate": box(4, 0.2, 1), "leg": box(0.2, 1.0, 0.2), "step": box(1, 0.5, 1)}
+    standing = [("plate", pose(0, 1.1, 0)), ("leg", pose(-1.5, 0.5, 0)), ("leg", pose(1.5, 0.5, 0))]
+    table = kit_of(legs, [standing])
+    assembly = table.exemplars[0].assembly
+    short = assembly.poses.copy()
+    leg = int(np.flatnonzero((assembly.types == table.type_names().index("leg")) & (short[:, 0, 3] > 0))[0])
+    lower = place_of(table, assembly, "leg")
+    lower = lower if lower != leg else lower + 1
+    plate = place_of(table, assembly, "plate")
+    short[[leg, plate], 1, 3] += 0.4
+    uneven = moved_leg(replace(assembly, poses=short), lower, 1.4)
+    asked: dict[str, dict[str, tuple[str, ...]]] = {"support": {}}
+    assert made_test(table, asked)(uneven) == "lifted off the ground"
+    mended = made_mend(table, asked, 1.5, ())(uneven)
+    assert mended is not None
+    np.testing.assert_allclose(spans_of(table, mended)[[leg, lower]], [[0, 1.4], [0, 1.4]], atol=1e-9)
+    assert made_mend(table, asked, 1.3, ())(uneven) is None
+    with pytest.raises(ConfigError, match="no parts called legg; did you mean leg"):
+        made_mend(table, asked, 1.5, ("legg",))
+
+
+def moved_leg(assembly: Assembly, part: int, factor: float) -> Assembly:
+    """The assembly with one part so many times as high, from its lowest point on."""
+    motions = np.tile(np.eye(4), (len(assembly), 1, 1))
+    motions[part, 1, 1] = factor
+    return moved_by(assembly, motions)
