@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
-from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
+from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
 from stages.variations.archive import Archive, Cell, Place, cell_of
@@ -40,6 +40,7 @@ from stages.variations.kernels.tables import kit_tables, multiset_weights, shape
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.search.steering import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.settings import SearchConfig
+from stages.variations.stretched import contact_fault
 from stages.variations.substitution.ground import GroundTest
 from stages.variations.substitution.substitute import substitute
 from stages.variations.substructures.replacer import Replacer
@@ -68,7 +69,7 @@ REPLACED_REASONS = {
     Outcome.NO_MATCH: "replaced: no embedding",
     Outcome.NOTHING_ATTACHED: "replaced: nothing but a gap to close",
     Outcome.KNOWN: DUPLICATE,
-    Outcome.ASKEW: "blended: boundaries stand at other angles",
+    Outcome.ASKEW: "bent: boundaries stand at other angles",
     **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
 }
 
@@ -121,6 +122,7 @@ class Search:
         self.tables = kit_tables(kit, config.upright)
         self._histogram_weights = multiset_weights(len(kit.types))
         self._ws = workspace(max(self.largest, *sizes))
+        self._stretches: FloatArray | None = None
         slotted = kit.grammar.strictness in SLOT_LEVELS
         self._slots = (slots or SlotGrammar(kit, answers.dockings, config.upright)) if slotted else None
         self._grower = self._made_grower() if config.method in ("both", "growth", "all") else None
@@ -217,7 +219,8 @@ class Search:
         if spare and self.config.novelty.guided:
             self.spares += 1
             return False
-        self.adopt(rng, self.parent(name, variant.assembly, variant.origins, place, variant.labels))
+        if variant.assembly.stretches is None:  # how stretched parts dock nobody has seen
+            self.adopt(rng, self.parent(name, variant.assembly, variant.origins, place, variant.labels))
         return True
 
     def adopt(self, rng: np.random.Generator, parent: Parent) -> None:
@@ -271,13 +274,18 @@ class Search:
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
         outcome, work = self._replacer.replace(rng, choice, self._ws)
         used = self._replacer.choice
-        return (self._replaced(used) if outcome == Outcome.OK else REPLACED_REASONS[outcome]), work, used
+        found = self._replaced(used) if outcome == Outcome.OK else REPLACED_REASONS[outcome]
+        self._stretches = None
+        return found, work, used
 
     def _replaced(self, choice: Choice) -> Variant | str:
         """What was put together by replacement, as a new variant, or the reason why it is none."""
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
         ws = self._ws
         with_labels = self.config.duplicates == "docking"
+        self._stretches = self._replacer.stretches
+        if self._stretches is not None:
+            return self._stretched(choice)
         how = "blended" if self._replacer.is_bent else "replaced"
         outcome = self._answered_by(find_contacts) if self._replacer.is_bent else Outcome.OK
         if outcome == Outcome.OK:
@@ -286,11 +294,26 @@ class Search:
             return f"{how}: {REASONS[outcome]}"
         if not self._replacer.is_joined(ws):
             return f"{how}: contact lost"
+        return self._replacement(int(key), choice)
+
+    def _stretched(self, choice: Choice) -> Variant | str:
+        """The same where the piece was stretched: its contacts are those that the operation says, which are held
+        against the meshes in the end."""
+        assert self._replacer is not None, "no choice is to replace where the method forbids it"
+        self._replacer.predict(self._ws)
+        labelled, grammar = self.kit.labelled(self._assembly()), self.kit.grammar
+        around = zip(labelled.types.tolist(), labelled.neighbours(), strict=True)
+        if not all(admits(grammar, label, labelled.multiset(near)) for label, near in around):
+            return f"stretched: {REASONS[Outcome.GRAMMAR]}"
+        return self._replacement(self._graph_keys()[int(self.config.duplicates == "docking")], choice)
+
+    def _replacement(self, key: int, choice: Choice) -> Variant | str:
+        assert self._replacer is not None, "no choice is to replace where the method forbids it"
         if not self._is_connected():
             return APART
         origins, lineage = self._descent("substructures", choice.a, self._replacer.base)
         lineage |= {"times": self._replacer.times, "bent": self._replacer.is_bent}
-        return self._finished(int(key), origins, lineage)
+        return self._finished(key, origins, lineage)
 
     def _descent(self, method: str, a: Parent, b: Parent) -> tuple[np.ndarray, dict[str, Any]]:
         """The exemplar that each part of the variant in hand came from, int8 (n,), and its lineage, where a piece of A
@@ -358,9 +381,13 @@ class Search:
         pieces_count = self.config.sub_assemblies
         if not pieces_count and any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
-        if self._ground is not None and self._ground.is_lifted(types, self._poses()):
+        if self._ground is not None and self._ground.is_lifted(types, self._assembly().placements):
             return LIFTED
-        outcome = self._answered_by(validate)
+        if self._stretches is not None:
+            fault = contact_fault(self.kit, self._assembly())
+            if fault is not None:
+                return f"stretched: {fault}"
+        outcome = self._answered_by(validate) if self._stretches is None else Outcome.OK
         if outcome != Outcome.OK:
             return REASONS[outcome]
         if self._slots is not None and self._slots.misfits(self._assembly()):
@@ -434,7 +461,7 @@ class Search:
         parts, count = int(ws.counts[PARTS]), int(ws.counts[EDGES])
         edges = np.sort(ws.edges[:count], axis=1)
         edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))].astype(np.int32)
-        return Assembly(ws.types[:parts].astype(np.int16), self._poses(), edges)
+        return Assembly(ws.types[:parts].astype(np.int16), self._poses(), edges, self._stretches)
 
     def _variant(self, origins: np.ndarray, lineage: dict[str, Any], graph: int, docked: int) -> Variant:
         assembly, label = self._assembly(), self._ws.label

@@ -17,7 +17,7 @@ from stages.shape.geometry.pose import pose_vectors
 from stages.shape.kit import Kit
 from stages.variations.substructures.embedding import Side, motions_onto
 
-__all__ = ["blend", "is_oriented_alike"]
+__all__ = ["blend", "boundary_moves", "is_oriented_alike"]
 
 MOST_TURN = np.radians(45.0)
 """Greatest difference of the angles between two consecutive cut edges, and between one and the vertical."""
@@ -33,7 +33,7 @@ def blend(kit: Kit, base: Side, giver: Side, boundary: np.ndarray, piece: np.nda
     its centre to the origins of their frames.
     """
     rows = boundary[(boundary >= 0).all(axis=1)]
-    origins, moves = _moves(kit, base, giver, rows)
+    origins, moves = boundary_moves(kit, base, giver, rows)
     centres = world_boxes(kit.types, giver.assembly.types[piece], giver.assembly.poses[piece]).mean(axis=1)
     gaps = np.linalg.norm(centres[:, None] - origins, axis=2)
     weights = 1.0 / np.maximum(gaps, kit.pose_tolerance)
@@ -64,7 +64,7 @@ def is_oriented_alike(kit: Kit, base: Side, giver: Side, boundary: np.ndarray) -
     return True
 
 
-def _moves(kit: Kit, base: Side, giver: Side, rows: np.ndarray) -> tuple[FloatArray, FloatArray]:
+def boundary_moves(kit: Kit, base: Side, giver: Side, rows: np.ndarray) -> tuple[FloatArray, FloatArray]:
     """The origins of the giver's frames, float64 (b, 3), and what moves them onto those of the base, (b, 4, 4)."""
     (_, aims, own), (_, origins, edges) = (
         _cut_edges(kit, side, rows[:, place]) for place, side in enumerate((base, giver))

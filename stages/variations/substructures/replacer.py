@@ -9,10 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
+from stages.shape.stretch import split
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import TRY, UPRIGHT, KitTables, Outcome, Workspace
 from stages.variations.kernels.tables import shape_tables
+from stages.variations.kernels.variant import set_edge
+from stages.variations.resizing import rigid_types
 from stages.variations.search.parents import Parent
 from stages.variations.search.steering import Choice
 from stages.variations.settings import SearchConfig
@@ -26,6 +30,7 @@ from stages.variations.substructures.recursion import cut_again, cut_farther, gr
 from stages.variations.substructures.replacement import replace_piece
 from stages.variations.substructures.result_key import result_key
 from stages.variations.substructures.sites import docking_graph
+from stages.variations.substructures.stretching import stretch_onto
 
 __all__ = ["Replacer"]
 
@@ -69,16 +74,19 @@ class Pair:
 
 class Replacer:
     """Replaces pieces within limits of size, as a config says. Matched by pose, edges match by their dockings, which
-    keeps rigid what is laid upon each other; else, and where types go by meaning, by the types at their ends alone.
+    keeps rigid what is laid upon each other; else, and where types go by meaning or pieces may be stretched, by the
+    types at their ends alone.
 
     After a try that is OK, `base` is what the piece was put into: the shape that was chosen, or what all times but the
-    last of a recursive rule have made of it; `times` is how often the operation was carried out. `lists` counts the
+    last of a recursive rule have made of it; `times` is how often the operation was carried out; `stretches`
+    float64 (n, 3, 3) are those of the parts where the piece was stretched, else None. `lists` counts the
     lists of operations that were made, by whether each was whole or cut short. `known` are keys of shapes, by graph and
     dockings, that need not be put together again.
     """
 
     base: Parent
     times = 1
+    stretches: FloatArray | None = None
 
     def __init__(
         self, answers: ContactAnswers, tables: KitTables, smallest: int, largest: int, config: SearchConfig
@@ -86,10 +94,11 @@ class Replacer:
         self.answers, self.tables = answers, tables
         self.smallest, self.largest = smallest, largest
         self.dummies, self.repeats = config.dummies, config.repeats
-        self.blends = config.blend
+        self.blends, self.most = config.blend, config.stretch.most
         kit = answers.kit
+        self._rigid = rigid_types(kit, config.stretch.rigid)
         self._by_meaning = len(kit.labels) < len(kit.types)
-        self._by_docking = config.matching == "pose" and not self._by_meaning
+        self._by_docking = config.matching == "pose" and not self._by_meaning and self.most == 1
         self.lists: Counter[str] = Counter()
         self.known: set[int] = set()
         self._open: dict[tuple[int, int], Pair] = {}
@@ -97,6 +106,7 @@ class Replacer:
         self._pair: Pair | None = None
         self._docked: Docked = []
         self._bent: np.ndarray | None = None
+        self._cut: tuple[Side, Side, np.ndarray] | None = None
 
     @property
     def choice(self) -> Choice:
@@ -130,7 +140,7 @@ class Replacer:
             return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, work
         if not piece.any() or taken.all():
             return Outcome.NOTHING_ATTACHED, work
-        if not (self._by_meaning or self.blends):
+        if not (self._by_meaning or self.blends or self.most > 1):
             key = int(result_key(side.graph, pair.sides[1].graph, taken, piece, boundary))
             if key in self.known:
                 return Outcome.KNOWN, work
@@ -140,17 +150,24 @@ class Replacer:
         exchanged, found = Exchanged(taken, piece), None
         if not self._by_meaning:
             found = self._rigidly(rng, side, pair.sides[1], boundary, exchanged)
-        elif not (self.blends and rng.random() < BLENDED):
+        elif not ((self.blends or self.most > 1) and rng.random() < BLENDED):
             found = self._by_meanings(rng, pair, exchanged)
-        if found is None and self.blends:
+        if found is None and (self.blends or self.most > 1):
             work += EMBEDDING_WORK
             if not is_oriented_alike(self.answers.kit, side, pair.sides[1], boundary):
                 return Outcome.ASKEW, work
-            found = self._blended(side, pair.sides[1], boundary, exchanged)
+            found = self._bending(side, pair.sides[1], boundary, exchanged)
         if found is None:
             return Outcome.NO_MATCH, work
         motion, poses, self._docked = found
         self._bent = np.flatnonzero(piece) if motion.ndim == 3 else None
+        self._cut, self.stretches = (side, pair.sides[1], boundary), None
+        if motion.ndim == 3:
+            own = pair.giver.assembly.poses[piece]
+            rigid, stretches = split(motion @ own)
+            motion = rigid @ invert(own)
+            if stretches is not None:
+                self.stretches = np.concatenate([stretches, np.tile(np.eye(3), (parts - len(own), 1, 1))])
         self.base = replace(self.base, assembly=replace(self.base.assembly, poses=poses))
         put_together(self.tables, pair.giver, self.base, exchanged, motion, self._docked, ws)
         return Outcome.OK, work
@@ -207,12 +224,33 @@ class Replacer:
         embedding = embed(rng, kit, up, base, giver, boundary, exchanged.taken) if docked else None
         return None if embedding is None else (embedding.motion, embedding.poses, docked)
 
-    def _blended(self, base: Side, giver: Side, boundary: np.ndarray, exchanged: Exchanged) -> Found | None:
-        """The same where each part of the piece has a motion of its own; the base stays where it is."""
-        docked = _docked(base, giver, boundary, exchanged.piece)
+    def _bending(self, base: Side, giver: Side, boundary: np.ndarray, exchanged: Exchanged) -> Found | None:
+        """The same where each part of the piece has a motion of its own, affine where pieces may be stretched; the base
+        stays where it is."""
+        docked, kit, piece = _docked(base, giver, boundary, exchanged.piece), self.answers.kit, exchanged.piece
         if not docked:
             return None
-        return blend(self.answers.kit, base, giver, boundary, exchanged.piece), base.assembly.poses, docked
+        motions, up = None, self.tables.up
+        if self.most > 1:
+            motions = stretch_onto(kit, base, giver, boundary, piece, self.most, up, self._rigid)
+        if motions is None and self.blends:
+            motions = blend(kit, base, giver, boundary, piece)
+        return None if motions is None else (motions, base.assembly.poses, docked)
+
+    def predict(self, ws: Workspace) -> None:
+        """Add the contacts that the operation says the piece has, in it and across its boundary, with the labels that
+        they had in the giver: of what is stretched no answer by relative pose can be had."""
+        assert self._cut is not None, "nothing was tried yet"
+        giver, (base, given, boundary) = self.choice.a, self._cut
+        ends = ws.from_a[giver.assembly.edges]
+        inner = (ends >= 0).all(axis=1)
+        found = np.concatenate([ends[inner], giver.labels[inner]], axis=1).tolist()
+        for dart, image in boundary[(boundary >= 0).all(axis=1)].tolist():
+            back = int(given.graph.twins[image])
+            hold, part = ws.from_b[base.graph.tails[dart]], ws.from_a[given.graph.tails[back]]
+            found.append((part, hold, int(given.graph.labels[back]) - 1, int(given.graph.labels[image]) - 1))
+        for each in found:
+            set_edge(ws.stamp, ws.label, ws.edges, ws.counts, *each)
 
     def _by_meanings(self, rng: np.random.Generator, pair: Pair, exchanged: Exchanged) -> Found | None:
         """The same where parts of one label are other meshes: a docking of one of them, fitted to all."""
