@@ -1,6 +1,7 @@
 """Programs from the command line: `python -m stages.programs inspect|movement|sheet|make|mix|interpolate PROGRAM ...`.
 
-A SHAPE is a JSON file of parameters, a whole number (the random shape of that seed), or `base`.
+A SHAPE is a JSON file of parameters, such as `make recover` writes, a whole number (the random shape of that seed), or
+`base`.
 """
 
 from __future__ import annotations
@@ -75,9 +76,10 @@ def _mix(program: Program, asked: argparse.Namespace) -> list[Path]:
 def _interpolate(program: Program, asked: argparse.Namespace) -> list[Path]:
     first, last = named_values(program, asked.first), named_values(program, asked.last)
     shares = [step / (asked.steps - 1) for step in range(asked.steps)]
-    shapes = [interpolate(program, first, last, share) for share in shares]
+    shapes = [interpolate(program, first, last, share, asked.group) for share in shares]
     names = [f"step-{number:02d}" for number in range(asked.steps)]
-    return _written(program, asked, shapes, names, f"{program.name}: from one shape to another")
+    title = f"{program.name}: from one shape to another"
+    return _written(program, asked, shapes, names, f"{title}, {', '.join(asked.group)} alone" if asked.group else title)
 
 
 def _written(
@@ -122,7 +124,10 @@ def _parser() -> argparse.ArgumentParser:
     between = command("interpolate", _interpolate, "Go from one shape to another in steps.")
     between.add_argument("first", metavar="SHAPE")
     between.add_argument("last", metavar="SHAPE")
-    between.add_argument("--steps", type=_count, default=8, help="how many shapes, both ends among them")
+    between.add_argument("--steps", type=_count, default=6, help="how many shapes, both ends among them")
+    between.add_argument(
+        "--group", action="append", default=[], help="a group of parameters that moves alone; may be given again"
+    )
     return parser
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,8 @@ __all__ = ["named_values", "random_shapes", "shape_glb"]
 
 
 def named_values(program: Program, name: str) -> dict[str, Value]:
-    """The values that a command line means: `base`, a whole number for the random shape of that seed, or a JSON file.
+    """The values that a command line means: `base`, a whole number for the random shape of that seed, or a JSON file:
+    of parameters, or one that `make recover` has written, which holds them under `parameters`.
 
     Raises ConfigError, which names the file and the parameter, for one that is not there or says no shape.
     """
@@ -27,7 +29,7 @@ def named_values(program: Program, name: str) -> dict[str, Value]:
     if name.isdecimal():
         return random_shapes(program, 1, int(name))[0]
     try:
-        values = program.schema.values(Path(name).read_text(encoding="utf-8"))
+        values = program.schema.values(_parameters(program, Path(name).read_text(encoding="utf-8")))
     except OSError as error:
         raise ConfigError(f"{name}: {error.strerror}; give a JSON file of parameters, a seed, or base") from error
     except (ParameterError, UnicodeDecodeError) as error:
@@ -36,6 +38,19 @@ def named_values(program: Program, name: str) -> dict[str, Value]:
     if broken:
         raise ConfigError(f"{name}: a {program.name} needs {broken[0].rule.text}: {broken[0].sentence}")
     return values
+
+
+def _parameters(program: Program, text: str) -> str:
+    """The object of parameters in the text of a file. Raises ParameterError for that of another program."""
+    try:
+        said = json.loads(text)
+    except (json.JSONDecodeError, RecursionError):
+        return text  # the schema says what is wrong with it
+    if not isinstance(said, dict) or not isinstance(said.get("parameters"), dict):
+        return text
+    if said.get("program", program.name) != program.name:
+        raise ParameterError(f"these are parameters of {said['program']!r}, not of {program.name}")
+    return json.dumps(said["parameters"])
 
 
 def random_shapes(program: Program, count: int, seed: int) -> list[dict[str, Value]]:

@@ -82,3 +82,17 @@ class TestInterpolate:
         for share, expected in ((0.2, 0.3), (0.6, 0.5), (1.0, 0.5)):
             assert interpolate(PROGRAM, bare, railed, share)["rail_height"] == expected
             assert interpolate(PROGRAM, bare, railed, share)["has_rail"] == (share > 0.5)
+
+    @given(valid_values, valid_values, st.floats(0, 1))
+    def test_a_group_moves_alone_and_ends_as_a_mix(
+        self, first: dict[str, Value], last: dict[str, Value], share: float
+    ) -> None:
+        text = PROGRAM.schema.text
+        between = interpolate(PROGRAM, first, last, share, ["seat"])
+        assert between["has_rail"] == first["has_rail"]
+        assert between["height"] == interpolate(PROGRAM, first, last, share)["height"]
+        assert text(interpolate(PROGRAM, first, last, 1.0, ["seat"])) == text(mix(PROGRAM, first, last, ["seat"]))
+
+    def test_a_group_that_is_not_there_is_named(self) -> None:
+        with pytest.raises(ParameterError, match="there is no group 'legs'"):
+            interpolate(PROGRAM, BASE, BASE, 0.5, ["legs"])

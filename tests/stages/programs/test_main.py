@@ -14,6 +14,7 @@ from stages.programs.__main__ import main
 from stages.programs.program import shape_of
 from stages.programs.sheets import CELL, reveal
 from stages.shape.views.portrait import PAPER
+from stages.training.recovery.recover import Recovered
 from tests.stages.programs.stool import PROGRAM
 
 BLOCK, STOOL = "tests.stages.programs.block", "tests.stages.programs.stool"
@@ -54,6 +55,21 @@ def test_steps_lead_from_one_shape_to_the_other(tmp_path: Path) -> None:
     assert main(["interpolate", STOOL, *map(str, ends), "--steps", "3", "--out", str(out)]) == 0
     heights = [json.loads((out / f"step-{number:02d}.json").read_text())["height"] for number in range(3)]
     assert heights == pytest.approx([0.4, 0.6, 0.8])
+
+
+def test_what_recovery_has_written_is_edited_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    low, high = ({**PROGRAM.schema.base, "height": height} for height in (0.4, 0.8))
+    for name, values in (("low", low), ("high", high)):
+        found = Recovered(PROGRAM, values, 0.001, 0.1, 0.0, None, None, "y", 1, ())
+        (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **found.described()}))
+    ends = [str(tmp_path / f"{name}.json") for name in ("low", "high")]
+    assert main(["interpolate", STOOL, *ends, "--steps", "3", "--group", "seat", "--out", str(tmp_path / "way")]) == 0
+    assert PROGRAM.schema.values((tmp_path / "way/step-01.json").read_text())["height"] == pytest.approx(0.6)
+    assert main(["mix", STOOL, *ends, "--group", "seat", "--out", str(tmp_path / "mix")]) == 0
+    assert PROGRAM.schema.values((tmp_path / "mix/mixed.json").read_text())["height"] == 0.8
+    capsys.readouterr()
+    assert main(["make", "chair", ends[0], "--out", str(tmp_path)]) == 2
+    assert "low.json: these are parameters of 'stool', not of chair" in capsys.readouterr().err
 
 
 def test_inspect_prints_the_table_and_draws_a_row_a_parameter(
