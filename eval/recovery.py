@@ -326,7 +326,7 @@ def _nearest(program: Program, rng: np.random.Generator) -> Method:
         points = frame_of(given.points).normalized(given.points[:GLIMPSE])
         distances = [chamfer_distance(points, each) for _, each in known()]
         values, _ = known()[int(np.argmin(distances))]
-        return Recovered(program, values, min(distances), min(distances), None, None, "y", NEIGHBORS, ())
+        return Recovered(program, values, min(distances), min(distances), 0.0, None, None, "y", NEIGHBORS, ())
 
     return method
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -17,6 +17,7 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.sketches.settings import SketchesConfig
 from stages.training.checkpoint import CheckpointError, weights_of_kind
 from stages.training.recovery.clouds import Frame, frame_of
+from stages.training.recovery.partial import PartialTarget, partial_target
 from stages.training.recovery.reading import Input, checked_cloud, ink_of
 from stages.training.recovery.refinement import Guess, Refined, base_guess, refine
 from stages.training.recovery.targets import CloudTarget, Target, cloud_target, drawing_target
@@ -34,6 +35,12 @@ UNLIKE = {"points": 0.004, "sketch": 0.001}
 drawing are everywhere, so that no other lines are far from them."""
 NO_BETTER = 0.9
 """A recovery that is not nearer than this share of the base shape's distance says nothing of the input."""
+TORN = 4.0
+"""A cloud that is so many times farther from the best whole shape than a cloud of that shape itself may be torn."""
+EXPLAINED = 0.5
+"""It is, if a part that is missing leaves no more than this share of the distance, and"""
+LEAST_MISSING = 0.1
+"""so much of the shape at least."""
 GLANCE = 40
 """Shapes that a program is given to show that it is the likeliest."""
 
@@ -53,15 +60,18 @@ Models = Mapping[tuple[str, str], TrainedRecovery]
 class Recovered:
     """program and values: what makes the shape. distance: mean squared distance between input and shape, both ways
     added, in longest sides of the box around the input (of a drawing: around its ink). base_distance: that of the
-    program's base shape. confidence: of each visible parameter the probability that the network gave to its value;
-    None without a network. placement: float64 (4, 4), from the program's coordinates to the input's; None of a
-    drawing. up: the axis of the input that points up. warnings: what speaks against the result, in words.
+    program's base shape. missing: the share of the shape's surface that a torn cloud says nothing of, and which its
+    distances leave out; 0 of a whole one and of a drawing. confidence: of each visible parameter the probability that
+    the network gave to its value; None without a network. placement: float64 (4, 4), from the program's coordinates to
+    the input's; None of a drawing. up: the axis of the input that points up. warnings: what speaks against the result,
+    in words.
     """
 
     program: Program
     values: Mapping[str, Value]
     distance: float
     base_distance: float
+    missing: float
     confidence: Mapping[str, float] | None
     placement: FloatArray | None
     up: str
@@ -77,6 +87,8 @@ class Recovered:
             "parameters": {name: value for name, value in settled.items() if name in visible},
             "chamfer": self.distance,
             "chamfer_of_base": self.base_distance,
+            "partial": self.missing > 0.0,
+            "missing": round(self.missing, 3),
             "confidence": None if self.confidence is None else dict(self.confidence),
             "placement": None if self.placement is None else self.placement.tolist(),
             "up": self.up,
@@ -122,7 +134,12 @@ def recover_input(
         rng = np.random.default_rng(seed)
         glances = [refine(each.program, each.guess, each.target, GLANCE, rng).distance for each in looks]
         looks = [looks[int(np.argmin(glances))]]
-    return _searched(looks[0], kind, budget, seed, guessed_program=not program)
+    fit = _fit(looks[0], budget, seed)
+    if given.points is not None and budget > 1 and fit.distance > TORN * fit.floor:
+        look = looks[0]
+        torn = _first_look(look.program, look.model, given, up, turned, seed, partial_target)
+        fit = min(fit, _fit(torn, budget, seed), key=_unexplained)
+    return _told(fit, kind, guessed_program=not program)
 
 
 def find_models(*folders: Path) -> tuple[dict[tuple[str, str], TrainedRecovery], list[str]]:
@@ -175,7 +192,13 @@ class _Look:
 
 
 def _first_look(
-    program: Program, model: TrainedRecovery | None, given: Input, up: Up, turned: bool, seed: int
+    program: Program,
+    model: TrainedRecovery | None,
+    given: Input,
+    up: Up,
+    turned: bool,
+    seed: int,
+    target_of: Callable[[FloatArray, np.random.Generator], Target] = cloud_target,
 ) -> _Look:
     """The best guess over the axes that may point up and the ways that a front may look."""
     if given.points is None:
@@ -188,7 +211,7 @@ def _first_look(
         cloud = given.points @ rotation.T
         rng = np.random.default_rng(seed)
         guess = base_guess(program) if model is None else model.guess_cloud(cloud, rng)
-        look = _Look(program, model, guess, cloud_target(cloud, rng), rotation, axis, frame_of(cloud))
+        look = _Look(program, model, guess, target_of(cloud, rng), rotation, axis, frame_of(cloud))
         looks.append((refine(program, guess, look.target, 1, rng).distance, look))
     return min(looks, key=lambda each: each[0])[1]
 
@@ -201,30 +224,65 @@ def _rotations(up: Up, quarters: int) -> Iterator[tuple[str, FloatArray]]:
             rotation = _QUARTER @ rotation
 
 
-def _searched(look: _Look, kind: str, budget: int, seed: int, guessed_program: bool) -> Recovered:
+@dataclass(frozen=True)
+class _Fit:
+    """What a search has found for a look. floor: how far a cloud or drawing of that shape itself is from it; base: how
+    far the program's base shape is; missing: the share of the shape that a torn cloud says nothing of."""
+
+    look: _Look
+    refined: Refined
+    floor: float
+    base: float
+    missing: float
+
+    @property
+    def distance(self) -> float:
+        return self.refined.distance
+
+
+def _fit(look: _Look, budget: int, seed: int) -> _Fit:
     rng = np.random.default_rng(seed)
-    program = look.program
-    refined = refine(program, look.guess, look.target, budget, rng)
-    base = refine(program, base_guess(program), look.target, 1, rng).distance
+    refined = refine(look.program, look.guess, look.target, budget, rng)
+    base = refine(look.program, base_guess(look.program), look.target, 1, rng).distance
+    parts = look.program.parts(refined.values)
+    missing = refined.target.missing(parts) if isinstance(refined.target, PartialTarget) else 0.0
+    return _Fit(look, refined, refined.target.floor(parts, rng), base, missing)
+
+
+def _unexplained(fit: _Fit) -> float:
+    """The distance, by which a fit that leaves something out is held against one of the whole shape."""
+    if isinstance(fit.refined.target, CloudTarget):
+        return EXPLAINED * fit.distance
+    return fit.distance if fit.missing >= LEAST_MISSING else float("inf")
+
+
+def _told(fit: _Fit, kind: str, guessed_program: bool) -> Recovered:
+    """A fit, and what speaks against it."""
+    look, refined, program = fit.look, fit.refined, fit.look.program
     warnings = []
     if guessed_program:
         warnings.append(f"no program was named: {program.name} fits best")
     if look.model is None:
         warnings.append(f"there is no trained model of {program.name} for {kind}: searched from its base shape alone")
-    limit = UNLIKE[kind] if look.model is None or kind == "sketch" else min(UNLIKE[kind], look.model.usual)
-    floor = refined.target.floor(program.parts(refined.values), rng)
-    if refined.distance - floor > limit:
+    if fit.missing > 0.0:
         warnings.append(
-            f"the input is unlike any {program.name}: the nearest that was found is {refined.distance:.2g} away, where "
-            f"{floor + limit:.2g} is much"
+            f"the cloud is partial: beyond its edge lies {fit.missing:.0%} of the shape that was found, of which the "
+            "cloud says nothing; its parameters there are guesses"
         )
-    if refined.distance - floor > NO_BETTER * (base - floor):
-        warnings.append(f"the result is no better than the base shape of the program ({base:.2g})")
+    limit = UNLIKE[kind] if look.model is None or kind == "sketch" else min(UNLIKE[kind], look.model.usual)
+    if fit.distance - fit.floor > limit:
+        warnings.append(
+            f"the input is unlike any {program.name}: the nearest that was found is {fit.distance:.2g} away, where "
+            f"{fit.floor + limit:.2g} is much"
+        )
+    if fit.distance - fit.floor > NO_BETTER * (fit.base - fit.floor):
+        warnings.append(f"the result is no better than the base shape of the program ({fit.base:.2g})")
     confidence = None if look.model is None else _confidence(program, look.guess, refined)
     placement = _placement(look, refined)
     return Recovered(
-        program, refined.values, refined.distance, base, confidence, placement, look.up, refined.tried, tuple(warnings)
-    )
+        program, refined.values, fit.distance, fit.base, fit.missing, confidence, placement, look.up, refined.tried,
+        tuple(warnings),
+    )  # fmt: skip
 
 
 def _confidence(program: Program, guess: Guess, refined: Refined) -> dict[str, float]:
@@ -238,7 +296,7 @@ def _confidence(program: Program, guess: Guess, refined: Refined) -> dict[str, f
 
 def _placement(look: _Look, refined: Refined) -> FloatArray | None:
     """From the program's coordinates to the box that targets are compared in, to the upright input, to the input."""
-    if look.frame is None or not isinstance(refined.target, CloudTarget):
+    if look.frame is None or not isinstance(refined.target, CloudTarget | PartialTarget):
         return None
     outer, inner = look.frame, refined.target.frame
     scale = outer.size / inner.size
