@@ -130,9 +130,9 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, wi
     is of, finds must get one of that type back; else any."""
     names = [answers.kit.types[index].name for index in setting.hubs]
     probe = Probe(answers, decision_rng(0, "choices", setting.grammar, *setting.kinds, *names))
-    rung = Rung(setting, probe.go_on(tries, GRAPHS), kept, 1.0)
+    rung = Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept, 1.0)
     if rung.finds.histograms >= PROMISING and not rung.gives_enough:
-        rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS), kept, 1.0)
+        rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS, evenly=True), kept, 1.0)
     if setting.hubs and rung.gives_enough:
         backdrop = Backdrop(answers, upright=True)
         chosen = [probe.variants[place].assembly for place in rung.finds.most_different[:LOOKED_AT]]
