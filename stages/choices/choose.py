@@ -16,10 +16,15 @@ from stages.exemplars.hubs import chosen_hubs
 from stages.exemplars.identify import Identified
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, KitConfig
+from stages.shape.kit import Assembly, Kit
+from stages.shape.physics.judge import unmet
+from stages.shape.physics.settings import Requirements
+from stages.shape.shape import kit_shape
+from stages.variations.carcass import carcass
 from stages.variations.dullness import COPIED
-from stages.variations.settings import CHOSEN_COPIED
+from stages.variations.settings import CHOSEN_CARCASS, CHOSEN_COPIED, CHOSEN_STABLE
 
-__all__ = ["Choices", "choose", "found_words", "most_copied"]
+__all__ = ["REQUIREMENTS", "Choices", "choose", "found_words", "most_copied", "must_stand"]
 
 TELLING = 0.25
 """Share of finds from which on a search that refuses the others still comes to an end."""
@@ -29,7 +34,7 @@ TELLING = 0.25
 class Choices:
     """What was chosen for a kit.
 
-    values: of the keys that the config left open, by OPEN_KEYS and CHOSEN_COPIED; reasons: a sentence for each; finds:
+    values: of the keys that the config left open, by OPEN_KEYS and REQUIREMENTS; reasons: a sentence for each; finds:
     of the probe under what was chosen, None where there was nothing to probe; kept: share of the parts that stay in
     the shape graphs; enough: whether the probe promises a pool of some size that is not dull; settings: how many were
     probed.
@@ -57,15 +62,22 @@ class Choices:
         }
 
 
+REQUIREMENTS = (CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS)
+
+
 def choose(
-    config: KitConfig, models: Sequence[Model], identified: Identified, tries: int, copies: bool = True
+    config: KitConfig,
+    models: Sequence[Model],
+    identified: Identified,
+    tries: int,
+    require: Sequence[str] = REQUIREMENTS,
 ) -> Choices:
     """Decide what `config` leaves open for a kit of `models`, whose parts are `identified`; what it states is obeyed.
 
     In this order: the axis that points up, the contact tolerance, the first rung of a ladder over kinds of contact,
-    grammar and hubs under which a short search, of `tries` or some times as many, finds enough; and with `copies`
-    whether what is hardly more than a copy of an exemplar is refused. All that is random in it depends on the models
-    and on what is stated alone, so every run and `make inspect` choose alike.
+    grammar and hubs under which a short search, of `tries` or some times as many, finds enough; and what variants must
+    be, those of REQUIREMENTS that are in `require`: no near copies, stable, with the carcass of the exemplars. All that
+    is random in it depends on the models and on what is stated alone, so every run and `make inspect` choose alike.
     Raises ConfigError for stated hubs that are no types.
     """
     open_keys = config.left_open()
@@ -80,8 +92,9 @@ def choose(
     sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up)
     one_surface = any(each.segmentation in ("symmetry", "sections") for each in models)
     rungs = climb(sight, _rails(stated, sight, open_keys, one_surface), tries)
-    if copies:
-        values[CHOSEN_COPIED], reasons[CHOSEN_COPIED] = most_copied(rungs[-1].finds if rungs else None)
+    for key, (value, why) in _required(sight, rungs).items():
+        if key in require:
+            values[key], reasons[key] = value, why
     if not rungs:
         return Choices(values, reasons, None, 1.0, False, 0)
     chosen = rungs[-1]
@@ -118,6 +131,40 @@ def most_copied(finds: Finds | None) -> tuple[float, str]:
         return 1.0, f"only {finds.telling:.0%} of the finds of a short search are no near copies"
     beside = f"{finds.telling:.0%} of the finds of a short search are none"
     return COPIED, f"refuses copies with little beside them; {beside}"
+
+
+def _required(sight: Sight, rungs: Sequence[Rung]) -> dict[str, tuple[Any, str]]:
+    """Value and reason of each of REQUIREMENTS, after the rung that was chosen, the last."""
+    if not rungs:
+        nothing = "there is nothing to search"
+        return {CHOSEN_COPIED: most_copied(None), CHOSEN_STABLE: (False, nothing), CHOSEN_CARCASS: ((), nothing)}
+    kit, finds = sight.kit(rungs[-1].setting), rungs[-1].finds
+    spanning = carcass(kit)
+    why = (
+        "the exemplars have parts of these as large as themselves" if spanning else "no part is as large as an exemplar"
+    )
+    return {
+        CHOSEN_COPIED: most_copied(finds),
+        CHOSEN_STABLE: must_stand(kit, rungs[-1].different),
+        CHOSEN_CARCASS: (spanning, why),
+    }
+
+
+def must_stand(kit: Kit, different: Sequence[Assembly]) -> tuple[bool, str]:
+    """Whether what falls over is refused, and why: where the exemplars of a kit stand, some of the most different finds
+    of a short search do not, and enough do."""
+    standing = Requirements(stable=True)
+    if any(unmet(standing, kit_shape(kit, each.whole)) for each in kit.exemplars):
+        return False, "not even the exemplars stand"
+    if not different:
+        return False, "a short search finds nothing that could fall"
+    falls = sum(unmet(standing, kit_shape(kit, each)) is not None for each in different)
+    told = f"of the {len(different)} most different finds of a short search"
+    if not falls:
+        return False, f"none {told} falls"
+    if len(different) - falls < TELLING * len(different):
+        return False, f"{falls} {told} fall, so that too few would be left"
+    return True, f"{falls} {told} fall, and the exemplars stand"
 
 
 def found_words(finds: Finds) -> str:

@@ -12,7 +12,7 @@ import yaml
 
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
-from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS
+from stages.variations.settings import CHOSEN_HUBS
 
 __all__ = ["config_text", "dataset_name"]
 
@@ -38,12 +38,12 @@ def config_text(
     config: KitConfig,
     models: Sequence[Model],
     reasons: Mapping[str, str],
-    copied: float,
+    require: Mapping[str, Any],
     layouts: int | None,
     said: str,
 ) -> str:
-    """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key, of `copied` too, the
-    greatest share that may be copied whole; `layouts`: about how many there are, None for very many; `said`: the
+    """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key, of `require` too, what
+    variants must be, by REQUIREMENTS; `layouts`: about how many there are, None for very many; `said`: the
     forecast in a sentence."""
     made = config.decided()
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
@@ -85,13 +85,14 @@ def config_text(
         "  search:",
         _line(2, "duplicates", "graph", "distinct shape graphs, not ways to turn a part in its place"),
     ]
-    require = []
+    asked = []
     if made.hubs and config.hubs.keep == "backdrop":
-        require.append(
+        asked.append(
             _line(2, "hubs", CHOSEN_HUBS, "a variant with a smaller share of what the exemplars have is refused")
         )
-    require.append(_line(2, "copied", copied, reasons.get(CHOSEN_COPIED, "")))
-    lines += ["  require:", *require]
+    for key, value in require.items():
+        asked.append(_line(2, key.removeprefix("require."), value, reasons.get(key, "")))
+    lines += ["  require:", *asked]
     return "\n".join(lines) + "\n"
 
 
@@ -102,7 +103,9 @@ def _line(depth: int, key: str, value: Any, comment: str) -> str:
 
 def _value(value: Any) -> str:
     """A value as YAML: lists in one line, text in quotes where it would be read as something else."""
-    if isinstance(value, list):
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(each) for each in value) + "]"
     text = str(value)
     plain = re.fullmatch(r"[A-Za-z_][A-Za-z_-]*", text) and yaml.safe_load(text) == text  # `no` is false

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
+from stages.choices.choose import REQUIREMENTS
 from stages.choices.config_text import config_text, dataset_name
 from stages.choices.prospect import Prospect, look_at
 from stages.choices.settings import ChoicesConfig
@@ -26,7 +27,6 @@ from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.shape.kit import ContactKind, Strictness
-from stages.variations.settings import CHOSEN_COPIED
 
 __all__ = ["main"]
 
@@ -75,8 +75,8 @@ def _written(
     if found.forecast is not None and found.assemblies:
         sheet = forecast_sheet(found.built.kit, found.assemblies, name, found.sentence)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
-    copied = found.choices.values[CHOSEN_COPIED]
-    text = config_text(name, found.config, models, found.choices.reasons, copied, layouts, found.sentence)
+    require = {key: found.choices.values[key] for key in REQUIREMENTS}
+    text = config_text(name, found.config, models, found.choices.reasons, require, layouts, found.sentence)
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from pipeline.randomness import decision_rng
 from stages.choices.probe import HUB, Finds, Probe
 from stages.choices.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
-from stages.shape.kit import ContactKind, Strictness
+from stages.shape.kit import Assembly, ContactKind, Strictness
 from stages.variations.backdrop import Backdrop
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
@@ -59,12 +59,14 @@ class Rails:
 @dataclass(frozen=True)
 class Rung:
     """A setting, what a probe found under it, the share of all parts that stay, and the share of the most different
-    finds that get their hub back; 1 where none are left out."""
+    finds that get their hub back, 1 where none are left out; different: the most different
+    finds, with their hubs where they are left out."""
 
     setting: Setting
     finds: Finds
     kept: float
     fitted: float
+    different: Sequence[Assembly] = ()
 
     @property
     def score(self) -> tuple[float, ...]:
@@ -133,13 +135,16 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, wi
     rung = Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept, 1.0)
     if rung.finds.histograms >= PROMISING and not rung.gives_enough:
         rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS, evenly=True), kept, 1.0)
-    if setting.hubs and rung.gives_enough:
-        backdrop = Backdrop(answers, upright=True)
-        chosen = [probe.variants[place].assembly for place in rung.finds.most_different[:LOOKED_AT]]
-        awaited = [widest] if widest in setting.hubs else list(setting.hubs)
-        fitted = sum(bool(np.isin(backdrop.fit(each).types, awaited).any()) for each in chosen) / len(chosen)
-        rung = replace(rung, fitted=fitted)
-    return rung
+    different = [probe.variants[place].assembly for place in rung.finds.most_different]
+    if not setting.hubs:
+        return replace(rung, different=different)
+    if not rung.gives_enough:
+        return rung
+    backdrop = Backdrop(answers, upright=True)
+    whole = [backdrop.fit(each) for each in different[:LOOKED_AT]]
+    awaited = [widest] if widest in setting.hubs else list(setting.hubs)
+    fitted = sum(bool(np.isin(each.types, awaited).any()) for each in whole) / len(whole)
+    return replace(rung, fitted=fitted, different=whole)
 
 
 def _settings(sight: Sight, rails: Rails) -> Iterator[Setting]:

@@ -14,6 +14,7 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
+from stages.variations.carcass import NO_CARCASS, carcass, carcass_test
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
@@ -72,13 +73,16 @@ class Finds:
 
 
 class Probe:
-    """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone."""
+    """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone. What lacks the
+    kit's carcass is no find."""
 
     def __init__(self, answers: ContactAnswers, rng: np.random.Generator) -> None:
         self.kit = answers.kit
         self.variants: list[Variant] = []
         self._rng = rng
         self._graphs: set[int] = set()
+        self._pieces = 0
+        self._is_whole = carcass_test(self.kit, carcass(self.kit))
         self._tries = 0
         widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
         methods = METHODS if widest <= HUB else METHODS[:1]
@@ -110,12 +114,14 @@ class Probe:
             found, used = search.run(self._rng, asked, missing, f"probe-{self._tries}", lambda _: None)
             self._tries += used
             left[number] = left[number] - used if found else 0
-            self.variants.extend(each for each in found if each.graph not in self._graphs)
-            self._graphs.update(each.graph for each in found)
+            whole = [each for each in found if self._is_whole(each.assembly)]
+            self._pieces += len(found) - len(whole)
+            self.variants.extend(each for each in whole if each.graph not in self._graphs)
+            self._graphs.update(each.graph for each in whole)
 
     def finds(self) -> Finds:
         """What was found so far."""
-        rejects = sum((each.rejects for each in self._searches), Counter[str]())
+        rejects = sum((each.rejects for each in self._searches), Counter({NO_CARCASS: self._pieces}))
         counts = _counts(self.kit, [each.assembly.types for each in self.variants])
         exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:

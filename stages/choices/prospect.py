@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from stages.choices.choose import Choices, choose, found_words
@@ -15,8 +16,12 @@ from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.shape.kit import Assembly
+from stages.shape.physics.judge import unmet
+from stages.shape.physics.settings import Requirements
+from stages.shape.shape import kit_shape
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import CHOSEN_STABLE
 
 __all__ = ["Prospect", "look_at"]
 
@@ -96,7 +101,10 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
         expected = forecast(built.kit, answers, tries, known)
         rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
         backdrop = Backdrop(answers, upright=True)
-        assemblies = [backdrop.fit(each.assembly) for each in expected.chosen[:SHOWN]]
+        asked = Requirements(stable=choices.values[CHOSEN_STABLE])
+        fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
+        kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
+        assemblies = list(islice(kept, SHOWN))
     return Prospect(decided, config, choices, seen, built, expected, assemblies, rate, time.process_time() - start)
 
 

@@ -12,7 +12,7 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.choices.settings import ChoicesConfig
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
-from stages.variations.settings import VariationsConfig
+from stages.variations.settings import CHOSEN_CARCASS, VariationsConfig
 
 __all__ = ["STAGE"]
 
@@ -20,17 +20,19 @@ BYTES_A_KIT = 4_000
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """One shard for each kit that leaves a key open; its params hold the kit's config, its models' digests, and whether
-    it is open what may be copied."""
+    """One shard for each kit that leaves a key open; its params hold the kit's config, its models' digests, and what
+    variants must be that is open, too."""
     variations = plan.config.section(VariationsConfig)
-    copies = variations.per_kit > 0 and variations.require.copied == "auto"
+    left_open = variations.require.left_open if variations.per_kit else ()
+    if variations.search.sub_assemblies:  # what is asked for by this name has no carcass
+        left_open = tuple(key for key in left_open if key != CHOSEN_CARCASS)
     return [
         Shard(
             kit.name,
             {
                 "kit": kit.model_dump(mode="json"),
                 "digests": [file_digest(shape.path) for shape in kit.shapes],
-                "copies": copies,
+                "require": list(left_open),
             },
         )
         for kit in _open_kits(plan.config)
@@ -47,8 +49,7 @@ def run_shard(task: Task) -> Outcome:
     limits = task.config.section(ExemplarsConfig).limits
     models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
     tries = task.config.section(ChoicesConfig).tries
-    identified, copies = identify_parts(models, config), task.shard.params["copies"]
-    made = choose(config, models, identified, tries, copies).as_json()
+    made = choose(config, models, identify_parts(models, config), tries, task.shard.params["require"]).as_json()
     with task.output(f"{config.name}.json") as stream:
         stream.write(json_bytes(made))
     return Outcome(samples=0, summary=made)

@@ -8,6 +8,7 @@ import numpy as np
 
 from stages.exemplars.findings import SMALL, hubs
 from stages.shape.kit import Kit
+from stages.variations.carcass import NO_CARCASS, carcass
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
 __all__ = ["another_model", "what_keeps", "what_was_left"]
@@ -29,16 +30,20 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     labelled = [kit.labelled(each.assembly).types for each in kit.exemplars]
     counts = np.bincount(np.concatenate(labelled), minlength=len(kit.labels))
     used, another = int((counts > 0).sum()), another_model(kit)
+    fitting = "by meaning (`types: meaning`; parts change places where what touches them is of one size)"
     if counts.max() < 2:
-        return f"every part is its own type; bring {another}, or name types by meaning (`types: meaning`)"
+        return f"every part is its own type; bring {another}, or name types {fitting}"
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
+    if rejects.get(NO_CARCASS, 0):
+        lost = f"all that was found lacks {' or '.join(carcass(kit))}, parts as large as the exemplar"
+        return f"{lost}, and is a piece of one; bring {another} that has them"
     pinned = _hub(kit)
     if pinned:
         return f"{pinned}; split it into several parts in the model, or bring {another}"
     most = max(map(len, labelled))
     if most <= SMALL:
-        by_meaning = "" if len(kit.labels) < len(kit.types) else ", or of parts named alike, with `types: meaning`"
+        by_meaning = "" if len(kit.labels) < len(kit.types) else f", or name types {fitting}"
         return f"of {most} parts hardly any can be exchanged; bring more models of the same parts{by_meaning}"
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
     if known > REGULAR * tries:

@@ -25,12 +25,19 @@ from stages.shape.shape import kit_shape
 from stages.variations.advice import what_keeps, what_was_left
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import backdrop_of
+from stages.variations.carcass import NO_CARCASS, carcass_test
 from stages.variations.constraint import made_mend, made_test, module_of
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.measures import pool_measures
 from stages.variations.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search.search import SPARE, Search, Variant
-from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS, VariationsConfig
+from stages.variations.settings import (
+    CHOSEN_CARCASS,
+    CHOSEN_COPIED,
+    CHOSEN_HUBS,
+    CHOSEN_STABLE,
+    VariationsConfig,
+)
 
 __all__ = ["has_hubs", "last_pool", "run_lane", "run_pool", "search_shards"]
 
@@ -53,7 +60,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     shards: list[Shard] = []
     found: list[str] = []
     state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], **{key: {} for key in COUNTED}}
-    target, copied = math.ceil(config.selection.oversample * config.per_kit), _most_copied(plan, kit)
+    target, required = math.ceil(config.selection.oversample * config.per_kit), _chosen(plan, kit)
     for number in range(config.search.rounds):
         name = f"{kit}-r{number:03d}"
         wanted = max(FEWEST, -(-(target - state["telling"]) * 11 // (10 * config.search.lanes)))
@@ -61,7 +68,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
         lanes = [
             Shard(
                 f"{name}-lane{lane:02d}",
-                {"job": "lane", "kit": kit, "wanted": wanted, "copied": copied},
+                {"job": "lane", "kit": kit, "wanted": wanted, **required},
                 (f"exemplars/{kit}", *found),
                 code=tuple(module_of(each) for each in config.require.constraints),
             )
@@ -118,7 +125,11 @@ def run_lane(task: Task) -> Outcome:
         search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, origins, (place[0], place[1]), labels))
     wanted = task.shard.params["wanted"]
     variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
-    kept, resized = _required(task, kit, section, variants)
+    is_whole = carcass_test(kit, task.shard.params["carcass"])
+    whole = [each for each in variants if is_whole(each.assembly)]
+    if len(whole) < len(variants):
+        search.rejects[NO_CARCASS] += len(variants) - len(whole)
+    kept, resized = _required(task, kit, section, whole)
     write_variants(task, kit, kept)
     rejects = dict(sorted(search.rejects.items()))
     for reason, count in rejects.items():
@@ -134,18 +145,18 @@ def _required(
 ) -> tuple[Sequence[Variant], Counter[str]]:
     """The variants that are, with their backdrop, what the config requires, the others being refused; and how many of
     them were resized so that they are, by the reason for which they would have been refused."""
-    require, most = section.require, task.shard.params["copied"]
-    telling = [each for each in variants if each.lineage["copied"]["largest"] <= most]
+    params = task.shard.params
+    telling = [each for each in variants if each.lineage["copied"]["largest"] <= params["copied"]]
     if len(telling) < len(variants):
         task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
     telling, resized = _constrained(task, kit, section, telling)
-    hubs = _hubs_required(task.config, kit)
-    if not (require.rooted or require.stable or hubs):
+    hubs, physical = _hubs_required(task.config, kit), section.require.physical(params["stable"])
+    if not (physical.rooted or physical.stable or hubs):
         return telling, resized
     backdrop, kept = backdrop_of(task, kit.name), []
     for variant in telling:
         whole = backdrop.fit(variant.assembly)
-        weak = unmet(require, kit_shape(kit, whole)) if has_hubs(kit, hubs, whole) else "no backdrop"
+        weak = unmet(physical, kit_shape(kit, whole)) if has_hubs(kit, hubs, whole) else "no backdrop"
         if weak is None:
             kept.append(variant)
         else:
@@ -177,13 +188,19 @@ def _constrained(
     return kept, resized
 
 
-def _most_copied(plan: Plan, kit: str) -> float:
-    """The greatest share of a variant of `kit` that may be copied whole, as stated or as was chosen."""
-    said = plan.config.section(VariationsConfig).require.copied
-    if said != "auto":
-        return said
+def _chosen(plan: Plan, kit: str) -> dict[str, Any]:
+    """What is required of a variant of `kit` by the keys that can be left open, as stated or as was chosen."""
+    require = plan.config.section(VariationsConfig).require
     built = plan.summary("exemplars", kit) or {"chosen": {}}
-    return float(built["chosen"].get(CHOSEN_COPIED, 1.0))
+    found: dict[str, Any] = {}
+    for key, said, otherwise in (
+        (CHOSEN_COPIED, require.copied, 1.0),
+        (CHOSEN_STABLE, require.stable, False),
+        (CHOSEN_CARCASS, require.carcass, ()),
+    ):
+        value = built["chosen"].get(key, otherwise) if said == "auto" else said
+        found[key.removeprefix("require.")] = list(value) if isinstance(value, tuple) else value
+    return found
 
 
 def _hubs_required(config: Config, kit: Kit) -> float:

@@ -7,12 +7,14 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
-from stages.shape.physics.settings import Requirements
+from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.variations.features import Axis
 
 __all__ = [
+    "CHOSEN_CARCASS",
     "CHOSEN_COPIED",
     "CHOSEN_HUBS",
+    "CHOSEN_STABLE",
     "GrownConfig",
     "NoveltyConfig",
     "SearchConfig",
@@ -24,8 +26,8 @@ __all__ = [
 CHOSEN_HUBS = 0.5
 """What is required of hubs that were chosen and not stated: a bridge with its road may end in a rail, and a mile of
 rail on which one brick of the road fits is no bridge."""
-CHOSEN_COPIED = "require.copied"
-"""What `require.copied` is called among the keys that are chosen for a kit."""
+CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS = "require.copied", "require.stable", "require.carcass"
+"""What these keys of `require` are called among those that are chosen for a kit."""
 
 
 class NoveltyConfig(StrictModel):
@@ -214,9 +216,26 @@ class SplitConfig(StrictModel):
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 
-class VariantRequirements(Requirements):
+class VariantRequirements(StrictModel):
     """What a variant must be, its backdrop included, so that it is kept; what is not named is not required."""
 
+    rooted: bool = Field(False, description="Whether every part must be connected to the ground.")
+    stable: Literal["auto"] | bool = Field(
+        "auto",
+        description="Whether the shape must stand and bear small pushes. `auto`: for a kit whose exemplars do, where a "
+        "short search finds some that do not, and enough that do; a kit that leaves no key of its own to be chosen is "
+        "not searched, and none is refused.",
+    )
+    physics: PhysicsConfig = Field(
+        default_factory=PhysicsConfig,
+        description="What they are judged by. Records are judged by the section validity: say the same there.",
+    )
+    carcass: Literal["auto"] | tuple[str, ...] = Field(
+        "auto",
+        description="Labels of which every variant must have a part, such as the top and the sides of a cabinet. "
+        "`auto`: those of which every exemplar has a part about as large as itself (two thirds of its diagonal), for a "
+        "kit that leaves a key of its own to be chosen; else none.",
+    )
     hubs: Literal["auto"] | Annotated[int, Field(ge=0)] | Annotated[float, Field(gt=0, lt=1)] = Field(
         "auto",
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
@@ -234,6 +253,16 @@ class VariantRequirements(Requirements):
         "exemplar; 1 refuses none. `auto`: 0.9 for a kit of which a short search finds enough beside such copies, else "
         "1; a kit that leaves no key of its own to be chosen is not searched, and none is refused.",
     )
+
+    @property
+    def left_open(self) -> tuple[str, ...]:
+        """Those of CHOSEN_COPIED, CHOSEN_STABLE and CHOSEN_CARCASS that are left at `auto`."""
+        said = {CHOSEN_COPIED: self.copied, CHOSEN_STABLE: self.stable, CHOSEN_CARCASS: self.carcass}
+        return tuple(key for key, each in said.items() if each == "auto")
+
+    def physical(self, stable: bool) -> Requirements:
+        """What a shape must be physically, where `stable` says what was chosen or stated of that key."""
+        return Requirements(rooted=self.rooted, stable=stable, physics=self.physics)
 
 
 class VariationsConfig(StrictModel):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stages.choices.choose import Choices, choose, most_copied
+from stages.choices.choose import REQUIREMENTS, Choices, choose, most_copied, must_stand
 from stages.choices.forecast import forecast
 from stages.choices.probe import Finds, Probe
 from stages.choices.sight import Setting, Sight, contact_tolerance
@@ -24,10 +24,11 @@ from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
 from stages.shape.kit import ContactKind
 from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.variations.tables import ROUND, SQUARE, THICK, THIN, table
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, config_of, models_of, pose, ring
+from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, config_of, kit_of, models_of, pose, ring
 
 ROOT = Path(__file__).resolve().parents[3]
 TRIES = 300
+CUBE = {"cube": box(1.0, 1.0, 1.0)}
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
@@ -101,12 +102,13 @@ class TestLadder:
         config = KitConfig(name="playground", shapes=tuple(paths))
         models = [read_model(path) for path in paths]
         made = choose(config, models, identify_parts(models, config), 2500)
-        assert (dict(made.values), made.settings, made.enough) == ({**STRICTEST, "require.copied": 0.9}, 1, True)
+        unasked = {"require.copied": 0.9, "require.stable": False, "require.carcass": ()}
+        assert (dict(made.values), made.settings, made.enough) == ({**STRICTEST, **unasked}, 1, True)
 
     def test_what_the_config_states_is_obeyed_and_not_chosen(self) -> None:
         stated = {"up": "z", "grammar": "count_and_set", "disconnected": "error", "hubs": HubConfig(types="none")}
         made = chosen([chain(3), chain(5)], CHAIN, **stated)
-        assert set(made.values) == {"contact.tolerance", "contact.kinds", "require.copied"} == set(made.reasons)
+        assert set(made.values) == {"contact.tolerance", "contact.kinds", *REQUIREMENTS} == set(made.reasons)
 
     def test_choices_are_the_same_every_time(self) -> None:
         shapes = [ring(1, 1), ring(2, 3)]
@@ -151,7 +153,7 @@ class TestLadder:
         built, _ = build_kit(config.decide(STRICTEST), models)
         assert probed.grammar.neighbourhoods == built.grammar.neighbourhoods
         made = choose(config, models, identified, TRIES)
-        assert set(made.values) == {*config.left_open(), "require.copied"}
+        assert set(made.values) == {*config.left_open(), *REQUIREMENTS}
         assert made.finds is not None
 
 
@@ -170,7 +172,7 @@ class TestCopies:
 
     def test_a_limit_that_is_stated_is_not_chosen(self) -> None:
         config, models = left_open([ring(1, 1), ring(2, 3)]), models_of(ROAD, [ring(1, 1), ring(2, 3)])
-        made = choose(config, models, identify_parts(models, config), TRIES, copies=False)
+        made = choose(config, models, identify_parts(models, config), TRIES, require=())
         assert set(made.values) == set(config.left_open())
 
     def test_finds_tell_something_unless_they_are_copied_but_for_a_tenth(self) -> None:
@@ -180,6 +182,26 @@ class TestCopies:
         shares = [0.5, 0.9, 0.95, 1.0]
         probe.variants[:] = [replace(probe.variants[0], lineage={"copied": {"largest": each}}) for each in shares]
         assert probe.finds().telling == 0.5
+
+
+class TestStanding:
+    @staticmethod
+    def row(*heights: float) -> Any:
+        """Cubes in a row at some heights: one on the ground and one beside it falls as soon as it is lifted."""
+        return kit_of(CUBE, [[("cube", pose(place, height, 0)) for place, height in enumerate(heights)]]).exemplars[0]
+
+    def test_what_falls_is_refused_where_exemplars_stand_and_enough_finds_do(self) -> None:
+        kit = kit_of(CUBE, [[("cube", pose(0, 0, 0)), ("cube", pose(1, 0, 0))]])
+        flat, arm = self.row(0, 0, 0).assembly, self.row(0, 0.9, 1.8).assembly
+        assert must_stand(kit, [flat, flat]) == (False, "none of the 2 most different finds of a short search falls")
+        assert must_stand(kit, [flat, arm, arm])[0]
+        assert not must_stand(kit, [flat, *[arm] * 4])[0]  # hardly any would be left
+        assert not must_stand(kit, [])[0]
+
+    def test_kits_that_do_not_stand_themselves_are_not_asked_to(self) -> None:
+        kit = kit_of(CUBE, [[("cube", pose(k, 0.9 * k, 0)) for k in range(3)]])
+        flat = self.row(0, 0, 0).assembly
+        assert must_stand(kit, [flat, kit.exemplars[0].assembly]) == (False, "not even the exemplars stand")
 
 
 class TestForecast:

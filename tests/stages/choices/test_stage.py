@@ -77,7 +77,9 @@ def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_p
     config = {"name": "toy", "exemplars": {"kits": [kit]}, "variations": variations}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("choices", "exemplars", "variations"))
-    assert record(tmp_path, "choices", "open")["summary"]["chosen"] == {"disconnected": "error", "require.copied": 0.9}
+    unasked = {"require.stable": False, "require.carcass": []}
+    chosen = record(tmp_path, "choices", "open")["summary"]["chosen"]
+    assert chosen == {"disconnected": "error", "require.copied": 0.9, **unasked}
     samples = [
         sample
         for shard in (tmp_path / "out" / ".work" / "toy" / "variations").glob("toy-t*.tar")

@@ -165,28 +165,36 @@ def digests(folder: Path, out: str) -> dict[str, str]:
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(root.glob("*.*"))}
 
 
-def test_only_towers_that_bear_the_required_push_are_kept(tmp_path: Path) -> None:
+def test_only_towers_that_bear_the_required_push_and_have_their_storey_are_kept(tmp_path: Path) -> None:
     upright = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    meshes = {**CHAIN, "storey": trimesh.creation.box((1.0, 0.3, 0.6))}
     towers = [[(name, upright @ at) for name, at in chain(links)] for links in (3, 5)]
-    paths = [write_model(tmp_path / f"tower{k}.glb", CHAIN, tower) for k, tower in enumerate(towers)]
+    towers[1][3] = ("storey", towers[1][3][1])  # so that some variants have none
+    paths = [write_model(tmp_path / f"tower{k}.glb", meshes, tower) for k, tower in enumerate(towers)]
     search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 0.1, "rounds": 20}
     config = {
         "name": "toy",
         "seed": 5,
         "exemplars": {"kits": [stated({"name": "tower", "shapes": paths, "parts": "nodes"})]},
         # a tower of n links is n + 1 high and one wide: it tips at a push of 1 / (n + 1) of its weight
-        "variations": {"per_kit": 50, "search": search, "require": {"stable": True, "physics": {"push": 0.135}}},
+        "variations": {
+            "per_kit": 50,
+            "search": search,
+            "require": {"stable": True, "physics": {"push": 0.135}, "carcass": ["storey"]},
+        },
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     for stage in ("exemplars", "variations"):
         code, printed = mill("run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1)
         assert code == 0, printed
-    links = {
-        len(sample) - 2 for shard in collection(tmp_path, "out") for sample in (s.assembly for s in read_samples(shard))
-    }
-    assert max(links) == 6
+    samples = [sample for shard in collection(tmp_path, "out") for sample in read_samples(shard)]
+    assert max(len(sample.assembly) - 2 for sample in samples) == 6
+    kit = load_kit(*(tmp_path / "out" / ".work" / "toy" / "exemplars" / f"tower{end}" for end in (".json", ".tar")))
+    (storey,) = (number for number, each in enumerate(kit.types) if each.name == "storey")
+    assert all(storey in sample.assembly.types for sample in samples)
     records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
     assert "not stable" in records
+    assert "without its carcass" in records
 
 
 def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: Path) -> None:

@@ -1,0 +1,51 @@
+"""The carcass of a kit: what is as large as an exemplar itself, without which a variant is no more than a piece of one.
+
+A cabinet is seen by its top, sides and back; what is left when these are gone is drawers, however well they fit. A
+castle of tiles has no such parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pipeline.config import nearest
+from pipeline.errors import ConfigError
+from stages.shape.geometry.contact import world_boxes
+from stages.shape.kit import Assembly, Exemplar, Kit
+
+__all__ = ["NO_CARCASS", "carcass", "carcass_test"]
+
+SPAN = 2 / 3
+"""A part belongs to the carcass if the diagonal of its box is so much of the exemplar's."""
+NO_CARCASS = "without its carcass"
+"""Why a variant is refused that lacks a part of the carcass."""
+
+
+def carcass(kit: Kit) -> tuple[str, ...]:
+    """The labels of the carcass, in the order of the kit's: of each, every exemplar has a part that spans it. Hubs are
+    none of it, for they are put back behind finished shapes."""
+    spanning = [_spanning(kit, each) for each in kit.exemplars]
+    return tuple(name for label, name in enumerate(kit.labels) if all(label in each for each in spanning))
+
+
+def carcass_test(kit: Kit, required: Sequence[str]) -> Callable[[Assembly], bool]:
+    """Whether an assembly has a part of each of the labels `required`. Raises ConfigError for one that no part has."""
+    for name in required:
+        if name not in kit.labels:
+            near = nearest(name, kit.labels)
+            told = f"did you mean {near}?" if near else f"its parts are {', '.join(kit.labels)}"
+            raise ConfigError(f"variations.require.carcass: kit {kit.name} has no parts called {name}; {told}")
+    asked = {kit.labels.index(name) for name in required}
+    return lambda assembly: asked <= set(kit.label_of[assembly.types].tolist())
+
+
+def _spanning(kit: Kit, exemplar: Exemplar) -> set[int]:
+    whole = exemplar.whole
+    boxes = world_boxes(kit.types, whole.types, whole.poses)
+    extent = np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0))
+    spans = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) >= SPAN * extent
+    bare = spans & ~np.isin(whole.types, kit.grammar.hubs)
+    found: set[int] = set(kit.label_of[whole.types[bare]].tolist())
+    return found

@@ -1,0 +1,50 @@
+"""The carcass of a kit: the parts that are as large as its exemplars."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.errors import ConfigError
+from stages.exemplars.settings import HubConfig
+from stages.variations.carcass import carcass, carcass_test
+from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, pose
+
+MESHES = {"top": box(4.0, 0.2, 2.0), "leg": box(0.2, 2.0, 0.2), "shelf": box(3.2, 0.2, 1.5)}
+
+
+def stand(*legs: tuple[float, float]) -> list[Placed]:
+    """A top of a diagonal of 4.48 on legs, all in all 4.98 across."""
+    return [("top", pose(0, 1.1, 0)), *(("leg", pose(x, 0, z)) for x, z in legs)]
+
+
+FOUR = stand((-1.5, -0.5), (1.5, -0.5), (-1.5, 0.5), (1.5, 0.5))
+
+
+def test_what_spans_an_exemplar_is_its_carcass_and_what_is_small_is_not() -> None:
+    assert carcass(kit_of(MESHES, [FOUR])) == ("top",)
+    assert carcass(kit_of(CHAIN, [chain(5)])) == ()
+
+
+def test_of_a_part_of_the_carcass_every_exemplar_has_one_that_spans_it() -> None:
+    shelf = ("shelf", pose(0, -1.1, 0))  # on the ground below the legs: 3.54 of 5.07 across
+    both = kit_of(MESHES, [[*FOUR, shelf], FOUR])
+    assert carcass(kit_of(MESHES, [[*FOUR, shelf]])) == ("top", "shelf")
+    assert carcass(both) == ("top",)
+
+
+def test_hubs_are_put_back_and_are_none_of_it() -> None:
+    table = [*FOUR, ("shelf", pose(0, -1.1, 0))]
+    kit = kit_of(MESHES, [table])
+    hub = kit_of(MESHES, [table], hubs=HubConfig(types=("top",)))
+    assert carcass(kit) == ("top", "shelf")
+    assert carcass(hub) == ("shelf",)
+
+
+def test_an_assembly_has_it_or_not_and_a_wrong_name_is_named() -> None:
+    kit = kit_of(MESHES, [FOUR])
+    whole = kit.exemplars[0].assembly
+    legs = whole.select([part for part in range(len(whole)) if kit.types[whole.types[part]].name == "leg"])
+    asked = carcass_test(kit, ("top",))
+    assert (asked(whole), asked(legs), carcass_test(kit, ())(legs)) == (True, False, True)
+    with pytest.raises(ConfigError, match=r"require\.carcass: kit toy has no parts called tap; did you mean top\?"):
+        carcass_test(kit, ("top", "tap"))
