@@ -91,6 +91,23 @@ def bench() -> Iterator[Measure]:
     yield Measure(f"{name}, {PUBLISHED_POINTS} points", "clouds", ours_many, "DGCNN as published", peer_rate)
 
 
+    yield Measure("recovery, a cloud of the base chair, guessed and searched", "clouds", _recoveries(), note="300 shapes")
+
+
+def _recoveries() -> float:
+    """Clouds a second that the model which ships recovers."""
+    from stages.training.recovery.recover import SHIPPED, find_models, recover
+
+    models, _ = find_models(SHIPPED)
+    cloud = _clouds(2048)[0]
+
+    def once() -> int:
+        recover(cloud, "chair", models, up="y", budget=300)
+        return 1
+
+    return rate(once, seconds=1.0, rounds=1)
+
+
 def _clouds(n: int) -> np.ndarray:
     """Clouds float32 (BATCH, n, 3) on the base chair."""
     from stages.points.area_sampling import sample_shape

@@ -39,8 +39,8 @@ TORN = 4.0
 """A cloud that is so many times farther from the best whole shape than a cloud of that shape itself may be torn."""
 EXPLAINED = 0.5
 """It is, if a part that is missing leaves no more than this share of the distance, and"""
-LEAST_MISSING = 0.1
-"""so much of the shape at least."""
+LEAST_MISSING, MOST_MISSING = 0.1, 0.75
+"""so much of the shape at least, and at most: a stick lies on every chair."""
 GLANCE = 40
 """Shapes that a program is given to show that it is the likeliest."""
 
@@ -253,7 +253,7 @@ def _unexplained(fit: _Fit) -> float:
     """The distance, by which a fit that leaves something out is held against one of the whole shape."""
     if isinstance(fit.refined.target, CloudTarget):
         return EXPLAINED * fit.distance
-    return fit.distance if fit.missing >= LEAST_MISSING else float("inf")
+    return fit.distance if LEAST_MISSING <= fit.missing <= MOST_MISSING else float("inf")
 
 
 def _told(fit: _Fit, kind: str, guessed_program: bool) -> Recovered:

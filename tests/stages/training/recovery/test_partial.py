@@ -95,3 +95,10 @@ def test_a_whole_scan_is_not_called_partial() -> None:
     assert found.missing == 0.0
     assert found.described()["partial"] is False
     assert not any("partial" in each for each in found.warnings)
+
+
+def test_a_stick_is_no_part_of_a_stool() -> None:
+    stick = np.stack([np.linspace(0.0, 1.0, 300), np.zeros(300), np.zeros(300)], axis=1)
+    found = recover(stick, "tests.stages.programs.stool", up="y", budget=30)
+    assert found.missing == 0.0
+    assert any("unlike any stool" in each for each in found.warnings)
