@@ -81,7 +81,10 @@ def run(
             *(stage, stages, loaded, places, workers, part, retries), only=only, patience=patience, cluster=cluster
         )
     if result.failed:
-        print(f"{stage}: set aside: {', '.join(result.failed)}; run again to try them again", file=sys.stderr)
+        print(
+            f"{stage}: set aside: {', '.join(result.failed)}; run again once what was said of them is mended",
+            file=sys.stderr,
+        )
         raise typer.Exit(1)
 
 

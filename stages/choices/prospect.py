@@ -25,6 +25,9 @@ from stages.variations.settings import CHOSEN_STABLE
 
 __all__ = ["Prospect", "look_at"]
 
+ACROSS = "cut it across, between bays and storeys with all that passes there: `parts: sections`"
+"""What helps where one mesh has a part that touches all others."""
+
 
 @dataclass(frozen=True)
 class Prospect:
@@ -32,7 +35,8 @@ class Prospect:
 
     config: nothing left open; asked: the config that they were looked at with; seen: all parts under what was chosen,
     hubs and what falls apart among them; built: what a run builds; forecast: None where a run would refuse the models;
-    rate: variants found a CPU second; seconds: CPU seconds of it all.
+    rate: variants found a CPU second; seconds: CPU seconds of it all; torn: whether the parts are pieces of meshes that
+    nobody but `auto` chose.
     """
 
     config: KitConfig
@@ -44,13 +48,15 @@ class Prospect:
     assemblies: Sequence[Assembly]
     rate: float
     seconds: float
+    torn: bool
 
     @property
     def sentence(self) -> str:
         """What to expect."""
         if self.forecast is None:
             return f"nothing, for a run refuses the models: {self.built.refusals[0]}"
-        return self.forecast.sentence
+        said = self.forecast.sentence
+        return said if self.forecast.finds.graphs or not self.torn else f"{said}; or {ACROSS}"
 
     def as_json(self) -> Mapping[str, Any]:
         """Choices and forecast, beside what `inspection` finds."""
@@ -105,7 +111,9 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
         fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
         kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
         assemblies = list(islice(kept, SHOWN))
-    return Prospect(decided, config, choices, seen, built, expected, assemblies, rate, time.process_time() - start)
+    torn = config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
+    seconds = time.process_time() - start
+    return Prospect(decided, config, choices, seen, built, expected, assemblies, rate, seconds, torn)
 
 
 def _shown(value: Any) -> str:

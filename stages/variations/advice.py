@@ -48,7 +48,9 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
     if known > REGULAR * tries:
         regular = "what can be exchanged gives the exemplar again, or a piece of it: it is regular"
-        return f"{regular}; bring {another}, or write a program with its counts and sizes as parameters"
+        return (
+            f"{regular}; bring {another}, or write a program of its counts and sizes, as stages/programs/GUIDE.md says"
+        )
     alone = int((counts == 1).sum())
     if alone > used / 2:
         return f"{alone} of {used} part types occur once; bring {another}"

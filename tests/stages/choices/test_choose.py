@@ -14,6 +14,7 @@ import pytest
 from stages.choices.choose import REQUIREMENTS, Choices, choose, most_copied, must_stand
 from stages.choices.forecast import forecast
 from stages.choices.probe import Finds, Probe
+from stages.choices.prospect import look_at
 from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
 from stages.exemplars.build import build_kit
@@ -228,6 +229,18 @@ class TestForecast:
         found = forecast(kit, ContactAnswers(kit), TRIES)
         assert (found.finds.graphs, found.layouts) == (0, 0)
         assert "every part is its own type; bring a second model" in found.sentence
+
+    @pytest.mark.parametrize(
+        ("parts", "segmentation"), [("auto", "components"), ("auto", "nodes"), ("components",) * 2]
+    )
+    def test_where_nothing_comes_of_the_pieces_of_a_mesh_other_cuts_are_named(
+        self, parts: str, segmentation: str
+    ) -> None:
+        shape = [("link", pose(0, 0, 0)), ("cap", pose(0.75, 0, 0))]
+        models = [replace(each, segmentation=segmentation) for each in models_of(CHAIN, [shape])]
+        sentence = look_at(left_open([shape], parts=parts), models, 50).sentence
+        assert sentence.startswith("nothing: every part is its own type")
+        assert ("`parts: sections`" in sentence) == (parts == "auto" and segmentation == "components")
 
 
 def test_an_undecided_kit_says_what_is_open() -> None:
