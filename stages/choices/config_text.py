@@ -50,7 +50,7 @@ def config_text(
     why = "; ".join(dict.fromkeys(model.why for model in models))
     wanted = MOST if layouts is None else max(1, min(MOST, UNSEEN * layouts))
     kit: list[tuple[int, str, Any, str]] = [
-        (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else ""),
+        (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else reasons.get("parts", "")),
         (3, "types", config.types, "what makes a part type"),
         *([(3, "meanings", None, "")] if config.meanings else []),
         *((4, _value(name), list(patterns), "") for name, patterns in config.meanings.items()),

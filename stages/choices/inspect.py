@@ -20,7 +20,6 @@ from stages.choices.prospect import Prospect, look_at
 from stages.choices.settings import ChoicesConfig
 from stages.choices.sheet import forecast_sheet
 from stages.exemplars.inspect import inspection, inspection_lines
-from stages.exemplars.model import Model
 from stages.exemplars.parse import FORMATS
 from stages.exemplars.portrait import kit_sheet
 from stages.exemplars.read import read_model
@@ -43,10 +42,10 @@ def main(arguments: list[str]) -> int:
         limits = _limits(asked)
         models = [read_model(path, asked.parts, limits) for path in paths]
         config = _config(asked, paths)
-        found = look_at(config, models, asked.tries)
-        seen = inspection(found.seen, models, found.config)
+        found = look_at(config, models, asked.tries, limits)
+        seen = inspection(found.seen, found.models, found.config)
         if asked.json:
-            written = {} if asked.out is None else dict(_written(asked.out, paths, models, found))
+            written = {} if asked.out is None else dict(_written(asked.out, paths, found))
             files = {title: str(path) for title, path in written.items()}
             print(json.dumps({**seen, **found.as_json(), "files": files}, ensure_ascii=False, allow_nan=False))
             return 0
@@ -56,7 +55,7 @@ def main(arguments: list[str]) -> int:
         for title, line in found.lines():
             print(f"{title:<18} {line}")
         sys.stdout.flush()
-        for title, path in _written(asked.out or FOLDER, paths, models, found):
+        for title, path in _written(asked.out or FOLDER, paths, found):
             print(f"{title:<18} {path}")
     except ConfigError as error:
         print(error, file=sys.stderr)
@@ -64,9 +63,7 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _written(
-    folder: Path, paths: Sequence[Path], models: Sequence[Model], found: Prospect
-) -> Iterator[tuple[str, Path]]:
+def _written(folder: Path, paths: Sequence[Path], found: Prospect) -> Iterator[tuple[str, Path]]:
     """Write the picture of what was seen, the sheet of what it can become and the config; what each is, and where."""
     name = dataset_name(paths)
     kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
@@ -76,7 +73,7 @@ def _written(
         sheet = forecast_sheet(found.built.kit, found.assemblies, name, found.sentence)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
     require = {key: found.choices.values[key] for key in REQUIREMENTS}
-    text = config_text(name, found.config, models, found.choices.reasons, require, layouts, found.sentence)
+    text = config_text(name, found.config, found.models, found.choices.reasons, require, layouts, found.sentence)
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
 
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from stages.choices.choose import Choices, choose, found_words
+from stages.choices.choose import REQUIREMENTS, Choices, choose, found_words
 from stages.choices.forecast import Forecast, forecast
+from stages.choices.reading import Reading, cut_if_nothing_comes
 from stages.choices.sheet import SHOWN
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
-from stages.exemplars.settings import KitConfig
+from stages.exemplars.settings import KitConfig, ReadLimits
 from stages.shape.kit import Assembly
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
@@ -33,13 +34,14 @@ ACROSS = "cut it across, between bays and storeys with all that passes there: `p
 class Prospect:
     """What some models will give.
 
-    config: nothing left open; asked: the config that they were looked at with; seen: all parts under what was chosen,
-    hubs and what falls apart among them; built: what a run builds; forecast: None where a run would refuse the models;
-    rate: variants found a CPU second; seconds: CPU seconds of it all; torn: whether the parts are pieces of meshes that
-    nobody but `auto` chose.
+    config: nothing left open; models: as they are read by it; asked: the config that they were looked at with; seen:
+    all parts under what was chosen, hubs and what falls apart among them; built: what a run builds; forecast: None
+    where a run would refuse the models; rate: variants found a CPU second; seconds: CPU seconds of it all; torn:
+    whether the parts are pieces of meshes that nobody but `auto` chose.
     """
 
     config: KitConfig
+    models: Sequence[Model]
     asked: KitConfig
     choices: Choices
     seen: Observation
@@ -86,18 +88,21 @@ class Prospect:
         return lines
 
 
-def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
-    """Decide what `config` leaves open, and forecast what comes of it.
+def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: ReadLimits | None = None) -> Prospect:
+    """Decide what `config` leaves open, and forecast what comes of it. Models that are read otherwise, as
+    `cut_if_nothing_comes` says, are read within `limits`.
 
     Raises ConfigError for a model in which no part has any area, and for stated hubs that are no types.
     """
     start = time.process_time()
     identified = identify_parts(models, config)
-    choices = choose(config, models, identified, tries)
-    decided = config.decide(choices.values)
+    first = Reading(config, models, identified, choose(config, models, identified, tries))
+    reading = cut_if_nothing_comes(first, limits or ReadLimits(), tries, REQUIREMENTS)
+    models, identified, choices = reading.models, reading.identified, reading.choices
+    decided = reading.config.decide(choices.values)
     built = seen = observe_parts(decided, models, identified)
     if decided.decided().hubs or decided.decided().disconnected == "largest":
-        whole = config.decide({**choices.values, "hubs.types": "none", "disconnected": "error"})
+        whole = reading.config.decide({**choices.values, "hubs.types": "none", "disconnected": "error"})
         seen = observe_parts(whole, models, identified)
     expected, assemblies, rate = None, [], 0.0
     if not built.refusals:
@@ -111,9 +116,9 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int) -> Prospect:
         fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
         kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
         assemblies = list(islice(kept, SHOWN))
-    torn = config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
+    torn = reading.config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
     seconds = time.process_time() - start
-    return Prospect(decided, config, choices, seen, built, expected, assemblies, rate, seconds, torn)
+    return Prospect(decided, models, config, choices, seen, built, expected, assemblies, rate, seconds, torn)
 
 
 def _shown(value: Any) -> str:

@@ -41,15 +41,11 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Read the models and decide."""
-    from stages.choices.choose import choose
-    from stages.exemplars.identify import identify_parts
-    from stages.exemplars.read import read_model
+    from stages.choices.reading import read_and_choose
 
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
-    limits = task.config.section(ExemplarsConfig).limits
-    models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
-    tries = task.config.section(ChoicesConfig).tries
-    made = choose(config, models, identify_parts(models, config), tries, task.shard.params["require"]).as_json()
+    limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(ChoicesConfig).tries
+    made = read_and_choose(config, limits, tries, task.shard.params["require"]).choices.as_json()
     with task.output(f"{config.name}.json") as stream:
         stream.write(json_bytes(made))
     return Outcome(samples=0, summary=made)

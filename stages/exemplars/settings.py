@@ -122,7 +122,8 @@ class KitConfig(StrictModel):
     parts: Segmentation = Field(
         "auto",
         description="What makes a part; `auto` picks and says what it picked. `symmetry` cuts one mesh between copies "
-        "of what it repeats, `sections` between parallel planes whose sections are alike.",
+        "of what it repeats, `sections` between parallel planes whose sections are alike. A kit that "
+        "leaves a key of its own open is cut so where a search finds nothing in the pieces of a mesh that `auto` took.",
     )
     types: Literal["congruence", "labels", "meaning"] = Field(
         "congruence",

@@ -43,6 +43,7 @@ def run_shard(task: Task) -> Outcome:
     if config.left_open():
         chosen = json.loads(task.input("choices", f"{config.name}.json").read_bytes())
         config = config.decide(chosen["chosen"])
+        config = config.model_copy(update={"parts": chosen["chosen"].get("parts", config.parts)})
     models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:

@@ -97,7 +97,9 @@ def measured(models: Sequence[Path], folder: Path, minutes: float, template: boo
         config.write_text(TEMPLATE.format(name=config.stem, shapes=json.dumps([str(each) for each in models])))
     made, ends = _made(config, folder, minutes)
     chosen, foreseen = seen["choices"]["chosen"], seen["forecast"]
-    settings = [_setting(each) for key, each in chosen.items() if key not in ("disconnected", "require.copied")]
+    settings = [
+        _setting(each) for key, each in chosen.items() if key != "disconnected" and not key.startswith("require.")
+    ]
     row = [
         name,
         f"{len(seen['parts'])} / {len(seen['types'])}",

@@ -1,0 +1,65 @@
+"""Models read and decided upon: by the parts that the config or `auto` takes, or by sections where nothing comes of
+those."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pipeline.errors import ConfigError
+from stages.choices.choose import Choices, choose
+from stages.exemplars.identify import Identified, identify_parts
+from stages.exemplars.model import Model
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
+
+__all__ = ["CHOSEN_PARTS", "Reading", "cut_if_nothing_comes", "read_and_choose"]
+
+CHOSEN_PARTS = "parts"
+"""What `parts` is called among the keys that are chosen for a kit."""
+COPIES = 2.0
+"""Cuts are tried where they make so many parts of each type: what repeats can be there once more, or gone."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Models with their identified parts, what was chosen for them, and the config that says which parts they have."""
+
+    config: KitConfig
+    models: Sequence[Model]
+    identified: Identified
+    choices: Choices
+
+
+def read_and_choose(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> Reading:
+    """Read the models of a kit and decide what its config leaves open, as `choose` and `cut_if_nothing_comes`."""
+    models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
+    identified = identify_parts(models, config)
+    first = Reading(config, models, identified, choose(config, models, identified, tries, require))
+    return cut_if_nothing_comes(first, limits, tries, require)
+
+
+def cut_if_nothing_comes(first: Reading, limits: ReadLimits, tries: int, require: Sequence[str]) -> Reading:
+    """Models cut by sections where `auto` took pieces of meshes for parts and a search found nothing in them, if it
+    finds enough then, under the strictest rules; else as they were read first."""
+    finds = first.choices.finds
+    by_author = any(each.segmentation in ("nodes", "objects") for each in first.models)
+    if first.config.parts != "auto" or by_author or finds is None or finds.graphs:
+        return first
+    config = first.config.model_copy(update={"parts": "sections"})
+    try:
+        models = [read_model(each.path, config.parts, limits) for each in first.models]
+        identified = identify_parts(models, config)
+    except ConfigError:
+        return first
+    if sum(len(each) for each in identified.assemblies) < COPIES * len(identified.types):
+        return first
+    searched = ("contact.kinds", "grammar", "hubs.types")
+    strictest = {key: STRICTEST[key] for key in config.left_open() if key in searched}
+    choices = choose(config.decide(strictest), models, identified, tries, require)
+    if not choices.enough:
+        return first
+    why = f"cut across: nothing comes of {len(first.models[0].parts)} {first.models[0].segmentation}"
+    values = {CHOSEN_PARTS: config.parts, **strictest, **choices.values}
+    reasons = {CHOSEN_PARTS: why, **dict.fromkeys(strictest, "the strictest, and it gives enough"), **choices.reasons}
+    return Reading(config, models, identified, replace(choices, values=values, reasons=reasons))
