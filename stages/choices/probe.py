@@ -74,14 +74,15 @@ class Finds:
 
 class Probe:
     """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone. What lacks the
-    kit's carcass is no find."""
+    kit's carcass is no find, nor is that of which a greater share than `copied` is copied whole."""
 
-    def __init__(self, answers: ContactAnswers, rng: np.random.Generator) -> None:
+    def __init__(self, answers: ContactAnswers, rng: np.random.Generator, copied: float = 1.0) -> None:
         self.kit = answers.kit
         self.variants: list[Variant] = []
         self._rng = rng
         self._graphs: set[int] = set()
         self._pieces = 0
+        self._copied = copied
         self._is_whole = carcass_test(self.kit, carcass(self.kit))
         self._tries = 0
         widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
@@ -116,8 +117,9 @@ class Probe:
             left[number] = left[number] - used if found else 0
             whole = [each for each in found if self._is_whole(each.assembly)]
             self._pieces += len(found) - len(whole)
-            self.variants.extend(each for each in whole if each.graph not in self._graphs)
-            self._graphs.update(each.graph for each in whole)
+            telling = [each for each in whole if each.lineage["copied"]["largest"] <= self._copied]
+            self.variants.extend(each for each in telling if each.graph not in self._graphs)
+            self._graphs.update(each.graph for each in telling)
 
     def finds(self) -> Finds:
         """What was found so far."""

@@ -97,13 +97,12 @@ def measured(models: Sequence[Path], folder: Path, minutes: float, template: boo
         config.write_text(TEMPLATE.format(name=config.stem, shapes=json.dumps([str(each) for each in models])))
     made, ends = _made(config, folder, minutes)
     chosen, foreseen = seen["choices"]["chosen"], seen["forecast"]
-    settings = [
-        _setting(each) for key, each in chosen.items() if key != "disconnected" and not key.startswith("require.")
-    ]
+    decided = {key: each for key, each in chosen.items() if key != "disconnected" and not key.startswith("require.")}
+    parts = sum(len(each["parts"]) for each in seen.get("models", [seen]))
     row = [
         name,
-        f"{len(seen['parts'])} / {len(seen['types'])}",
-        ", ".join(settings),
+        f"{parts} / {len(seen['types'])}",
+        ", ".join(map(_setting, decided.values())),
         foreseen["sentence"],
         *ends,
         f"{inspected.seconds:.0f}",

@@ -223,6 +223,12 @@ class TestForecast:
         assert 20 <= found.finds.graphs <= found.layouts <= 32
         assert re.match(r"[23]0 or more layouts of \d+ to \d+ parts", found.sentence)
 
+    def test_what_will_be_refused_for_what_it_copies_does_not_count(self) -> None:
+        kit = self.kit([ring(1, 1), ring(2, 3)], ROAD)
+        found = [forecast(kit, ContactAnswers(kit), TRIES, copied=most) for most in (1.0, 0.6)]
+        copied = [[each.lineage["copied"]["largest"] for each in one.variants] for one in found]
+        assert max(copied[0]) > 0.6 >= max(copied[1]) > 0.0
+
     def test_every_part_its_own_type_is_said_with_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
         kit = self.kit([[("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]], meshes)
