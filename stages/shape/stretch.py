@@ -19,6 +19,8 @@ __all__ = ["STRETCHED_DEPTH", "StretchedMesh", "bake", "moved_by", "placements",
 
 SAME = 1e-6
 """A linear map whose singular values are as near to 1 is a rotation."""
+DECIMALS = 9
+"""So many of a stretch are kept."""
 STRETCHED_DEPTH = 0.02
 """A stretched part may reach so far into another, as a share of the smaller one's diagonal, beyond what their types do
 in the exemplars."""
@@ -47,7 +49,8 @@ def split(placed: FloatArray) -> tuple[FloatArray, FloatArray | None]:
     u, sizes, vt = np.linalg.svd(linear[bent])
     poses, stretches = placed.copy(), np.tile(np.eye(3), (len(placed), 1, 1))
     poses[bent, :3, :3] = u @ vt
-    stretches[bent] = np.swapaxes(vt, 1, 2) @ (sizes[:, :, None] * vt)
+    # On a grid, so that a record is split into the same again: parts that are stretched alike share a mesh.
+    stretches[bent] = np.round(np.swapaxes(vt, 1, 2) @ (sizes[:, :, None] * vt), DECIMALS) + 0.0
     return poses, stretches
 
 

@@ -381,12 +381,12 @@ class Search:
         pieces_count = self.config.sub_assemblies
         if not pieces_count and any(lies_in(kit, ws, each.tables) for each in self.parents.exemplars):
             return SUBASSEMBLY
-        if self._ground is not None and self._ground.is_lifted(types, self._assembly().placements):
+        placed = self._poses() if self._stretches is None else self._assembly().placements
+        if self._ground is not None and self._ground.is_lifted(types, placed):
             return LIFTED
-        if self._stretches is not None:
-            fault = contact_fault(self.kit, self._assembly())
-            if fault is not None:
-                return f"stretched: {fault}"
+        fault = None if self._stretches is None else contact_fault(self.kit, self._assembly())
+        if fault is not None:
+            return f"stretched: {fault}"
         outcome = self._answered_by(validate) if self._stretches is None else Outcome.OK
         if outcome != Outcome.OK:
             return REASONS[outcome]
