@@ -69,7 +69,7 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW) $(LASTS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset choices exemplars variations programs writing shapeassembly synthesis
+.PHONY: dataset choices exemplars variations programs grammars writing shapeassembly synthesis
 .PHONY: validity abstraction strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
@@ -81,21 +81,23 @@ variations: exemplars  ## Make new shapes from the exemplars' parts
 	$(RUN)
 programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
+grammars: setup  ## Find the shape grammar of a mesh in one piece, and make new shapes by its rules and grids
+	$(RUN)
 writing: setup  ## Let trained models write ShapeAssembly programs
 	$(RUN)
 shapeassembly: writing  ## Make shapes from ShapeAssembly programs, or from part hierarchies
 	$(RUN)
 synthesis: exemplars  ## Make new shapes from what trained models write
 	$(RUN)
-validity: variations programs shapeassembly synthesis  ## Judge each shape: is it rooted, does it stand?
+validity: variations programs grammars shapeassembly synthesis  ## Judge each shape: is it rooted, does it stand?
 	$(RUN)
-abstraction: variations programs shapeassembly synthesis  ## Find a ShapeAssembly program of each shape, if asked for
+abstraction: variations programs grammars shapeassembly synthesis  ## Find a ShapeAssembly program of each shape, if asked for
 	$(RUN)
-strings: variations programs shapeassembly synthesis  ## Write each shape as strings, and the text corpus
+strings: variations programs grammars shapeassembly synthesis  ## Write each shape as strings, and the text corpus
 	$(RUN)
-points: variations programs shapeassembly synthesis  ## Turn each shape into a labelled point cloud
+points: variations programs grammars shapeassembly synthesis  ## Turn each shape into a labelled point cloud
 	$(RUN)
-sketches: variations programs shapeassembly synthesis  ## Draw each shape as lines
+sketches: variations programs grammars shapeassembly synthesis  ## Draw each shape as lines
 	$(RUN)
 package: validity abstraction strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)

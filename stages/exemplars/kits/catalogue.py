@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from pipeline.places import write_file
-from stages.exemplars.kits import castle, playground, space_base, temple
+from stages.exemplars.kits import castle, facade, playground, space_base, temple
 from stages.exemplars.kits.layout import Layout, glb_bytes
 
 __all__ = ["KITS", "write_kits"]
 
 KITS: Mapping[str, Callable[[], dict[str, Layout]]] = {
     "castle": castle.shapes,
+    "facade": facade.shapes,
     "playground": playground.shapes,
     "space-base": space_base.shapes,
     "temple": temple.shapes,

@@ -13,7 +13,7 @@ from stages.exemplars.symmetry.places import items_in
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["DockingSite", "docking_sites", "regions_of", "slippable_motions"]
+__all__ = ["DockingSite", "OperationKind", "docking_sites", "operation_kind", "regions_of", "slippable_motions"]
 
 SAME_SET = 0.02
 """Share of a docker by which another may reach beyond it and count as inside: borders of cells do not move with it."""
@@ -77,7 +77,9 @@ def docking_sites(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_b
         secondary = np.sort(np.concatenate([of_image[each] for each in other])).astype(np.int32)
         cells = np.unique(border[np.concatenate([of_border[each] for each in own]), 0]).astype(np.int32)
         sites.append(
-            DockingSite(motion, primary, secondary, cells, _kind(primary, secondary), slippable_motions(grid, cells))
+            DockingSite(
+                motion, primary, secondary, cells, operation_kind(primary, secondary), slippable_motions(grid, cells)
+            )
         )
     return sites
 
@@ -110,7 +112,8 @@ def _members(region: np.ndarray, count: int) -> list[np.ndarray]:
     return np.split(order, np.searchsorted(region[order], np.arange(count + 1)))[1:-1]
 
 
-def _kind(primary: IntArray, secondary: IntArray) -> OperationKind:
+def operation_kind(primary: IntArray, secondary: IntArray) -> OperationKind:
+    """What it is to put the docker of cells `primary` where that of cells `secondary` is, int32 (n,) each."""
     shared = len(np.intersect1d(primary, secondary, assume_unique=True))
     if len(secondary) < len(primary) and shared >= (1 - SAME_SET) * len(secondary):
         return "insert"

@@ -8,10 +8,10 @@ import numpy as np
 from stages.exemplars.symmetry.boundary import SAME_ANGLE
 from stages.exemplars.symmetry.cells import cell_index, cell_of
 from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert
 
-__all__ = ["eroded", "matched_items", "r_symmetric_cells", "symmetric_cells"]
+__all__ = ["cells_within", "eroded", "eroded_twice", "matched_items", "r_symmetric_cells", "symmetric_cells"]
 
 TINY = 1e-9
 
@@ -50,10 +50,22 @@ def matched_items(grid: SurfaceGrid, motion: FloatArray, items: np.ndarray | Non
 
 def eroded(grid: SurfaceGrid, symmetric: BoolArray) -> BoolArray:
     """The r-symmetric cells: farther than the radius, along the surface, from every cell that is not symmetric."""
-    reach: BoolArray = _distances(symmetric, grid.cells, grid.neighbours, grid.radius / grid.size) > (
-        grid.radius / grid.size + TINY
-    )
-    return reach
+    return eroded_twice(grid, symmetric, 0.0)[0]
+
+
+def eroded_twice(grid: SurfaceGrid, symmetric: BoolArray, beyond: float) -> tuple[BoolArray, BoolArray]:
+    """The r-symmetric cells, and those that would be for a radius larger by so many cells `beyond`, bool (n,) each."""
+    most = grid.radius / grid.size
+    away = _distances(symmetric, grid.cells, grid.neighbours, most + beyond)
+    return away > most + TINY, away > most + beyond + TINY
+
+
+def cells_within(grid: SurfaceGrid, cells: IntArray, most: float) -> IntArray:
+    """The cells that are at most so many cells, along the surface, from one of `cells`, int32 ascending."""
+    apart = np.ones(len(grid), dtype=bool)
+    apart[cells] = False
+    near = _distances(apart, grid.cells, grid.neighbours, most) <= most + TINY
+    return np.flatnonzero(near).astype(np.int32)
 
 
 @numba.njit(cache=True)

@@ -15,7 +15,7 @@ from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, with_area
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
-__all__ = ["by_sections", "by_symmetry", "search_size"]
+__all__ = ["about_size", "by_sections", "by_symmetry", "search_size"]
 
 LEFT_OUT = 1e-5
 """Share of the surface from which on it is told that it is left out."""
@@ -62,14 +62,18 @@ def _parted(scene: Scene, pieces_of: Callable[[FloatArray, IntArray], list[Piece
 
 
 def search_size(scene: Scene) -> int:
-    """How large a search for symmetries of the scene would be: its triangles, and about the cells that they lie in. A
-    plane at a random slant crosses 3/2 cells of a lattice for each square as wide as a cell."""
+    """How large a search for symmetries of the scene would be: `about_size`."""
     vertices, faces = _in_the_world(scene)
-    corners = vertices[faces]
+    return about_size(vertices[faces], RADIUS)
+
+
+def about_size(corners: FloatArray, radius: float) -> int:
+    """How many triangles (f, 3, 3) have area, and about how many cells they lie in, for a radius as a share of the
+    longest side. A plane at a random slant crosses 3/2 cells of a lattice for each square as wide as a cell."""
     corners = corners[with_area(corners)]
     if not len(corners):
         return 0
-    size = RADIUS / CELLS_A_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    size = radius / CELLS_A_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
     return len(corners) + round(1.5 * area / 2 / size**2)
 

@@ -1,0 +1,207 @@
+"""A context-free grammar of an exemplar: what docks at which sites (symmetry §3.4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stages.exemplars.symmetry.carve import Soup
+from stages.exemplars.symmetry.derivations import START, Derivation, Place
+from stages.exemplars.symmetry.matching import matched_items
+from stages.exemplars.symmetry.places import items_in
+from stages.exemplars.symmetry.seams import Seam, cut_out, seam_of, widened
+from stages.exemplars.symmetry.sites import Docker, beside
+from stages.exemplars.symmetry.surface import SurfaceGrid
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.pose import invert, transform_points
+
+__all__ = ["Production", "productions", "seams_of"]
+
+SETS = 10
+"""Independent sets of sites that are sampled for a docker (symmetry §3.4.2)."""
+ROOM = 2
+"""Cells by which a docker must lie inside another, or apart from it."""
+LEAST = 2e-3
+"""Share of the surface by which a docker is larger than one in it."""
+ALIKE = 0.99
+"""Share of the items of a piece that must have their equals in another for the two to be one terminal."""
+SAME_AREA = 1e-3
+"""Share of their surface by which terminals that are equal may differ."""
+BORDERS = 1.5
+"""A piece that is cut out may differ from its cells by so much of what lies around them: a seam follows others."""
+
+
+@dataclass(frozen=True)
+class Production:
+    """What may stand at a site: a terminal, and places for others.
+
+    site: its class, or START; frame: float64 (4, 4), of the site where the exemplar has this docker; terminal: its
+    triangles as the exemplar has them; places: the non-terminals in it.
+    """
+
+    site: int
+    frame: FloatArray
+    terminal: Soup
+    places: tuple[Place, ...]
+
+
+def seams_of(grid: SurfaceGrid, dockers: Sequence[Docker]) -> dict[int, Seam]:
+    """The seam of each class of sites."""
+    firsts = [each for each in dockers if np.array_equal(each.frame, np.eye(4))]
+    return {each.site: seam_of(grid, each.border, each.cells) for each in reversed(firsts)}
+
+
+def productions(
+    grid: SurfaceGrid, dockers: Sequence[Docker], seams: dict[int, Seam], rng: np.random.Generator
+) -> list[Production]:
+    """The productions of an exemplar, those of START first.
+
+    Dockers that lie in a docker are its children; of those that overlap some are chosen, in at most SETS ways, each a
+    production of its own. Of a child that overlaps what is chosen its own children are tried, one level. Productions
+    that are equal, terminal and places, are one.
+    """
+    whole = Docker(np.arange(len(grid), dtype=np.int32), np.empty(0, np.int32), 1.0, START, np.eye(4))
+    every = [*dockers, whole]
+    inside, apart = _relations(grid, every)
+    whole_soup = Soup(grid.corners, grid.faces)
+    found: list[tuple[Production, IntArray]] = []
+    original: dict[int, Derivation] = {}
+    # smallest first: what gives a docker back is made of what gives those in it back
+    for node in np.argsort([each.area for each in every], kind="stable").tolist():
+        for chosen in _independent(node, inside, apart, rng):
+            if not all(each in original for each in chosen):
+                continue
+            cells = _rest(grid, every, node, chosen)
+            terminal = _cut(grid, whole_soup, [every[node], *(every[each] for each in chosen)], seams)
+            if not len(terminal) or not _faithful(grid, terminal, cells):
+                continue
+            places = tuple(Place(every[each].site, every[each].frame, original[each]) for each in chosen)
+            made = Production(every[node].site, every[node].frame, terminal, places), cells
+            known, order = len(found), tuple(range(len(places)))
+            for number, each in enumerate(found):
+                same = _equal(grid, each, made, seams)
+                if same is not None:
+                    known, order = number, same
+                    break
+            else:
+                found.append(made)
+            # places of one production lie elsewhere in the exemplar, with other things in them
+            original.setdefault(node, Derivation(known, tuple(places[each].original for each in order)))
+    return _by_site([each for each, _ in found])
+
+
+def _relations(grid: SurfaceGrid, every: Sequence[Docker]) -> tuple[BoolArray, BoolArray]:
+    """Of each two dockers whether the second lies in the first, and whether they lie apart, bool (n, n) each."""
+    count = len(every)
+    wide = [widened(grid, each.cells, ROOM) for each in every]
+    inside, apart = np.zeros((count, count), dtype=bool), np.zeros((count, count), dtype=bool)
+    for one, docker in enumerate(every):
+        within = np.zeros(len(grid), dtype=bool)
+        within[docker.cells] = True
+        for other in range(count):
+            if other != one:
+                inside[one, other] = every[other].area < docker.area - LEAST and not (wide[other] & ~within).any()
+                apart[one, other] = not (wide[other] & within).any()
+    return inside, apart & apart.T
+
+
+def _independent(node: int, inside: BoolArray, apart: BoolArray, rng: np.random.Generator) -> list[tuple[int, ...]]:
+    """Sets of dockers in docker `node` that lie apart from each other, different ones, at most SETS."""
+    children = _direct(node, inside)
+    if not len(children):
+        return [()]
+    found: dict[tuple[int, ...], None] = {}
+    for first in rng.permutation(children)[:SETS].tolist():
+        chosen = [first]
+        others = [each for each in rng.permutation(children).tolist() if each != first]
+        left: list[int] = []
+        for each in others:
+            (chosen if apart[each, chosen].all() else left).append(each)
+        for each in left:
+            chosen += [one for one in _direct(each, inside).tolist() if apart[one, chosen].all()][:1]
+        found[tuple(sorted(chosen))] = None
+    return list(found)
+
+
+def _direct(node: int, inside: BoolArray) -> np.ndarray:
+    """The dockers in a docker that lie in no other one in it."""
+    within = np.flatnonzero(inside[node])
+    found: np.ndarray = within[~inside[np.ix_(within, within)].any(axis=0)]
+    return found
+
+
+def _rest(grid: SurfaceGrid, every: Sequence[Docker], node: int, chosen: tuple[int, ...]) -> IntArray:
+    """The cells of a docker that are in none of those chosen in it."""
+    left = np.zeros(len(grid), dtype=bool)
+    left[every[node].cells] = True
+    for each in chosen:
+        left[every[each].cells] = False
+    return np.flatnonzero(left).astype(np.int32)
+
+
+def _cut(grid: SurfaceGrid, whole: Soup, dockers: Sequence[Docker], seams: dict[int, Seam]) -> Soup:
+    """The triangles of the first docker that are in none of the others."""
+    first, *others = dockers
+    soup = whole if first.site == START else cut_out(whole, grid, first.cells, first.frame, seams[first.site])[0]
+    for each in others:
+        soup = cut_out(soup, grid, each.cells, each.frame, seams[each.site])[1]
+    return soup
+
+
+def _faithful(grid: SurfaceGrid, soup: Soup, cells: IntArray) -> bool:
+    """Whether triangles that were cut out are those of some cells, but for the border: a seam that moved here may part
+    something else where sheets lie in one cell."""
+    wanted = float(grid.area[cells].sum())
+    border = float(grid.area[beside(grid, cells)].sum())
+    return abs(soup.area - wanted) <= BORDERS * border + SAME_AREA * wanted
+
+
+def _equal(
+    grid: SurfaceGrid, one: tuple[Production, IntArray], other: tuple[Production, IntArray], seams: dict[int, Seam]
+) -> tuple[int, ...] | None:
+    """Whether two productions, each with its cells, are equal in their sites, their places, and what is left: for each
+    place of the first which of the second it is, None where they are not."""
+    (first, cells), (second, others) = one, other
+    if first.site != second.site or len(first.places) != len(second.places):
+        return None
+    if abs(first.terminal.area - second.terminal.area) > SAME_AREA * first.terminal.area:
+        return None
+    motion = second.frame @ invert(first.frame)
+    order: list[int] = []
+    for place in first.places:
+        probe = grid.points[items_in(grid, seams[place.site].inner)]
+        want = transform_points(motion @ place.frame, probe)
+        same = [
+            number
+            for number, each in enumerate(second.places)
+            if number not in order
+            and each.site == place.site
+            and np.abs(transform_points(each.frame, probe) - want).max() < grid.size
+        ]
+        if not same:
+            return None
+        order.append(same[0])
+    alike = all(
+        bool(matched_items(grid, way, items_in(grid, held)).mean() > ALIKE)
+        for way, held in ((motion, cells), (invert(motion), others))
+    )
+    return tuple(order) if alike else None
+
+
+def _by_site(found: Sequence[Production]) -> list[Production]:
+    """The productions in the order of their sites."""
+    order = sorted(range(len(found)), key=lambda place: (found[place].site, place))
+    number = {old: new for new, old in enumerate(order)}
+
+    def renumbered(each: Derivation) -> Derivation:
+        return Derivation(number[each.production], tuple(map(renumbered, each.parts)))
+
+    return [
+        replace(
+            found[old],
+            places=tuple(replace(each, original=renumbered(each.original)) for each in found[old].places),
+        )
+        for old in order
+    ]

@@ -1,0 +1,31 @@
+"""How `make verify` looks at samples that are derivations of a grammar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pipeline.places import Places
+from stages.grammars.derivation import derivation_text, pieces_of, read_derivation, surface_digest
+from stages.grammars.files import made_grammars
+from stages.grammars.language import LANGUAGE
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.packaged import Packaged
+
+__all__ = ["AUDIT"]
+
+
+def _anew(sample: Packaged, places: Places) -> Iterator[str]:
+    """The text is read, and written again, and the surface that it makes is the one of which the record has a
+    digest."""
+    record = sample.record
+    if record["language"] != LANGUAGE.name:
+        return
+    grammar = made_grammars(places)[record["kit"]]
+    made = read_derivation(grammar, record["text"])
+    if derivation_text(grammar, made) != record["text"]:
+        yield "its derivation is written in another way than the grammar writes it"
+    if surface_digest(grammar, pieces_of(grammar, made)) != record["graph"]:
+        yield "its derivation makes another surface than its json names"
+
+
+AUDIT = Audit(anew=_anew)

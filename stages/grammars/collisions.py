@@ -1,0 +1,134 @@
+"""Whether a piece of a grammar runs into others: it may come near them at seams alone, or as it does in the exemplar
+(symmetry §3.2, §3.4.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from stages.exemplars.symmetry.clip import fragments
+from stages.exemplars.symmetry.derivations import Derivation, row_seams
+from stages.exemplars.symmetry.surface import CELLS_A_RADIUS
+from stages.grammars.derivation import Piece, Resized, pieces_of
+from stages.grammars.grammar import ShapeGrammar
+from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.geometry.pose import invert, transform_points
+
+__all__ = ["Collisions"]
+
+NEAR = 1.8
+"""Pieces are apart where no two of their points, one in each cell, are closer than so many cells."""
+BESIDE = 2.0
+"""At a seam they may be near as far as so many radii from it."""
+SAME = 0.5
+"""Cells by which the corners of a piece may lie elsewhere and the piece still stand as another one does."""
+
+
+class Collisions:
+    """What stands near what in the exemplar, as far as the grammar shows it, and whether anything else is near."""
+
+    def __init__(self, grammar: ShapeGrammar) -> None:
+        self._grammar = grammar
+        self._cell = grammar.radius / CELLS_A_RADIUS
+        self._points = [self._points_of(each) for each in range(len(grammar.meshes))]
+        self._trees: dict[int, Any] = {}
+        self._seam_trees: dict[int, Any] = {}
+
+    def collides(self, piece: Piece, others: Sequence[Piece], seams: Sequence[tuple[int, FloatArray]]) -> bool:
+        """Whether a piece is near one of others where no seam is, a class of sites and its frame (4, 4) each, and
+        nothing in the exemplar is so near."""
+        own: FloatArray | None = None
+        for other in others:
+            near = self._near(piece, other)
+            if not near.any() or self._as_in_exemplar(piece, other):
+                continue
+            if own is None:
+                own = transform_points(piece.pose, self._points[piece.mesh])
+            if (near & ~self._at_seams(own, near, seams)).any():
+                return True
+        return False
+
+    def whole(self, made: Resized) -> bool:
+        """Whether pieces of a resized grid run into each other."""
+        grid = self._grammar.grids[made.grid]
+        seams = row_seams(grid.motions, grid.frames, grid.sites, made.counts)
+        pieces = pieces_of(self._grammar, made)
+        return any(self.collides(each, pieces[:place], seams) for place, each in enumerate(pieces))
+
+    @cached_property
+    def _known(self) -> dict[tuple[int, int], list[FloatArray]]:
+        """For each two meshes how the second stands to the first where both are near in the exemplar."""
+        grammar = self._grammar
+        shown: list[Derivation | Resized] = [
+            Derivation(number, tuple(place.original for place in rule.places))
+            for number, rule in enumerate(grammar.rules)
+        ]
+        shown += [Resized(number, grid.counts) for number, grid in enumerate(grammar.grids)]
+        found: dict[tuple[int, int], list[FloatArray]] = {}
+        for made in shown:
+            pieces = pieces_of(grammar, made)
+            for place, one in enumerate(pieces):
+                for other in pieces[:place]:
+                    pose = invert(one.pose) @ other.pose
+                    listed = found.setdefault((one.mesh, other.mesh), [])
+                    if not self._listed(listed, other.mesh, pose) and self._near(one, other).any():
+                        listed.append(pose)
+                        found.setdefault((other.mesh, one.mesh), []).append(invert(pose))
+        return found
+
+    def _as_in_exemplar(self, one: Piece, other: Piece) -> bool:
+        listed = self._known.get((one.mesh, other.mesh), [])
+        return self._listed(listed, other.mesh, invert(one.pose) @ other.pose)
+
+    def _listed(self, listed: Sequence[FloatArray], mesh: int, pose: FloatArray) -> bool:
+        """Whether a pose of a mesh is one of those listed."""
+        corners = self._grammar.meshes[mesh].bounds
+        here = transform_points(pose, corners)
+        return any(np.abs(transform_points(each, corners) - here).max() < SAME * self._cell for each in listed)
+
+    def _points_of(self, mesh: int) -> FloatArray:
+        """A point of a mesh in each cell in which it lies, float64 (n, 3)."""
+        part = self._grammar.meshes[mesh]
+        corners = part.vertices[part.faces]
+        where, _, middles = fragments(corners, corners.min(axis=(0, 1)) - self._cell / 3, self._cell)
+        _, first = np.unique(where, axis=0, return_index=True)
+        return np.ascontiguousarray(middles[first, :3])
+
+    def _tree(self, mesh: int) -> Any:
+        from scipy.spatial import KDTree
+
+        if mesh not in self._trees:
+            self._trees[mesh] = KDTree(self._points[mesh])
+        return self._trees[mesh]
+
+    def _near(self, one: Piece, other: Piece) -> BoolArray:
+        """Which points of a piece are near another piece, bool (n,)."""
+        points = self._points[one.mesh]
+        found = np.zeros(len(points), dtype=bool)
+        pose = invert(other.pose) @ one.pose
+        moved = transform_points(pose, points)
+        low, high = self._grammar.meshes[other.mesh].bounds
+        reach = NEAR * self._cell
+        close = np.flatnonzero(((moved > low - reach) & (moved < high + reach)).all(axis=1))
+        if len(close):
+            away, _ = self._tree(other.mesh).query(moved[close], distance_upper_bound=reach)
+            found[close] = np.isfinite(away)
+        return found
+
+    def _at_seams(self, points: FloatArray, asked: BoolArray, seams: Sequence[tuple[int, FloatArray]]) -> BoolArray:
+        """Which of the points asked for lie beside a seam, bool (n,)."""
+        from scipy.spatial import KDTree
+
+        found = np.zeros(len(points), dtype=bool)
+        places = np.flatnonzero(asked)
+        for site, frame in seams:
+            if site not in self._seam_trees:
+                self._seam_trees[site] = KDTree(self._grammar.seams[site])
+            away, _ = self._seam_trees[site].query(
+                transform_points(invert(frame), points[places]), distance_upper_bound=BESIDE * self._grammar.radius
+            )
+            found[places] |= np.isfinite(away)
+        return found

@@ -1,0 +1,115 @@
+"""A grammar as JSON that a person can read: sites, what may dock there, rules, terminals, grids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stages.exemplars.symmetry.derivations import ENDS, Derivation
+from stages.grammars.derivation import derivation_text
+from stages.grammars.editing import options_of
+from stages.grammars.extraction import Extraction
+from stages.grammars.grammar import GridRule, site_name
+
+__all__ = ["describe_grammar"]
+
+
+def describe_grammar(found: Extraction) -> dict[str, Any]:
+    """All that there is to say of a grammar, with the editing options at each docking site. `tree` and `frame` are what
+    programs read: an original as places among the rules, and poses (4, 4)."""
+    grammar = found.grammar
+    whole = float(found.grid.area.sum())
+    options = options_of(found)
+    terminals = [
+        {
+            "name": each.name,
+            "triangles": len(each.faces),
+            "size": [round(float(side), 6) for side in np.ptp(each.bounds, axis=0)],
+            "middle": middle.tolist(),
+        }
+        for each, middle in zip(grammar.meshes, grammar.middles, strict=True)
+    ]
+    return {
+        "grammar": grammar.name,
+        "up": grammar.up,
+        "radius": grammar.radius,
+        "triangles": len(found.mesh.faces),
+        "area": whole,
+        "motions": found.motions,
+        "dockers": len(found.dockers),
+        "non_terminals": [
+            {
+                "name": site_name(site),
+                "site": site,
+                "dockers": sum(each.site == site for each in found.dockers),
+                "rules": [grammar.rules[each].name for each in rules],
+            }
+            for site, rules in grammar.of_site.items()
+        ],
+        "rules": [
+            {
+                "name": each.name,
+                "site": each.site,
+                "frame": each.frame.tolist(),
+                "places": [
+                    {
+                        "site": place.site,
+                        "non_terminal": site_name(place.site),
+                        "frame": place.frame.tolist(),
+                        "original": derivation_text(grammar, place.original),
+                        "tree": _tree(place.original),
+                    }
+                    for place in each.places
+                ],
+            }
+            for each in grammar.rules
+        ],
+        "grids": [_described_grid(each) for each in grammar.grids],
+        "terminals": terminals,
+        "editing": [
+            {
+                "docker": place,
+                "non_terminal": site_name(docker.site),
+                "share": round(docker.area, 6),
+                "at": [round(float(each), 6) for each in _middle(found, place)],
+                "options": [
+                    {
+                        "docker": each.other,
+                        "kind": each.kind,
+                        "share": round(found.dockers[each.other].area, 6),
+                        "motion": each.motion.tolist(),
+                    }
+                    for each in options.get(place, [])
+                ],
+            }
+            for place, docker in enumerate(found.dockers)
+        ],
+    }
+
+
+def _middle(found: Extraction, docker: int) -> np.ndarray:
+    cells = found.dockers[docker].border
+    middle: np.ndarray = found.grid.origin + (found.grid.cells[cells].mean(axis=0) + 0.5) * found.grid.size
+    return middle
+
+
+def _described_grid(grid: GridRule) -> dict[str, Any]:
+    return {
+        "name": grid.name,
+        "rows": [
+            {
+                "site": site,
+                "non_terminal": site_name(site),
+                "cells": count,
+                "motion": motion.tolist(),
+                "frame": frame.tolist(),
+            }
+            for site, count, motion, frame in zip(grid.sites, grid.counts, grid.motions, grid.frames, strict=True)
+        ],
+        "pieces": [{"terminal": mesh, "along": [ENDS[each] for each in where]} for mesh, where in grid.pieces],
+    }
+
+
+def _tree(made: Derivation) -> list[Any]:
+    return [made.production, *map(_tree, made.parts)]

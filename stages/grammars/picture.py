@@ -1,0 +1,130 @@
+"""The picture of a grammar: the exemplar with its docking sites, what may dock at each, and its grids resized."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stages.exemplars.symmetry.carve import Soup, carve
+from stages.grammars.derivation import Piece, Resized, pieces_of
+from stages.grammars.editing import Option, edited, options_of
+from stages.grammars.extraction import Extraction
+from stages.grammars.grammar import GridRule, site_name
+from stages.shape.arrays import ByteArray, FloatArray
+from stages.shape.geometry.pose import transform_points
+from stages.shape.kit import Assembly, PartMesh
+from stages.shape.shape import Shape
+from stages.shape.views.camera import Camera
+from stages.shape.views.palette import label_colors
+from stages.shape.views.portrait import portrait
+from stages.shape.views.scene import scene_of
+from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
+
+__all__ = ["grammar_sheet"]
+
+CELL = 240
+COLUMNS = 5
+CAMERA = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.06)
+STAYS, COMES, GOES = (196, 192, 186), (204, 72, 58), (232, 186, 64)
+SITES = 8
+"""So many classes of sites are shown, those at which most can dock."""
+OPTIONS = 4
+"""So many editing options of one site, those that change most."""
+
+
+def grammar_sheet(found: Extraction) -> bytes:
+    """A PNG: the exemplar, its sites in a colour for each class, and dockers; at a site of each class what may take the
+    place of what is there, yellow, in red; and each grid with other numbers of cells."""
+    grammar, whole = found.grammar, _whole(found)
+    dockers = len(found.dockers)
+    classes = len({each.site for each in found.dockers})
+    exemplar = [
+        _cell(found, [(whole, STAYS)], f"{len(found.mesh.faces):,} triangles"),
+        _cell(found, _sites(found), f"{dockers} docking sites of {classes} classes"),
+    ]
+    sections = [Section("Exemplar", [exemplar], f"{len(grammar.rules)} rules, {len(grammar.grids)} grids", 2)]
+    rows = list(_editing(found))
+    if rows:
+        sections.append(Section("Editing options", rows, "yellow: what a site holds; red: what may take its place"))
+    resized = [_grid_row(found, number, grid) for number, grid in enumerate(grammar.grids[:SITES])]
+    if resized:
+        sections.append(Section("Grids", resized, "cells along each row"))
+    return picture_png(contact_sheet(sections, grammar.name, CELL))
+
+
+def _whole(found: Extraction) -> Soup:
+    return Soup(found.grid.corners, np.arange(len(found.grid.corners), dtype=np.int32))
+
+
+def _sites(found: Extraction) -> list[tuple[Soup, tuple[int, int, int]]]:
+    """The exemplar with what lies in the cells of docking sites in the colour of their class."""
+    rest, parts = _whole(found), []
+    colors = label_colors(1 + max((each.site for each in found.dockers), default=0)).tolist()
+    for docker in found.dockers:
+        red, green, blue = colors[docker.site]
+        inside, rest = carve(rest, found.grid, docker.border, np.eye(4))
+        parts.append((inside, (red, green, blue)))
+    return [*parts, (rest, STAYS)]
+
+
+def _editing(found: Extraction) -> Iterator[list[Cell]]:
+    """For the site of each class at which most may dock what is there, and what may be."""
+    options = options_of(found)
+    best: dict[int, int] = {}
+    for place in options:
+        site = found.dockers[place].site
+        if site not in best or len(options[place]) > len(options[best[site]]):
+            best[site] = place
+    ranked = sorted(best.items(), key=lambda each: (-len(options[each[1]]), each[0]))
+    for site, place in ranked[:SITES]:
+        docker = found.dockers[place]
+        inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
+        cells = [_cell(found, [(outside, STAYS), (inside, GOES)], f"{site_name(site)}: {docker.area:.0%} of it")]
+        chosen = sorted(options[place], key=lambda each: -abs(found.dockers[each.other].area - docker.area))
+        cells += [_option(found, each) for each in chosen[:OPTIONS]]
+        yield cells
+
+
+def _option(found: Extraction, option: Option) -> Cell:
+    stays, comes = edited(found, option)
+    return _cell(found, [(stays, STAYS), (comes, COMES)], f"{option.kind}: docker {option.other}")
+
+
+def _grid_row(found: Extraction, number: int, grid: GridRule) -> list[Cell]:
+    """A grid with no cells, as in the exemplar, and with more along each row."""
+    wanted: Sequence[tuple[int, ...]] = [
+        tuple(0 for _ in grid.counts),
+        grid.counts,
+        *(tuple(each + 2 * (row == way) for row, each in enumerate(grid.counts)) for way in range(len(grid.counts))),
+        tuple(each + 3 for each in grid.counts),
+    ]
+    return [_resized(found, number, counts) for counts in dict.fromkeys(wanted)][:COLUMNS]
+
+
+def _resized(found: Extraction, number: int, counts: tuple[int, ...]) -> Cell:
+    grammar = found.grammar
+    pieces = pieces_of(grammar, Resized(number, counts))
+    paint = dict(zip((mesh for mesh, _ in grammar.grids[number].pieces), label_colors(27).tolist(), strict=False))
+    parts = [(_soup(grammar.meshes[each.mesh], each), tuple(paint[each.mesh])) for each in pieces]
+    return _cell(found, parts, f"{grammar.grids[number].name}[{','.join(map(str, counts))}]")
+
+
+def _soup(mesh: PartMesh, piece: Piece) -> Soup:
+    corners = transform_points(piece.pose, mesh.vertices)[mesh.faces]
+    return Soup(corners, np.zeros(len(corners), dtype=np.int32))
+
+
+def _cell(found: Extraction, parts: Sequence[tuple[Soup, tuple[int, int, int]]], caption: str) -> Cell:
+    filled = [(each, color) for each, color in parts if len(each)]
+    meshes = tuple(_mesh(each.corners, color) for each, color in filled)
+    types = np.arange(len(meshes), dtype=np.int16)
+    assembly = Assembly(types, np.tile(np.eye(4), (len(meshes), 1, 1)), np.empty((0, 2), np.int32))
+    picture = portrait(scene_of(Shape(meshes, assembly, found.grammar.up, ("part",))), CAMERA, (CELL, CELL))
+    return Cell(picture, caption)
+
+
+def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:
+    colors: ByteArray = np.tile(np.array(color, np.uint8), (len(corners), 1))
+    vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    return PartMesh("part", vertices, place.reshape(-1, 3).astype(np.int32), colors)

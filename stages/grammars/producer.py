@@ -1,0 +1,24 @@
+"""What stage `grammars` says of itself as a producer of samples."""
+
+from __future__ import annotations
+
+from stages.grammars.origins import mesh_origins
+from stages.grammars.settings import GrammarsConfig
+from stages.shape.collection.producer import Producer
+
+__all__ = ["PRODUCER"]
+
+PRODUCER = Producer(
+    language="derivation",
+    keys="grammars.models",
+    asked=lambda config: bool(config.section(GrammarsConfig).models),
+    sentence="a shape grammar is found in a mesh in one piece, by its partial symmetries, and its rules and grids are "
+    "carried out; a shape's derivation is its `txt`.",
+    origins=mesh_origins,
+    limits=(
+        "Every neighbourhood of the radius of similarity is one of the mesh's; nothing new is seen from nearby.",
+        "Parts are terminals of the grammar: pieces between docking sites, which mean nothing.",
+    ),
+    splits="No two samples are congruent, within a split or across splits.",
+    apart=True,
+)

@@ -1,0 +1,86 @@
+"""The `grammars` section of a config."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from pipeline.config import ExistingFile, StrictModel
+from stages.shape.collection.origin import Credit
+
+__all__ = ["GrammarConfig", "GrammarSplitConfig", "GrammarsConfig"]
+
+
+class GrammarConfig(StrictModel):
+    """One mesh, and how many shapes of its grammar are made."""
+
+    name: str = Field(
+        pattern=r"^[a-z0-9][a-z0-9-]*$",
+        max_length=64,
+        description="Name of the grammar; starts the keys of its samples.",
+    )
+    model: ExistingFile = Field(
+        description="Model file (GLB, glTF, OBJ, PLY, STL, OFF, DAE), from the run's folder; all of it is one mesh."
+    )
+    # excluded from what the stage's fingerprint sees: a mended licence makes the card anew and no shape
+    credit: Credit = Field(default_factory=Credit, exclude=True, description="Whose the model is.")
+    radius: float = Field(
+        0.016,
+        ge=0.004,
+        le=0.1,
+        description="Radius of similarity, as a share of the longest side of the model's box: every neighbourhood of "
+        "this size in a shape is one of the model's. Smaller finds more sites, and takes longer.",
+    )
+    up: Literal["auto", "y", "z"] = Field(
+        "auto", description="The axis that points up in the file; `auto` is what the file says, else y."
+    )
+    instances: int = Field(
+        100, ge=0, le=1_000_000, description="Shapes by random productions; those that come twice count once."
+    )
+    resized: int = Field(
+        100,
+        ge=0,
+        le=1_000_000,
+        description="Shapes by grids with other numbers of cells; those that come twice count once.",
+    )
+    most_cells: int = Field(12, ge=1, le=1000, description="Most cells along a row of a resized grid.")
+    most_pieces: int = Field(
+        40, ge=1, le=400, description="After so many productions a random shape takes what the model has."
+    )
+
+
+class GrammarSplitConfig(StrictModel):
+    """How the samples are shared out."""
+
+    val: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes in the validation split.")
+    test: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes in the test split.")
+    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
+    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
+
+
+class GrammarsConfig(StrictModel):
+    """Shapes from the grammars of meshes in one piece."""
+
+    models: tuple[GrammarConfig, ...] = Field(
+        (), description="The meshes; none for a dataset that is made in another way."
+    )
+    splits: GrammarSplitConfig = Field(
+        default_factory=GrammarSplitConfig, description="How the samples are shared out; no shape comes twice."
+    )
+
+    @field_validator("models")
+    @classmethod
+    def _names_differ(cls, models: tuple[GrammarConfig, ...]) -> tuple[GrammarConfig, ...]:
+        names = [each.name for each in models]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two grammars are named {name!r}; give each its own name")
+        return models
+
+    @model_validator(mode="after")
+    def _something_is_made(self) -> Self:
+        for each in self.models:
+            if not each.instances and not each.resized:
+                raise ValueError(f"grammar {each.name} makes nothing; set instances or resized")
+        return self

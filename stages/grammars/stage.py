@@ -1,0 +1,258 @@
+"""Stage `grammars`: meshes in one piece in; random and resized shapes of their grammars out, as the shards
+`<dataset>-<split>-<index>.tar`.
+
+Its first shards extract a grammar each: `<name>.json`, `<name>.tar`, `<name>.png`. Then one draws the shapes of all of
+them, refuses what collides or was drawn before, and gives each of the others its split and shard. A sample carries no
+meshes: its text is its derivation, and `stages.grammars.derivation.shape_of_text` makes the shape.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pipeline.config import Config
+from pipeline.errors import ShardFailed
+from pipeline.places import file_digest
+from pipeline.shards import ShardWriter, json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.grammars.language import drawing_name, grammar_shards, input_grammars
+from stages.grammars.origins import mesh_origins
+from stages.grammars.settings import GrammarConfig, GrammarsConfig
+from stages.shape.collection.origin import unstated
+from stages.shape.sample import Sample, write_sample
+from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
+
+__all__ = ["STAGE"]
+
+BYTES_A_GRAMMAR = 20_000_000
+BYTES_A_SAMPLE = 4_000
+TRIES = 20
+"""Draws for each shape that is asked for."""
+
+
+def planned_shards(plan: Plan) -> list[Shard]:
+    """The grammars; the drawing of all shapes; when that is made, the shards of the collection."""
+    config = plan.config.section(GrammarsConfig)
+    if not config.models:
+        return []
+    shards = [
+        Shard(name, {"job": "extraction", "digest": file_digest(each.model)})
+        for name, each in zip(grammar_shards(plan.config), config.models, strict=True)
+    ]
+    inputs = tuple(f"grammars/{each.name}" for each in shards)
+    drawing = Shard(drawing_name(plan.config.name), {"job": "drawing"}, inputs)
+    summary = plan.summary("grammars", drawing.name)
+    if summary is None:
+        return [*shards, drawing]
+    collection = [
+        Shard(
+            f"{plan.config.name}-{split}-{number:06d}",
+            {"job": "collection", "split": split, "number": number},
+            (f"grammars/{drawing.name}",),
+        )
+        for split in SPLITS
+        for number in range(summary["shards"][split])
+    ]
+    return [*shards, drawing, *collection]
+
+
+def run_shard(task: Task) -> Outcome:
+    """A grammar, the drawing of all shapes, or a shard of the collection."""
+    jobs = {"extraction": run_extraction, "drawing": run_drawing, "collection": run_collection}
+    return jobs[task.shard.params["job"]](task)
+
+
+def run_extraction(task: Task) -> Outcome:
+    """Read a mesh, find its grammar, write it. Raises ShardFailed for a mesh in which nothing can be exchanged."""
+    from stages.exemplars.read import read_model
+    from stages.grammars.description import describe_grammar
+    from stages.grammars.extraction import extract, mesh_of
+    from stages.grammars.files import write_grammar
+    from stages.grammars.picture import grammar_sheet
+
+    names = grammar_shards(task.config)
+    config = task.config.section(GrammarsConfig).models[names.index(task.shard.name)]
+    model = read_model(config.model, "components")
+    up = config.up if config.up != "auto" else model.up or "y"
+    found = extract(mesh_of(model), config.name, config.radius, up, task.rng("sets"))
+    if len(found.grammar.rules) < 2 and not found.grammar.grids:
+        raise ShardFailed(
+            f"{config.model}: nothing in it can be exchanged, for {found.motions} motions leave no docking site; set "
+            f"grammars.models[{config.name}].radius smaller, or take it by its parts: exemplars.kits"
+        )
+    described = describe_grammar(found)
+    with task.output(f"{task.shard.name}.json") as text, task.output(f"{task.shard.name}.tar") as arrays:
+        write_grammar(described, found.grammar, text, arrays)
+    with task.output(f"{task.shard.name}.png") as picture:
+        picture.write(grammar_sheet(found))
+    return Outcome(
+        samples=0,
+        summary={
+            "triangles": len(found.mesh.faces),
+            "motions": found.motions,
+            "sites": len({each.site for each in found.dockers}),
+            "dockers": len(found.dockers),
+            "rules": len(found.grammar.rules),
+            "grids": [list(each.counts) for each in found.grammar.grids],
+        },
+    )
+
+
+def run_drawing(task: Task) -> Outcome:
+    """Draw the shapes of all grammars, and share them out; shapes that a rigid motion takes to each other are one.
+
+    Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises ShardFailed
+    where there are no shapes.
+    """
+    config = task.config.section(GrammarsConfig)
+    rows: list[dict[str, Any]] = []
+    for each in config.models:
+        rows += _drawn(task, each, len(rows))
+    if not rows:
+        raise ShardFailed("no shape was drawn that does not run into itself; set grammars.models[].radius")
+    groups: dict[str, list[int]] = {}
+    for index, row in enumerate(rows):
+        groups.setdefault(row["graph"], []).append(index)
+    split_of = share_out(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
+    order = task.rng("order").permutation(len(rows))
+    shards: dict[str, int] = {}
+    for split, name in enumerate(SPLITS):
+        members = order[split_of[order] == split]
+        shard_of = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
+        shards[name] = int(shard_of[-1]) + 1 if len(members) else 0
+        for number in range(shards[name]):
+            with task.output(f"{task.shard.name}.{name}-{number:06d}.jsonl") as stream:
+                stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
+    counts = Counter(f"{row['kit']}, {row['method']}" for row in rows)
+    return Outcome(0, {"shards": shards, "shapes": dict(sorted(counts.items()))})
+
+
+def _drawn(task: Task, config: GrammarConfig, first: int) -> list[dict[str, Any]]:
+    """The shapes of one grammar as rows, `first` rows being there already."""
+    from stages.exemplars.symmetry.derivations import Derivation
+    from stages.grammars.collisions import Collisions
+    from stages.grammars.derivation import Resized, derivation_text, pieces_of, surface_digest
+    from stages.grammars.drawing import Collided, random_counts, random_derivation
+
+    grammar = input_grammars(task)[config.name]
+    collisions = Collisions(grammar)
+    known: set[str] = set()
+    rows: list[dict[str, Any]] = []
+    for method, wanted in (("random rules", config.instances), ("resized grid", config.resized)):
+        if method == "resized grid" and not grammar.grids:
+            continue
+        made = 0
+        for number in range(TRIES * wanted):
+            if made == wanted:
+                break
+            rng = task.rng(config.name, method, number)
+            drawn: Derivation | Resized
+            if method == "resized grid":
+                drawn = random_counts(grammar, config.most_cells, rng)
+                refused = "runs into itself" if collisions.whole(drawn) else ""
+            else:
+                try:
+                    drawn = random_derivation(grammar, collisions, int(rng.integers(1, config.most_pieces + 1)), rng)
+                    refused = ""
+                except Collided:
+                    refused = "runs into itself"
+            if not refused:
+                digest = surface_digest(grammar, pieces_of(grammar, drawn))
+                refused = "drawn before" if digest in known else ""
+            if refused:
+                task.reject(config.name, refused)
+                continue
+            known.add(digest)
+            made += 1
+            rows.append(
+                {
+                    "key": f"{config.name}-{first + len(rows):06d}",
+                    "kit": config.name,
+                    "graph": digest,
+                    "method": method,
+                    "file": "/".join(config.model.parts[-2:]),
+                    "text": derivation_text(grammar, drawn),
+                }
+            )
+            task.progress(made, wanted)
+    return rows
+
+
+def run_collection(task: Task) -> Outcome:
+    """Write the samples of one shard."""
+    split, number = task.shard.params["split"], task.shard.params["number"]
+    drawing = drawing_name(task.config.name)
+    listing = task.input("grammars", f"{drawing}.{split}-{number:06d}.jsonl").read_text()
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for line in listing.rstrip("\n").split("\n"):
+            row = json.loads(line)
+            lineage = {"method": row["method"], "parents": [row["file"]]}
+            sample = Sample(row["key"], split, "grammars", row["kit"], row["graph"], lineage, text=row["text"])
+            write_sample(writer, sample)
+    return Outcome(writer.samples, {"split": split, "samples": writer.samples})
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """What each grammar has, how many shapes were drawn of it, and why others were refused."""
+    lines = []
+    for name in grammar_shards(plan.config):
+        seen = plan.summary("grammars", name)
+        if seen is not None:
+            grids = ", ".join(" x ".join(map(str, each)) for each in seen["grids"]) or "none"
+            lines.append(
+                f"{name}: {seen['triangles']:,} triangles, {seen['motions']} motions, {seen['dockers']} dockers at "
+                f"{seen['sites']} classes of sites, {seen['rules']} rules; grids: {grids}"
+            )
+    drawing = drawing_name(plan.config.name)
+    made = plan.summary("grammars", drawing) if lines else None
+    if made is not None:
+        shapes = "; ".join(f"{count:,} {each}" for each, count in made["shapes"].items())
+        why = ", ".join(f"{count:,} {reason}" for reason, count in sorted(plan.rejects("grammars", drawing).items()))
+        lines.append(f"shapes: {shapes}; refused: {why or 'none'}")
+    lines += [f"warning: {sentence}" for sentence in unstated(mesh_origins(plan))]
+    return lines
+
+
+def asked(config: Config) -> Sequence[int]:
+    """The shapes of each shard of the collection, if as many are found as are asked for."""
+    section = config.section(GrammarsConfig)
+    total = sum(each.instances + each.resized for each in section.models)
+    val, test = round(section.splits.val * total), round(section.splits.test * total)
+    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+
+
+def trial(config: Config) -> GrammarsConfig:
+    """The same grammars, and few shapes of each."""
+    section = config.section(GrammarsConfig)
+    models = tuple(
+        each.model_copy(update={"instances": min(each.instances, 8), "resized": min(each.resized, 8)})
+        for each in section.models
+    )
+    return section.model_copy(
+        update={"models": models, "splits": section.splits.model_copy(update={"samples_per_shard": 8})}
+    )
+
+
+def estimate_bytes(plan: Plan) -> int:
+    """Bytes of the grammars and of all samples."""
+    return BYTES_A_GRAMMAR * len(grammar_shards(plan.config)) + BYTES_A_SAMPLE * int(np.sum(asked(plan.config)))
+
+
+STAGE = Stage(
+    name="grammars",
+    module=__name__,
+    stays=True,
+    config=GrammarsConfig,
+    inputs=(),
+    plan=planned_shards,
+    run_shard=run_shard,
+    estimate_bytes=estimate_bytes,
+    report=report,
+    asked=asked,
+    trial=trial,
+)
