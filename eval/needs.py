@@ -11,6 +11,7 @@ __all__ = [
     "CORPUS",
     "CURVE_PROGRAM",
     "EDGE_CATEGORIES",
+    "EXEMPLARS",
     "FINISHED",
     "KITS",
     "PROGRAMS",
@@ -40,6 +41,16 @@ def _kits(subject: Subject) -> str:
 
 KITS = Need("kits read by stage exemplars", _kits)
 """The samples are shape graphs, and the kits that they are of stand in the mill's folder."""
+
+
+def _exemplars(subject: Subject) -> str:
+    if any(subject.places.stage("grammars").root.glob("*.json")):
+        return ""
+    return _kits(subject)
+
+
+EXEMPLARS = Need("the exemplars of shapes", _exemplars)
+"""The kits or the grammars that the samples are of stand in the mill's folder."""
 
 
 def _search(subject: Subject) -> str:

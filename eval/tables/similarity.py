@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from eval.evaluation import Answer, Evaluation
-from eval.needs import FINISHED, KITS
+from eval.needs import EXEMPLARS, FINISHED
 from eval.subject import Subject
+from stages.shape.arrays import FloatArray
 
 __all__ = ["TABLE"]
 
@@ -22,20 +23,32 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from eval.shapes import dataset_shapes
     from eval.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.randomness import decision_rng
-    from stages.exemplars.language import made_kits
-    from stages.shape.arrays import FloatArray
-    from stages.shape.shape import kit_shape
 
     shapes: dict[str, list[FloatArray]] = {}
     for name, shape in dataset_shapes(subject.folder, asked.similar):
         shapes.setdefault(name, []).append(triangles_of(shape))
     rows = []
-    for name, kit in made_kits(subject.places).items():
+    for name, exemplars in _exemplars(subject).items():
         if name in shapes:
-            exemplars = [triangles_of(kit_shape(kit, each.assembly)) for each in kit.exemplars]
             rng = decision_rng(subject.config.seed, "similarity", name)
             rows.append(similarity_row(name, exemplars, shapes[name], asked.radius, asked.probes, rng))
     return Answer([similarity_table(rows)])
+
+
+def _exemplars(subject: Subject) -> dict[str, list[FloatArray]]:
+    """The triangles of the exemplars of each kit, and of the mesh of each grammar."""
+    from eval.similarity import triangles_of
+    from stages.exemplars.language import made_kits
+    from stages.grammars.files import made_grammars
+    from stages.shape.shape import kit_shape
+
+    found = {
+        name: [triangles_of(kit_shape(kit, each.assembly)) for each in kit.exemplars]
+        for name, kit in made_kits(subject.places).items()
+    }
+    for name, grammar in made_grammars(subject.places).items():
+        found[name] = [grammar.exemplar.vertices[grammar.exemplar.faces]]
+    return found
 
 
 def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
@@ -62,7 +75,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="Does each shape look around every point as an exemplar does somewhere?",
-    needs=(FINISHED, KITS),
+    needs=(FINISHED, EXEMPLARS),
     seconds=lambda subject: 20 + 4 * min(subject.samples, MOST),
     answer=_answer,
     of_files=_of_files,

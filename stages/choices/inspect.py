@@ -25,6 +25,7 @@ from stages.exemplars.portrait import kit_sheet
 from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
+from stages.grammars.inspect import has_grammar, written_grammar
 from stages.shape.kit import ContactKind, Strictness
 
 __all__ = ["main"]
@@ -57,6 +58,11 @@ def main(arguments: list[str]) -> int:
         sys.stdout.flush()
         for title, path in _written(asked.out or FOLDER, paths, found):
             print(f"{title:<18} {path}")
+        if len(models) == 1 and has_grammar(models[0], asked.parts):
+            sys.stdout.flush()
+            up, name = found.config.decided().up, dataset_name(paths)
+            for title, said in written_grammar(asked.out or FOLDER, name, paths[0], up, limits):
+                print(f"{title:<18} {said}")
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2

@@ -23,6 +23,8 @@ NEAR = 1.8
 """Pieces are apart where no two of their points, one in each cell, are closer than so many cells."""
 BESIDE = 2.0
 """At a seam they may be near as far as so many radii from it."""
+DECIMALS = 6
+"""Digits of relative poses, shifts in cells, that count."""
 SAME = 0.5
 """Cells by which the corners of a piece may lie elsewhere and the piece still stand as another one does."""
 
@@ -34,6 +36,7 @@ class Collisions:
         self._grammar = grammar
         self._cell = grammar.radius / CELLS_A_RADIUS
         self._points = [self._points_of(each) for each in range(len(grammar.meshes))]
+        self._answers: dict[tuple[int, int, bytes], BoolArray | None] = {}
         self._trees: dict[int, Any] = {}
         self._seam_trees: dict[int, Any] = {}
 
@@ -43,7 +46,7 @@ class Collisions:
         own: FloatArray | None = None
         for other in others:
             near = self._near(piece, other)
-            if not near.any() or self._as_in_exemplar(piece, other):
+            if near is None or self._as_in_exemplar(piece, other):
                 continue
             if own is None:
                 own = transform_points(piece.pose, self._points[piece.mesh])
@@ -74,7 +77,7 @@ class Collisions:
                 for other in pieces[:place]:
                     pose = invert(one.pose) @ other.pose
                     listed = found.setdefault((one.mesh, other.mesh), [])
-                    if not self._listed(listed, other.mesh, pose) and self._near(one, other).any():
+                    if not self._listed(listed, other.mesh, pose) and self._near(one, other) is not None:
                         listed.append(pose)
                         found.setdefault((other.mesh, one.mesh), []).append(invert(pose))
         return found
@@ -104,19 +107,33 @@ class Collisions:
             self._trees[mesh] = KDTree(self._points[mesh])
         return self._trees[mesh]
 
-    def _near(self, one: Piece, other: Piece) -> BoolArray:
-        """Which points of a piece are near another piece, bool (n,)."""
-        points = self._points[one.mesh]
-        found = np.zeros(len(points), dtype=bool)
+    def _near(self, one: Piece, other: Piece) -> BoolArray | None:
+        """Which points of a piece are near another piece, bool (n,); None for none. Relative poses recur, so that each
+        is answered once, at its rounded value."""
         pose = invert(other.pose) @ one.pose
-        moved = transform_points(pose, points)
-        low, high = self._grammar.meshes[other.mesh].bounds
+        pose[:3, 3] /= self._cell
+        pose = np.round(pose, DECIMALS) + 0.0
+        key = (one.mesh, other.mesh, pose.tobytes())
+        if key not in self._answers:
+            pose[:3, 3] *= self._cell
+            self._answers[key] = self._points_near(one.mesh, other.mesh, pose)
+        return self._answers[key]
+
+    def _points_near(self, mesh: int, other: int, pose: FloatArray) -> BoolArray | None:
+        """Which points of a mesh at a pose in the coordinates of another are near that."""
+        low, high = self._grammar.meshes[other].bounds
         reach = NEAR * self._cell
+        box = self._grammar.meshes[mesh].bounds
+        middle, half = box.mean(axis=0), (box[1] - box[0]) / 2
+        around, wide = transform_points(pose, middle), np.abs(pose[:3, :3]) @ half
+        if ((around - wide > high + reach) | (around + wide < low - reach)).any():
+            return None
+        moved = transform_points(pose, self._points[mesh])
         close = np.flatnonzero(((moved > low - reach) & (moved < high + reach)).all(axis=1))
-        if len(close):
-            away, _ = self._tree(other.mesh).query(moved[close], distance_upper_bound=reach)
-            found[close] = np.isfinite(away)
-        return found
+        away, _ = self._tree(other).query(moved[close], distance_upper_bound=reach)
+        found = np.zeros(len(moved), dtype=bool)
+        found[close] = np.isfinite(away)
+        return found if found.any() else None
 
     def _at_seams(self, points: FloatArray, asked: BoolArray, seams: Sequence[tuple[int, FloatArray]]) -> BoolArray:
         """Which of the points asked for lie beside a seam, bool (n,)."""

@@ -25,11 +25,11 @@ from stages.shape.kit import PartMesh
 
 __all__ = ["Extraction", "Mesh", "extract", "mesh_of"]
 
-MOTIONS = 40
+MOTIONS = 24
 """So many motions are looked at, of a grid of many cells fewer."""
-WORK = 24_000_000
+WORK = 8_000_000
 """Cells that are looked at in all, each once for a motion."""
-WELDED = 1e-3
+WELDED = 1e-6
 """Corners of pieces are one vertex where they are closer than this share of a cell."""
 
 
@@ -40,6 +40,12 @@ class Mesh:
     vertices: FloatArray
     faces: IntArray
     colors: ByteArray
+
+    @property
+    def corners(self) -> FloatArray:
+        """Of each triangle, float64 (f, 3, 3)."""
+        found: FloatArray = self.vertices[self.faces]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +80,7 @@ def extract(mesh: Mesh, name: str, radius: float, up: Literal["y", "z"], rng: np
 
     Triangles without area are left out. Raises ConfigError for a mesh without any other.
     """
-    corners = mesh.vertices[mesh.faces]
+    corners = mesh.corners
     if not with_area(corners).any():
         raise ConfigError(f"{name}: no triangle has any area; export the model again, with its surfaces")
     seconds: dict[str, float] = {}

@@ -23,13 +23,13 @@ from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
 __all__ = ["grammar_sheet"]
 
-CELL = 240
-COLUMNS = 5
+CELL = 200
+COLUMNS = 4
 CAMERA = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.06)
 STAYS, COMES, GOES = (196, 192, 186), (204, 72, 58), (232, 186, 64)
-SITES = 8
+SITES = 5
 """So many classes of sites are shown, those at which most can dock."""
-OPTIONS = 4
+OPTIONS = 3
 """So many editing options of one site, those that change most."""
 
 

@@ -12,10 +12,11 @@ from stages.exemplars.kits.solid import Color, Face, Point, Solid
 
 __all__ = ["shapes"]
 
-BAYS, STOREYS = 5, 4
+BAYS, STOREYS = 5, 3
 BAY, STOREY = 1.2, 1.5
-MARGIN, PLINTH, CORNICE = 0.7, 0.6, 0.9
-DEPTH = 1.2
+MARGIN, PLINTH, CORNICE = 0.45, 0.77, 0.525
+"""So that a cut beside a corner, and beside each row of windows, runs through plain wall."""
+DEPTH = 0.8
 WALL: Color = (214, 186, 150)
 STONE: Color = (160, 152, 144)
 GLASS: Color = (92, 118, 138)
