@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +14,13 @@ from pipeline.errors import ConfigError
 from stages.programs.parameters import Value
 from stages.programs.program import Program, find_program, program_names
 from stages.shape.arrays import ByteArray, FloatArray
-from stages.sketches.settings import SketchesConfig
 from stages.training.checkpoint import CheckpointError, weights_of_kind
-from stages.training.recovery.clouds import Frame, frame_of
-from stages.training.recovery.partial import PartialTarget, partial_target
+from stages.training.recovery.fitting import Fit, Up, best_fit, first_look
 from stages.training.recovery.reading import Input, checked_cloud, ink_of
-from stages.training.recovery.refinement import Guess, Refined, base_guess, refine
-from stages.training.recovery.targets import CloudTarget, Target, cloud_target, drawing_target
+from stages.training.recovery.refinement import Guess, Refined, refine
 from stages.training.recovery.trained import KIND, TrainedRecovery, load_recovery
 
 __all__ = ["SHIPPED", "Models", "Recovered", "find_models", "recover", "recover_input"]
-
-Up = Literal["x", "y", "z", ""]
 
 SHIPPED = Path(__file__).parents[3] / "datasets/exemplars/models"
 """Models that come with Shapemill; `ship.py` puts them there."""
@@ -35,22 +30,8 @@ UNLIKE = {"points": 0.004, "sketch": 0.001}
 drawing are everywhere, so that no other lines are far from them."""
 NO_BETTER = 0.9
 """A recovery that is not nearer than this share of the base shape's distance says nothing of the input."""
-TORN = 4.0
-"""A cloud that is so many times farther from the best whole shape than a cloud of that shape itself may be torn."""
-EXPLAINED = 0.5
-"""It is, if a part that is missing leaves no more than this share of the distance, and"""
-LEAST_MISSING, MOST_MISSING = 0.1, 0.75
-"""so much of the shape at least, and at most: a stick lies on every chair."""
 GLANCE = 40
 """Shapes that a program is given to show that it is the likeliest."""
-
-_UPRIGHT: Mapping[str, FloatArray] = {
-    "y": np.eye(3),
-    "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
-    "x": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
-}
-_QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-"""A quarter turn about the axis that points up."""
 
 Models = Mapping[tuple[str, str], TrainedRecovery]
 """Trained models by program and kind of input, `points` or `sketch`."""
@@ -129,16 +110,12 @@ def recover_input(
     only along the program's."""
     kind = "points" if given.ink is None else "sketch"
     names = [program] if program else sorted({*program_names(), *(name for name, known in models if known == kind)})
-    looks = [_first_look(find_program(name), models.get((name, kind)), given, up, turned, seed) for name in names]
+    looks = [first_look(find_program(name), models.get((name, kind)), given, up, turned, seed) for name in names]
     if len(looks) > 1:
         rng = np.random.default_rng(seed)
         glances = [refine(each.program, each.guess, each.target, GLANCE, rng).distance for each in looks]
         looks = [looks[int(np.argmin(glances))]]
-    fit = _fit(looks[0], budget, seed)
-    if given.points is not None and budget > 1 and fit.distance > TORN * fit.floor:
-        look = looks[0]
-        torn = _first_look(look.program, look.model, given, up, turned, seed, partial_target)
-        fit = min(fit, _fit(torn, budget, seed), key=_unexplained)
+    fit = best_fit(looks[0], given, up, turned, budget, seed)
     return _told(fit, kind, guessed_program=not program)
 
 
@@ -177,86 +154,7 @@ def _models_in(folder: Path, wrong: list[str]) -> dict[tuple[str, str], TrainedR
     return found
 
 
-@dataclass(frozen=True)
-class _Look:
-    """A program, what is guessed of the input, and the input as it stands upright, turned by `rotation` (3, 3). frame:
-    the box around it then; none of a drawing."""
-
-    program: Program
-    model: TrainedRecovery | None
-    guess: Guess
-    target: Target
-    rotation: FloatArray
-    up: str
-    frame: Frame | None
-
-
-def _first_look(
-    program: Program,
-    model: TrainedRecovery | None,
-    given: Input,
-    up: Up,
-    turned: bool,
-    seed: int,
-    target_of: Callable[[FloatArray, np.random.Generator], Target] = cloud_target,
-) -> _Look:
-    """The best guess over the axes that may point up and the ways that a front may look."""
-    if given.points is None:
-        assert given.ink is not None
-        config = SketchesConfig() if model is None else model.sketches
-        guess = base_guess(program) if model is None else model.guess_drawing(given.ink)
-        return _Look(program, model, guess, drawing_target(program, config, given.ink), np.eye(3), "y", None)
-    looks = []
-    for axis, rotation in _rotations(up, 4 if turned else 1):
-        cloud = given.points @ rotation.T
-        rng = np.random.default_rng(seed)
-        guess = base_guess(program) if model is None else model.guess_cloud(cloud, rng)
-        look = _Look(program, model, guess, target_of(cloud, rng), rotation, axis, frame_of(cloud))
-        looks.append((refine(program, guess, look.target, 1, rng).distance, look))
-    return min(looks, key=lambda each: each[0])[1]
-
-
-def _rotations(up: Up, quarters: int) -> Iterator[tuple[str, FloatArray]]:
-    for axis in [up] if up else ["y", "z", "x"]:
-        rotation = _UPRIGHT[axis]
-        for _ in range(quarters):
-            yield axis, rotation
-            rotation = _QUARTER @ rotation
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """What a search has found for a look. floor: how far a cloud or drawing of that shape itself is from it; base: how
-    far the program's base shape is; missing: the share of the shape that a torn cloud says nothing of."""
-
-    look: _Look
-    refined: Refined
-    floor: float
-    base: float
-    missing: float
-
-    @property
-    def distance(self) -> float:
-        return self.refined.distance
-
-
-def _fit(look: _Look, budget: int, seed: int) -> _Fit:
-    rng = np.random.default_rng(seed)
-    refined = refine(look.program, look.guess, look.target, budget, rng)
-    base = refine(look.program, base_guess(look.program), look.target, 1, rng).distance
-    parts = look.program.parts(refined.values)
-    missing = refined.target.missing(parts) if isinstance(refined.target, PartialTarget) else 0.0
-    return _Fit(look, refined, refined.target.floor(parts, rng), base, missing)
-
-
-def _unexplained(fit: _Fit) -> float:
-    """The distance, by which a fit that leaves something out is held against one of the whole shape."""
-    if isinstance(fit.refined.target, CloudTarget):
-        return EXPLAINED * fit.distance
-    return fit.distance if LEAST_MISSING <= fit.missing <= MOST_MISSING else float("inf")
-
-
-def _told(fit: _Fit, kind: str, guessed_program: bool) -> Recovered:
+def _told(fit: Fit, kind: str, guessed_program: bool) -> Recovered:
     """A fit, and what speaks against it."""
     look, refined, program = fit.look, fit.refined, fit.look.program
     warnings = []
@@ -278,9 +176,8 @@ def _told(fit: _Fit, kind: str, guessed_program: bool) -> Recovered:
     if fit.distance - fit.floor > NO_BETTER * (fit.base - fit.floor):
         warnings.append(f"the result is no better than the base shape of the program ({fit.base:.2g})")
     confidence = None if look.model is None else _confidence(program, look.guess, refined)
-    placement = _placement(look, refined)
     return Recovered(
-        program, refined.values, fit.distance, fit.base, fit.missing, confidence, placement, look.up, refined.tried,
+        program, refined.values, fit.distance, fit.base, fit.missing, confidence, fit.placement, look.up, fit.tried,
         tuple(warnings),
     )  # fmt: skip
 
@@ -292,15 +189,3 @@ def _confidence(program: Program, guess: Guess, refined: Refined) -> dict[str, f
         for each in program.parameters
         if each.name in visible
     }
-
-
-def _placement(look: _Look, refined: Refined) -> FloatArray | None:
-    """From the program's coordinates to the box that targets are compared in, to the upright input, to the input."""
-    if look.frame is None or not isinstance(refined.target, CloudTarget | PartialTarget):
-        return None
-    outer, inner = look.frame, refined.target.frame
-    scale = outer.size / inner.size
-    matrix = np.eye(4)
-    matrix[:3, :3] = look.rotation.T * scale
-    matrix[:3, 3] = look.rotation.T @ (outer.centre - inner.centre * scale)
-    return matrix

@@ -1,0 +1,142 @@
+"""An input laid on the shapes of one program: which way up it stands, and whether it is whole or torn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from stages.programs.program import Program
+from stages.shape.arrays import FloatArray
+from stages.sketches.settings import SketchesConfig
+from stages.training.recovery.clouds import Frame, frame_of
+from stages.training.recovery.partial import PartialTarget, partial_target
+from stages.training.recovery.reading import Input
+from stages.training.recovery.refinement import Guess, Refined, base_guess, refine
+from stages.training.recovery.targets import CloudTarget, Target, cloud_target, drawing_target
+from stages.training.recovery.trained import TrainedRecovery
+
+__all__ = ["Fit", "Look", "Up", "best_fit", "first_look"]
+
+Up = Literal["x", "y", "z", ""]
+
+TORN = 4.0
+"""A cloud that is so many times farther from the best whole shape than a cloud of that shape itself may be torn."""
+EXPLAINED = 0.5
+"""It is, if a part that is missing leaves no more than this share of the distance, and"""
+LEAST_MISSING, MOST_MISSING = 0.1, 0.75
+"""so much of the shape at least, and at most: a stick lies on every chair."""
+
+_UPRIGHT: Mapping[str, FloatArray] = {
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "x": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+}
+_QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""A quarter turn about the axis that points up."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """A program, what is guessed of the input, and the input as it stands upright, turned by `rotation` (3, 3). frame:
+    the box around it then; none of a drawing."""
+
+    program: Program
+    model: TrainedRecovery | None
+    guess: Guess
+    target: Target
+    rotation: FloatArray
+    up: str
+    frame: Frame | None
+
+
+def first_look(
+    program: Program,
+    model: TrainedRecovery | None,
+    given: Input,
+    up: Up,
+    turned: bool,
+    seed: int,
+    target_of: Callable[[FloatArray, np.random.Generator], Target] = cloud_target,
+) -> Look:
+    """The best guess over the axes that may point up and the ways that a front may look."""
+    if given.points is None:
+        assert given.ink is not None
+        config = SketchesConfig() if model is None else model.sketches
+        guess = base_guess(program) if model is None else model.guess_drawing(given.ink)
+        return Look(program, model, guess, drawing_target(program, config, given.ink), np.eye(3), "y", None)
+    looks = []
+    for axis, rotation in _rotations(up, 4 if turned else 1):
+        cloud = given.points @ rotation.T
+        rng = np.random.default_rng(seed)
+        guess = base_guess(program) if model is None else model.guess_cloud(cloud, rng)
+        look = Look(program, model, guess, target_of(cloud, rng), rotation, axis, frame_of(cloud))
+        looks.append((refine(program, guess, look.target, 1, rng).distance, look))
+    return min(looks, key=lambda each: each[0])[1]
+
+
+def _rotations(up: Up, quarters: int) -> Iterator[tuple[str, FloatArray]]:
+    for axis in [up] if up else ["y", "z", "x"]:
+        rotation = _UPRIGHT[axis]
+        for _ in range(quarters):
+            yield axis, rotation
+            rotation = _QUARTER @ rotation
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a search has found for a look. floor: how far a cloud or drawing of that shape itself is from it; base: how
+    far the program's base shape is; missing: the share of the shape that a torn cloud says nothing of; tried: shapes
+    that were made until it was found."""
+
+    look: Look
+    refined: Refined
+    floor: float
+    base: float
+    missing: float
+    tried: int
+
+    @property
+    def distance(self) -> float:
+        return self.refined.distance
+
+    @property
+    def placement(self) -> FloatArray | None:
+        """From the program's coordinates to the box that targets are compared in, to the upright input, to the input;
+        float64 (4, 4)."""
+        target = self.refined.target
+        if self.look.frame is None or not isinstance(target, CloudTarget | PartialTarget):
+            return None
+        outer, inner = self.look.frame, target.frame
+        scale = outer.size / inner.size
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.look.rotation.T * scale
+        matrix[:3, 3] = self.look.rotation.T @ (outer.centre - inner.centre * scale)
+        return matrix
+
+
+def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: int) -> Fit:
+    """The nearest whole shape; or, where a cloud lies far from it, that of which the cloud may be a part."""
+    whole = _fit(look, budget, seed)
+    if given.points is None or budget == 1 or whole.distance <= TORN * whole.floor:
+        return whole
+    torn = _fit(first_look(look.program, look.model, given, up, turned, seed, partial_target), budget, seed)
+    return replace(min(whole, torn, key=_unexplained), tried=whole.tried + torn.tried)
+
+
+def _fit(look: Look, budget: int, seed: int) -> Fit:
+    rng = np.random.default_rng(seed)
+    refined = refine(look.program, look.guess, look.target, budget, rng)
+    base = refine(look.program, base_guess(look.program), look.target, 1, rng).distance
+    parts = look.program.parts(refined.values)
+    missing = refined.target.missing(parts) if isinstance(refined.target, PartialTarget) else 0.0
+    return Fit(look, refined, refined.target.floor(parts, rng), base, missing, refined.tried)
+
+
+def _unexplained(fit: Fit) -> float:
+    """The distance, by which a fit that leaves something out is held against one of the whole shape."""
+    if isinstance(fit.refined.target, CloudTarget):
+        return EXPLAINED * fit.distance
+    return fit.distance if LEAST_MISSING <= fit.missing <= MOST_MISSING else float("inf")
