@@ -90,8 +90,7 @@ def bench() -> Iterator[Measure]:
     ours_many = rate(lambda: step(ours, many), seconds=1.0, rounds=1)
     yield Measure(f"{name}, {PUBLISHED_POINTS} points", "clouds", ours_many, "DGCNN as published", peer_rate)
 
-
-    yield Measure("recovery, a cloud of the base chair, guessed and searched", "clouds", _recoveries(), note="300 shapes")
+    yield Measure("recovery of a cloud, guessed and searched", "clouds", _recoveries(), note="300 shapes of a chair")
 
 
 def _recoveries() -> float:
