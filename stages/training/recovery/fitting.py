@@ -24,7 +24,7 @@ Up = Literal["x", "y", "z", ""]
 
 TORN = 4.0
 """A cloud that is so many times farther from the best whole shape than a cloud of that shape itself may be torn."""
-EXPLAINED = 0.5
+EXPLAINED = 0.25
 """It is, if a part that is missing leaves no more than this share of the distance, and"""
 LEAST_MISSING, MOST_MISSING = 0.1, 0.75
 """so much of the shape at least, and at most: a stick lies on every chair."""
