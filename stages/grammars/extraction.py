@@ -75,10 +75,14 @@ def mesh_of(model: Model) -> Mesh:
     )
 
 
-def extract(mesh: Mesh, name: str, radius: float, up: Literal["y", "z"], rng: np.random.Generator) -> Extraction:
+def extract(
+    mesh: Mesh, name: str, radius: float, up: Literal["y", "z"], rng: np.random.Generator, upright: bool = True
+) -> Extraction:
     """The grammar of a mesh for a radius of similarity, as a share of the longest side of its box.
 
-    Triangles without area are left out. Raises ConfigError for a mesh without any other.
+    upright: whether only motions are looked for that keep what points up: a front that is like itself upside down
+    would get its door under the roof. Triangles without area are left out. Raises ConfigError for a mesh without any
+    other.
     """
     corners = mesh.corners
     if not with_area(corners).any():
@@ -92,7 +96,8 @@ def extract(mesh: Mesh, name: str, radius: float, up: Literal["y", "z"], rng: np
 
     grid = surface_grid(corners, radius)
     passed("surface")
-    motions = candidate_motions(grid, min(MOTIONS, max(1, WORK // len(grid))))
+    axis = np.eye(3)[{"y": 1, "z": 2}[up]] if upright else None
+    motions = candidate_motions(grid, min(MOTIONS, max(1, WORK // len(grid))), axis)
     passed("motions")
     dockers = dockers_of(grid, motions)
     seams = seams_of(grid, dockers)

@@ -35,6 +35,10 @@ class GrammarConfig(StrictModel):
     up: Literal["auto", "y", "z"] = Field(
         "auto", description="The axis that points up in the file; `auto` is what the file says, else y."
     )
+    upright: bool = Field(
+        True,
+        description="Whether what points up in the model does so in every shape; if not, pieces are turned over, too.",
+    )
     instances: int = Field(
         100, ge=0, le=1_000_000, description="Shapes by random productions; those that come twice count once."
     )

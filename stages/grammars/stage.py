@@ -79,7 +79,7 @@ def run_extraction(task: Task) -> Outcome:
     config = task.config.section(GrammarsConfig).models[names.index(task.shard.name)]
     model = read_model(config.model, "components")
     up = config.up if config.up != "auto" else model.up or "y"
-    found = extract(mesh_of(model), config.name, config.radius, up, task.rng("sets"))
+    found = extract(mesh_of(model), config.name, config.radius, up, task.rng("sets"), config.upright)
     if len(found.grammar.rules) < 2 and not found.grammar.grids:
         raise ShardFailed(
             f"{config.model}: nothing in it can be exchanged, for {found.motions} motions leave no docking site; set "

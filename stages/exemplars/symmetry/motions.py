@@ -28,12 +28,13 @@ PLAIN = 1e-4
 """Radians below which a motion does not turn."""
 
 
-def candidate_motions(grid: SurfaceGrid, most: int) -> FloatArray:
+def candidate_motions(grid: SurfaceGrid, most: int, axis: FloatArray | None = None) -> FloatArray:
     """At most `most` rigid motions (m, 4, 4) that carry parts of the surface onto it, that of the largest part first.
 
     Of a motion and its inverse one stands for both; the identity is none. Frames in corners of feature lines that agree
     in kind, and in the lengths of their edges where many do, are aligned; alignments are hashed into clusters, and
     those of many votes tried on a sample of the surface: thousands are pruned before the whole surface is looked at.
+    axis: a direction, float64 (3,), that all of them keep; None for any.
     """
     found = corner_frames(grid.corners, grid.tolerance)
     middle = grid.corners.reshape(-1, 3).mean(axis=0)
@@ -43,6 +44,8 @@ def candidate_motions(grid: SurfaceGrid, most: int) -> FloatArray:
     aligned = centred[target] @ invert(centred[source])
     reach = float(np.linalg.norm(np.ptp(grid.corners.reshape(-1, 3), axis=0))) / 2
     aligned = _one_of_each(aligned, grid.size / reach)
+    if axis is not None:
+        aligned = aligned[np.linalg.norm(aligned[:, :3, :3] @ axis - axis, axis=1) * reach <= 2 * grid.size]
     moves = rotation_angle(aligned) * reach + np.linalg.norm(aligned[:, :3, 3], axis=1) > grid.radius
     clusters = _clusters(aligned[moves], grid.size, reach)
     motions = np.array([_agreed(each) for each in clusters]).reshape(-1, 4, 4)

@@ -84,6 +84,13 @@ class TestSymmetricCells:
 
 
 class TestMotions:
+    def test_those_that_keep_a_direction_turn_nothing_over(self, four_windows: SurfaceGrid) -> None:
+        up = np.array([0.0, 0.0, 1.0])
+        anywhere, upright = (candidate_motions(four_windows, 64, axis) for axis in (None, up))
+        assert (anywhere[:, 2, 2] < 0).any(), "the wall is like itself upside down"
+        assert len(upright)
+        np.testing.assert_allclose(upright[:, :3, :3] @ up, np.tile(up, (len(upright), 1)), atol=1e-6)
+
     def test_the_period_of_a_wall_is_found(self, four_windows: SurfaceGrid) -> None:
         motions = candidate_motions(four_windows, 64)
         for count in (1, 2, 3):
