@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stages.choices.ladder import FITTED, GRAMMARS, GRAPHS, KINDS, STAY, Rails, Rung, climb, is_dull, peeled
+from stages.choices.ladder import FITTED, GRAMMARS, GRAPHS, KINDS, STAY, TELLING, Rails, Rung, climb, is_dull, peeled
 from stages.choices.probe import Finds
 from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
@@ -25,9 +25,6 @@ from stages.variations.dullness import COPIED
 from stages.variations.settings import CHOSEN_CARCASS, CHOSEN_COPIED, CHOSEN_STABLE
 
 __all__ = ["REQUIREMENTS", "Choices", "choose", "found_words", "most_copied", "must_stand"]
-
-TELLING = 0.25
-"""Share of finds from which on a search that refuses the others still comes to an end."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from stages.variations.backdrop import Backdrop
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["FEW", "FITTED", "GRAPHS", "STAY", "Rails", "Rung", "climb", "is_dull", "peeled"]
+__all__ = ["FEW", "FITTED", "GRAPHS", "STAY", "TELLING", "Rails", "Rung", "climb", "is_dull", "peeled"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -24,6 +24,8 @@ HISTOGRAMS = 16
 DISTANCE = 0.05
 SPREAD = 0.03
 """Of so many histograms, so far from the exemplars and from each other, is a pool that is not dull."""
+TELLING = 0.25
+"""Share of finds that are no near copies from which on a search that refuses the others still comes to an end."""
 FAMILIAR = 0.85
 """Share of parts with fillings as seen below which a grammar of slots is too loose for a kit."""
 FEW = 20
@@ -91,8 +93,10 @@ class Rung:
 
 
 def is_dull(finds: Finds) -> bool:
-    """Whether finds look like an exemplar, or like each other."""
-    return finds.distance < DISTANCE or finds.spread < SPREAD or finds.copied >= COPIED
+    """Whether finds look like an exemplar, or like each other; near copies do no harm where enough are none, for then
+    they are refused."""
+    copies = finds.copied >= COPIED and finds.telling < TELLING
+    return finds.distance < DISTANCE or finds.spread < SPREAD or copies
 
 
 def peeled(sight: Sight, hubs: tuple[int, ...]) -> int:
