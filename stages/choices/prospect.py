@@ -26,7 +26,10 @@ from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
 
 __all__ = ["Prospect", "look_at"]
 
-ACROSS = "cut it across, between bays and storeys with all that passes there: `parts: sections`"
+ACROSS = (
+    "cut it across, between bays and storeys with all that passes there: `parts: sections`; or where it is like itself "
+    "elsewhere: `parts: symmetry`, which writes a shape grammar, too"
+)
 """What helps where one mesh has a part that touches all others."""
 
 
