@@ -121,11 +121,9 @@ def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
     targets = ("dataset", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert (
-        len(reached) == 13 + len(targets[1:]) + 1
-    )  # dataset is thirteen stages; inspect looks at a program and a model
+    assert len(reached) == 14 + len(targets[1:]) + 1, "14 stages of dataset; inspect looks at a program and a model"
     assert all(any(said in each for each in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 13 * 6
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 14 * 6
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 

@@ -95,7 +95,8 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
         whole = backdrop.fit(exemplar.assembly)
         names = kit_shape(kit, whole).part_names
         labels = [kit.types[index].name for index in whole.types]
-        parts = [{"name": name, "label": label} for name, label in zip(names, labels, strict=True)]
+        described = zip(names, labels, whole.poses.tolist(), strict=True)
+        parts = [{"name": name, "label": label, "pose": pose} for name, label, pose in described]
         record, contacts = json.dumps({"parts": parts}).encode(), pair_bytes(whole.edges)
         members = {"json": record, CONTACTS: contacts, "glb": glb_bytes(kit_shape(kit, whole))}
         assert geometry_faults(kit, members) == []
