@@ -24,6 +24,7 @@ from stages.grammars.language import drawing_name, grammar_shards, input_grammar
 from stages.grammars.origins import mesh_origins
 from stages.grammars.settings import GrammarConfig, GrammarsConfig
 from stages.shape.collection.origin import unstated
+from stages.shape.collection.shards import made_shards
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
 
@@ -49,15 +50,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
     summary = plan.summary("grammars", drawing.name)
     if summary is None:
         return [*shards, drawing]
-    collection = [
-        Shard(
-            f"{plan.config.name}-{split}-{number:06d}",
-            {"job": "collection", "split": split, "number": number},
-            (f"grammars/{drawing.name}",),
-        )
-        for split in SPLITS
-        for number in range(summary["shards"][split])
-    ]
+    collection = made_shards(plan, summary["shards"], (f"grammars/{drawing.name}",))
     return [*shards, drawing, *collection]
 
 

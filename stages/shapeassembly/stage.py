@@ -20,6 +20,7 @@ from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import unstated
+from stages.shape.collection.shards import made_shards
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shard_sizes, shards_of_split
 from stages.shapeassembly.accept import accepted_rows
@@ -53,15 +54,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
     summary = plan.summary("shapeassembly", assignment.name)
     if summary is None:
         return [*extraction, assignment]
-    collection = [
-        Shard(
-            f"{plan.config.name}-{split}-{number:06d}",
-            {"job": "collection", "split": split, "number": number},
-            (f"shapeassembly/{assignment.name}",),
-        )
-        for split in SPLITS
-        for number in range(summary["shards"][split])
-    ]
+    collection = made_shards(plan, summary["shards"], (f"shapeassembly/{assignment.name}",))
     return [*extraction, assignment, *collection]
 
 

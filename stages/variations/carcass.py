@@ -10,10 +10,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pipeline.config import nearest
-from pipeline.errors import ConfigError
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.kit import Assembly, Exemplar, Kit
+from stages.variations.labels import named_labels
 
 __all__ = ["NO_CARCASS", "carcass", "carcass_test"]
 
@@ -32,12 +31,7 @@ def carcass(kit: Kit) -> tuple[str, ...]:
 
 def carcass_test(kit: Kit, required: Sequence[str]) -> Callable[[Assembly], bool]:
     """Whether an assembly has a part of each of the labels `required`. Raises ConfigError for one that no part has."""
-    for name in required:
-        if name not in kit.labels:
-            near = nearest(name, kit.labels)
-            told = f"did you mean {near}?" if near else f"its parts are {', '.join(kit.labels)}"
-            raise ConfigError(f"variations.require.carcass: kit {kit.name} has no parts called {name}; {told}")
-    asked = {kit.labels.index(name) for name in required}
+    asked = set(np.flatnonzero(named_labels(kit, required, "variations.require.carcass")).tolist())
     return lambda assembly: asked <= set(kit.label_of[assembly.types].tolist())
 
 

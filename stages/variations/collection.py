@@ -12,6 +12,7 @@ from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.collection.shards import made_shards
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.sample import Sample, write_sample
@@ -47,15 +48,7 @@ def collection_shards_of(plan: Plan, assignment: Shard) -> list[Shard]:
     if summary is None:
         return []
     lanes = tuple(each for each in assignment.inputs if not each.endswith("-pool"))
-    return [
-        Shard(
-            f"{plan.config.name}-{split}-{number:06d}",
-            {"job": "collection", "split": split, "number": number},
-            (*lanes, f"variations/{assignment.name}"),
-        )
-        for split in SPLITS
-        for number in range(summary["shards"][split])
-    ]
+    return made_shards(plan, summary["shards"], (*lanes, f"variations/{assignment.name}"))
 
 
 def run_assignment(task: Task) -> Outcome:

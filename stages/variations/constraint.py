@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pkgutil import iter_modules
 
 from pipeline.config import nearest
-from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
+from stages.variations.labels import named_labels
 from stages.variations.resizing import Resizer
 from stages.variations.stretched import contact_fault
 
@@ -87,13 +87,8 @@ def made_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
     kit has not."""
     known = find_constraints()
     for name, labels in asked.items():
-        for what, each in ((what, each) for what, listed in labels.items() for each in listed):
-            if each not in kit.labels:
-                close = nearest(each, kit.labels)
-                told = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
-                raise ConfigError(
-                    f"variations.require.constraints.{name}.{what}: kit {kit.name} has no parts called {each}; {told}"
-                )
+        for what, listed in labels.items():
+            named_labels(kit, listed, f"variations.require.constraints.{name}.{what}")
     tests = [known[name].test(kit, labels) for name, labels in asked.items()]
 
     def unmet(assembly: Assembly) -> str | None:

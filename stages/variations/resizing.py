@@ -7,11 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.config import nearest
-from pipeline.errors import ConfigError
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import moved_by
+from stages.variations.labels import named_labels
 
 __all__ = ["Resizer", "heights_of", "rigid_types", "spans_of"]
 
@@ -38,12 +37,7 @@ def spans_of(kit: Kit, assembly: Assembly) -> FloatArray:
 def rigid_types(kit: Kit, rigid: Sequence[str]) -> BoolArray:
     """Which types of a kit have a label that is never stretched, bool (types,). Raises ConfigError for labels that it
     has not."""
-    for each in rigid:
-        if each not in kit.labels:
-            close = nearest(each, kit.labels)
-            told = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
-            raise ConfigError(f"variations.search.stretch.rigid: kit {kit.name} has no parts called {each}; {told}")
-    found: BoolArray = np.isin(kit.labels, list(rigid))[kit.label_of]
+    found: BoolArray = named_labels(kit, rigid, "variations.search.stretch.rigid")[kit.label_of]
     return found
 
 

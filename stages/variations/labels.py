@@ -1,0 +1,29 @@
+"""Labels of parts that a config names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from pipeline.config import nearest
+from pipeline.errors import ConfigError
+from stages.shape.arrays import BoolArray
+from stages.shape.kit import Kit
+
+__all__ = ["named_labels"]
+
+
+def named_labels(kit: Kit, names: Iterable[str], key: str) -> BoolArray:
+    """Which labels of a kit are among the `names` that a config has at `key`, bool (labels,).
+
+    Raises ConfigError for a name that no part has.
+    """
+    names = list(names)
+    for name in names:
+        if name not in kit.labels:
+            close = nearest(name, kit.labels)
+            told = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
+            raise ConfigError(f"{key}: kit {kit.name} has no parts called {name}; {told}")
+    found: BoolArray = np.isin(kit.labels, names)
+    return found
