@@ -63,7 +63,7 @@ def _options(parser: ArgumentParser) -> None:
 TABLE = Evaluation(
     question="Do strings come back from a string VAE, and how many new shapes does each way of sampling find?",
     needs=(STRING_VAE, CORPUS),
-    seconds=lambda subject: 150.0 * len(weights_of_kind(subject.models, "string_vae")),
+    seconds=lambda subject: 530.0 * len(weights_of_kind(subject.models, "string_vae")),
     answer=_answer,
     options=_options,
 )
