@@ -125,7 +125,7 @@ inspect: setup  ## Show what MESH can become and write a config for it, or what 
 	@[ -z "$$PROGRAM" ] || $(PYTHON) -m stages.programs inspect --out "$$OUT/inspect" -- "$$PROGRAM"
 	@[ -z "$$MESH" ] || $(PYTHON) -m pipeline inspect --out "$$OUT/inspect" -- "$$MESH"
 eval: setup  ## Print TABLE about the finished dataset and keep it; all: every table, and a report; without: list them
-	@$(PYTHON) -m eval $(ASKED) -- "$$TABLE"
+	@$(PYTHON) -m eval $(ASKED) --workers "$$WORKERS" -- "$$TABLE"
 cluster: setup  ## Start a cluster of WORKERS workers on this machine, for runs with the CLUSTER that it says
 	@$(PYTHON) -m pipeline cluster --workers "$$WORKERS"
 doctor: setup  ## Try everything that Shapemill needs on this machine, with the mend for what fails

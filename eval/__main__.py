@@ -59,6 +59,7 @@ def _parser(tables: Mapping[str, Evaluation]) -> argparse.ArgumentParser:
     parser.add_argument("files", nargs="*", type=Path, help="models or boxes instead of the dataset")
     parser.add_argument("--config", type=Path, default=Path("configs/default.yaml"), help="the dataset's YAML")
     parser.add_argument("--out", type=Path, default=Path("datasets"), help="folder that datasets are made in")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes for tables of many models")
     for each in tables.values():
         each.options(parser)
     return parser

@@ -3,29 +3,61 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 from eval.evaluation import Answer, Curve, Evaluation, Strip
 from eval.needs import CORPUS, STRING_VAE
 from eval.subject import Subject
 from stages.training.checkpoint import weights_of_kind
 
+if TYPE_CHECKING:
+    from eval.models import Trained
+    from eval.strings import Reconstruction, Sampling
+    from stages.training.string_vae.structuring import PathFigures
+    from stages.training.string_vae.trained import TrainedStringVae
+
 __all__ = ["TABLE"]
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.journeys import journey_strips
     from eval.models import training_curve
-    from eval.strings import (
-        corpus_strings,
-        model_rng,
-        reconstruction,
-        reconstruction_table,
-        sampling,
-        sampling_table,
-        string_vaes,
-        structure,
-        structure_table,
+    from eval.side_by_side import side_by_side
+    from eval.strings import reconstruction_table, sampling_table, string_vaes, structure_table
+
+    rebuilt, sampled, joined, lines = [], [], [], {}
+    strips: list[Strip] = []
+    models = string_vaes(subject.models)
+    for each, seen in side_by_side(partial(_look_at, subject, asked.searches), models, asked.workers, "models"):
+        if seen.rebuilt is not None:
+            rebuilt.append((each, seen.rebuilt))
+        sampled += [(each, way, figures) for way, figures in seen.sampled.items()]
+        joined.append((each, seen.nodes, seen.joined))
+        strips += seen.strips
+        lines[each.folder] = training_curve(subject.models / each.folder, "val_nats")
+    return Answer(
+        [reconstruction_table(rebuilt), sampling_table(sampled), structure_table(joined)],
+        [Curve("What a string that was not learnt takes", "steps of training", "nats a string", lines)],
+        strips,
     )
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """All about one model. joined: of so many nodes."""
+
+    rebuilt: Reconstruction | None
+    sampled: Mapping[str, Sampling]
+    nodes: int
+    joined: Mapping[str, PathFigures]
+    strips: Sequence[Strip]
+
+
+def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]) -> _Seen:
+    from eval.journeys import journey_strips
+    from eval.strings import corpus_strings, model_rng, reconstruction, sampling, structure
     from stages.exemplars.language import made_kits
     from stages.strings.settings import StringsConfig
     from stages.synthesis.instantiation.instantiate import Instantiator
@@ -33,25 +65,18 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.training.string_vae.sampling import WAYS
     from stages.variations.kernels.answers import ContactAnswers
 
-    rebuilt, sampled, joined, lines, seed = [], [], [], {}, subject.config.seed
+    model, seed, kits = trained.model, subject.config.seed, made_kits(subject.places)
+    train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))
     strips: list[Strip] = []
-    kits, whole = made_kits(subject.places), subject.config.section(StringsConfig).edges == "all"
-    for each in string_vaes(subject.models):
-        train, test = (corpus_strings(subject.corpus, each.kit, split, each.model) for split in ("train", "test"))
-        if test:
-            rebuilt.append((each, reconstruction(each.model, test)))
-        for way in WAYS:
-            rng = model_rng(seed, each, way)
-            sampled.append((each, way, sampling(each.model, way, train, asked.searches, rng)))
-        joined.append((each, *structure(each.model, train, model_rng(seed, each, "structure"))))
-        if not each.seed and each.kit in kits:
-            maker = Instantiator(ContactAnswers(kits[each.kit]))
-            rng = model_rng(seed, each, "journeys")
-            strips += journey_strips(each.model, train, maker, STANDARD._replace(whole=whole), each.folder, rng)
-        lines[each.folder] = training_curve(subject.models / each.folder, "val_nats")
-    return Answer(
-        [reconstruction_table(rebuilt), sampling_table(sampled), structure_table(joined)],
-        [Curve("What a string that was not learnt takes", "steps of training", "nats a string", lines)],
+    if not trained.seed and trained.kit in kits:
+        maker = Instantiator(ContactAnswers(kits[trained.kit]))
+        method = STANDARD._replace(whole=subject.config.section(StringsConfig).edges == "all")
+        rng = model_rng(seed, trained, "journeys")
+        strips += journey_strips(model, train, maker, method, trained.folder, rng)
+    return _Seen(
+        reconstruction(model, test) if test else None,
+        {way: sampling(model, way, train, searches, model_rng(seed, trained, way)) for way in WAYS},
+        *structure(model, train, model_rng(seed, trained, "structure")),
         strips,
     )
 
@@ -63,7 +88,7 @@ def _options(parser: ArgumentParser) -> None:
 TABLE = Evaluation(
     question="Do strings come back from a string VAE, and how many new shapes does each way of sampling find?",
     needs=(STRING_VAE, CORPUS),
-    seconds=lambda subject: 530.0 * len(weights_of_kind(subject.models, "string_vae")),
+    seconds=lambda subject: 140.0 * len(weights_of_kind(subject.models, "string_vae")),
     answer=_answer,
     options=_options,
 )
