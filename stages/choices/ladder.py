@@ -12,9 +12,10 @@ from stages.choices.probe import HUB, Finds, Probe
 from stages.choices.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
-from stages.variations.backdrop import Backdrop
+from stages.variations.backdrop import Backdrop, has_hubs
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import CHOSEN_HUBS
 
 __all__ = ["FEW", "FITTED", "GRAPHS", "STAY", "TELLING", "Rails", "Rung", "climb", "is_dull", "peeled"]
 
@@ -38,6 +39,8 @@ STAY = 0.6
 """Share of the parts that must stay where some are left out."""
 FITTED = 0.75
 """Share of finds on which hubs must fit again, of so many of the most different."""
+UNFITTED = 0.5
+"""Share below which no hubs are left out: a cabinet without a side is none, however many there are."""
 LOOKED_AT = 8
 WORK = 8_000_000
 """Tries times parts after which no more are tried but slots: a try takes the longer the more parts there are."""
@@ -61,8 +64,8 @@ class Rails:
 @dataclass(frozen=True)
 class Rung:
     """A setting, what a probe found under it, the share of all parts that stay, and the share of the most different
-    finds that get their hub back, 1 where none are left out; different: the most different
-    finds, with their hubs where they are left out."""
+    finds that get their hubs back, 1 where none are left out or next to nothing was found; different: the most
+    different finds, with their hubs where they are left out."""
 
     setting: Setting
     finds: Finds
@@ -73,9 +76,9 @@ class Rung:
     @property
     def score(self) -> tuple[float, ...]:
         """By which rungs that give too little are compared: histograms at their distances, in what is left of the
-        exemplars; then graphs. For next to nothing no hubs are left out."""
+        exemplars; then graphs. For next to nothing no hubs are left out, nor where most finds do without."""
         finds, worth = self.finds, self.kept * self.fitted
-        if (self.setting.hubs and finds.graphs < FEW) or finds.familiar < FAMILIAR:
+        if (self.setting.hubs and (finds.graphs < FEW or self.fitted < UNFITTED)) or finds.familiar < FAMILIAR:
             return (0.0, 0.0)
         return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * worth, finds.graphs * worth)
 
@@ -122,7 +125,7 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
         kit = sight.kit(setting)
         if setting.kinds not in known:
             known[setting.kinds] = ContactAnswers(kit)
-        tried.append(_rung(known[setting.kinds].under(kit), setting, tries, kept, sight.widest(())))
+        tried.append(_rung(known[setting.kinds].under(kit), setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS))
         if tried[-1].gives_enough:
             return tried
     if tried:
@@ -131,9 +134,9 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     return tried
 
 
-def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, widest: int | None) -> Rung:
-    """The first tries, and more where they found something that differs. Where hubs are left out that the `widest` type
-    is of, finds must get one of that type back; else any."""
+def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, required: float) -> Rung:
+    """The first tries, and more where they found something that differs. Where hubs are left out, finds must get back
+    those that are `required` of a variant."""
     names = [answers.kit.types[index].name for index in setting.hubs]
     probe = Probe(answers, decision_rng(0, "choices", setting.grammar, *setting.kinds, *names))
     rung = Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept, 1.0)
@@ -142,12 +145,11 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, wi
     different = [probe.variants[place].assembly for place in rung.finds.most_different]
     if not setting.hubs:
         return replace(rung, different=different)
-    if not rung.gives_enough:
+    if rung.finds.graphs < FEW:
         return rung
     backdrop = Backdrop(answers, upright=True)
     whole = [backdrop.fit(each) for each in different[:LOOKED_AT]]
-    awaited = [widest] if widest in setting.hubs else list(setting.hubs)
-    fitted = sum(bool(np.isin(each.types, awaited).any()) for each in whole) / len(whole)
+    fitted = sum(has_hubs(answers.kit, required, each) for each in whole) / len(whole)
     return replace(rung, fitted=fitted, different=whole)
 
 

@@ -12,11 +12,12 @@ from stages.shape.geometry.contact import world_boxes
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 from stages.shape.kit_input import input_kit
+from stages.variations.carcass import spanning_hubs
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import FORBIDDEN, NONE
 from stages.variations.settings import VariationsConfig
 
-__all__ = ["Backdrop", "backdrop_of"]
+__all__ = ["Backdrop", "backdrop_of", "has_hubs"]
 
 FIT_SHARE = 0.75
 """A hub fits where it has at least this share of the neighbours that one of its type had in an exemplar."""
@@ -146,6 +147,24 @@ def backdrop_of(task: Task, kit: str) -> Backdrop:
     if made_from not in _known:
         _known[made_from] = Backdrop(ContactAnswers(read), upright)
     return _known[made_from]
+
+
+def has_hubs(kit: Kit, required: float, whole: Assembly) -> bool:
+    """Whether a variant with its backdrop has the hub parts that are required: so many; or, below 1, of the type that
+    touches most that share of what so many parts have in the exemplars, and one, and all those of the carcass."""
+    fitted = whole.types[np.isin(whole.types, kit.grammar.hubs)]
+    if not 0 < required < 1:
+        return len(fitted) >= required
+    if any((fitted == hub).sum() < count for hub, count in spanning_hubs(kit).items()):
+        return False
+    touching = {
+        hub: max(sum(count for _, count in seen) for seen in kit.grammar.neighbourhoods[hub])
+        for hub in kit.grammar.hubs
+    }
+    widest = max(touching, key=lambda hub: touching[hub])
+    there = sum(int((each.backdrop.types == widest).sum()) for each in kit.exemplars)
+    share = there / sum(len(each.whole) for each in kit.exemplars)
+    return int((fitted == widest).sum()) >= max(1.0, required * share * len(whole))
 
 
 def _has_most(kit: Kit, hub: int, around: np.ndarray) -> bool:

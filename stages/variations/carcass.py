@@ -6,15 +6,17 @@ castle of tiles has no such parts.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from stages.shape.arrays import BoolArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.variations.labels import named_labels
 
-__all__ = ["NO_CARCASS", "carcass", "carcass_test"]
+__all__ = ["NO_CARCASS", "carcass", "carcass_test", "spanning_hubs"]
 
 SPAN = 2 / 3
 """A part belongs to the carcass if the diagonal of its box is so much of the exemplar's."""
@@ -35,11 +37,25 @@ def carcass_test(kit: Kit, required: Sequence[str]) -> Callable[[Assembly], bool
     return lambda assembly: asked <= set(kit.label_of[assembly.types].tolist())
 
 
+def spanning_hubs(kit: Kit) -> dict[int, int]:
+    """The hubs that would be of the carcass, such as the sides of a cabinet, by type, and how many of each the exemplar
+    has that has fewest: a shape with half of them is no whole one."""
+    counts = [Counter(each.whole.types[_spans(kit, each)].tolist()) for each in kit.exemplars]
+    fewest = {hub: min(each[hub] for each in counts) for hub in kit.grammar.hubs}
+    return {hub: count for hub, count in fewest.items() if count}
+
+
 def _spanning(kit: Kit, exemplar: Exemplar) -> set[int]:
+    types = exemplar.whole.types
+    bare = _spans(kit, exemplar) & ~np.isin(types, kit.grammar.hubs)
+    found: set[int] = set(kit.label_of[types[bare]].tolist())
+    return found
+
+
+def _spans(kit: Kit, exemplar: Exemplar) -> BoolArray:
+    """Which parts of an exemplar, hubs among them, are about as large as itself."""
     whole = exemplar.whole
     boxes = world_boxes(kit.types, whole.types, whole.poses)
     extent = np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0))
-    spans = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) >= SPAN * extent
-    bare = spans & ~np.isin(whole.types, kit.grammar.hubs)
-    found: set[int] = set(kit.label_of[whole.types[bare]].tolist())
-    return found
+    spans: BoolArray = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) >= SPAN * extent
+    return spans

@@ -18,13 +18,13 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.kit import Assembly, Kit
+from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
 from stages.variations.advice import what_keeps, what_was_left
 from stages.variations.archive import cell_of
-from stages.variations.backdrop import backdrop_of
+from stages.variations.backdrop import backdrop_of, has_hubs
 from stages.variations.carcass import NO_CARCASS, carcass_test
 from stages.variations.constraint import made_mend, made_test, module_of
 from stages.variations.kernels.answers import ContactAnswers
@@ -39,7 +39,7 @@ from stages.variations.settings import (
     VariationsConfig,
 )
 
-__all__ = ["has_hubs", "last_pool", "run_lane", "run_pool", "search_shards"]
+__all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
 
 ROUND_FIND = 400
 """Most variants that one lane finds in a round before the lanes exchange what they have."""
@@ -211,22 +211,6 @@ def _hubs_required(config: Config, kit: Kit) -> float:
     asked = next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name)
     chosen = asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs)
     return CHOSEN_HUBS if chosen else 0
-
-
-def has_hubs(kit: Kit, required: float, whole: Assembly) -> bool:
-    """Whether a variant with its backdrop has the hub parts that are required: so many, or, below 1, of the type that
-    touches most that share of what so many parts have in the exemplars, and one."""
-    fitted = whole.types[np.isin(whole.types, kit.grammar.hubs)]
-    if not 0 < required < 1:
-        return len(fitted) >= required
-    touching = {
-        hub: max(sum(count for _, count in seen) for seen in kit.grammar.neighbourhoods[hub])
-        for hub in kit.grammar.hubs
-    }
-    widest = max(touching, key=lambda hub: touching[hub])
-    there = sum(int((each.backdrop.types == widest).sum()) for each in kit.exemplars)
-    share = there / sum(len(each.whole) for each in kit.exemplars)
-    return int((fitted == widest).sum()) >= max(1.0, required * share * len(whole))
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:

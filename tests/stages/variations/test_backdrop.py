@@ -18,9 +18,8 @@ from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar import check
 from stages.strings.tokens import StringError
-from stages.variations.backdrop import Backdrop
+from stages.variations.backdrop import Backdrop, has_hubs
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.rounds import has_hubs
 from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
@@ -117,3 +116,17 @@ def test_hubs_are_required_by_number_or_by_their_share_in_the_exemplars(kit: Kit
     assert [has(0.5, hubs, 24 - hubs) for hubs in (0, 1, 2)] == [False, False, True]
     assert [has(0.5, hubs, 3) for hubs in (0, 1)] == [False, True]
     assert [has(required, 1, 30) for required in (0, 1, 2)] == [True, True, False]
+
+
+def test_a_cabinet_gets_both_of_its_sides_back_or_is_none() -> None:
+    meshes = {"side": box(0.1, 4.0, 2.0), "board": box(2.0, 0.1, 1.5)}
+    sides: list[Placed] = [("side", pose(x, 0, 0)) for x in (-1.05, 1.05)]
+    boards: list[Placed] = [("board", pose(0, y, 0)) for y in (-0.8, -0.7, -0.6)]
+    whole = kit_of(meshes, [[*sides, *boards]], hubs=HubConfig(types=("side",), keep="backdrop"))
+    cabinet = whole.exemplars[0].whole
+    (side,) = whole.grammar.hubs
+    one = cabinet.select(
+        [part for part in range(len(cabinet)) if part != int(np.flatnonzero(cabinet.types == side)[0])]
+    )
+    assert has_hubs(whole, 0.5, cabinet)
+    assert not has_hubs(whole, 0.5, one), "half of its sides are enough by number, but each is as large as itself"

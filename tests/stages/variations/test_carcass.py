@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.exemplars.settings import HubConfig
-from stages.variations.carcass import carcass, carcass_test
+from stages.variations.carcass import carcass, carcass_test, spanning_hubs
 from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, pose
 
 MESHES = {"top": box(4.0, 0.2, 2.0), "leg": box(0.2, 2.0, 0.2), "shelf": box(3.2, 0.2, 1.5)}
@@ -38,6 +38,18 @@ def test_hubs_are_put_back_and_are_none_of_it() -> None:
     hub = kit_of(MESHES, [table], hubs=HubConfig(types=("top",)))
     assert carcass(kit) == ("top", "shelf")
     assert carcass(hub) == ("shelf",)
+    assert spanning_hubs(hub) == {hub.type_names().index("top"): 1}
+    assert spanning_hubs(kit) == {}
+
+
+def test_of_large_hubs_as_many_are_awaited_as_the_exemplar_with_fewest_has() -> None:
+    sides: list[Placed] = [("side", pose(x, 0, 0)) for x in (-1.05, 1.05)]
+    shelves: list[Placed] = [("board", pose(0, y, 0)) for y in (-0.1, 0.0, 0.1)]
+    middle: Placed = ("side", pose(3.15, 0, 0))
+    more: list[Placed] = [("board", pose(2.1, y, 0)) for y in (0.0, 0.1)]
+    meshes = {"side": box(0.1, 4.0, 2.0), "board": box(2.0, 0.1, 1.5)}
+    kit = kit_of(meshes, [[*sides, *shelves], [*sides, *shelves, middle, *more]], hubs=HubConfig(types=("side",)))
+    assert spanning_hubs(kit) == {kit.type_names().index("side"): 2}
 
 
 def test_an_assembly_has_it_or_not_and_a_wrong_name_is_named() -> None:
