@@ -240,7 +240,8 @@ class VariantRequirements(StrictModel):
         "auto",
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
         "no bridge. Below 1: of the type that touches most, the share of what so many parts have of it in the "
-        "exemplars, and of hubs as large as the exemplars all. `auto`: 0.5, of a kit whose hubs were chosen and not stated.",
+        "exemplars, and of hubs as large as the exemplars all. `auto`: 0.5, of a kit whose hubs were chosen and not "
+        "stated.",
     )
     constraints: dict[str, dict[str, tuple[str, ...]]] = Field(
         default_factory=dict,

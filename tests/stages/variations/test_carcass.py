@@ -45,10 +45,9 @@ def test_hubs_are_put_back_and_are_none_of_it() -> None:
 def test_of_large_hubs_as_many_are_awaited_as_the_exemplar_with_fewest_has() -> None:
     sides: list[Placed] = [("side", pose(x, 0, 0)) for x in (-1.05, 1.05)]
     shelves: list[Placed] = [("board", pose(0, y, 0)) for y in (-0.1, 0.0, 0.1)]
-    middle: Placed = ("side", pose(3.15, 0, 0))
-    more: list[Placed] = [("board", pose(2.1, y, 0)) for y in (0.0, 0.1)]
+    lining: Placed = ("side", pose(-1.15, 0, 0))
     meshes = {"side": box(0.1, 4.0, 2.0), "board": box(2.0, 0.1, 1.5)}
-    kit = kit_of(meshes, [[*sides, *shelves], [*sides, *shelves, middle, *more]], hubs=HubConfig(types=("side",)))
+    kit = kit_of(meshes, [[*sides, *shelves], [*sides, *shelves, lining]], hubs=HubConfig(types=("side",)))
     assert spanning_hubs(kit) == {kit.type_names().index("side"): 2}
 
 
