@@ -21,6 +21,7 @@ from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import kit_shape
 from stages.variations.backdrop import Backdrop
+from stages.variations.facing import Facing
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
 
@@ -118,7 +119,8 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
         asked = Requirements(stable=choices.values[CHOSEN_STABLE])
         fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
         kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
-        assemblies = list(islice(kept, SHOWN))
+        facing = Facing(built.kit)
+        assemblies = [facing.turned_back(each, facing.turn(each)) for each in islice(kept, SHOWN)]
     torn = reading.config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
     seconds = time.process_time() - start
     return Prospect(decided, models, config, choices, seen, built, expected, assemblies, rate, seconds, torn)

@@ -20,6 +20,7 @@ from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.variations.ancestry import Ancestry, read_ancestry
 from stages.variations.backdrop import Backdrop, backdrop_of
 from stages.variations.dullness import dullness
+from stages.variations.facing import Facing
 from stages.variations.measures import SAMPLE, edit_measures, pool_measures
 from stages.variations.meeting import meeting
 from stages.variations.partition import Chosen, candidates, choose_by_family, nearness_of, packed_shapes, wanted_sizes
@@ -178,6 +179,7 @@ def run_collection(task: Task) -> Outcome:
     split: str = task.shard.params["split"]
     mine = np.flatnonzero((rows[:, 4] == SPLITS.index(split)) & (rows[:, 5] == task.shard.params["number"]))
     found: dict[int, FoundVariants] = {}
+    facing: dict[str, Facing] = {}
     counts: Counter[str] = Counter()
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for row in mine.tolist():
@@ -185,18 +187,33 @@ def run_collection(task: Task) -> Outcome:
             if lane not in found:
                 found[lane] = FoundVariants.of(task, lanes[lane])
             named = json.loads(parents[row])
-            write_sample(writer, _sample(backdrop_of(task, kits[kit]), place, split, found[lane], index, named))
+            behind = backdrop_of(task, kits[kit])
+            if kits[kit] not in facing:
+                facing[kits[kit]] = Facing(behind.kit)
+            write_sample(writer, _sample(behind, facing[kits[kit]], place, split, found[lane], index, named))
             counts[kits[kit]] += 1
     summary: dict[str, Any] = {"split": split, "samples": len(mine), "kits": dict(sorted(counts.items()))}
     return Outcome(len(mine), summary)
 
 
-def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, index: int, parents: list[str]) -> Sample:
-    """One variant with its backdrop. Variants whose graphs are equal with it are equal without it, so it never takes a
-    graph into another split. Its lineage names as `parents` samples of its own split and exemplars, and as `made_of`
-    what it was put together from: exemplars, or variants by the `name` that each variant of the search has."""
+def _sample(
+    backdrop: Backdrop,
+    facing: Facing,
+    place: int,
+    split: str,
+    found: FoundVariants,
+    index: int,
+    parents: list[str],
+) -> Sample:
+    """One variant with its backdrop, facing as the exemplars do.
+
+    Variants whose graphs are equal with it are equal without it, so it never takes a graph into another split. Its
+    lineage names as `parents` samples of its own split and exemplars, and as `made_of` what it was put together from:
+    exemplars, or variants by the `name` that each variant of the search has.
+    """
     bare, _ = found.assembly(index)
     assembly = backdrop.fit(bare)
+    turn = facing.turn(assembly)
     kit, added = backdrop.kit.name, len(assembly) - len(bare)
     described = found.described(index)
     return Sample(
@@ -205,7 +222,7 @@ def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, in
         producer="variations",
         kit=kit,
         graph=graph_digest(backdrop.kit.label_of[assembly.types], assembly.edges) if added else found.digest(index),
-        assembly=assembly,
+        assembly=facing.turned_back(assembly, turn),
         lineage={
             "method": described["method"],
             "name": f"{found.name}-{index}",
@@ -213,5 +230,6 @@ def _sample(backdrop: Backdrop, place: int, split: str, found: FoundVariants, in
             "parents": parents,
             "made_of": described["parents"],
             "backdrop": added,
+            "turned": round(-turn % 360, 6),
         },
     )

@@ -145,6 +145,15 @@ def _lineage(_: Config) -> Mapping[str, Field]:
             }
         ),
         "backdrop": Field({**whole, "description": "parts at the end of the list that were put back behind it"}),
+        "turned": Field(
+            {
+                "type": "number",
+                "minimum": 0,
+                "exclusiveMaximum": 360,
+                "description": "degrees about the vertical axis by which all of it was turned in the end, to face as "
+                "the exemplars do; motion is that before",
+            }
+        ),
     }
 
 

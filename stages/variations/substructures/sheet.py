@@ -14,6 +14,7 @@ from stages.shape.views.camera import Camera
 from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
+from stages.variations.facing import vertical_turn
 
 __all__ = ["replaced_parts", "replacements_sheet"]
 
@@ -61,9 +62,10 @@ def replaced_parts(kit: Kit, sample: Sample) -> tuple[tuple[Assembly, BoolArray]
     count = lineage["parts_from"][0]
     motion = np.eye(4)
     motion[:3, :3], motion[:3, 3] = lineage["motion"][:3], lineage["motion"][3]
+    turn = vertical_turn({"y": 1, "z": 2}[kit.up], lineage["turned"])
     first, rest = np.arange(count), np.arange(count, sum(lineage["parts_from"]))
-    piece = _found(kit, giver, motion @ giver.poses, sample.assembly.select(first))
-    stays = _found(kit, base, base.poses, sample.assembly.select(rest))
+    piece = _found(kit, giver, turn @ motion @ giver.poses, sample.assembly.select(first))
+    stays = _found(kit, base, turn @ base.poses, sample.assembly.select(rest))
     if piece.sum() != len(first) or stays.sum() != len(rest):
         return None
     return (base, ~stays), (giver, piece)

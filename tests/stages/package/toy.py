@@ -99,6 +99,7 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
             "motion": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]],
             "times": 1,
             "bent": False,
+            "turned": 0.0,
             "copied": {"largest": 1.0, "pieces": 1, "exemplar": 0.5, "of": "row"},
             "backdrop": 0,
         }

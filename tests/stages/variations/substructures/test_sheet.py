@@ -3,31 +3,41 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from stages.shape.kit import Kit
 from stages.shape.sample import Sample
+from stages.variations.facing import vertical_turn
 from stages.variations.substructures.sheet import replaced_parts, replacements_sheet
 from tests.stages.variations.substructures.test_replacing import replaced
 from tests.stages.variations.toy import CHAIN, chain, kit_of
 
 
-def samples_of(kit: Kit) -> list[Sample]:
+def samples_of(kit: Kit, turned: float = 0.0) -> list[Sample]:
     _, found = replaced(kit, 600, repeats=1)
+    turn = vertical_turn(1, turned)
     return [
         Sample(
-            f"toy-{place}", "train", "variations", kit.name, "", {**each.lineage, "made_of": each.lineage["parents"]},
-            each.assembly,
+            f"toy-{place}",
+            "train",
+            "variations",
+            kit.name,
+            "",
+            {**each.lineage, "made_of": each.lineage["parents"], "turned": turned},
+            replace(each.assembly, poses=turn @ each.assembly.poses),
         )
         for place, each in enumerate(found)
-    ]  # fmt: skip
+    ]
 
 
-def test_the_parts_that_left_and_came_are_told_from_the_lineage() -> None:
+@pytest.mark.parametrize("turned", [0.0, 90.0])
+def test_the_parts_that_left_and_came_are_told_from_the_lineage(turned: float) -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
-    told = [(each, replaced_parts(kit, each)) for each in samples_of(kit)]
+    told = [(each, replaced_parts(kit, each)) for each in samples_of(kit, turned)]
     known = [(sample, found) for sample, found in told if found is not None]
     assert known
     for sample, ((base, taken), (_, piece)) in known:
