@@ -30,6 +30,7 @@ __all__ = [
     "reconstruction_table",
     "sampling",
     "sampling_table",
+    "shape_graphs",
     "string_vaes",
     "structure",
     "structure_table",
@@ -105,13 +106,17 @@ def reconstruction(model: TrainedStringVae, strings: Sequence[str]) -> Reconstru
     return Reconstruction(count, 100 * right / total, 100 * same / count, 100 * graphs / count, 100 * valid / count)
 
 
+def shape_graphs(model: TrainedStringVae, strings: Iterable[str]) -> set[str]:
+    """The shape graphs that strings stand for, by their digests."""
+    return {_graph(model, each) for each in strings}
+
+
 def sampling(
-    model: TrainedStringVae, way: str, strings: Sequence[str], searches: int, rng: np.random.Generator
+    model: TrainedStringVae, way: str, strings: Sequence[str], known: set[str], searches: int, rng: np.random.Generator
 ) -> Sampling:
-    """`searches` searches of one of WAYS among training strings."""
+    """`searches` searches of one of WAYS among training strings, whose shape graphs are `known`."""
     found = sample(model, way, strings, searches, rng)
     graphs = [_graph(model, each.string) for each in found if each.string is not None]
-    known = {_graph(model, each) for each in strings}
     asked = sum(each.asked for each in found)
     distinct = set(graphs)
     return Sampling(

@@ -57,7 +57,7 @@ class _Seen:
 
 def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]) -> _Seen:
     from eval.journeys import journey_strips
-    from eval.strings import corpus_strings, model_rng, reconstruction, sampling, structure
+    from eval.strings import corpus_strings, model_rng, reconstruction, sampling, shape_graphs, structure
     from stages.exemplars.language import made_kits
     from stages.strings.settings import StringsConfig
     from stages.synthesis.instantiation.instantiate import Instantiator
@@ -73,9 +73,10 @@ def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]
         method = STANDARD._replace(whole=subject.config.section(StringsConfig).edges == "all")
         rng = model_rng(seed, trained, "journeys")
         strips += journey_strips(model, train, maker, method, trained.folder, rng)
+    known = shape_graphs(model, train)
     return _Seen(
         reconstruction(model, test) if test else None,
-        {way: sampling(model, way, train, searches, model_rng(seed, trained, way)) for way in WAYS},
+        {way: sampling(model, way, train, known, searches, model_rng(seed, trained, way)) for way in WAYS},
         *structure(model, train, model_rng(seed, trained, "structure")),
         strips,
     )

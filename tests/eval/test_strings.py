@@ -17,6 +17,7 @@ from eval.strings import (
     reconstruction_table,
     sampling,
     sampling_table,
+    shape_graphs,
     string_vaes,
     structure,
     structure_table,
@@ -43,11 +44,12 @@ def test_what_was_learnt_by_heart_comes_back_and_what_was_not_does_not() -> None
 @pytest.mark.parametrize("way", WAYS)
 def test_figures_of_a_way_are_shares_of_what_it_found(way: str) -> None:
     strings = toy_strings()
-    figures = sampling(random_vae("masked"), way, strings, 30, np.random.default_rng(0))
+    model = random_vae("masked")
+    figures = sampling(model, way, strings, shape_graphs(model, strings), 30, np.random.default_rng(0))
     assert figures.valid == 100
     assert 0 < figures.found <= 100
     assert 0 < figures.unique <= 100
-    plain = sampling(random_vae("plain"), "prior", strings, 30, np.random.default_rng(0))
+    plain = sampling(random_vae("plain"), "prior", strings, set(), 30, np.random.default_rng(0))
     assert plain.valid < 50
 
 
@@ -55,8 +57,11 @@ def test_strings_that_are_all_known_are_not_novel() -> None:
     model = random_vae("masked")
     found = sample(model, "prior", toy_strings(), 60, np.random.default_rng(7))
     dreamt = [each.string for each in found if each.string]
-    known = sampling(model, "prior", [*toy_strings(), *dreamt], 60, np.random.default_rng(7))
-    fresh = sampling(model, "prior", toy_strings(), 60, np.random.default_rng(7))
+    toys = shape_graphs(model, toy_strings())
+    known, fresh = (
+        sampling(model, "prior", toy_strings(), graphs, 60, np.random.default_rng(7))
+        for graphs in (toys | shape_graphs(model, dreamt), toys)
+    )
     assert known.novel == 0
     assert fresh.novel > 0
 
