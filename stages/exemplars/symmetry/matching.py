@@ -7,11 +7,20 @@ import numpy as np
 
 from stages.exemplars.symmetry.boundary import SAME_ANGLE
 from stages.exemplars.symmetry.cells import cell_index, cell_of
+from stages.exemplars.symmetry.places import keys_at
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert
 
-__all__ = ["cells_within", "eroded", "eroded_twice", "matched_items", "r_symmetric_cells", "symmetric_cells"]
+__all__ = [
+    "cells_within",
+    "eroded",
+    "eroded_twice",
+    "matched_items",
+    "mutual",
+    "r_symmetric_cells",
+    "symmetric_cells",
+]
 
 TINY = 1e-9
 
@@ -58,6 +67,26 @@ def eroded_twice(grid: SurfaceGrid, symmetric: BoolArray, beyond: float) -> tupl
     most = grid.radius / grid.size
     away = _distances(symmetric, grid.cells, grid.neighbours, most + beyond)
     return away > most + TINY, away > most + beyond + TINY
+
+
+def mutual(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray) -> tuple[BoolArray, BoolArray]:
+    """The cells of `kept` that a rigid motion (4, 4) takes to cells of `kept_back`, and those of `kept_back` that its
+    inverse takes to cells of `kept`, bool (n,) each.
+
+    What is r-symmetric under a motion is taken to what is r-symmetric under its inverse. But ways along cells are not:
+    where two sheets are about a cell apart, erosion leaps from one to the other or does not, as the lattice falls.
+    """
+    return _taken_into(grid, motion, kept, kept_back), _taken_into(grid, invert(motion), kept_back, kept)
+
+
+def _taken_into(grid: SurfaceGrid, motion: FloatArray, cells: BoolArray, into: BoolArray) -> BoolArray:
+    """Which of `cells` have nothing that a motion takes to an occupied cell beside `into`."""
+    keys = keys_at(grid, motion, grid.points)
+    home = np.minimum(np.searchsorted(grid.keys, keys), len(grid) - 1)
+    lost = (grid.keys[home] == keys) & ~into[home]
+    found = cells.copy()
+    found[grid.item_cell[lost]] = False
+    return found
 
 
 def cells_within(grid: SurfaceGrid, cells: IntArray, most: float) -> IntArray:

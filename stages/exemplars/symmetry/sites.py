@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stages.exemplars.symmetry.docking import docking_sites, slippable_motions
-from stages.exemplars.symmetry.matching import cells_within, eroded_twice, symmetric_cells
+from stages.exemplars.symmetry.matching import cells_within, eroded_twice, mutual, symmetric_cells
 from stages.exemplars.symmetry.seams import stands, widened
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
@@ -66,7 +66,7 @@ def dockers_of(grid: SurfaceGrid, motions: FloatArray) -> list[Docker]:
     for motion in motions:
         forth, back = (eroded_twice(grid, each, BEYOND) for each in symmetric_cells(grid, motion))
         kept += [forth[0], back[0]]
-        for docker in _of_motion(grid, motion, forth[1], back[1]):
+        for docker in _of_motion(grid, motion, *mutual(grid, motion, forth[1], back[1])):
             site = _Site(grid, docker)
             if len(found) < MOST and not any(site.lies_on(each, np.eye(4)) for each in found):
                 found.append(site)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.exemplars.symmetry.docking import DockingSite, docking_sites, slippable_motions
-from stages.exemplars.symmetry.matching import eroded, matched_items, r_symmetric_cells, symmetric_cells
+from stages.exemplars.symmetry.matching import eroded, matched_items, mutual, r_symmetric_cells, symmetric_cells
 from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from tests.stages.exemplars.symmetry.planted import blocks, box, moved, screw, spiral_stair, wall
@@ -76,6 +76,20 @@ class TestSymmetricCells:
         away = np.linalg.norm(four_windows.cells - four_windows.cells[100], axis=1)
         assert not kept[away <= 3].any()
         assert kept[away > 4].all()
+
+    def test_what_is_r_symmetric_is_taken_to_what_is_r_symmetric_backward(self, four_windows: SurfaceGrid) -> None:
+        """A leak of the erosion on one side alone, as where two sheets are a cell apart, is one of both sides."""
+        motion = shift(1, 0, 0)
+        kept, kept_back = r_symmetric_cells(four_windows, motion)
+        middles = four_windows.origin + four_windows.size * (four_windows.cells + 0.5)
+        there = middles[np.flatnonzero(kept_back & (np.abs(middles[:, 0] - 3) < 0.05))[0]]
+        leak = np.linalg.norm(middles - there, axis=1) < 3.5 * four_windows.size
+        forth, back = mutual(four_windows, motion, kept, kept_back & ~leak)
+        away = np.linalg.norm(middles + np.array([1, 0, 0]) - there, axis=1) / four_windows.size
+        assert leak.sum() > 10
+        assert not forth[away < 2.5].any()
+        assert (forth == mutual(four_windows, motion, kept, kept_back)[0])[away > 4.5].all()
+        assert (back <= kept_back & ~leak).all()
 
     def test_a_turn_that_maps_a_box_onto_itself_leaves_nothing(self) -> None:
         grid = surface_grid(box((-1, -1, -1), (1, 1, 1)), 0.1)
