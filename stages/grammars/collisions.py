@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from stages.exemplars.symmetry.clip import fragments
 from stages.exemplars.symmetry.derivations import Derivation, row_seams
-from stages.exemplars.symmetry.surface import CELLS_A_RADIUS
 from stages.grammars.derivation import Piece, Resized, pieces_of
 from stages.grammars.grammar import ShapeGrammar
+from stages.grammars.samples import TerminalSamples
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 
@@ -34,8 +33,8 @@ class Collisions:
 
     def __init__(self, grammar: ShapeGrammar) -> None:
         self._grammar = grammar
-        self._cell = grammar.radius / CELLS_A_RADIUS
-        self._points = [self._points_of(each) for each in range(len(grammar.meshes))]
+        self.samples = TerminalSamples(grammar)
+        self._cell = self.samples.cell
         self._answers: dict[tuple[int, int, bytes], BoolArray | None] = {}
         self._trees: dict[int, Any] = {}
         self._seam_trees: dict[int, Any] = {}
@@ -49,7 +48,7 @@ class Collisions:
             if near is None or self._as_in_exemplar(piece, other):
                 continue
             if own is None:
-                own = transform_points(piece.pose, self._points[piece.mesh])
+                own = transform_points(piece.pose, self.samples[piece.mesh].points)
             if (near & ~self._at_seams(own, near, seams)).any():
                 return True
         return False
@@ -92,19 +91,11 @@ class Collisions:
         here = transform_points(pose, corners)
         return any(np.abs(transform_points(each, corners) - here).max() < SAME * self._cell for each in listed)
 
-    def _points_of(self, mesh: int) -> FloatArray:
-        """A point of a mesh in each cell in which it lies, float64 (n, 3)."""
-        part = self._grammar.meshes[mesh]
-        corners = part.vertices[part.faces]
-        where, _, middles = fragments(corners, corners.min(axis=(0, 1)) - self._cell / 3, self._cell)
-        _, first = np.unique(where, axis=0, return_index=True)
-        return np.ascontiguousarray(middles[first, :3])
-
     def _tree(self, mesh: int) -> Any:
         from scipy.spatial import KDTree
 
         if mesh not in self._trees:
-            self._trees[mesh] = KDTree(self._points[mesh])
+            self._trees[mesh] = KDTree(self.samples[mesh].points)
         return self._trees[mesh]
 
     def _near(self, one: Piece, other: Piece) -> BoolArray | None:
@@ -128,7 +119,7 @@ class Collisions:
         around, wide = transform_points(pose, middle), np.abs(pose[:3, :3]) @ half
         if ((around - wide > high + reach) | (around + wide < low - reach)).any():
             return None
-        moved = transform_points(pose, self._points[mesh])
+        moved = transform_points(pose, self.samples[mesh].points)
         close = np.flatnonzero(((moved > low - reach) & (moved < high + reach)).all(axis=1))
         away, _ = self._tree(other).query(moved[close], distance_upper_bound=reach)
         found = np.zeros(len(moved), dtype=bool)

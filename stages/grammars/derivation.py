@@ -20,6 +20,7 @@ __all__ = [
     "Piece",
     "Resized",
     "derivation_text",
+    "exemplar_shape",
     "pieces_of",
     "read_derivation",
     "shape_of_text",
@@ -149,6 +150,12 @@ def shape_of_text(grammar: ShapeGrammar, text: str) -> Shape:
     types = np.array([each.mesh for each in pieces], dtype=np.int16)
     poses = np.array([each.pose for each in pieces])
     return Shape(grammar.meshes, Assembly(types, poses, np.empty((0, 2), np.int32)), grammar.up, grammar.labels)
+
+
+def exemplar_shape(grammar: ShapeGrammar) -> Shape:
+    """The exemplar, as one part."""
+    alone = Assembly(np.zeros(1, dtype=np.int16), np.eye(4)[None], np.empty((0, 2), np.int32))
+    return Shape((grammar.exemplar,), alone, grammar.up, (grammar.exemplar.name,))
 
 
 def surface_digest(grammar: ShapeGrammar, pieces: list[Piece]) -> str:

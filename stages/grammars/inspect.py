@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.places import write_file
+from pipeline.randomness import decision_rng
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ReadLimits
 from stages.exemplars.symmetry.parts import about_size
 from stages.grammars.description import describe_grammar
 from stages.grammars.extraction import Extraction, extract, mesh_of
-from stages.grammars.picture import grammar_sheet
+from stages.grammars.grammar import ShapeGrammar
+from stages.grammars.picture import grammar_sheet, shapes_sheet
 from stages.grammars.settings import GrammarConfig
+from stages.grammars.variety import METHODS, Variety
 
 __all__ = ["has_grammar", "written_grammar"]
 
+SHOWN = 12
+"""So many shapes by each method are drawn to see what will come."""
+FEWEST = 8
+"""With fewer shapes there is no config: a split has as many shards."""
 LARGEST = 400_000
 """Cells and triangles up to which a grammar is looked for unasked: with more it takes minutes."""
 
@@ -53,29 +61,56 @@ def has_grammar(model: Model, asked: str) -> bool:
 def written_grammar(
     folder: Path, name: str, path: Path, up: str, limits: ReadLimits
 ) -> Iterator[tuple[str, Path | str]]:
-    """Write the grammar of a model as JSON and as a picture, and a config; what each is, and where, and what there is
-    in the grammar in a sentence. Nothing where nothing can be exchanged."""
-    radius = float(GrammarConfig.model_fields["radius"].default)
+    """Write the grammar of a model as JSON and as a picture, some shapes of it, and a config; what each is, and where,
+    and what there is in the grammar in a sentence. No config where few shapes differ from the model to the eye."""
+    config = GrammarConfig(name=name, model=path.resolve(), up="z" if up == "z" else "y")
     mesh = mesh_of(read_model(path, "components", limits))
-    found = extract(mesh, name, radius, "z" if up == "z" else "y", np.random.default_rng(0))
+    found = extract(mesh, name, config.radius, "z" if up == "z" else "y", np.random.default_rng(0))
     said = _sentence(found)
+    yield "grammar", said
     if len(found.grammar.rules) < 2 and not found.grammar.grids:
-        yield "grammar", said
         return
     text = json.dumps(describe_grammar(found), indent=1, ensure_ascii=False, allow_nan=False)
-    yield "grammar", said
     yield "grammar as JSON", write_file(folder / f"{name}-grammar.json", f"{text}\n".encode())
     yield "docking sites", write_file(folder / f"{name}-grammar.png", grammar_sheet(found))
-    config = CONFIG.format(
+    drawn = _drawn(found.grammar, config)
+    counts = {method: len(each) for method, each in drawn.items()}
+    yield "shapes", _prospect(counts)
+    if not any(counts.values()):
+        return
+    shapes = [each for listed in drawn.values() for each in listed]
+    yield "some shapes", write_file(folder / f"{name}-grammar-shapes.png", shapes_sheet(found.grammar, shapes))
+    if len(shapes) < FEWEST:
+        return
+    asked = {method: 100 if count == SHOWN else count for method, count in counts.items()}
+    written = CONFIG.format(
         said=said,
-        name=name,
+        name=config.name,
         model=json.dumps(str(path)),
-        radius=radius,
+        radius=config.radius,
         up=up,
-        instances=100 if len(found.grammar.rules) > 1 else 0,
-        resized=100 if found.grammar.grids else 0,
+        instances=asked[METHODS[0]],
+        resized=asked[METHODS[1]],
     )
-    yield "grammar config", write_file(folder / f"{name}-grammar.yaml", config.encode())
+    yield "grammar config", write_file(folder / f"{name}-grammar.yaml", written.encode())
+
+
+def _drawn(grammar: ShapeGrammar, config: GrammarConfig) -> dict[str, list[str]]:
+    """At most SHOWN shapes by each method, as texts."""
+    variety = Variety(grammar, config, partial(decision_rng, 0, "inspect"), lambda _: None)
+    return {method: [each.text for each in variety.shapes(method, SHOWN)] for method in METHODS}
+
+
+def _prospect(counts: dict[str, int]) -> str:
+    """How many shapes a short search found that differ to the eye, and what may help where they are few."""
+    found = ", ".join(f"{count}{' or more' * (count == SHOWN)} by {method}" for method, count in counts.items())
+    if any(count == SHOWN for count in counts.values()):
+        return found
+    many = "few" if sum(counts.values()) >= FEWEST else "too few"
+    return (
+        f"{found}, {many} for a dataset: all else looks like the model, for what may dock at a site is nearly what is "
+        "there. A smaller grammars.models[].radius finds more sites; else take the model by its parts"
+    )
 
 
 def _sentence(found: Extraction) -> str:

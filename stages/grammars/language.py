@@ -10,13 +10,12 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
-from stages.grammars.derivation import shape_of_text
+from stages.grammars.derivation import exemplar_shape, shape_of_text
 from stages.grammars.files import load_grammar, made_grammars
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.settings import GrammarsConfig
 from stages.shape.arrays import IntArray
 from stages.shape.collection.language import Anew, Language, Source
-from stages.shape.kit import Assembly
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
@@ -36,12 +35,7 @@ class Derivations:
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """The exemplars."""
-        return [(name, _exemplar(each)) for name, each in self._grammars.items()][:count]
-
-
-def _exemplar(grammar: ShapeGrammar) -> Shape:
-    alone = Assembly(np.zeros(1, dtype=np.int16), np.eye(4)[None], np.empty((0, 2), np.int32))
-    return Shape((grammar.exemplar,), alone, grammar.up, (grammar.exemplar.name,))
+        return [(name, exemplar_shape(each)) for name, each in self._grammars.items()][:count]
 
 
 def _source(grammar: ShapeGrammar) -> Source:

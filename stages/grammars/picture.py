@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup, carve
-from stages.grammars.derivation import Piece, Resized, pieces_of
+from stages.grammars.derivation import Piece, Resized, exemplar_shape, pieces_of, shape_of_text
 from stages.grammars.editing import Option, edited, options_of
 from stages.grammars.extraction import Extraction
-from stages.grammars.grammar import GridRule, site_name
+from stages.grammars.grammar import GridRule, ShapeGrammar, site_name
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, PartMesh
@@ -21,7 +21,7 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
-__all__ = ["grammar_sheet"]
+__all__ = ["grammar_sheet", "shapes_sheet"]
 
 CELL = 200
 COLUMNS = 4
@@ -51,6 +51,14 @@ def grammar_sheet(found: Extraction) -> bytes:
     if resized:
         sections.append(Section("Grids", resized, "cells along each row"))
     return picture_png(contact_sheet(sections, grammar.name, CELL))
+
+
+def shapes_sheet(grammar: ShapeGrammar, texts: Sequence[str]) -> bytes:
+    """A PNG: the exemplar, and the shapes of some derivations."""
+    cells = [Cell(_pictured(exemplar_shape(grammar)), "the model")]
+    cells += [Cell(_pictured(shape_of_text(grammar, each)), each) for each in texts]
+    rows = [cells[place : place + COLUMNS] for place in range(0, len(cells), COLUMNS)]
+    return picture_png(contact_sheet([Section("Shapes of the grammar", rows)], grammar.name, CELL))
 
 
 def _whole(found: Extraction) -> Soup:
@@ -120,8 +128,11 @@ def _cell(found: Extraction, parts: Sequence[tuple[Soup, tuple[int, int, int]]],
     meshes = tuple(_mesh(each.corners, color) for each, color in filled)
     types = np.arange(len(meshes), dtype=np.int16)
     assembly = Assembly(types, np.tile(np.eye(4), (len(meshes), 1, 1)), np.empty((0, 2), np.int32))
-    picture = portrait(scene_of(Shape(meshes, assembly, found.grammar.up, ("part",))), CAMERA, (CELL, CELL))
-    return Cell(picture, caption)
+    return Cell(_pictured(Shape(meshes, assembly, found.grammar.up, ("part",))), caption)
+
+
+def _pictured(shape: Shape) -> ByteArray:
+    return portrait(scene_of(shape), CAMERA, (CELL, CELL))
 
 
 def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:

@@ -19,6 +19,6 @@ PRODUCER = Producer(
         "Every neighbourhood of the radius of similarity is one of the mesh's; nothing new is seen from nearby.",
         "Parts are terminals of the grammar: pieces between docking sites, which mean nothing.",
     ),
-    splits="No two samples are congruent, within a split or across splits.",
+    splits="No two samples look alike, within a split or across splits: the radius of similarity counts as nothing.",
     apart=True,
 )

@@ -40,13 +40,20 @@ class GrammarConfig(StrictModel):
         description="Whether what points up in the model does so in every shape; if not, pieces are turned over, too.",
     )
     instances: int = Field(
-        100, ge=0, le=1_000_000, description="Shapes by random productions; those that come twice count once."
+        100, ge=0, le=1_000_000, description="Shapes by random productions; those that look alike count once."
     )
     resized: int = Field(
         100,
         ge=0,
         le=1_000_000,
-        description="Shapes by grids with other numbers of cells; those that come twice count once.",
+        description="Shapes by grids with other numbers of cells; those that look alike count once.",
+    )
+    apart: float = Field(
+        0.05,
+        ge=0,
+        lt=1,
+        description="Share of what one sees of a shape, its surface by voxels as wide as the radius, that must differ "
+        "from the exemplar and from each shape drawn before. A grammar may give fewer shapes than are asked for.",
     )
     most_cells: int = Field(12, ge=1, le=1000, description="Most cells along a row of a resized grid.")
     most_pieces: int = Field(

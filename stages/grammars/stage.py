@@ -32,8 +32,6 @@ __all__ = ["STAGE"]
 
 BYTES_A_GRAMMAR = 20_000_000
 BYTES_A_SAMPLE = 4_000
-TRIES = 20
-"""Draws for each shape that is asked for."""
 
 
 def planned_shards(plan: Plan) -> list[Shard]:
@@ -97,17 +95,19 @@ def run_extraction(task: Task) -> Outcome:
 
 
 def run_drawing(task: Task) -> Outcome:
-    """Draw the shapes of all grammars, and share them out; shapes that a rigid motion takes to each other are one.
+    """Draw the shapes of all grammars, and share them out; shapes that look alike are one.
 
     Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises ShardFailed
     where there are no shapes.
     """
+    from stages.grammars.variety import few
+
     config = task.config.section(GrammarsConfig)
     rows: list[dict[str, Any]] = []
     for each in config.models:
         rows += _drawn(task, each, len(rows))
     if not rows:
-        raise ShardFailed("no shape was drawn that does not run into itself; set grammars.models[].radius")
+        raise ShardFailed("; ".join(few(each, 0) for each in config.models))
     groups: dict[str, list[int]] = {}
     for index, row in enumerate(rows):
         groups.setdefault(row["graph"], []).append(index)
@@ -121,58 +121,34 @@ def run_drawing(task: Task) -> Outcome:
         for number in range(shards[name]):
             with task.output(f"{task.shard.name}.{name}-{number:06d}.jsonl") as stream:
                 stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
-    counts = Counter(f"{row['kit']}, {row['method']}" for row in rows)
-    return Outcome(0, {"shards": shards, "shapes": dict(sorted(counts.items()))})
+    counts = {each.name: Counter(row["method"] for row in rows if row["kit"] == each.name) for each in config.models}
+    return Outcome(0, {"shards": shards, "shapes": counts})
 
 
 def _drawn(task: Task, config: GrammarConfig, first: int) -> list[dict[str, Any]]:
     """The shapes of one grammar as rows, `first` rows being there already."""
-    from stages.exemplars.symmetry.derivations import Derivation
-    from stages.grammars.collisions import Collisions
-    from stages.grammars.derivation import Resized, derivation_text, pieces_of, surface_digest
-    from stages.grammars.drawing import Collided, random_counts, random_derivation
+    from stages.grammars.variety import Variety, wanted
 
-    grammar = input_grammars(task)[config.name]
-    collisions = Collisions(grammar)
-    known: set[str] = set()
+    variety = Variety(
+        input_grammars(task)[config.name],
+        config,
+        lambda *decision: task.rng(config.name, *decision),
+        lambda reason: task.reject(config.name, reason),
+    )
     rows: list[dict[str, Any]] = []
-    for method, wanted in (("random rules", config.instances), ("resized grid", config.resized)):
-        if method == "resized grid" and not grammar.grids:
-            continue
-        made = 0
-        for number in range(TRIES * wanted):
-            if made == wanted:
-                break
-            rng = task.rng(config.name, method, number)
-            drawn: Derivation | Resized
-            if method == "resized grid":
-                drawn = random_counts(grammar, config.most_cells, rng)
-                refused = "runs into itself" if collisions.whole(drawn) else ""
-            else:
-                try:
-                    drawn = random_derivation(grammar, collisions, int(rng.integers(1, config.most_pieces + 1)), rng)
-                    refused = ""
-                except Collided:
-                    refused = "runs into itself"
-            if not refused:
-                digest = surface_digest(grammar, pieces_of(grammar, drawn))
-                refused = "drawn before" if digest in known else ""
-            if refused:
-                task.reject(config.name, refused)
-                continue
-            known.add(digest)
-            made += 1
+    for method, most in wanted(config).items():
+        for drawn in variety.shapes(method, most):
             rows.append(
                 {
                     "key": f"{config.name}-{first + len(rows):06d}",
                     "kit": config.name,
-                    "graph": digest,
+                    "graph": drawn.digest,
                     "method": method,
                     "file": "/".join(config.model.parts[-2:]),
-                    "text": derivation_text(grammar, drawn),
+                    "text": drawn.text,
                 }
             )
-            task.progress(made, wanted)
+            task.progress(len(rows), config.instances + config.resized)
     return rows
 
 
@@ -191,7 +167,9 @@ def run_collection(task: Task) -> Outcome:
 
 
 def report(plan: Plan) -> Sequence[str]:
-    """What each grammar has, how many shapes were drawn of it, and why others were refused."""
+    """What each grammar has, how many shapes were drawn of it, why others were refused, and where there are no more."""
+    from stages.grammars.variety import few
+
     lines = []
     for name in grammar_shards(plan.config):
         seen = plan.summary("grammars", name)
@@ -204,9 +182,14 @@ def report(plan: Plan) -> Sequence[str]:
     drawing = drawing_name(plan.config.name)
     made = plan.summary("grammars", drawing) if lines else None
     if made is not None:
-        shapes = "; ".join(f"{count:,} {each}" for each, count in made["shapes"].items())
+        shapes = "; ".join(
+            f"{count:,} {name}, {method}" for name, each in made["shapes"].items() for method, count in each.items()
+        )
         why = ", ".join(f"{count:,} {reason}" for reason, count in sorted(plan.rejects("grammars", drawing).items()))
         lines.append(f"shapes: {shapes}; refused: {why or 'none'}")
+        for each in plan.config.section(GrammarsConfig).models:
+            count = sum(made["shapes"][each.name].values())
+            lines += [f"warning: {few(each, count)}"] if count < each.instances + each.resized else []
     lines += [f"warning: {sentence}" for sentence in unstated(mesh_origins(plan))]
     return lines
 

@@ -23,33 +23,15 @@ from stages.grammars.derivation import (
 from stages.grammars.description import describe_grammar
 from stages.grammars.drawing import random_derivation
 from stages.grammars.editing import edited, options_of
-from stages.grammars.extraction import Extraction, Mesh, extract
+from stages.grammars.extraction import Extraction
 from stages.grammars.files import load_grammar, write_grammar
 from stages.grammars.grammar import ShapeGrammar
-from tests.stages.exemplars.symmetry.planted import mesh, wall
+from tests.stages.exemplars.symmetry.planted import wall
 
 
 def area(triangles: np.ndarray) -> float:
     ways = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     return float(np.linalg.norm(ways, axis=1).sum() / 2)
-
-
-@pytest.fixture(scope="module")
-def found() -> Extraction:
-    """A wall of four windows."""
-    vertices, faces = mesh(wall(4))
-    colors = np.full((len(faces), 3), 160, np.uint8)
-    return extract(Mesh(vertices, faces, colors), "wall", 0.03, "z", np.random.default_rng(0))
-
-
-@pytest.fixture(scope="module")
-def grammar(found: Extraction) -> ShapeGrammar:
-    return found.grammar
-
-
-@pytest.fixture(scope="module")
-def collisions(grammar: ShapeGrammar) -> Collisions:
-    return Collisions(grammar)
 
 
 def original(grammar: ShapeGrammar, start: int) -> Derivation:

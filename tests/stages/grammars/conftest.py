@@ -1,0 +1,29 @@
+"""What all tests of grammars look at: a wall of four windows, cut once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.grammars.collisions import Collisions
+from stages.grammars.extraction import Extraction, Mesh, extract
+from stages.grammars.grammar import ShapeGrammar
+from tests.stages.exemplars.symmetry.planted import mesh, wall
+
+
+@pytest.fixture(scope="session")
+def found() -> Extraction:
+    """A wall of four windows."""
+    vertices, faces = mesh(wall(4))
+    colors = np.full((len(faces), 3), 160, np.uint8)
+    return extract(Mesh(vertices, faces, colors), "wall", 0.03, "z", np.random.default_rng(0))
+
+
+@pytest.fixture(scope="session")
+def grammar(found: Extraction) -> ShapeGrammar:
+    return found.grammar
+
+
+@pytest.fixture(scope="session")
+def collisions(grammar: ShapeGrammar) -> Collisions:
+    return Collisions(grammar)
