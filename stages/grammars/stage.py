@@ -121,7 +121,9 @@ def run_drawing(task: Task) -> Outcome:
         for number in range(shards[name]):
             with task.output(f"{task.shard.name}.{name}-{number:06d}.jsonl") as stream:
                 stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
-    counts = {each.name: Counter(row["method"] for row in rows if row["kit"] == each.name) for each in config.models}
+    counts = {
+        each.name: dict(Counter(row["method"] for row in rows if row["kit"] == each.name)) for each in config.models
+    }
     return Outcome(0, {"shards": shards, "shapes": counts})
 
 
