@@ -40,6 +40,8 @@ SAME_NORMAL = 1e-3
 """Radians between faces at a vertex that count as one plane."""
 SAME_VERTEX = 1e-4
 """Corners of triangles closer than about this share of the radius are one vertex."""
+ABOUT = np.linspace(0.25, 1.75, 7) * np.pi
+"""Directions about a side, in radians from its own triangle, in which more surface is looked for."""
 MOST_PLANES = 8
 """A vertex of more planes is the tip of a cone."""
 NEAREST = 12
@@ -168,16 +170,20 @@ class _Surface:
 
         ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         doubled = np.linalg.norm(ways, axis=1)
-        if not doubled.sum() > 0:
+        # slivers, such as cuts leave, have normals of rounding
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        real = doubled > SAME_VERTEX * radius * sides
+        if not real.any():
             raise ValueError("a surface without area is similar to nothing")
-        corners, normals = corners[doubled > 0], ways[doubled > 0] / doubled[doubled > 0, None]
+        corners, doubled = corners[real], doubled[real]
+        normals = ways[real] / doubled[:, None]
         self.corners, self.face_normals, self.radius = corners, normals, radius
         self.tolerance, self.spacing = TOLERANCE * radius, radius / SPACING
         self._scene = o3d.t.geometry.RaycastingScene(1)
         self._scene.add_triangles(
             corners.reshape(-1, 3).astype(np.float32), np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)
         )
-        areas = np.cumsum(doubled[doubled > 0]) / 2
+        areas = np.cumsum(doubled) / 2
         count = int(np.ceil(areas[-1] / self.spacing**2))
         face = np.searchsorted(areas, (np.arange(count) + rng.random(count)) / count * areas[-1])
         face = np.minimum(face, len(corners) - 1)
@@ -280,6 +286,8 @@ class _Surface:
         along = vertices[sides[single, 1]] - vertices[sides[single, 0]]
         out = np.cross(along, self.face_normals[of[single]])
         out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+        bare = ~self._goes_on(vertices[sides[single]].mean(axis=1), out, self.face_normals[of[single]])
+        single, out = single[bare], out[bare]
         at = np.concatenate([faces.T.reshape(-1), sides[single].T.reshape(-1)])
         normals = np.concatenate([np.tile(self.face_normals, (3, 1)), np.tile(out, (2, 1))])
         is_end = np.arange(len(at)) >= 3 * len(faces)
@@ -287,6 +295,17 @@ class _Surface:
         labels = np.column_stack([at, is_end, np.round(normals / SAME_NORMAL)])
         _, first = np.unique(labels, axis=0, return_index=True)
         return at[first], normals[first], is_end[first], points[first]
+
+    def _goes_on(self, middles: FloatArray, out: FloatArray, normals: FloatArray) -> BoolArray:
+        """Whether there is more surface about sides of triangles, bool (n,), than the triangles, which lie against
+        `out` (n, 3): sides that are cut in other places on either side are no ends, though no two triangles share
+        them."""
+        reach = 2 * self.tolerance
+        found = np.zeros(len(middles), dtype=bool)
+        for angle in ABOUT:
+            asked = middles + reach * (np.sin(angle) * normals - np.cos(angle) * out)
+            found |= self._scene.compute_distance(asked.astype(np.float32)).numpy() < reach / 2
+        return found
 
 
 def _search(

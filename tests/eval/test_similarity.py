@@ -20,6 +20,17 @@ def _largest(shape: np.ndarray) -> int:
     return int(np.linalg.norm(np.cross(shape[:, 1] - shape[:, 0], shape[:, 2] - shape[:, 0]), axis=1).argmax())
 
 
+def quartered(triangle: np.ndarray, times: int) -> np.ndarray:
+    """A triangle (3, 3) as 4^times triangles of its shape."""
+    if not times:
+        return triangle[None]
+    a, b, c = triangle
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    return np.concatenate(
+        [quartered(np.stack(each), times - 1) for each in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    )
+
+
 class TestSimilar:
     @pytest.mark.parametrize(("windows", "storeys"), [(1, 1), (6, 1), (2, 3)])
     def test_a_wall_of_other_windows_is_similar_to_one_that_has_all_its_kinds_of_corners(
@@ -34,6 +45,19 @@ class TestSimilar:
 
     def test_a_stair_goes_on_by_its_screw(self) -> None:
         assert similarity(spiral_stair(4), spiral_stair(7)).share == 1.0
+
+    def test_faces_may_be_cut_in_other_places_on_either_side_of_an_edge_and_leave_slivers(self) -> None:
+        """As cuts along cells do: no two triangles share a side there, and normals of slivers are rounding."""
+        shape = wall(2)
+        flat = np.isclose(np.ptp(shape[..., 1], axis=1), 0)
+        cut = np.concatenate([shape[~flat], *(quartered(each, 3) for each in shape[flat])])
+        corners = np.unique(shape.reshape(-1, 3), axis=0)
+        ways = np.random.default_rng(0).normal(size=(2, 6, len(corners), 3)) * 1e-9
+        slivers = np.stack(np.broadcast_arrays(corners, corners + ways[0], corners + ways[1]), axis=-2).reshape(
+            -1, 3, 3
+        )
+        found = similarity(wall(4), moved(np.concatenate([cut, slivers]), screw(0.7, 3.0)), probes=150)
+        assert found.share == 1.0
 
     def test_motions_that_are_told_take_the_exemplar_to_the_shape(self) -> None:
         found = similarity(wall(4), moved(wall(4), screw(0.3, 1.0)))
