@@ -5,9 +5,14 @@ import itertools
 import numpy as np
 import pytest
 
+from eval.similarity import r_similarity
+from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.docking import DockingSite, docking_sites, slippable_motions
 from stages.exemplars.symmetry.matching import eroded, matched_items, mutual, r_symmetric_cells, symmetric_cells
 from stages.exemplars.symmetry.motions import candidate_motions
+from stages.exemplars.symmetry.productions import seams_of
+from stages.exemplars.symmetry.seams import cut_out
+from stages.exemplars.symmetry.sites import dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from tests.stages.exemplars.symmetry.planted import blocks, box, moved, screw, spiral_stair, wall
 
@@ -139,16 +144,29 @@ class TestDockingSites:
 
     def test_dockers_whose_images_are_one_region_are_taken_together(self) -> None:
         """Symmetry figure 5: two prongs of one side stand on a bridge of the other, which the motion makes one."""
-        solid = blocks(
-            [0, 1, 2, 5, 6, 7, 9, 10, 11, 14, 15, 16], [0, 1], [0, 1, 3, 4],
-            lambda x, _, z: z < 1 or (x in (1.5, 5.5)) or (x in (10.5, 14.5)) or (z > 3 and 10 < x < 15),
-        )  # fmt: skip
-        sites = sites_of(surface_grid(solid, 0.02), shift(9, 0, 0))
-        prongs = [each for each in sites if each.kind == "replace"]
-        assert len(prongs) == 1
-        grid = surface_grid(solid, 0.02)
-        x = grid.origin[0] + grid.size * grid.cells[prongs[0].primary, 0]
+        grid = surface_grid(prongs_and_bridge(), 0.02)
+        sites = [each for each in sites_of(grid, shift(9, 0, 0)) if each.kind == "replace"]
+        assert len(sites) == 1
+        x = grid.origin[0] + grid.size * grid.cells[sites[0].primary, 0]
         assert ((x < 2.5).any(), ((x > 2.5) & (x < 4.5)).any(), (x > 4.5).any()) == (True, False, True)
+
+    def test_interlocked_dockers_take_the_place_of_each_other_as_one(self) -> None:
+        """Symmetry figure 5d: two prongs where the bridge is, and a bridge where they are, whose bar has four sides of
+        3 by 1 and covers two of 1 by 1."""
+        triangles = prongs_and_bridge()
+        grid = surface_grid(triangles, 0.02)
+        dockers = dockers_of(grid, shift(9, 0, 0)[None])
+        seams = seams_of(grid, dockers)
+        whole = Soup(grid.corners, grid.faces)
+        z = grid.origin[2] + grid.size * grid.cells[:, 2]
+        prongs, bridge = (each for each in dockers if z[each.cells].min() > 1)
+        assert prongs.site == bridge.site
+        for old, new, more in ((prongs, bridge, 10.0), (bridge, prongs, -10.0)):
+            _, stays = cut_out(whole, grid, old.cells, old.frame, seams[old.site])
+            comes, _ = cut_out(whole, grid, new.cells, new.frame, seams[new.site])
+            shape = np.concatenate([stays.corners, moved(comes.corners, old.frame @ np.linalg.inv(new.frame))])
+            assert area(shape) == pytest.approx(area(triangles) + more, rel=1e-9)
+            assert r_similarity(triangles, shape, grid.radius, 60, np.random.default_rng(0)).share == 1.0
 
     def test_a_straight_prism_slips_one_way_and_a_plane_three(self) -> None:
         grid = surface_grid(box((0, 0, 0), (6, 1, 1)), 0.03)
@@ -157,6 +175,19 @@ class TestDockingSites:
         top = around[z[around] > 1 - grid.size]
         inner = top[np.abs(grid.cells[top, 1] - np.median(grid.cells[top, 1])) < 5]
         assert (slippable_motions(grid, around), slippable_motions(grid, inner)) == (1, 3)
+
+
+def prongs_and_bridge() -> np.ndarray:
+    """A plate with two prongs, and nine beside them two prongs with a bar between them."""
+    return blocks(
+        [0, 1, 2, 5, 6, 7, 9, 10, 11, 14, 15, 16], [0, 1], [0, 1, 3, 4],
+        lambda x, _, z: z < 1 or (x in (1.5, 5.5)) or (x in (10.5, 14.5)) or (z > 3 and 10 < x < 15),
+    )  # fmt: skip
+
+
+def area(triangles: np.ndarray) -> float:
+    ways = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return float(np.linalg.norm(ways, axis=1).sum() / 2)
 
 
 def period_area() -> float:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from stages.exemplars.symmetry.derivations import START, Derivation, grid_poses
 from stages.exemplars.symmetry.grids import Grid, crossing, cut_grid, rows_of
 from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.productions import Production, productions, seams_of
-from stages.exemplars.symmetry.sites import Docker, dockers_of
+from stages.exemplars.symmetry.sites import Docker, beside, dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from stages.shape.geometry.pose import transform_points
 from tests.stages.exemplars.symmetry.planted import screw, spiral_stair, wall
@@ -94,6 +96,27 @@ class TestGrids:
         assert len(facade.first.pieces) == 9
         one, other = facade.first.motions
         assert np.allclose(one @ other, other @ one)
+
+    def test_rows_whose_sites_cross_unlike_from_cell_to_cell_make_no_grid(self, facade: Planted) -> None:
+        """Symmetry figure 7b: the sites of each row are symmetric under its motion, but those of one lie higher in one
+        cell of the other."""
+        grid, one, other = facade.grid, *(facade.rows[each] for each in facade.sets[0])
+        upward, along = (one, other) if abs(one.motion[2, 3]) > 1 else (other, one)
+        middles = grid.origin + grid.size * (grid.cells + 0.5)
+        above = middles[:, 2] if upward.motion[2, 3] > 0 else 6.4 - 0.4 - middles[:, 2]
+
+        def cut_at(heights: np.ndarray) -> list[Docker]:
+            """The dockers, those of the row upward beginning at a height, float64 (n,) for each cell, and a storey of 2
+            further each."""
+            dockers = list(facade.dockers)
+            for number, place in enumerate(upward.dockers):
+                cells = np.flatnonzero(above > heights + 2 * number).astype(np.int32)
+                dockers[place] = replace(dockers[place], cells=cells, border=beside(grid, cells))
+            return dockers
+
+        in_one_bay = (middles[:, 0] > 1.6) & (middles[:, 0] < 2.6)
+        assert crossing(grid, cut_at(np.full(len(grid), 0.4)), [along, upward]) == [(0, 1)]
+        assert crossing(grid, cut_at(np.where(in_one_bay, 0.1, 0.4)), [along, upward]) == [(0,), (1,)]
 
     def test_a_grid_of_any_counts_is_the_wall_of_so_many_windows(self, facade: Planted) -> None:
         across = facade.first.counts.index(3)
