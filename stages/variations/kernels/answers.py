@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import ctypes
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.geometry.pose import invert
-from stages.shape.kit import Kit
+from stages.shape.kit import ContactKind, Kit
 from stages.variations.kernels.layout import FORBIDDEN, LABELS, MISSING, NONE, Answers, Workspace
 from stages.variations.kernels.lookup import ask_around, hash_key, quantise
 from stages.variations.kernels.tables import QUANTUM
@@ -44,6 +44,7 @@ class ContactAnswers:
         self._penetration = PenetrationTest(kit.types)
         self._of_geometry: dict[bytes, int] = {}
         self._quantum = kit.contact_tolerance * QUANTUM
+        self._every_kind = set(kit.contact_kinds) == set(get_args(ContactKind))
 
     def under(self, kit: Kit) -> ContactAnswers:
         """These answers, with all that is known, for a kit that differs in its exemplars and in which neighbourhoods it
@@ -135,7 +136,8 @@ class ContactAnswers:
             if fit is not None:
                 allowed = self.kit.grammar.dockings[fit[0] // 2].depth + self.contact.tolerance
                 return FORBIDDEN if self._is_deeper(a, b, pose, allowed) else fit[0] * LABELS + fit[1]
-            if self.contact.kind(a, b, pose) in self.kit.contact_kinds:
+            # What touches does so in some kind, and which one is dear to tell.
+            if self._every_kind or self.contact.kind(a, b, pose) in self.kit.contact_kinds:
                 return FORBIDDEN
         elif self.contact.touches(a, b, pose, BORDERLINE * self.contact.tolerance):
             return FORBIDDEN
