@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stages.choices.ladder import FITTED, GRAMMARS, GRAPHS, KINDS, STAY, TELLING, Rails, Rung, climb, is_dull, peeled
+from stages.choices.ladder import GRAMMARS, GRAPHS, KINDS, STAY, TELLING, Rails, Rung, climb, is_dull, peeled
 from stages.choices.probe import Finds
 from stages.choices.sight import Setting, Sight, contact_tolerance
 from stages.choices.up import upward
@@ -172,11 +172,6 @@ def found_words(finds: Finds) -> str:
     return f"{finds.graphs:,} graphs and {finds.histograms:,} histograms in {finds.tries:,} tries{alike}"
 
 
-def _rung_words(rung: Rung) -> str:
-    back = f", with their hub on {rung.fitted:.0%} of them" if rung.fitted < FITTED else ""
-    return found_words(rung.finds) + back
-
-
 def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str], one_surface: bool) -> Rails:
     """What the ladder may choose from: one value of each key that the config states.
 
@@ -215,7 +210,7 @@ def _reason(key: str, chosen: Rung, rungs: Sequence[Rung]) -> str:
     for other in reversed(stricter):
         rung = next((each for each in rungs if each.setting == other), None)
         if rung is not None:
-            return f"{_rung_words(chosen)}; the next stricter: {_rung_words(rung)}"
+            return f"{found_words(chosen.finds)}; the next stricter: {found_words(rung.finds)}"
     if chosen.gives_enough:
         return "the strictest, and it gives enough"
     return f"nothing else gives more than {found_words(chosen.finds)}"

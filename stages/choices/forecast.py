@@ -46,11 +46,13 @@ class Forecast:
         return [self.variants[place] for place in self.finds.most_different]
 
 
-def forecast(kit: Kit, answers: ContactAnswers, tries: int, known: int = 0, copied: float = 1.0) -> Forecast:
+def forecast(
+    kit: Kit, answers: ContactAnswers, tries: int, known: int = 0, hubs: float = 0, copied: float = 1.0
+) -> Forecast:
     """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone. `known`:
-    how many graphs a probe has found in it: where there are any, a first search in vain is no answer; `copied`: what a
-    larger share of is copied whole will be refused, and does not count."""
-    probe = Probe(answers, decision_rng(0, "choices", "forecast"), copied)
+    how many graphs a probe has found in it: where there are any, a first search in vain is no answer; `hubs`, `copied`:
+    as for Probe, for what will be refused does not count."""
+    probe = Probe(answers, decision_rng(0, "choices", "forecast"), hubs, copied)
     finds = probe.go_on(tries, MANY, evenly=True)
     if finds.graphs or known:
         finds = probe.go_on((LONG - 1) * tries, MANY, evenly=True)

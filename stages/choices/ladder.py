@@ -12,12 +12,11 @@ from stages.choices.probe import HUB, Finds, Probe
 from stages.choices.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
-from stages.variations.backdrop import Backdrop, has_hubs
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import CHOSEN_HUBS
 
-__all__ = ["FEW", "FITTED", "GRAPHS", "STAY", "TELLING", "Rails", "Rung", "climb", "is_dull", "peeled"]
+__all__ = ["FEW", "GRAPHS", "STAY", "TELLING", "Rails", "Rung", "climb", "is_dull", "peeled"]
 
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -37,11 +36,6 @@ LONGER = 4
 """As many times the tries, for a setting that looks promising."""
 STAY = 0.6
 """Share of the parts that must stay where some are left out."""
-FITTED = 0.75
-"""Share of finds on which hubs must fit again, of so many of the most different."""
-UNFITTED = 0.5
-"""Share below which no hubs are left out: a cabinet without a side is none, however many there are."""
-LOOKED_AT = 8
 WORK = 8_000_000
 """Tries times parts after which no more are tried but slots: a try takes the longer the more parts there are."""
 PEELED = 4
@@ -63,34 +57,31 @@ class Rails:
 
 @dataclass(frozen=True)
 class Rung:
-    """A setting, what a probe found under it, the share of all parts that stay, and the share of the most different
-    finds that get their hubs back, 1 where none are left out or next to nothing was found; different: the most
-    different finds, with their hubs where they are left out."""
+    """A setting, what a probe found under it, and the share of all parts that stay; different: the most different
+    finds, with their hubs where they are left out."""
 
     setting: Setting
     finds: Finds
     kept: float
-    fitted: float
     different: Sequence[Assembly] = ()
 
     @property
     def score(self) -> tuple[float, ...]:
         """By which rungs that give too little are compared: histograms at their distances, in what is left of the
-        exemplars; then graphs. For next to nothing no hubs are left out, nor where most finds do without."""
-        finds, worth = self.finds, self.kept * self.fitted
-        if (self.setting.hubs and (finds.graphs < FEW or self.fitted < UNFITTED)) or finds.familiar < FAMILIAR:
+        exemplars; then graphs. For next to nothing no hubs are left out."""
+        finds, kept = self.finds, self.kept
+        if (self.setting.hubs and finds.graphs < FEW) or finds.familiar < FAMILIAR:
             return (0.0, 0.0)
-        return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * worth, finds.graphs * worth)
+        return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * kept, finds.graphs * kept)
 
     @property
     def gives_enough(self) -> bool:
-        """Whether it promises a pool of some size that is not dull, with most of the hubs behind it."""
+        """Whether it promises a pool of some size that is not dull."""
         finds = self.finds
         return (
             finds.graphs >= GRAPHS
             and finds.histograms >= HISTOGRAMS
             and finds.familiar >= FAMILIAR
-            and self.fitted >= FITTED
             and not is_dull(finds)
         )
 
@@ -138,19 +129,12 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, re
     """The first tries, and more where they found something that differs. Where hubs are left out, finds must get back
     those that are `required` of a variant."""
     names = [answers.kit.types[index].name for index in setting.hubs]
-    probe = Probe(answers, decision_rng(0, "choices", setting.grammar, *setting.kinds, *names))
-    rung = Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept, 1.0)
+    rng = decision_rng(0, "choices", setting.grammar, *setting.kinds, *names)
+    probe = Probe(answers, rng, required if setting.hubs else 0)
+    rung = Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept)
     if rung.finds.histograms >= PROMISING and not rung.gives_enough:
-        rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS, evenly=True), kept, 1.0)
-    different = [probe.variants[place].assembly for place in rung.finds.most_different]
-    if not setting.hubs:
-        return replace(rung, different=different)
-    if rung.finds.graphs < FEW:
-        return rung
-    backdrop = Backdrop(answers, upright=True)
-    whole = [backdrop.fit(each) for each in different[:LOOKED_AT]]
-    fitted = sum(has_hubs(answers.kit, required, each) for each in whole) / len(whole)
-    return replace(rung, fitted=fitted, different=whole)
+        rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS, evenly=True), kept)
+    return replace(rung, different=[probe.whole(place) for place in rung.finds.most_different])
 
 
 def _settings(sight: Sight, rails: Rails) -> Iterator[Setting]:

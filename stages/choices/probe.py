@@ -14,6 +14,7 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
+from stages.variations.backdrop import NO_BACKDROP, Backdrop
 from stages.variations.carcass import NO_CARCASS, carcass, carcass_test
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
@@ -74,16 +75,18 @@ class Finds:
 
 class Probe:
     """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone. What lacks the
-    kit's carcass is no find, nor is that of which a greater share than `copied` is copied whole."""
+    kit's carcass is no find, nor is that which does not get back the `hubs` that are required, as `Backdrop.has_hubs`
+    says, or of which a greater share than `copied` is copied whole."""
 
-    def __init__(self, answers: ContactAnswers, rng: np.random.Generator, copied: float = 1.0) -> None:
+    def __init__(self, answers: ContactAnswers, rng: np.random.Generator, hubs: float = 0, copied: float = 1.0) -> None:
         self.kit = answers.kit
         self.variants: list[Variant] = []
         self._rng = rng
         self._graphs: set[int] = set()
-        self._pieces = 0
-        self._copied = copied
-        self._is_whole = carcass_test(self.kit, carcass(self.kit))
+        self._copied, self._hubs = copied, hubs
+        self._refused = Counter[str]()
+        self._has_carcass = carcass_test(self.kit, carcass(self.kit))
+        self._backdrop = Backdrop(answers, upright=True)
         self._tries = 0
         widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
         methods = METHODS if widest <= HUB else METHODS[:1]
@@ -116,14 +119,27 @@ class Probe:
             self._tries += used
             left[number] = left[number] - used if found else 0
             whole = [each for each in found if self._is_whole(each.assembly)]
-            self._pieces += len(found) - len(whole)
             telling = [each for each in whole if each.lineage["copied"]["largest"] <= self._copied]
             self.variants.extend(each for each in telling if each.graph not in self._graphs)
             self._graphs.update(each.graph for each in telling)
 
+    def _is_whole(self, assembly: Assembly) -> bool:
+        """Whether a find has what makes it one; what it lacks is counted."""
+        lacks = ""
+        if not self._has_carcass(assembly):
+            lacks = NO_CARCASS
+        elif self._hubs and not self._backdrop.has_hubs(self._hubs, self._backdrop.fit(assembly)):
+            lacks = NO_BACKDROP
+        self._refused[lacks] += bool(lacks)
+        return not lacks
+
+    def whole(self, place: int) -> Assembly:
+        """The find at this place among the variants, with its backdrop."""
+        return self._backdrop.fit(self.variants[place].assembly)
+
     def finds(self) -> Finds:
         """What was found so far."""
-        rejects = sum((each.rejects for each in self._searches), Counter({NO_CARCASS: self._pieces}))
+        rejects = sum((each.rejects for each in self._searches), +self._refused)
         counts = _counts(self.kit, [each.assembly.types for each in self.variants])
         exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:

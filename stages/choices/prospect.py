@@ -23,7 +23,7 @@ from stages.shape.shape import kit_shape
 from stages.variations.backdrop import Backdrop
 from stages.variations.facing import Facing
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
+from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS, CHOSEN_STABLE
 
 __all__ = ["Prospect", "look_at"]
 
@@ -113,7 +113,8 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
         answers = ContactAnswers(built.kit)
         begun = time.process_time()
         known = choices.finds.graphs if choices.finds is not None else 0
-        expected = forecast(built.kit, answers, tries, known, choices.values[CHOSEN_COPIED])
+        hubs = CHOSEN_HUBS if built.kit.grammar.hubs and "hubs.types" in config.left_open() else 0
+        expected = forecast(built.kit, answers, tries, known, hubs, choices.values[CHOSEN_COPIED])
         rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
         backdrop = Backdrop(answers, upright=True)
         asked = Requirements(stable=choices.values[CHOSEN_STABLE])

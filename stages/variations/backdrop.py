@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import cached_property
 
 import numpy as np
 
@@ -17,12 +18,16 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import FORBIDDEN, NONE
 from stages.variations.settings import VariationsConfig
 
-__all__ = ["Backdrop", "backdrop_of", "has_hubs"]
+__all__ = ["NO_BACKDROP", "Backdrop", "backdrop_of"]
 
+NO_BACKDROP = "no backdrop"
+"""Why a variant is refused that does not get back the hubs that are required."""
 FIT_SHARE = 0.75
 """A hub fits where it has at least this share of the neighbours that one of its type had in an exemplar."""
 ASKEW = 1e-2
 """Directions of up that differ by less are one."""
+LACKING = 0.05
+"""No greater share of a variant's parts may be without a hub that each of their type has in the exemplars."""
 
 
 class Backdrop:
@@ -49,24 +54,65 @@ class Backdrop:
         kit = self.kit
         if assembly.stretches is not None:
             return assembly
-        types, poses = assembly.types, assembly.poses
-        edges = [assembly.edges]
-        boxes = world_boxes(kit.types, types, poses)
+        whole = assembly
+        boxes = world_boxes(kit.types, whole.types, whole.poses)
         for hub in kit.grammar.hubs:
             for place in self._places(hub, assembly):
                 box = world_boxes(kit.types, np.array([hub]), place[None])
                 near = _near(boxes, box[0], 1.1 * kit.contact_tolerance)
-                touched = self._touched(hub, place, types, poses, near)
-                if touched is None or not _has_most(
-                    kit, hub, types[[part for part in touched if part < len(assembly)]]
-                ):
+                touched = self._touched(hub, place, whole.types, whole.poses, near)
+                own = [] if touched is None else [part for part in touched if part < len(assembly)]
+                if touched is None or not _has_most(kit, hub, whole.types[own]):
                     continue
-                edges.append(np.array([(part, len(types)) for part in touched], dtype=np.int32))
-                types = np.append(types, types.dtype.type(hub))
-                poses = np.concatenate([poses, place[None]])
+                whole = _with_part(whole, hub, place, touched)
                 boxes = np.concatenate([boxes, box])
-        joined = np.concatenate(edges)
-        return Assembly(types, poses, joined[np.lexsort((joined[:, 1], joined[:, 0]))])
+        order = np.lexsort((whole.edges[:, 1], whole.edges[:, 0]))
+        return Assembly(whole.types, whole.poses, whole.edges[order])
+
+    def has_hubs(self, required: float, whole: Assembly) -> bool:
+        """Whether a variant with its backdrop has the hub parts that are required: so many; or, below 1, of the type
+        that touches most that share of what so many parts have in the exemplars, and one, and all those of the carcass,
+        and beside nearly each part those types that all of its type have beside them: a rail goes no farther than the
+        road that it stands on."""
+        kit = self.kit
+        fitted = whole.types[np.isin(whole.types, kit.grammar.hubs)]
+        if not 0 < required < 1:
+            return len(fitted) >= required
+        if any((fitted == hub).sum() < count for hub, count in spanning_hubs(kit).items()):
+            return False
+        touching = {
+            hub: max(sum(count for _, count in seen) for seen in kit.grammar.neighbourhoods[hub])
+            for hub in kit.grammar.hubs
+        }
+        widest = max(touching, key=lambda hub: touching[hub])
+        there = sum(int((each.backdrop.types == widest).sum()) for each in kit.exemplars)
+        share = there / sum(len(each.whole) for each in kit.exemplars)
+        if int((fitted == widest).sum()) < max(1.0, required * share * len(whole)):
+            return False
+        beside = zip(whole.types.tolist(), self._hubs_beside(whole), strict=True)
+        return sum(not self._always[part_type] <= found for part_type, found in beside) <= LACKING * len(whole)
+
+    @cached_property
+    def _always(self) -> dict[int, set[int]]:
+        """For each type the types of hubs that every part of it touches in the exemplars."""
+        always: dict[int, set[int]] = {}
+        for exemplar in self.kit.exemplars:
+            whole = exemplar.assembly
+            for hub, place in zip(exemplar.backdrop.types.tolist(), exemplar.backdrop.poses, strict=True):
+                answers = self.answers.around(whole.types, whole.poses, hub, place)
+                whole = _with_part(whole, hub, place, np.flatnonzero(answers >= 0).tolist())
+            for part_type, found in zip(whole.types.tolist(), self._hubs_beside(whole), strict=True):
+                always[part_type] = always.get(part_type, found) & found
+        return always
+
+    def _hubs_beside(self, whole: Assembly) -> list[set[int]]:
+        """The types of hubs that each part touches."""
+        beside: list[set[int]] = [set() for _ in range(len(whole))]
+        types, hubs = whole.types.tolist(), set(self.kit.grammar.hubs)
+        for first, second in whole.edges.tolist():
+            beside[first] |= {types[second]} & hubs
+            beside[second] |= {types[first]} & hubs
+        return beside
 
     def _observed(self, hub: int) -> dict[int, tuple[FloatArray, FloatArray]]:
         """For each type the poses (k, 4, 4) that a hub has in coordinates of a part of that type, by exemplars and the
@@ -149,22 +195,14 @@ def backdrop_of(task: Task, kit: str) -> Backdrop:
     return _known[made_from]
 
 
-def has_hubs(kit: Kit, required: float, whole: Assembly) -> bool:
-    """Whether a variant with its backdrop has the hub parts that are required: so many; or, below 1, of the type that
-    touches most that share of what so many parts have in the exemplars, and one, and all those of the carcass."""
-    fitted = whole.types[np.isin(whole.types, kit.grammar.hubs)]
-    if not 0 < required < 1:
-        return len(fitted) >= required
-    if any((fitted == hub).sum() < count for hub, count in spanning_hubs(kit).items()):
-        return False
-    touching = {
-        hub: max(sum(count for _, count in seen) for seen in kit.grammar.neighbourhoods[hub])
-        for hub in kit.grammar.hubs
-    }
-    widest = max(touching, key=lambda hub: touching[hub])
-    there = sum(int((each.backdrop.types == widest).sum()) for each in kit.exemplars)
-    share = there / sum(len(each.whole) for each in kit.exemplars)
-    return int((fitted == widest).sum()) >= max(1.0, required * share * len(whole))
+def _with_part(assembly: Assembly, part_type: int, place: FloatArray, touched: list[int]) -> Assembly:
+    """An assembly with one part more, the last one, which touches others."""
+    edges = np.array([(part, len(assembly)) for part in touched], dtype=np.int32).reshape(-1, 2)
+    return Assembly(
+        np.append(assembly.types, assembly.types.dtype.type(part_type)),
+        np.concatenate([assembly.poses, place[None]]),
+        np.concatenate([assembly.edges, edges]),
+    )
 
 
 def _has_most(kit: Kit, hub: int, around: np.ndarray) -> bool:

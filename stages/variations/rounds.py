@@ -24,7 +24,7 @@ from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
 from stages.variations.advice import what_keeps, what_was_left
 from stages.variations.archive import cell_of
-from stages.variations.backdrop import backdrop_of, has_hubs
+from stages.variations.backdrop import NO_BACKDROP, backdrop_of
 from stages.variations.carcass import NO_CARCASS, carcass_test
 from stages.variations.constraint import made_mend, made_test, module_of
 from stages.variations.kernels.answers import ContactAnswers
@@ -156,7 +156,7 @@ def _required(
     backdrop, kept = backdrop_of(task, kit.name), []
     for variant in telling:
         whole = backdrop.fit(variant.assembly)
-        weak = unmet(physical, kit_shape(kit, whole)) if has_hubs(kit, hubs, whole) else "no backdrop"
+        weak = unmet(physical, kit_shape(kit, whole)) if backdrop.has_hubs(hubs, whole) else NO_BACKDROP
         if weak is None:
             kept.append(variant)
         else:

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+import trimesh
 from trimesh.transformations import translation_matrix
 
 from stages.exemplars.faults import geometry_faults
@@ -18,7 +19,7 @@ from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar import check
 from stages.strings.tokens import StringError
-from stages.variations.backdrop import Backdrop, has_hubs
+from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, models_of, pose
 
@@ -106,11 +107,13 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
         check(f"{link}{plate}", alphabet, kit.grammar)
 
 
-def test_hubs_are_required_by_number_or_by_their_share_in_the_exemplars(kit: Kit) -> None:
+def test_hubs_are_required_by_number_or_by_their_share_in_the_exemplars(kit: Kit, backdrop: Backdrop) -> None:
+    (plate,), link = kit.grammar.hubs, kit.type_names().index("link")
+
     def has(required: float, hubs: int, others: int) -> bool:
-        types = np.array([kit.grammar.hubs[0]] * hubs + [kit.exemplars[0].assembly.types[0]] * others)
+        types = np.array([plate] * hubs + [link] * others)
         poses, edges = np.tile(np.eye(4), (len(types), 1, 1)), np.empty((0, 2), np.int32)
-        return has_hubs(kit, required, Assembly(types, poses, edges))
+        return backdrop.has_hubs(required, Assembly(types, poses, edges))
 
     # the exemplar has one hub part of six
     assert [has(0.5, hubs, 24 - hubs) for hubs in (0, 1, 2)] == [False, False, True]
@@ -122,11 +125,35 @@ def test_a_cabinet_gets_both_of_its_sides_back_or_is_none() -> None:
     meshes = {"side": box(0.1, 4.0, 2.0), "board": box(2.0, 0.1, 1.5)}
     sides: list[Placed] = [("side", pose(x, 0, 0)) for x in (-1.05, 1.05)]
     boards: list[Placed] = [("board", pose(0, y, 0)) for y in (-0.8, -0.7, -0.6)]
-    whole = kit_of(meshes, [[*sides, *boards]], hubs=HubConfig(types=("side",), keep="backdrop"))
-    cabinet = whole.exemplars[0].whole
-    (side,) = whole.grammar.hubs
-    one = cabinet.select(
-        [part for part in range(len(cabinet)) if part != int(np.flatnonzero(cabinet.types == side)[0])]
+    backdrop = cut_out(meshes, [*sides, *boards], "side")
+    cabinet = backdrop.fit(backdrop.kit.exemplars[0].assembly)
+    (side,) = backdrop.kit.grammar.hubs
+    one = cabinet.select([part for part in range(len(cabinet)) if part != np.flatnonzero(cabinet.types == side)[0]])
+    assert backdrop.has_hubs(0.5, cabinet)
+    assert not backdrop.has_hubs(0.5, one), "half of its sides are enough by number, but each is as large as itself"
+
+
+def test_rails_go_no_farther_than_the_road_that_they_stand_on() -> None:
+    meshes = {"road": box(5.0, 0.2, 1.0), "rail": box(0.5, 0.3, 0.1)}
+
+    def rails(count: int) -> list[Placed]:
+        return [("rail", pose(0.5 * place - 2.25, 0.25, 0.3)) for place in range(count)]
+
+    backdrop = cut_out(meshes, [("road", pose(0, 0, 0)), *rails(10)], "road")
+    asked = {count: models_of(meshes, [rails(count)])[0] for count in (10, 11, 15)}
+    poses = {count: np.array([part.pose for part in model.parts]) for count, model in asked.items()}
+    rail = backdrop.kit.type_names().index("rail")
+    found = {}
+    for count, each in poses.items():
+        types = np.full(count, rail, dtype=np.int16)
+        whole = backdrop.fit(Assembly(types, each, backdrop.answers.contact.contacts(types, each)))
+        assert len(whole) > count, "it has its road"
+        found[count] = backdrop.has_hubs(0.5, whole)
+    assert found == {10: True, 11: False, 15: False}
+
+
+def cut_out(meshes: dict[str, trimesh.Trimesh], shape: list[Placed], hub: str) -> Backdrop:
+    """The backdrop of a kit of one shape from which a type is left out."""
+    return Backdrop(
+        ContactAnswers(kit_of(meshes, [shape], hubs=HubConfig(types=(hub,), keep="backdrop"))), upright=True
     )
-    assert has_hubs(whole, 0.5, cabinet)
-    assert not has_hubs(whole, 0.5, one), "half of its sides are enough by number, but each is as large as itself"
