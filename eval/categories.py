@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -90,25 +91,30 @@ def judge(
     """What a model says of some shapes, by strings of them; shapes without strings or categories are left out. `voters`
     strings of each shape beside its canonical one."""
     alone, voted = _Tally(), _Tally()
-    graphs, given = 0, [0, 0]
+    asked: list[list[Encoded]] = []
+    labelled: list[list[Labelled]] = []
     for shape in shapes:
         try:
             strings = writer.strings(writer.graph(shape), voters, rng)
-            labelled = model.space.label(shape, strings, either_hand=True)
+            labelled.append(model.space.label(shape, strings, either_hand=True))
+            asked.append(strings)
         except (NotConnectedError, NoCategoryError):
             continue
-        graphs += 1
-        truth = [each.categories for each in labelled]
-        texts = [each.string for each in strings]
-        for scores, wanted in zip(model.log_probabilities(texts, truth), truth, strict=True):
-            given = [given[0] + int((scores.argmax(axis=1) == wanted).sum()), given[1] + len(wanted)]
-        own = model.choose(texts, None)
-        ballots = model.vote(strings)
+    # All at once: a walker goes token by token, whatever the number of strings.
+    texts = [each.string for strings in asked for each in strings]
+    truth = [each.categories for of_shape in labelled for each in of_shape]
+    given = [0, 0]
+    for scores, wanted in zip(model.log_probabilities(texts, truth), truth, strict=True):
+        given = [given[0] + int((scores.argmax(axis=1) == wanted).sum()), given[1] + len(wanted)]
+    said = iter(model.choose(texts, None))
+    for strings, of_shape in zip(asked, labelled, strict=True):
+        own = list(islice(said, len(strings)))
+        ballots = model.vote(strings, own)
         together = ballots[0].categories if ballots else own
-        for each, one, all_said in zip(labelled, own, together, strict=True):
+        for each, one, all_said in zip(of_shape, own, together, strict=True):
             alone.add(model, each, one)
             voted.add(model, each, all_said)
-    return Judged(graphs, alone.strings, 100 * given[0] / max(given[1], 1), alone.shares(), voted.shares())
+    return Judged(len(asked), alone.strings, 100 * given[0] / max(given[1], 1), alone.shares(), voted.shares())
 
 
 def read_back(

@@ -82,17 +82,19 @@ class TrainedEdgeCategories:
             found += steps.chosen()
         return found
 
-    def vote(self, strings: Sequence[Encoded]) -> list[Ballot]:
+    def vote(self, strings: Sequence[Encoded], likeliest: Sequence[IntArray] | None = None) -> list[Ballot]:
         """Shapes of a graph, by what several strings of it say of them, the likeliest first.
 
-        Each string proposes the shape that its likeliest categories make. Proposals whose cycles do not close fall
+        Each string proposes the shape that its likeliest categories make, those of `choose`, which are asked for unless
+        they are given. Proposals whose cycles do not close fall
         through; the others are labelled along all strings, and each string says how likely it holds what it reads. In
         the paper strings vote on edges; but the frame of a part is that of the way to it, so what strings can compare
         are shapes.
         """
         texts = [each.string for each in strings]
         proposed: dict[tuple[tuple[int, ...], ...], list[IntArray]] = {}
-        for encoded, categories in zip(strings, self.choose(texts, None), strict=True):
+        likeliest = self.choose(texts, None) if likeliest is None else likeliest
+        for encoded, categories in zip(strings, likeliest, strict=True):
             try:
                 placed = self.space.place(encoded.string, categories)
                 order = np.argsort(encoded.nodes)
