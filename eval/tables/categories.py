@@ -67,7 +67,7 @@ def _options(parser: ArgumentParser) -> None:
 TABLE = Evaluation(
     question="How often is it read from a string where each of its parts stands, and does it help to ask several?",
     needs=(KITS, EDGE_CATEGORIES),
-    seconds=lambda subject: 5 + 60.0 * len(weights_of_kind(subject.models, "edge_categories")),
+    seconds=lambda subject: 5 + 110.0 * len(weights_of_kind(subject.models, "edge_categories")),
     answer=_answer,
     options=_options,
 )

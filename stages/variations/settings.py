@@ -24,8 +24,8 @@ __all__ = [
 ]
 
 CHOSEN_HUBS = 0.5
-"""What is required of hubs that were chosen and not stated: a bridge with its road may end in a rail, and a mile of
-rail on which one brick of the road fits is no bridge."""
+"""What is required of hubs that were chosen and not stated: a mile of rail on which one brick of the road fits is no
+bridge."""
 CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS = "require.copied", "require.stable", "require.carcass"
 """What these keys of `require` are called among those that are chosen for a kit."""
 
@@ -240,8 +240,8 @@ class VariantRequirements(StrictModel):
         "auto",
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
         "no bridge. Below 1: of the type that touches most, the share of what so many parts have of it in the "
-        "exemplars, and of hubs as large as the exemplars all. `auto`: 0.5, of a kit whose hubs were chosen and not "
-        "stated.",
+        "exemplars, of hubs as large as the exemplars all, and beside 95 % of its parts each type of hub that all of "
+        "their type touch there. `auto`: 0.5, of a kit whose hubs were chosen and not stated.",
     )
     constraints: dict[str, dict[str, tuple[str, ...]]] = Field(
         default_factory=dict,
