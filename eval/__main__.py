@@ -98,14 +98,20 @@ def _print_of_files(name: str, asked: argparse.Namespace) -> int:
 
 
 def _make_one(subject: Subject, name: str, asked: argparse.Namespace) -> int:
+    from eval.report import Made, report_html
+
     evaluation = find_tables()[name]
     missing = evaluation.missing(subject)
     if missing:
         raise ConfigError(f"{name}: {missing}")
+    start, began = perf_counter(), datetime.now(UTC)
     answer = evaluation.answer(subject, asked)
     _keep(subject, name, answer)
+    made = Made(name, evaluation.question, answer, perf_counter() - start)
+    write_file(subject.results / f"{name}.html", report_html(subject, [made], {}, began).encode())
     print(_markdown(answer), end="")
-    print(f"\nAlso in {subject.results}: {name}.md, {name}.csv, {name}.tex")
+    drawn = ", with curves and pictures" if answer.curves or answer.strips else ""
+    print(f"\nAlso in {subject.results}: {name}.html{drawn}, {name}.md, {name}.csv, {name}.tex")
     return 0
 
 

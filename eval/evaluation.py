@@ -33,7 +33,7 @@ class Strip:
 
 @dataclass(frozen=True)
 class Answer:
-    """tables: at least one, the first under the evaluation's own name; curves and strips for the report alone."""
+    """tables: at least one, the first under the evaluation's own name; curves and strips for the pages alone."""
 
     tables: Sequence[Table]
     curves: Sequence[Curve] = ()

@@ -133,3 +133,10 @@ def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -
     assert "it failed: ValueError: no such luck" in report
     assert 'id="sound"' in report
     assert all(f"<td>{name}</td>" in report for name in find_tables()), "what was not made is listed"
+    alone = subprocess.run(
+        [*command[:3], "sound", *command[4:]], cwd=ROOT, env=environment, capture_output=True, text=True
+    )
+    assert alone.returncode == 0, alone.stderr
+    page = (results / "sound.html").read_text()
+    assert 'id="sound"' in page
+    assert "not-made" not in page
