@@ -20,10 +20,10 @@ from stages.shape.kit import Assembly
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import kit_shape
-from stages.variations.backdrop import Backdrop
+from stages.variations.backdrop import Backdrop, hubs_by_choice
 from stages.variations.facing import Facing
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.settings import CHOSEN_COPIED, CHOSEN_HUBS, CHOSEN_STABLE
+from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
 
 __all__ = ["Prospect", "look_at"]
 
@@ -113,7 +113,7 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
         answers = ContactAnswers(built.kit)
         begun = time.process_time()
         known = choices.finds.graphs if choices.finds is not None else 0
-        hubs = CHOSEN_HUBS if built.kit.grammar.hubs and "hubs.types" in config.left_open() else 0
+        hubs = hubs_by_choice(config, built.kit)
         expected = forecast(built.kit, answers, tries, known, hubs, choices.values[CHOSEN_COPIED])
         rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
         backdrop = Backdrop(answers, upright=True)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.stage import Task
+from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.geometry.pose import invert, pose_vectors
@@ -16,9 +17,9 @@ from stages.shape.kit_input import input_kit
 from stages.variations.carcass import spanning_hubs
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import FORBIDDEN, NONE
-from stages.variations.settings import VariationsConfig
+from stages.variations.settings import CHOSEN_HUBS, VariationsConfig
 
-__all__ = ["NO_BACKDROP", "Backdrop", "backdrop_of"]
+__all__ = ["NO_BACKDROP", "Backdrop", "backdrop_of", "hubs_by_choice"]
 
 NO_BACKDROP = "no backdrop"
 """Why a variant is refused that does not get back the hubs that are required."""
@@ -203,6 +204,13 @@ def _with_part(assembly: Assembly, part_type: int, place: FloatArray, touched: l
         np.concatenate([assembly.poses, place[None]]),
         np.concatenate([assembly.edges, edges]),
     )
+
+
+def hubs_by_choice(asked: KitConfig, kit: Kit) -> float:
+    """The share of what exemplars have of hub parts that a variant of `kit` must get back, where nobody states it: of a
+    kit whose hubs were chosen, and are put back."""
+    chosen = asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs)
+    return CHOSEN_HUBS if chosen else 0
 
 
 def _has_most(kit: Kit, hub: int, around: np.ndarray) -> bool:

@@ -24,7 +24,7 @@ from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
 from stages.variations.advice import what_keeps, what_was_left
 from stages.variations.archive import cell_of
-from stages.variations.backdrop import NO_BACKDROP, backdrop_of
+from stages.variations.backdrop import NO_BACKDROP, backdrop_of, hubs_by_choice
 from stages.variations.carcass import NO_CARCASS, carcass_test
 from stages.variations.constraint import made_mend, made_test, module_of
 from stages.variations.kernels.answers import ContactAnswers
@@ -34,7 +34,6 @@ from stages.variations.search.search import SPARE, Search, Variant
 from stages.variations.settings import (
     CHOSEN_CARCASS,
     CHOSEN_COPIED,
-    CHOSEN_HUBS,
     CHOSEN_STABLE,
     VariationsConfig,
 )
@@ -208,9 +207,7 @@ def _hubs_required(config: Config, kit: Kit) -> float:
     said = config.section(VariationsConfig).require.hubs
     if said != "auto":
         return said
-    asked = next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name)
-    chosen = asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs)
-    return CHOSEN_HUBS if chosen else 0
+    return hubs_by_choice(next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name), kit)
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:
