@@ -138,7 +138,7 @@ def test_records_index_card_and_table_say_the_same_of_physics(made: tuple[Path, 
     row = next(line for line in done.stdout.splitlines() if line.startswith("| tests.stages.programs.stool"))
     columns = [each.strip() for each in row.strip("|").split("|")]
     assert float(columns[4]) == pytest.approx(share, abs=0.1)
-    assert {path.suffix for path in (made[0] / "toy-eval").iterdir()} == {".md", ".csv", ".tex"}
+    assert {path.suffix for path in (made[0] / "toy-eval").iterdir()} == {".html", ".md", ".csv", ".tex"}
 
 
 def test_a_row_of_the_index_finds_its_sample(made: tuple[Path, tuple[str, ...]]) -> None:
