@@ -125,13 +125,13 @@ class Probe:
 
     def _is_whole(self, assembly: Assembly) -> bool:
         """Whether a find has what makes it one; what it lacks is counted."""
-        lacks = ""
         if not self._has_carcass(assembly):
-            lacks = NO_CARCASS
-        elif self._hubs and not self._backdrop.has_hubs(self._hubs, self._backdrop.fit(assembly)):
-            lacks = NO_BACKDROP
-        self._refused[lacks] += bool(lacks)
-        return not lacks
+            self._refused[NO_CARCASS] += 1
+            return False
+        if self._hubs and not self._backdrop.has_hubs(self._hubs, self._backdrop.fit(assembly)):
+            self._refused[NO_BACKDROP] += 1
+            return False
+        return True
 
     def whole(self, place: int) -> Assembly:
         """The find at this place among the variants, with its backdrop."""
@@ -139,7 +139,7 @@ class Probe:
 
     def finds(self) -> Finds:
         """What was found so far."""
-        rejects = sum((each.rejects for each in self._searches), +self._refused)
+        rejects = sum((each.rejects for each in self._searches), self._refused)
         counts = _counts(self.kit, [each.assembly.types for each in self.variants])
         exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:

@@ -8,6 +8,7 @@ import numpy as np
 
 from stages.exemplars.findings import SMALL, hubs
 from stages.shape.kit import Kit
+from stages.variations.backdrop import NO_BACKDROP
 from stages.variations.carcass import NO_CARCASS, carcass
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
@@ -38,6 +39,9 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     if rejects.get(NO_CARCASS, 0):
         lost = f"all that was found lacks {' or '.join(carcass(kit))}, parts as large as the exemplar"
         return f"{lost}, and is a piece of one; bring {another} that has them"
+    if rejects.get(NO_BACKDROP, 0):
+        left_out = " or ".join(kit.types[hub].name for hub in kit.grammar.hubs)
+        return f"what was found stands without {left_out}, left out by `hubs.types`; bring {another}"
     pinned = _hub(kit)
     if pinned:
         return f"{pinned}; split it into several parts in the model, or bring {another}"

@@ -81,17 +81,23 @@ class Backdrop:
             return len(fitted) >= required
         if any((fitted == hub).sum() < count for hub, count in spanning_hubs(kit).items()):
             return False
+        widest, share = self._widest
+        if int((fitted == widest).sum()) < max(1.0, required * share * len(whole)):
+            return False
+        beside = zip(whole.types.tolist(), self._hubs_beside(whole), strict=True)
+        return sum(not self._always[part_type] <= found for part_type, found in beside) <= LACKING * len(whole)
+
+    @cached_property
+    def _widest(self) -> tuple[int, float]:
+        """The hub type that touches most, and its share of the parts of the exemplars."""
+        kit = self.kit
         touching = {
             hub: max(sum(count for _, count in seen) for seen in kit.grammar.neighbourhoods[hub])
             for hub in kit.grammar.hubs
         }
         widest = max(touching, key=lambda hub: touching[hub])
         there = sum(int((each.backdrop.types == widest).sum()) for each in kit.exemplars)
-        share = there / sum(len(each.whole) for each in kit.exemplars)
-        if int((fitted == widest).sum()) < max(1.0, required * share * len(whole)):
-            return False
-        beside = zip(whole.types.tolist(), self._hubs_beside(whole), strict=True)
-        return sum(not self._always[part_type] <= found for part_type, found in beside) <= LACKING * len(whole)
+        return widest, there / sum(len(each.whole) for each in kit.exemplars)
 
     @cached_property
     def _always(self) -> dict[int, set[int]]:

@@ -128,7 +128,7 @@ def run_lane(task: Task) -> Outcome:
     whole = [each for each in variants if is_whole(each.assembly)]
     if len(whole) < len(variants):
         search.rejects[NO_CARCASS] += len(variants) - len(whole)
-    kept, resized = _required(task, kit, section, whole)
+    kept, resized = _required(task, kit, section, whole, search.rejects)
     write_variants(task, kit, kept)
     rejects = dict(sorted(search.rejects.items()))
     for reason, count in rejects.items():
@@ -140,15 +140,15 @@ def run_lane(task: Task) -> Outcome:
 
 
 def _required(
-    task: Task, kit: Kit, section: VariationsConfig, variants: Sequence[Variant]
+    task: Task, kit: Kit, section: VariationsConfig, variants: Sequence[Variant], rejects: Counter[str]
 ) -> tuple[Sequence[Variant], Counter[str]]:
-    """The variants that are, with their backdrop, what the config requires, the others being refused; and how many of
-    them were resized so that they are, by the reason for which they would have been refused."""
+    """The variants that are, with their backdrop, what the config requires, the others being added to `rejects` by
+    reason; and how many of them were resized so that they are, by the reason for which they would have been refused."""
     params = task.shard.params
     telling = [each for each in variants if each.lineage["copied"]["largest"] <= params["copied"]]
     if len(telling) < len(variants):
-        task.reject(task.shard.name, "too much copied whole", count=len(variants) - len(telling))
-    telling, resized = _constrained(task, kit, section, telling)
+        rejects["too much copied whole"] += len(variants) - len(telling)
+    telling, resized = _constrained(kit, section, telling, rejects)
     hubs, physical = _hubs_required(task.config, kit), section.require.physical(params["stable"])
     if not (physical.rooted or physical.stable or hubs):
         return telling, resized
@@ -159,15 +159,15 @@ def _required(
         if weak is None:
             kept.append(variant)
         else:
-            task.reject(task.shard.name, weak)
+            rejects[weak] += 1
     return kept, resized
 
 
 def _constrained(
-    task: Task, kit: Kit, section: VariationsConfig, variants: list[Variant]
+    kit: Kit, section: VariationsConfig, variants: list[Variant], rejects: Counter[str]
 ) -> tuple[list[Variant], Counter[str]]:
     """The variants that meet the global constraints, resized where that helps and the config allows it, and how many
-    were; the others are refused."""
+    were; the others are added to `rejects`."""
     asked, stretch, resized = section.require.constraints, section.search.stretch, Counter[str]()
     if not asked:
         return variants, resized
@@ -180,7 +180,7 @@ def _constrained(
             continue
         mended = None if mend is None else mend(variant.assembly)
         if mended is None:
-            task.reject(task.shard.name, reason)
+            rejects[reason] += 1
             continue
         kept.append(replace(variant, assembly=mended, lineage={**variant.lineage, "bent": True}))
         resized[reason] += 1

@@ -8,8 +8,10 @@ from dataclasses import replace
 import pytest
 
 from stages.exemplars.build import build_kit
+from stages.exemplars.settings import HubConfig
 from stages.shape.kit import Kit
 from stages.variations.advice import what_keeps
+from stages.variations.backdrop import NO_BACKDROP
 from tests.stages.variations.toy import CHAIN, Placed, box, chain, config_of, kit_of, models_of, pose
 
 BLOCKS = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
@@ -42,3 +44,13 @@ def test_of_small_shapes_more_are_asked_for_and_parts_that_mean_the_same() -> No
 )
 def test_models_that_are_there_already_are_not_asked_for(shapes: list[list[Placed]], asked: str) -> None:
     assert asked in what_keeps(kit_of(CHAIN, shapes), {}, 100)
+
+
+def test_what_stands_without_the_hubs_that_were_left_out_is_said_to() -> None:
+    plate: Placed = ("plate", pose(1, -0.55, 0))
+    meshes = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
+    kit = kit_of(meshes, [[*chain(3), plate]], hubs=HubConfig(types=("plate",), keep="backdrop"))
+    said = what_keeps(kit, {NO_BACKDROP: 3}, 100)
+    assert (
+        said == "what was found stands without plate, left out by `hubs.types`; bring a second model of the same parts"
+    )
