@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from eval.models import Trained, trained_models
+from eval.subject import Subject
 from eval.table import Cell, Published, Table
 from pipeline.randomness import decision_rng
 from stages.exemplars.faults import assembly_faults
@@ -24,6 +25,8 @@ from stages.synthesis.instantiation.instantiate import Instantiator
 from stages.synthesis.instantiation.layout import STANDARD, Method
 from stages.training.checkpoint import weights_header, weights_of_kind
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import VariationsConfig
 
 __all__ = [
     "DRAWS",
@@ -34,6 +37,7 @@ __all__ = [
     "dream_rng",
     "edge_categories",
     "guides_of",
+    "instantiator_of",
     "methods_table",
     "outcome_table",
 ]
@@ -97,6 +101,11 @@ def distinct_graphs(
 def dream_rng(seed: int, model: str) -> np.random.Generator:
     """The random stream by which strings are drawn from a model."""
     return decision_rng(seed, "eval", "instantiation", model)
+
+
+def instantiator_of(subject: Subject, kit: Kit) -> Instantiator:
+    """What puts graphs of a kit together, its parts upright where variants of the config are."""
+    return Instantiator(ContactAnswers(kit), subject.config.section(VariationsConfig).search.upright)
 
 
 def edge_categories(folder: Path, kit: Kit) -> list[Trained[TrainedEdgeCategories]]:

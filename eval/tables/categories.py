@@ -11,6 +11,8 @@ from stages.training.checkpoint import weights_of_kind
 
 __all__ = ["TABLE"]
 
+DRAWS = 3
+"""How often each graph is put together by chance, to see what it leaves open."""
 SHOWN = 3
 """So many shapes are drawn beside what was read of them."""
 
@@ -18,8 +20,10 @@ SHOWN = 3
 def _answer(subject: Subject, asked: Namespace) -> Answer:
     from itertools import islice
 
+    from eval.ambiguity import ambiguity, ambiguity_table
     from eval.categories import categories_table, category_models, clusters_table, judge, made_shapes, read_back
     from eval.clusters import clusters_of
+    from eval.instantiation import instantiator_of
     from eval.models import training_curve
     from eval.pictures import shape_picture
     from pipeline.randomness import decision_rng
@@ -32,7 +36,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     kits = made_kits(subject.places)
     edges = subject.config.section(StringsConfig).edges
     writers = {name: KitStrings(kit, edges) for name, kit in kits.items()}
-    judged, clusters, lines, strips = [], [], {}, []
+    judged, clusters, open_graphs, lines, strips = [], [], [], {}, []
     for each in category_models(subject.models, kits):
         for split in ("val", "test"):
             rng = decision_rng(subject.config.seed, "eval", "categories", each.kit, split)
@@ -52,8 +56,12 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     for name in dict.fromkeys(each.kit for each, _, _ in judged):
         learnt = list(islice(made_shapes(subject, name, "train"), asked.graphs))
         clusters.append((name, len(learnt), clusters_of(CategorySpace(kits[name]), learnt)))
+        rng = decision_rng(subject.config.seed, "eval", "categories", name, "ambiguity")
+        unseen = islice(made_shapes(subject, name, "test"), asked.graphs)
+        maker = instantiator_of(subject, kits[name])
+        open_graphs.append((name, ambiguity(maker, writers[name], unseen, DRAWS, rng)))
     return Answer(
-        [categories_table(judged), clusters_table(clusters)],
+        [categories_table(judged), ambiguity_table(open_graphs), clusters_table(clusters)],
         [Curve("Tokens with the right category, each after the right ones before it", "steps", "% of val", lines)],
         strips,
     )

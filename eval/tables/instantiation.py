@@ -28,6 +28,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         dream_rng,
         edge_categories,
         guides_of,
+        instantiator_of,
         methods_table,
         outcome_table,
     )
@@ -38,9 +39,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.shape.shape import kit_shape
     from stages.strings.alphabet import make_alphabet
     from stages.strings.decoder import decode
-    from stages.synthesis.instantiation.instantiate import Instantiator
     from stages.training.string_vae.sampling import sample
-    from stages.variations.kernels.answers import ContactAnswers
 
     outcomes: list[tuple[str, Sequence[Attempt]]] = []
     compared: list[tuple[str, str, Sequence[Attempt]]] = []
@@ -50,7 +49,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         train, test = (_lines(subject, name, split) for split in ("train", "test"))
         if not test:
             continue
-        maker, alphabet = Instantiator(ContactAnswers(kit)), make_alphabet(kit.labels)
+        maker, alphabet = instantiator_of(subject, kit), make_alphabet(kit.labels)
         limits = {"budget": asked.parts, "whole": _tells_all(subject, name)}
         standard = METHODS["all steps"]._replace(**limits)
         unseen = distinct_graphs(test, alphabet, asked.instantiated)

@@ -56,20 +56,19 @@ class _Seen:
 
 
 def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]) -> _Seen:
+    from eval.instantiation import instantiator_of
     from eval.journeys import journey_strips
     from eval.strings import corpus_strings, model_rng, reconstruction, sampling, shape_graphs, structure
     from stages.exemplars.language import made_kits
     from stages.strings.settings import StringsConfig
-    from stages.synthesis.instantiation.instantiate import Instantiator
     from stages.synthesis.instantiation.layout import STANDARD
     from stages.training.string_vae.sampling import WAYS
-    from stages.variations.kernels.answers import ContactAnswers
 
     model, seed, kits = trained.model, subject.config.seed, made_kits(subject.places)
     train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))
     strips: list[Strip] = []
     if not trained.seed and trained.kit in kits:
-        maker = Instantiator(ContactAnswers(kits[trained.kit]))
+        maker = instantiator_of(subject, kits[trained.kit])
         method = STANDARD._replace(whole=subject.config.section(StringsConfig).edges == "all")
         rng = model_rng(seed, trained, "journeys")
         strips += journey_strips(model, train, maker, method, trained.folder, rng)
