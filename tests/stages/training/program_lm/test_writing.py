@@ -99,7 +99,8 @@ def test_a_model_learns_two_programs_and_writes_them() -> None:
     optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
-    before = learner.validate(noise)
+    with torch.no_grad():
+        before = learner.validate(noise)
     assert before["loss"] > before["numbers"] > 0
     for step in range(120):
         losses = learner.losses(next(stream), step, noise)
@@ -107,7 +108,8 @@ def test_a_model_learns_two_programs_and_writes_them() -> None:
         losses["loss"].backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(module.parameters(), 1.0)
         optimizer.step()
-    assert learner.validate(noise)["loss"] < 0.05 * before["loss"]
+    with torch.no_grad():
+        assert learner.validate(noise)["loss"] < 0.05 * before["loss"]
     programs, begun = trained(module, 0.9).sample(40, np.random.default_rng(0))
     assert begun == 40
     assert {signature(each) for each in programs} == {signature(each) for each in PROGRAMS}
