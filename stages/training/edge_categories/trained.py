@@ -89,16 +89,17 @@ class TrainedEdgeCategories:
         they are given. Proposals whose cycles do not close fall
         through; the others are labelled along all strings, and each string says how likely it holds what it reads. In
         the paper strings vote on edges; but the frame of a part is that of the way to it, so what strings can compare
-        are shapes.
+        are shapes. Strings that tell of a spanning tree each tell of other contacts: all of them have to hold.
         """
         texts = [each.string for each in strings]
         proposed: dict[tuple[tuple[int, ...], ...], list[IntArray]] = {}
         likeliest = self.choose(texts, None) if likeliest is None else likeliest
+        told = [np.sort(each.nodes[decode(each.string, self.space.alphabet).edges], axis=1) for each in strings]
+        ends = np.unique(np.concatenate(told), axis=0).astype(np.int32)
         for encoded, categories in zip(strings, likeliest, strict=True):
             try:
                 placed = self.space.place(encoded.string, categories)
                 order = np.argsort(encoded.nodes)
-                ends = np.sort(encoded.nodes[placed.edges], axis=1).astype(np.int32)
                 shape = Assembly(placed.types[order], placed.poses[order], ends)
                 read = [each.categories for each in self.space.label(shape, strings, either_hand=True)]
             except (NoCategoryError, ValueError):

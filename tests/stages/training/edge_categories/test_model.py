@@ -231,3 +231,14 @@ def test_weights_come_back_from_their_file_and_only_for_their_kit(reader: str, t
         path.write_bytes(checkpoint_bytes(model.module.state_dict(), {**model.header, **changes}))
         with pytest.raises(CheckpointError, match=f"another {said}"):
             load_edge_categories(path, kit())
+
+
+def test_strings_of_other_spanning_trees_vote_for_a_shape_if_all_that_they_tell_of_holds() -> None:
+    ring = next(each for each in map(network, range(50)) if len(each.edges) == len(each))
+    trees = KitStrings(kit(), "tree")
+    strings = trees.strings(trees.graph(ring), 5, np.random.default_rng(0))
+    truth = [each.categories for each in space().label(ring, strings, either_hand=True)]
+    model = random_model(reader="walker")
+    (ballot,) = model.vote(strings, truth)
+    for read, wanted in zip(ballot.categories, truth, strict=True):
+        np.testing.assert_array_equal(read, wanted)
