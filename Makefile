@@ -69,7 +69,7 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW) $(LASTS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset choices exemplars variations programs grammars writing shapeassembly synthesis
+.PHONY: dataset choices exemplars variations proportions programs grammars writing shapeassembly synthesis
 .PHONY: validity abstraction strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
@@ -78,6 +78,8 @@ choices: setup  ## Choose what the config leaves at auto: up axis, contacts, gra
 exemplars: choices  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
 	$(RUN)
 variations: exemplars  ## Make new shapes from the exemplars' parts
+	$(RUN)
+proportions: exemplars  ## Make the exemplars anew in other proportions
 	$(RUN)
 programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
@@ -89,15 +91,15 @@ shapeassembly: writing  ## Make shapes from ShapeAssembly programs, or from part
 	$(RUN)
 synthesis: exemplars  ## Make new shapes from what trained models write
 	$(RUN)
-validity: variations programs grammars shapeassembly synthesis  ## Judge each shape: is it rooted, does it stand?
+validity: variations proportions programs grammars shapeassembly synthesis  ## Judge each shape: is it rooted, does it stand?
 	$(RUN)
-abstraction: variations programs grammars shapeassembly synthesis  ## Find a ShapeAssembly program of each shape, if asked for
+abstraction: variations proportions programs grammars shapeassembly synthesis  ## Find a ShapeAssembly program of each shape, if asked for
 	$(RUN)
-strings: variations programs grammars shapeassembly synthesis  ## Write each shape as strings, and the text corpus
+strings: variations proportions programs grammars shapeassembly synthesis  ## Write each shape as strings, and the text corpus
 	$(RUN)
-points: variations programs grammars shapeassembly synthesis  ## Turn each shape into a labelled point cloud
+points: variations proportions programs grammars shapeassembly synthesis  ## Turn each shape into a labelled point cloud
 	$(RUN)
-sketches: variations programs grammars shapeassembly synthesis  ## Draw each shape as lines
+sketches: variations proportions programs grammars shapeassembly synthesis  ## Draw each shape as lines
 	$(RUN)
 package: validity abstraction strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)

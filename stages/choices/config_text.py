@@ -14,7 +14,7 @@ from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.variations.settings import CHOSEN_HUBS
 
-__all__ = ["config_text", "dataset_name"]
+__all__ = ["config_text", "dataset_name", "proportions_section", "variations_section"]
 
 MOST = 200
 """Variants that the config asks for, if there are as many."""
@@ -38,17 +38,14 @@ def config_text(
     config: KitConfig,
     models: Sequence[Model],
     reasons: Mapping[str, str],
-    require: Mapping[str, Any],
-    layouts: int | None,
+    asked: Sequence[str],
     said: str,
 ) -> str:
-    """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key, of `require` too, what
-    variants must be, by REQUIREMENTS; `layouts`: about how many there are, None for very many; `said`: the
-    forecast in a sentence."""
+    """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key; `asked`: the lines that say
+    what is made of it; `said`: the forecast in a sentence."""
     made = config.decided()
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
     why = "; ".join(dict.fromkeys(model.why for model in models))
-    wanted = MOST if layouts is None else max(1, min(MOST, UNSEEN * layouts))
     kit: list[tuple[int, str, Any, str]] = [
         (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else reasons.get("parts", "")),
         (3, "types", config.types, "what makes a part type"),
@@ -80,20 +77,46 @@ def config_text(
         '        source: ""',
         '        license: ""',
         *(_line(*each) for each in kit),
+        *asked,
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def variations_section(
+    config: KitConfig, reasons: Mapping[str, str], require: Mapping[str, Any], layouts: int | None
+) -> list[str]:
+    """The lines of a dataset of other layouts. `reasons`: of `require`, what variants must be, by REQUIREMENTS;
+    `layouts`: about how many there are, None for very many."""
+    wanted = MOST if layouts is None else max(1, min(MOST, UNSEEN * layouts))
+    lines = [
         "variations:",
         _line(1, "per_kit", wanted, "more than there may be" if wanted < MOST else "raise it for more"),
         "  search:",
         _line(2, "duplicates", "graph", "distinct shape graphs, not ways to turn a part in its place"),
+        "  require:",
     ]
-    asked = []
-    if made.hubs and config.hubs.keep == "backdrop":
-        asked.append(
+    if config.decided().hubs and config.hubs.keep == "backdrop":
+        lines.append(
             _line(2, "hubs", CHOSEN_HUBS, "a variant with a smaller share of what the exemplars have is refused")
         )
-    for key, value in require.items():
-        asked.append(_line(2, key.removeprefix("require."), value, reasons.get(key, "")))
-    lines += ["  require:", *asked]
-    return "\n".join(lines) + "\n"
+    return [
+        *lines,
+        *(_line(2, key.removeprefix("require."), value, reasons.get(key, "")) for key, value in require.items()),
+    ]
+
+
+def proportions_section(stable: bool, layouts: str) -> list[str]:
+    """The lines of a dataset of other proportions. stable: whether shapes must stand; layouts: what is to be said of
+    other layouts."""
+    why = "the exemplars stand" if stable else "not even the exemplars stand"
+    return [
+        "variations:",
+        _line(1, "per_kit", 0, f"other layouts: {layouts}"),
+        "proportions:",
+        _line(1, "per_kit", MOST, "the same parts longer, wider, thicker; raise it for more"),
+        "  require:",
+        _line(2, "stable", stable, why),
+    ]
 
 
 def _line(depth: int, key: str, value: Any, comment: str) -> str:

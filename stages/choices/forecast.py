@@ -41,6 +41,11 @@ class Forecast:
     variants: Sequence[Variant]
 
     @property
+    def is_poor(self) -> bool:
+        """Whether it is no dataset: next to nothing, or all of it alike."""
+        return not self.finds.graphs or (self.layouts is not None and self.layouts < FEW) or is_dull(self.finds)
+
+    @property
     def chosen(self) -> list[Variant]:
         """The most different finds."""
         return [self.variants[place] for place in self.finds.most_different]

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
 from stages.choices.choose import REQUIREMENTS
-from stages.choices.config_text import config_text, dataset_name
+from stages.choices.config_text import config_text, dataset_name, proportions_section, variations_section
 from stages.choices.prospect import Prospect, look_at
 from stages.choices.settings import ChoicesConfig
 from stages.choices.sheet import forecast_sheet
@@ -75,11 +75,16 @@ def _written(folder: Path, paths: Sequence[Path], found: Prospect) -> Iterator[t
     kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
     yield "picture", write_file(folder / f"{name}.png", kit_sheet(kit))
     layouts = found.forecast.layouts if found.forecast is not None else 0
-    if found.forecast is not None and found.assemblies:
-        sheet = forecast_sheet(found.built.kit, found.assemblies, name, found.sentence)
+    if found.shapes:
+        title = "Other proportions" if found.proportioned else "Most different finds of a short search"
+        sheet = forecast_sheet(found.built.kit, found.shapes, title, name, found.sentence)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
-    require = {key: found.choices.values[key] for key in REQUIREMENTS}
-    text = config_text(name, found.config, found.models, found.choices.reasons, require, layouts, found.sentence)
+    if found.proportioned is not None:
+        asked = proportions_section(found.proportioned.stable, found.forecast.sentence if found.forecast else "nothing")
+    else:
+        require = {key: found.choices.values[key] for key in REQUIREMENTS}
+        asked = variations_section(found.config, found.choices.reasons, require, layouts)
+    text = config_text(name, found.config, found.models, found.choices.reasons, asked, found.sentence)
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
 
 

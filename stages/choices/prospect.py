@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
 from stages.choices.choose import REQUIREMENTS, Choices, choose, found_words
 from stages.choices.forecast import Forecast, forecast
+from stages.choices.proportioned import Proportioned, in_proportions
 from stages.choices.reading import Reading, cut_if_nothing_comes
 from stages.choices.sheet import SHOWN
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig, ReadLimits
-from stages.shape.kit import Assembly
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
-from stages.shape.shape import kit_shape
+from stages.shape.shape import Shape, kit_shape
 from stages.variations.backdrop import Backdrop, hubs_by_choice
 from stages.variations.facing import Facing
 from stages.variations.kernels.answers import ContactAnswers
@@ -40,8 +40,9 @@ class Prospect:
 
     config: nothing left open; models: as they are read by it; asked: the config that they were looked at with; seen:
     all parts under what was chosen, hubs and what falls apart among them; built: what a run builds; forecast: None
-    where a run would refuse the models; rate: variants found a CPU second; seconds: CPU seconds of it all; torn:
-    whether the parts are pieces of meshes that nobody but `auto` chose.
+    where a run would refuse the models; shapes: what it may look like; rate: variants found a CPU second; seconds: CPU
+    seconds of it all; torn: whether the parts are pieces of meshes that nobody but `auto` chose; proportioned: what
+    other proportions promise where other layouts are too few or too dull, and then config and built are for these.
     """
 
     config: KitConfig
@@ -51,10 +52,11 @@ class Prospect:
     seen: Observation
     built: Observation
     forecast: Forecast | None
-    assemblies: Sequence[Assembly]
+    shapes: Sequence[Shape]
     rate: float
     seconds: float
     torn: bool
+    proportioned: Proportioned | None
 
     @property
     def sentence(self) -> str:
@@ -62,7 +64,11 @@ class Prospect:
         if self.forecast is None:
             return f"nothing, for a run refuses the models: {self.built.refusals[0]}"
         said = self.forecast.sentence
-        return said if self.forecast.finds.graphs or not self.torn else f"{said}; or {ACROSS}"
+        if self.torn and not self.forecast.finds.graphs:
+            said = f"{said}; or {ACROSS}"
+        if self.proportioned is None:
+            return said
+        return f"hundreds of the same layout in other proportions; of other layouts {said}"
 
     def as_json(self) -> Mapping[str, Any]:
         """Choices and forecast, beside what `inspection` finds."""
@@ -75,6 +81,8 @@ class Prospect:
                 "variants_a_cpu_second": round(self.rate, 1),
                 "seen_once": round(self.forecast.seen_once, 4),
             }
+        if self.proportioned is not None:
+            expected["proportions"] = {"holds": round(self.proportioned.holds, 4), "stable": self.proportioned.stable}
         return {"choices": made, "forecast": expected, "cpu_seconds": round(self.seconds, 1)}
 
     def lines(self) -> list[tuple[str, str]]:
@@ -122,9 +130,33 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
         kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
         facing = Facing(built.kit)
         assemblies = [facing.turned_back(each, facing.turn(each)) for each in islice(kept, SHOWN)]
+    shapes = [kit_shape(built.kit, each) for each in assemblies]
+    proportioned = None
+    if expected is not None and not choices.enough and expected.is_poor:
+        unvaried = _unvaried(reading, choices)
+        whole = reading.config.decide(unvaried.values)
+        held = observe_parts(whole, models, identified)
+        found = in_proportions(held.kit, SHOWN) if not held.refusals else None
+        if found is not None and found.enough:
+            proportioned, choices, decided, built, shapes = found, unvaried, whole, held, list(found.shapes)
     torn = reading.config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
     seconds = time.process_time() - start
-    return Prospect(decided, models, config, choices, seen, built, expected, assemblies, rate, seconds, torn)
+    return Prospect(decided, models, config, choices, seen, built, expected, shapes, rate, seconds, torn, proportioned)
+
+
+def _unvaried(reading: Reading, choices: Choices) -> Choices:
+    """What is chosen where layouts stay as they are: no hub is left out, and of what stands apart the largest piece
+    stays."""
+    others = {
+        "hubs.types": ("none", "all parts stay, only sizes change"),
+        "disconnected": ("error", "nothing stands apart"),
+    }
+    open_keys = others.keys() & choices.values.keys()
+    values = {**choices.values, **{key: others[key][0] for key in open_keys}}
+    reasons = {**choices.reasons, **{key: others[key][1] for key in open_keys}}
+    if observe_parts(reading.config.decide(values), reading.models, reading.identified).refusals:
+        values["disconnected"], reasons["disconnected"] = "largest", "parts stand apart from the largest piece"
+    return replace(choices, values=values, reasons=reasons)
 
 
 def _shown(value: Any) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stages.shape.kit import Assembly, Kit
-from stages.shape.shape import kit_shape, upright
+from stages.shape.kit import Kit
+from stages.shape.shape import Shape, kit_shape, part_count, upright
 from stages.shape.views.camera import Camera
 from stages.shape.views.paint import part_paint
 from stages.shape.views.portrait import portrait
@@ -20,18 +20,18 @@ CELL = 300
 CAMERA = Camera(azimuth=-40.0, elevation=25.0)
 
 
-def forecast_sheet(kit: Kit, assemblies: Sequence[Assembly], title: str, note: str) -> bytes:
-    """A PNG of the exemplars of a kit and of at most SHOWN `assemblies` of its types."""
-    whole = [_cell(kit, each.whole, each.name) for each in kit.exemplars]
-    found = [_cell(kit, each, f"{len(each)} parts") for each in assemblies[:SHOWN]]
+def forecast_sheet(kit: Kit, shapes: Sequence[Shape], found: str, title: str, note: str) -> bytes:
+    """A PNG of the exemplars of a kit and of at most SHOWN `shapes`; `found`: what these are."""
+    whole = [_cell(kit_shape(kit, each.whole), each.name) for each in kit.exemplars]
+    cells = [_cell(each, part_count(each)) for each in shapes[:SHOWN]]
     sections = [Section("Exemplars", _rows(whole), "what goes in")]
-    if found:
-        sections.append(Section("Most different finds of a short search", _rows(found), note))
+    if cells:
+        sections.append(Section(found, _rows(cells), note))
     return picture_png(contact_sheet(sections, title, CELL))
 
 
-def _cell(kit: Kit, assembly: Assembly, caption: str) -> Cell:
-    shape = upright(kit_shape(kit, assembly))
+def _cell(shape: Shape, caption: str) -> Cell:
+    shape = upright(shape)
     return Cell(portrait(scene_of(shape), CAMERA, (CELL, CELL), part_paint(shape)), caption)
 
 

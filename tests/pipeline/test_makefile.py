@@ -63,7 +63,8 @@ def nasty(folder: Path) -> str:
 def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
     runs = calls("dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
     assert [run[3] for run in runs] == [
-        "choices", "exemplars", "variations", "programs", "grammars", "writing", "shapeassembly", "synthesis",
+        "choices", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
+        "synthesis",
         "validity", "abstraction", "strings", "points", "sketches", "package",
     ]  # fmt: skip
     asked = ["--config", "c.yaml", "--out", "/data", "--seed", "7", "--workers", "3"]
@@ -74,7 +75,8 @@ def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for
     first, *runs = calls("train", "MODEL=masked-castle", "CONFIG=c.yaml")
     assert first == ["-m", "stages.training", "--config", "c.yaml", "--only", "masked-castle"]
     assert [run[3] for run in runs] == [
-        "choices", "exemplars", "variations", "programs", "grammars", "writing", "shapeassembly", "synthesis",
+        "choices", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
+        "synthesis",
         "strings", "training",
     ]  # fmt: skip
     assert all(run[4:6] == ["--config", "c.yaml"] for run in runs)
@@ -121,9 +123,9 @@ def test_every_target_gets_every_value_as_it_was_said(tmp_path: Path) -> None:
     targets = ("dataset", "plan", "status", "verify", "inspect", "eval", "doctor", "clean")
     arguments = [f"{name}={said}" for name in VARIABLES]
     reached = calls(*targets, *arguments)
-    assert len(reached) == 14 + len(targets[1:]) + 1, "14 stages of dataset; inspect looks at a program and a model"
+    assert len(reached) == 15 + len(targets[1:]) + 1, "15 stages of dataset; inspect looks at a program and a model"
     assert all(any(said in each for each in call) for call in reached)
-    assert sum(call.count(said) for call in reached if call[2] == "run") == 14 * 6
+    assert sum(call.count(said) for call in reached if call[2] == "run") == 15 * 6
     assert make("help", *arguments).stdout.count(said) == len(VARIABLES)
     assert not list(tmp_path.iterdir())
 

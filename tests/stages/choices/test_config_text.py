@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from stages.choices.config_text import config_text
+from stages.choices.config_text import config_text, proportions_section, variations_section
 from tests.stages.variations.toy import ROAD, config_of, models_of, ring
 
 
@@ -14,7 +14,8 @@ def test_what_variants_must_be_is_typed_out_with_its_reasons(copied: float, carc
     shapes = [ring(1, 1), ring(2, 3)]
     require = {"require.copied": copied, "require.stable": True, "require.carcass": carcass}
     reasons = {"require.copied": "because", "require.stable": "some fall"}
-    text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), reasons, require, None, "hundreds")
+    asked = variations_section(config_of(shapes), reasons, require, None)
+    text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), reasons, asked, "hundreds")
     said = {"copied": copied, "stable": True, "carcass": list(carcass)}
     assert yaml.safe_load(text)["variations"]["require"] == said
     assert f"copied: {copied}   # because" in text
@@ -25,6 +26,16 @@ def test_names_that_yaml_reads_as_something_else_come_back_as_they_are() -> None
     shapes = [ring(1, 1), ring(2, 3)]
     meanings = {"no": ("yes", "12", "leg*"), "3: top": ("null",)}
     config = config_of(shapes).model_copy(update={"types": "meaning", "meanings": meanings})
-    text = config_text("toy", config, models_of(ROAD, shapes), {}, {}, None, "hundreds")
+    text = config_text("toy", config, models_of(ROAD, shapes), {}, variations_section(config, {}, {}, None), "hundreds")
     (kit,) = yaml.safe_load(text)["exemplars"]["kits"]
     assert kit["meanings"] == {name: list(patterns) for name, patterns in meanings.items()}
+
+
+def test_a_config_of_other_proportions_varies_no_layouts_and_says_why() -> None:
+    shapes = [ring(1, 1)]
+    lines = proportions_section(True, "nothing: every part is its own type")
+    text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), {}, lines, "hundreds")
+    said = yaml.safe_load(text)
+    assert said["variations"] == {"per_kit": 0}
+    assert said["proportions"] == {"per_kit": 200, "require": {"stable": True}}
+    assert "per_kit: 0   # other layouts: nothing: every part is its own type" in text

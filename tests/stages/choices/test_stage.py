@@ -99,13 +99,20 @@ def test_inspect_chooses_the_same(made: tuple[Path, str], capsys: pytest.Capture
 
 
 def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
+    """Two rings have 16 other layouts, which is no dataset, so other proportions are proposed; and layouts go, too."""
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
     assert main([*paths, "--tries", "200", "--out", str(tmp_path)]) == 0
     written = yaml.safe_load((tmp_path / "ring0.yaml").read_text())
     written["name"] = "toy"
-    written["variations"] |= {"per_kit": 8}
-    written["variations"]["search"] |= {"tries": 400, "patience": 800}
+    assert written["variations"] == {"per_kit": 0}
+    written["proportions"] |= {"per_kit": 8}
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
+    run(tmp_path, ("choices", "exemplars", "proportions"))
+    work = tmp_path / "out" / ".work" / "toy"
+    assert not list((work / "choices").glob("*.json"))
+    assert list((work / "proportions").glob("toy-train-*.tar"))
+    del written["proportions"]
+    written["variations"] = {"per_kit": 8, "search": {"duplicates": "graph", "tries": 400, "patience": 800}}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
     run(tmp_path, ("choices", "exemplars", "variations"))
-    assert not list((tmp_path / "out" / ".work" / "toy" / "choices").glob("*.json"))
-    assert list((tmp_path / "out" / ".work" / "toy" / "variations").glob("toy-train-*.tar"))
+    assert list((work / "variations").glob("toy-train-*.tar"))

@@ -1,0 +1,36 @@
+"""How `make verify` looks at samples that are exemplars in other proportions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pipeline.places import Places
+from stages.exemplars.language import made_kits
+from stages.proportions.faults import warp_fault
+from stages.proportions.language import LANGUAGE
+from stages.proportions.text import ProportionError, exemplar_of, proportion_text, read_proportions, shape_of_text
+from stages.shape.collection.audit import Audit
+from stages.shape.collection.packaged import Packaged
+
+__all__ = ["AUDIT"]
+
+
+def _anew(sample: Packaged, places: Places) -> Iterator[str]:
+    """The text is read, and written again; the shape that it makes holds together as the exemplar does."""
+    record = sample.record
+    if record["language"] != LANGUAGE.name:
+        return
+    kit = made_kits(places)[record["kit"]]
+    try:
+        name, warp = read_proportions(record["text"])
+        fault = warp_fault(kit, exemplar_of(kit, name).whole, shape_of_text(kit, record["text"]))
+    except ProportionError as error:
+        yield str(error)
+        return
+    if proportion_text(name, warp) != record["text"]:
+        yield "its proportions are written in another way than they are read"
+    if fault is not None:
+        yield f"beside its exemplar: {fault}"
+
+
+AUDIT = Audit(anew=_anew)

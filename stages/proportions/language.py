@@ -1,0 +1,64 @@
+"""The language of proportions: a sample is an exemplar with factors, and its shape is the exemplar's with these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pipeline.places import Places
+from pipeline.stage import Plan
+from stages.exemplars.language import Kits, made_kits
+from stages.proportions.text import shape_of_text
+from stages.shape.arrays import IntArray
+from stages.shape.collection.language import Anew, Language
+from stages.shape.kit import Kit
+from stages.shape.kit_input import input_kits
+from stages.shape.sample import Sample
+from stages.shape.shape import Shape, kit_shape, part_count, upright
+
+__all__ = ["LANGUAGE"]
+
+
+class Proportions:
+    """The kits that a shard reads."""
+
+    def __init__(self, kits: Mapping[str, Kit]) -> None:
+        self._kits = kits
+        self.sources = Kits(kits).sources
+
+    def shape(self, sample: Sample) -> Shape:
+        """The exemplar as the sample's text says. Raises ProportionError for a text that is none of its kit."""
+        return shape_of_text(self._kits[sample.kit], sample.text)
+
+    def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
+        """The exemplars, hubs among their parts."""
+        found = [(each.name, kit_shape(kit, each.whole)) for kit in self._kits.values() for each in kit.exemplars]
+        return [(f"{name}, {part_count(shape)}", shape) for name, shape in found[:count]]
+
+
+def _reads(plan: Plan) -> tuple[str, ...]:
+    return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
+
+
+def _anew(places: Places) -> Anew:
+    kits = made_kits(places)
+
+    def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
+        if record["kit"] not in kits:
+            raise LookupError(f"kit {record['kit']} is not beside the dataset in .work")
+        return upright(shape_of_text(kits[record["kit"]], record["text"]))
+
+    return shape
+
+
+LANGUAGE = Language(
+    name="proportions",
+    reads=_reads,
+    speaker=lambda task: Proportions(input_kits(task)),
+    graphs=False,
+    text="Its proportions as JSON: the exemplar, and for each axis the factors of the intervals between the ends of "
+    "the exemplar's parts.",
+    anew=_anew,
+    coordinates="The unit is that of the model files, and the lowest point is as high as in the exemplar's. The origin "
+    "of a mesh is the middle of the box around the part, and poses turn nothing.",
+)

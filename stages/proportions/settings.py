@@ -1,0 +1,56 @@
+"""The `proportions` section of a config."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pipeline.config import StrictModel
+from stages.shape.physics.settings import Requirements
+
+__all__ = ["ProportionSplitConfig", "ProportionsConfig"]
+
+
+class ProportionSplitConfig(StrictModel):
+    """How the samples are shared out; no two are alike."""
+
+    val: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in validation.")
+    test: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in test.")
+    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
+    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
+
+
+class ProportionsConfig(StrictModel):
+    """The exemplars of all kits in other proportions."""
+
+    per_kit: int = Field(
+        0,
+        ge=0,
+        le=1_000_000,
+        description="Shapes wanted of each kit, its exemplars taking turns; 0 for a dataset that is made in another "
+        "way.",
+    )
+    spread: float = Field(
+        0.25,
+        gt=0,
+        le=1,
+        description="How far proportions go: standard deviation of the logarithm of the size along an axis, and of the "
+        "length of what lies between the ends of parts.",
+    )
+    most: float = Field(
+        2.0, gt=1, le=4, description="How many times longer or shorter than it is a length is made at most."
+    )
+    apart: float = Field(
+        0.02,
+        ge=0,
+        lt=1,
+        description="How far some end of a part must have moved at least against the exemplar, and against each other "
+        "shape of the dataset, as a share of the diagonal, all of them being made equally large.",
+    )
+    require: Requirements = Field(
+        default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
+    )
+    lanes: int = Field(4, ge=1, le=64, description="Shards of one kit that draw beside each other.")
+    tries: int = Field(8, ge=1, le=1000, description="Draws at most, as a multiple of the shapes wanted.")
+    splits: ProportionSplitConfig = Field(
+        default_factory=ProportionSplitConfig, description="How the samples are shared out."
+    )

@@ -1,0 +1,235 @@
+"""Stage `proportions`: exemplars in; the same in other proportions out, as the shards `<dataset>-<split>-<index>.tar`.
+
+Its first shards, some lanes for each kit, draw factors and keep those under which the exemplar holds together. Then one
+chooses of them, those farthest apart first, and gives each its split and shard. A sample carries no meshes: its text is
+its factors, and `stages.proportions.text.shape_of_text` makes the shape.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pipeline.config import Config
+from pipeline.errors import ConfigError, ShardFailed
+from pipeline.shards import ShardWriter, json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.exemplars.origins import exemplar_origins
+from stages.exemplars.settings import ExemplarsConfig
+from stages.proportions.faults import warp_fault
+from stages.proportions.settings import ProportionsConfig
+from stages.proportions.text import proportion_text, read_proportions
+from stages.proportions.warp import lattice_of, warped
+from stages.shape.arrays import FloatArray
+from stages.shape.collection.origin import unstated
+from stages.shape.collection.shards import made_shards
+from stages.shape.graphs.canonical import graph_digest
+from stages.shape.kit_input import input_kit
+from stages.shape.physics.judge import unmet
+from stages.shape.sample import Sample, write_sample
+from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
+
+__all__ = ["STAGE", "farthest_first"]
+
+BYTES_A_SAMPLE = 8_000
+OVERSAMPLED = 2
+"""So many times the shapes wanted are found, for the choice."""
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """The lanes of all kits; the choice; when that is made, the shards of the collection."""
+    config = plan.config.section(ProportionsConfig)
+    if not config.per_kit:
+        return []
+    lanes = [
+        Shard(f"{kit}-lane{lane:02}", {"job": "lane", "kit": kit, "lane": lane}, (f"exemplars/{kit}",))
+        for kit in plan.shards("exemplars")
+        for lane in range(config.lanes)
+    ]
+    inputs = (
+        *(f"exemplars/{kit}" for kit in plan.shards("exemplars")),
+        *(f"proportions/{each.name}" for each in lanes),
+    )
+    choice = Shard(choice_name(plan.config.name), {"job": "choice", "lanes": [each.name for each in lanes]}, inputs)
+    summary = plan.summary("proportions", choice.name)
+    if summary is None:
+        return [*lanes, choice]
+    return [*lanes, choice, *made_shards(plan, summary["shards"], (f"proportions/{choice.name}",))]
+
+
+def choice_name(dataset: str) -> str:
+    """The shard that chooses the shapes of a dataset."""
+    return f"{dataset}-choice"
+
+
+def run_shard(task: Task) -> Outcome:
+    """A lane, the choice, or a shard of the collection."""
+    jobs = {"lane": run_lane, "choice": run_choice, "collection": run_collection}
+    return jobs[task.shard.params["job"]](task)
+
+
+def run_lane(task: Task) -> Outcome:
+    """File of the shard: `.txt`, a text a line of shapes that hold together and are what they must be."""
+    config = task.config.section(ProportionsConfig)
+    kit = input_kit(task, task.shard.params["kit"])
+    exemplars = [each.whole for each in kit.exemplars]
+    lattices = [lattice_of(kit, each) for each in exemplars]
+    wanted = -(-OVERSAMPLED * config.per_kit // config.lanes)
+    found: list[str] = []
+    tries = 0
+    while len(found) < wanted and tries < config.tries * wanted:
+        place = tries % len(exemplars)
+        tries += 1
+        name, whole, lattice = kit.exemplars[place].name, exemplars[place], lattices[place]
+        text = proportion_text(name, lattice.draw(task.rng("factors", tries), config.spread, config.most))
+        shape = warped(kit, whole, lattice, read_proportions(text)[1])
+        wrong = warp_fault(kit, whole, shape) or unmet(config.require, shape)
+        if wrong is not None:
+            task.reject(text, wrong)
+            continue
+        found.append(text)
+        task.progress(len(found), wanted)
+    with task.output(f"{task.shard.name}.txt") as stream:
+        stream.write("".join(f"{text}\n" for text in found).encode())
+    return Outcome(0, {"tries": tries, "found": len(found)})
+
+
+def run_choice(task: Task) -> Outcome:
+    """Files of the shard: one for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises
+    ShardFailed where there are no shapes."""
+    config = task.config.section(ProportionsConfig)
+    texts: dict[str, list[str]] = {}
+    for lane in task.shard.params["lanes"]:
+        kit = lane.rpartition("-lane")[0]
+        texts.setdefault(kit, []).extend(task.input("proportions", f"{lane}.txt").read_text().splitlines())
+    rows: list[dict[str, Any]] = []
+    counts: dict[str, int] = {}
+    files = {kit.name: [shape.path for shape in kit.shapes] for kit in task.config.section(ExemplarsConfig).kits}
+    for name, of_kit in texts.items():
+        kit = input_kit(task, name)
+        chosen: list[dict[str, Any]] = []
+        for number, (exemplar, path) in enumerate(zip(kit.exemplars, files[name], strict=True)):
+            lattice = lattice_of(kit, exemplar.whole)
+            own = [text for text in of_kit if read_proportions(text)[0] == exemplar.name]
+            points = np.array([lattice.signature(read_proportions(text)[1]) for text in own])
+            origin = lattice.signature([np.ones(len(each)) for each in lattice.lengths])
+            share = len(range(number, config.per_kit, len(kit.exemplars)))
+            graph = kit.labelled(exemplar.assembly)
+            digest = graph_digest(graph.types, graph.edges)
+            for place in farthest_first(points, origin, share, config.apart):
+                parents = ["/".join(path.parts[-2:])]
+                chosen.append({"kit": name, "graph": digest, "parents": parents, "text": own[place]})
+        for number, row in enumerate(chosen):
+            rows.append({"key": f"{name}-{number:06d}", **row})
+        counts[name] = len(chosen)
+    if not rows:
+        raise ShardFailed(
+            "no exemplar holds together in other proportions, or none differs enough; set proportions.spread or "
+            "proportions.apart smaller, or require less, or vary the layout: variations.per_kit"
+        )
+    split_of = share_out([[row] for row in range(len(rows))], config.splits.val, config.splits.test, task.rng("splits"))
+    order = task.rng("order").permutation(len(rows))
+    shards: dict[str, int] = {}
+    for split, title in enumerate(SPLITS):
+        members = order[split_of[order] == split]
+        shard_of = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
+        shards[title] = int(shard_of[-1]) + 1 if len(members) else 0
+        for number in range(shards[title]):
+            with task.output(f"{task.shard.name}.{title}-{number:06d}.jsonl") as stream:
+                stream.writelines(json_bytes(rows[row]) for row in members[shard_of == number].tolist())
+    return Outcome(0, {"shards": shards, "shapes": counts})
+
+
+def farthest_first(points: FloatArray, origin: FloatArray, most: int, apart: float) -> list[int]:
+    """The places of at most `most` of the points (n, d), each in turn the one that is farthest from `origin` (d,) and
+    from those before it, by the greatest difference of a coordinate, as long as that is `apart` at least."""
+    gaps = np.abs(points - origin).max(axis=1) if len(points) else np.empty(0)
+    chosen: list[int] = []
+    while len(chosen) < min(most, len(points)):
+        place = int(gaps.argmax())
+        if gaps[place] < max(apart, 1e-9):
+            break
+        chosen.append(place)
+        gaps = np.minimum(gaps, np.abs(points - points[place]).max(axis=1))
+    return chosen
+
+
+def run_collection(task: Task) -> Outcome:
+    """Write the samples of one shard."""
+    split, number = task.shard.params["split"], task.shard.params["number"]
+    listing = task.input("proportions", f"{choice_name(task.config.name)}.{split}-{number:06d}.jsonl").read_text()
+    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
+        for row in map(json.loads, listing.splitlines()):
+            lineage = {"method": "proportions", "parents": row["parents"]}
+            write_sample(
+                writer,
+                Sample(row["key"], split, "proportions", row["kit"], row["graph"], lineage, text=row["text"]),
+            )
+    return Outcome(writer.samples, {"split": split, "samples": writer.samples})
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """How many shapes each kit has, what was refused, and where there are fewer than wanted."""
+    config = plan.config.section(ProportionsConfig)
+    made = plan.summary("proportions", choice_name(plan.config.name)) if config.per_kit else None
+    if made is None:
+        return []
+    lines = []
+    for kit, count in made["shapes"].items():
+        refused: dict[str, int] = {}
+        for lane in range(config.lanes):
+            for reason, number in plan.rejects("proportions", f"{kit}-lane{lane:02}").items():
+                refused[reason] = refused.get(reason, 0) + number
+        why = ", ".join(f"{number:,} {reason}" for reason, number in sorted(refused.items()))
+        lines.append(f"{kit}: {count:,} of {config.per_kit:,} shapes; refused: {why or 'none'}")
+        if count < config.per_kit:
+            lines.append(
+                f"warning: {kit} has fewer shapes than wanted; set proportions.apart smaller, or proportions.tries or "
+                "spread larger"
+            )
+    return [*lines, *(f"warning: {sentence}" for sentence in unstated(exemplar_origins(plan.config)))]
+
+
+def check(config: Config) -> None:
+    """Raises ConfigError where there is nothing that could have other proportions."""
+    if config.section(ProportionsConfig).per_kit and not config.section(ExemplarsConfig).kits:
+        raise ConfigError(f"{config.path}: proportions.per_kit asks for shapes, and there are no exemplars.kits")
+
+
+def asked(config: Config) -> Sequence[int]:
+    """The shapes of each shard of the collection, if as many are found as are asked for."""
+    section = config.section(ProportionsConfig)
+    total = section.per_kit * len(config.section(ExemplarsConfig).kits)
+    val, test = round(section.splits.val * total), round(section.splits.test * total)
+    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+
+
+def trial(config: Config) -> ProportionsConfig:
+    """Few shapes of each kit."""
+    section = config.section(ProportionsConfig)
+    few = max(32 // max(len(config.section(ExemplarsConfig).kits), 1), 4)
+    splits = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
+    return section.model_copy(update={"per_kit": min(section.per_kit, few), "lanes": 1, "splits": splits})
+
+
+def estimate_bytes(plan: Plan) -> int:
+    """Bytes of all texts, in their lanes and in the collection."""
+    return 2 * BYTES_A_SAMPLE * int(np.sum(asked(plan.config)))
+
+
+STAGE = Stage(
+    name="proportions",
+    module=__name__,
+    config=ProportionsConfig,
+    inputs=("exemplars",),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=estimate_bytes,
+    report=report,
+    check=check,
+    asked=asked,
+    trial=trial,
+)

@@ -1,0 +1,91 @@
+"""Exemplars in other proportions through the real mill, with any number of workers, to a verified dataset."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from stages.proportions.stage import farthest_first
+from stages.shape.sample import Sample, read_samples
+from tests.mill import mill
+from tests.stages.proportions.stools import MESHES, STOOL
+from tests.stages.variations.toy import write_model
+from tests.stated import stated
+
+STAGES = ("choices", "exemplars", "proportions")
+
+
+def write_config(folder: Path, **section: object) -> Path:
+    paths = [write_model(folder / f"stool{number}.glb", MESHES, STOOL) for number in range(2)]
+    path = folder / "stools.yaml"
+    config = {
+        "name": "stools",
+        "seed": 3,
+        "license": "MIT",
+        "exemplars": {"kits": [stated({"name": "stool", "shapes": paths})]},
+        "variations": {"per_kit": 0},
+        "proportions": {"per_kit": 9, "splits": {"val": 0.2, "test": 0.2, "shards": 2}, **section},
+        "points": {"uniform": 64},
+        "sketches": {"size": 32, "views": [{"name": "front", "azimuth": 0.0, "elevation": 10.0}]},
+    }
+    path.write_text(yaml.safe_dump(config))
+    return path
+
+
+def run(config: Path, out: Path, *stages: str, workers: int = 1) -> str:
+    printed = ""
+    for stage in stages:
+        code, said = mill("run", stage, "--config", config, "--out", out, "--workers", workers)
+        assert code == 0, said
+        printed += said
+    return printed
+
+
+def samples(out: Path) -> list[Sample]:
+    shards = sorted((out / ".work" / "stools" / "proportions").glob("stools-*-0*.tar"))
+    return [sample for shard in shards for sample in read_samples(shard)]
+
+
+@pytest.mark.slow
+def test_a_dataset_of_stools_goes_the_whole_way_and_is_the_same_with_two_workers(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    said = run(config, tmp_path / "one", *STAGES)
+    assert "stool: 9 of 9 shapes; refused: none" in said
+    found = samples(tmp_path / "one")
+    assert len({each.key for each in found}) == len({each.text for each in found}) == 9
+    assert {each.split for each in found} == {"train", "val", "test"}
+    assert {json.loads(each.text)["exemplar"] for each in found} == {"stool0", "stool1"}, "exemplars take turns"
+    run(config, tmp_path / "two", *STAGES, workers=2)
+    assert [(each.key, each.text) for each in samples(tmp_path / "two")] == [(each.key, each.text) for each in found]
+    run(config, tmp_path / "one", "validity", "abstraction", "strings", "points", "sketches", "package")
+    code, said = mill("verify", "--config", config, "--out", tmp_path / "one")
+    assert code == 0, said
+
+
+def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
+    config = write_config(tmp_path, apart=0.4)
+    code, said = mill("run", "choices", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    assert code == 0, said
+    mill("run", "exemplars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    code, said = mill("run", "proportions", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    assert code != 0
+    assert "set proportions.spread smaller" in said
+
+
+def test_the_farthest_come_first_and_none_that_are_alike() -> None:
+    points = np.array([[0.1], [1.0], [0.99], [-0.6], [0.0]])
+    assert farthest_first(points, np.zeros(1), 5, 0.05) == [1, 3, 0]
+    assert farthest_first(points, np.zeros(1), 2, 0.05) == [1, 3]
+    assert farthest_first(np.empty((0, 1)), np.zeros(1), 2, 0.05) == []
+
+
+def test_no_proportions_without_exemplars(tmp_path: Path) -> None:
+    path = tmp_path / "stools.yaml"
+    path.write_text(yaml.safe_dump({"name": "stools", "seed": 1, "proportions": {"per_kit": 3}}))
+    code, said = mill("plan", "--config", path, "--out", tmp_path / "out")
+    assert code == 2
+    assert "exemplars.kits" in said
