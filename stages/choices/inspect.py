@@ -76,8 +76,13 @@ def _written(folder: Path, paths: Sequence[Path], found: Prospect) -> Iterator[t
     yield "picture", write_file(folder / f"{name}.png", kit_sheet(kit))
     layouts = found.forecast.layouts if found.forecast is not None else 0
     if found.shapes:
-        title = "Other proportions" if found.proportioned else "Most different finds of a short search"
-        sheet = forecast_sheet(found.built.kit, found.shapes, title, name, found.sentence)
+        title, note = "Most different finds of a short search", found.sentence
+        if found.proportioned is not None:
+            title, note = (
+                "The same in other proportions",
+                f"{found.proportioned.holds:.0%} of what is drawn holds together",
+            )
+        sheet = forecast_sheet(found.built.kit, found.shapes, title, name, note)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
     if found.proportioned is not None:
         asked = proportions_section(found.proportioned.stable, found.forecast.sentence if found.forecast else "nothing")

@@ -87,7 +87,12 @@ class Prospect:
 
     def lines(self) -> list[tuple[str, str]]:
         """Title and text of each thing that was chosen and foreseen."""
-        chosen = [(key, f"{_shown(each)}: {self.choices.reasons[key]}") for key, each in self.choices.values.items()]
+        told = {
+            key: each
+            for key, each in self.choices.values.items()
+            if self.proportioned is None or key not in REQUIREMENTS  # those of layouts
+        }
+        chosen = [(key, f"{_shown(each)}: {self.choices.reasons[key]}") for key, each in told.items()]
         lines = [*chosen, ("forecast", self.sentence)]
         if self.forecast is not None:
             whole = f"half of the finds have {self.forecast.finds.copied:.0%} or more in one piece of an exemplar"
