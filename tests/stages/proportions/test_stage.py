@@ -73,7 +73,7 @@ def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
     mill("run", "exemplars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     code, said = mill("run", "proportions", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code != 0
-    assert "set proportions.spread smaller" in said
+    assert "set proportions.spread or proportions.apart smaller" in said
 
 
 def test_the_farthest_come_first_and_none_that_are_alike() -> None:
