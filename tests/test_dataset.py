@@ -123,7 +123,8 @@ def test_every_table_about_kits_can_be_made_of_it_and_stands_in_the_report(
     for name in ("small", ".work"):
         (tmp_path / name).symlink_to(one / name)
     asked = ["--config", str(config), "--out", str(tmp_path)]
-    assert evaluate(["all", *asked, "--most", "6", "--dry", "0"]) == 0, capsys.readouterr()
+    few = ["--most", "6", "--dry", "0", "--similar", "2", "--probes", "200"]
+    assert evaluate(["all", *asked, *few]) == 0, capsys.readouterr()
     about_kits = {"compression", "corpora", "growth", "near_twins", "physical"}
     results = tmp_path / "small-eval"
     assert about_kits <= {path.stem for path in results.glob("*.csv")}
