@@ -3,7 +3,7 @@
 python -m tests.bench.exemplars [--out FOLDER] [--minutes 10] [--template] MODEL...
 
 A MODEL is a file, some files of one kit with spaces between them, as in MESH="a.glb b.glb", or a folder of models.
-Each goes through inspect, then through choices, exemplars and variations, with one worker, as a user would run them.
+Each goes through inspect, then through choices, exemplars, variations and proportions, with one worker, as users do.
 Prints a row of a Markdown table for each, as soon as it has ended, and leaves in a folder of FOLDER for each the
 config, what inspect drew, and a sheet of the most different variants, which somebody has to look at: no figure tells a
 good shape.
@@ -36,7 +36,7 @@ HEADER = (
     "| copied | mixed | inspect, CPU s | making, CPU s | MB |\n"
     "|---|---:|---|---|---|---:|---:|---:|---:|---:|---:|---:|"
 )
-STAGES = ("choices", "exemplars", "variations")
+STAGES = ("choices", "exemplars", "variations", "proportions")
 TEMPLATE = """\
 name: {name}
 seed: 1
@@ -125,6 +125,9 @@ def _made(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]
         if ended.late:
             break
     whole = Ended(spent, peak, ended.said, ended.complained, ended.late)
+    chosen = read_record(Places(folder, config.stem).stage("proportions").records / f"{config.stem}-choice.json")
+    if chosen is not None:
+        return whole, [f"{sum(chosen.summary['shapes'].values()):,} in other proportions", *[""] * 4]
     record = read_record(Places(folder, config.stem).stage("variations").records / f"{config.stem}-assignment.json")
     if record is None:
         return whole, ["stopped at the limit" if ended.late else _why(ended), *[""] * 4]
