@@ -105,15 +105,15 @@ def variations_section(
     ]
 
 
-def proportions_section(stable: bool, layouts: str) -> list[str]:
-    """The lines of a dataset of other proportions. stable: whether shapes must stand; layouts: what is to be said of
-    other layouts."""
-    why = "the exemplars stand" if stable else "not even the exemplars stand"
+def proportions_section(different: int, stable: bool, why: str, layouts: str) -> list[str]:
+    """The lines of a dataset of other proportions. different: how many are to be had; stable: whether shapes must
+    stand, and why; layouts: what is to be said of other layouts."""
+    more = "raise it for more" if different >= MOST else "that differ by proportions.apart"
     return [
         "variations:",
         _line(1, "per_kit", 0, f"other layouts: {layouts}"),
         "proportions:",
-        _line(1, "per_kit", MOST, "the same parts longer, wider, thicker; raise it for more"),
+        _line(1, "per_kit", min(different, MOST), f"the same parts longer, wider, thicker; {more}"),
         "  require:",
         _line(2, "stable", stable, why),
     ]

@@ -16,7 +16,7 @@ from stages.variations.advice import another_model, what_keeps
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import DUPLICATE, Variant
 
-__all__ = ["Forecast", "forecast"]
+__all__ = ["Forecast", "forecast", "rounded"]
 
 MANY = 300
 """The search for a forecast ends at so many distinct graphs."""
@@ -87,19 +87,19 @@ def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int
     if not finds.graphs:
         return f"nothing: {what_keeps(kit, finds.rejects, finds.tries)}"
     size = f"{parts[0]} to {parts[1]} parts" if parts[0] < parts[1] else f"{parts[0]} parts each"
-    count = "hundreds of layouts" if layouts is None else f"about {_round(layouts)} layout{'s'[: layouts != 1]}"
+    count = "hundreds of layouts" if layouts is None else f"about {rounded(layouts)} layout{'s'[: layouts != 1]}"
     if layouts is not None and layouts < FEW:
         return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
     if layouts is not None:  # at least: some are far rarer than others, and a long search builds on what it found
-        count = f"{_round(layouts)} or more layouts"
+        count = f"{rounded(layouts)} or more layouts"
     if is_dull(finds):
         alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
         looked = f"{count} of {size} that look {alike}; look at the sheet before you make many"
         return f"{looked}, and bring {another_model(kit)}"
-    return f"{count} of {size}, {_round(finds.histograms)} or more of them of different parts lists"
+    return f"{count} of {size}, {rounded(finds.histograms)} or more of them of different parts lists"
 
 
-def _round(number: int) -> str:
+def rounded(number: int) -> str:
     """A number with one or two digits that mean something."""
     if number < 20:
         return str(number)

@@ -27,6 +27,7 @@ from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.grammars.inspect import has_grammar, written_grammar
 from stages.shape.kit import ContactKind, Strictness
+from stages.variations.settings import CHOSEN_INSTEAD_STABLE
 
 __all__ = ["main"]
 
@@ -85,7 +86,9 @@ def _written(folder: Path, paths: Sequence[Path], found: Prospect) -> Iterator[t
         sheet = forecast_sheet(found.built.kit, found.shapes, title, name, note)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
     if found.proportioned is not None:
-        asked = proportions_section(found.proportioned.stable, found.forecast.sentence if found.forecast else "nothing")
+        why = found.choices.reasons[CHOSEN_INSTEAD_STABLE]
+        others = found.forecast.sentence if found.forecast else "nothing"
+        asked = proportions_section(found.proportioned.different, found.proportioned.stable, why, others)
     else:
         require = {key: found.choices.values[key] for key in REQUIREMENTS}
         asked = variations_section(found.config, found.choices.reasons, require, layouts)

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.randomness import decision_rng
+from stages.choices.choose import REQUIREMENTS, Choices
+from stages.choices.config_text import MOST
+from stages.choices.forecast import Forecast, rounded
+from stages.choices.reading import Reading
+from stages.exemplars.build import Observation, observe_parts
 from stages.proportions.faults import warp_fault
 from stages.proportions.settings import ProportionsConfig
-from stages.proportions.stage import farthest_first
+from stages.proportions.stage import OVERSAMPLED, farthest_first
 from stages.proportions.warp import Warp, lattice_of, warped
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import Shape, kit_shape
+from stages.variations.settings import CHOSEN_INSTEAD, CHOSEN_INSTEAD_STABLE
 
-__all__ = ["Proportioned", "in_proportions"]
+__all__ = ["Instead", "Proportioned", "in_proportions", "instead_of_layouts"]
 
 TRIES = 36
 """Draws of a probe, of all exemplars together."""
@@ -29,17 +35,68 @@ LEAST = 0.2
 class Proportioned:
     """What other proportions of a kit's exemplars promise.
 
-    holds: share of the draws that hold together; shapes: of these the most different, at most as many as asked for;
-    stable: whether a dataset should ask that shapes stand, for all exemplars do; enough: whether it is worth one.
+    holds: share of the draws that hold together; different: how many that differ a dataset finds, of MOST at most;
+    shapes: the most different of the draws, at most as many as asked for; stable: whether a dataset should ask that
+    shapes stand, for all exemplars do; enough: whether it is worth one.
     """
 
     holds: float
+    different: int
     shapes: Sequence[Shape]
     stable: bool
 
     @property
     def enough(self) -> bool:
         return self.holds >= LEAST
+
+    @property
+    def sentence(self) -> str:
+        """How many there are."""
+        many = "hundreds" if self.different >= MOST else f"about {rounded(self.different)}"
+        return f"{many} of the same layout in other proportions"
+
+
+@dataclass(frozen=True)
+class Instead:
+    """What is chosen where exemplars come in other proportions instead of other layouts, and what a run builds then."""
+
+    choices: Choices
+    built: Observation
+    proportioned: Proportioned
+
+
+def instead_of_layouts(reading: Reading, expected: Forecast, shown: int) -> Instead | None:
+    """Other proportions with at most `shown` shapes, where `expected` promises next to no other layouts, or all alike,
+    and the exemplars hold together in other proportions."""
+    if reading.choices.enough or not expected.is_poor:
+        return None
+    unvaried = _unvaried(reading)
+    built = observe_parts(reading.config.decide(unvaried.values), reading.models, reading.identified)
+    found = in_proportions(built.kit, shown) if not built.refusals else None
+    if found is None or not found.enough:
+        return None
+    why = f"{found.holds:.0%} of what is drawn holds together; of other layouts {expected.sentence}"
+    stands = "the exemplars stand" if found.stable else "not even the exemplars stand"
+    values = {**unvaried.values, CHOSEN_INSTEAD: "proportions", CHOSEN_INSTEAD_STABLE: found.stable}
+    reasons = {**unvaried.reasons, CHOSEN_INSTEAD: why, CHOSEN_INSTEAD_STABLE: stands}
+    return Instead(replace(unvaried, values=values, reasons=reasons), built, found)
+
+
+def _unvaried(reading: Reading) -> Choices:
+    """What is chosen where layouts stay as they are: no hub is left out, of what stands apart the largest piece stays,
+    and nothing is required of layouts."""
+    choices = reading.choices
+    others = {
+        "hubs.types": ("none", "all parts stay, only sizes change"),
+        "disconnected": ("error", "nothing stands apart"),
+    }
+    open_keys = others.keys() & choices.values.keys()
+    kept = [key for key in choices.values if key not in REQUIREMENTS]
+    values = {key: others[key][0] if key in open_keys else choices.values[key] for key in kept}
+    reasons = {key: others[key][1] if key in open_keys else choices.reasons[key] for key in kept}
+    if observe_parts(reading.config.decide(values), reading.models, reading.identified).refusals:
+        values["disconnected"], reasons["disconnected"] = "largest", "parts stand apart from the largest piece"
+    return replace(choices, values=values, reasons=reasons)
 
 
 def in_proportions(kit: Kit, shown: int) -> Proportioned:
@@ -48,7 +105,7 @@ def in_proportions(kit: Kit, shown: int) -> Proportioned:
     stands = Requirements(stable=True)
     stable = all(unmet(stands, kit_shape(kit, each.whole)) is None for each in kit.exemplars)
     require = stands if stable else Requirements()
-    tried = held = 0
+    tried = held = different = 0
     found: list[Shape] = []
     for number, exemplar in enumerate(kit.exemplars):
         lattice = lattice_of(kit, exemplar.whole)
@@ -65,4 +122,8 @@ def in_proportions(kit: Kit, shown: int) -> Proportioned:
         origin = lattice.signature([np.ones(len(each)) for each in lattice.lengths])
         most = len(range(number, shown, len(kit.exemplars)))
         found += [kept[place][1] for place in farthest_first(points, origin, most, config.apart)]
-    return Proportioned(held / max(tried, 1), found, stable)
+        rng, share = decision_rng(0, "choices", "different", number), len(range(number, MOST, len(kit.exemplars)))
+        draws = [lattice.draw(rng, config.spread, config.most) for _ in range(OVERSAMPLED * share)]
+        points = np.array([lattice.signature(each) for each in draws])
+        different += len(farthest_first(points, origin, share, config.apart))
+    return Proportioned(held / max(tried, 1), different, found, stable)

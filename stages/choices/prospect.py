@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
 from stages.choices.choose import REQUIREMENTS, Choices, choose, found_words
 from stages.choices.forecast import Forecast, forecast
-from stages.choices.proportioned import Proportioned, in_proportions
+from stages.choices.proportioned import Proportioned, instead_of_layouts
 from stages.choices.reading import Reading, cut_if_nothing_comes
 from stages.choices.sheet import SHOWN
 from stages.exemplars.build import Observation, observe_parts
@@ -25,7 +25,7 @@ from stages.variations.facing import Facing
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
 
-__all__ = ["Prospect", "look_at"]
+__all__ = ["Prospect", "foreseen", "look_at"]
 
 ACROSS = (
     "cut it across, between bays and storeys with all that passes there: `parts: sections`; or where it is like itself "
@@ -68,7 +68,7 @@ class Prospect:
             said = f"{said}; or {ACROSS}"
         if self.proportioned is None:
             return said
-        return f"hundreds of the same layout in other proportions; of other layouts {said}"
+        return f"{self.proportioned.sentence}; of other layouts {said}"
 
     def as_json(self) -> Mapping[str, Any]:
         """Choices and forecast, beside what `inspection` finds."""
@@ -87,12 +87,7 @@ class Prospect:
 
     def lines(self) -> list[tuple[str, str]]:
         """Title and text of each thing that was chosen and foreseen."""
-        told = {
-            key: each
-            for key, each in self.choices.values.items()
-            if self.proportioned is None or key not in REQUIREMENTS  # those of layouts
-        }
-        chosen = [(key, f"{_shown(each)}: {self.choices.reasons[key]}") for key, each in told.items()]
+        chosen = [(key, f"{_shown(each)}: {self.choices.reasons[key]}") for key, each in self.choices.values.items()]
         lines = [*chosen, ("forecast", self.sentence)]
         if self.forecast is not None:
             whole = f"half of the finds have {self.forecast.finds.copied:.0%} or more in one piece of an exemplar"
@@ -125,9 +120,7 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
     if not built.refusals:
         answers = ContactAnswers(built.kit)
         begun = time.process_time()
-        known = choices.finds.graphs if choices.finds is not None else 0
-        hubs = hubs_by_choice(config, built.kit)
-        expected = forecast(built.kit, answers, tries, known, hubs, choices.values[CHOSEN_COPIED])
+        expected = foreseen(config, reading, answers, tries)
         rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
         backdrop = Backdrop(answers, upright=True)
         asked = Requirements(stable=choices.values[CHOSEN_STABLE])
@@ -137,31 +130,22 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
         assemblies = [facing.turned_back(each, facing.turn(each)) for each in islice(kept, SHOWN)]
     shapes = [kit_shape(built.kit, each) for each in assemblies]
     proportioned = None
-    if expected is not None and not choices.enough and expected.is_poor:
-        unvaried = _unvaried(reading, choices)
-        whole = reading.config.decide(unvaried.values)
-        held = observe_parts(whole, models, identified)
-        found = in_proportions(held.kit, SHOWN) if not held.refusals else None
-        if found is not None and found.enough:
-            proportioned, choices, decided, built, shapes = found, unvaried, whole, held, list(found.shapes)
+    instead = None if expected is None else instead_of_layouts(reading, expected, SHOWN)
+    if instead is not None:
+        proportioned, choices, built = instead.proportioned, instead.choices, instead.built
+        decided, shapes = reading.config.decide(choices.values), list(proportioned.shapes)
     torn = reading.config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
     seconds = time.process_time() - start
     return Prospect(decided, models, config, choices, seen, built, expected, shapes, rate, seconds, torn, proportioned)
 
 
-def _unvaried(reading: Reading, choices: Choices) -> Choices:
-    """What is chosen where layouts stay as they are: no hub is left out, and of what stands apart the largest piece
-    stays."""
-    others = {
-        "hubs.types": ("none", "all parts stay, only sizes change"),
-        "disconnected": ("error", "nothing stands apart"),
-    }
-    open_keys = others.keys() & choices.values.keys()
-    values = {**choices.values, **{key: others[key][0] for key in open_keys}}
-    reasons = {**choices.reasons, **{key: others[key][1] for key in open_keys}}
-    if observe_parts(reading.config.decide(values), reading.models, reading.identified).refusals:
-        values["disconnected"], reasons["disconnected"] = "largest", "parts stand apart from the largest piece"
-    return replace(choices, values=values, reasons=reasons)
+def foreseen(asked: KitConfig, reading: Reading, answers: ContactAnswers, tries: int) -> Forecast:
+    """What a short search promises of the layouts of the kit of `answers`, which is built as `reading` has chosen of
+    what `asked` leaves open."""
+    choices = reading.choices
+    known = choices.finds.graphs if choices.finds is not None else 0
+    hubs = hubs_by_choice(asked, answers.kit)
+    return forecast(answers.kit, answers, tries, known, hubs, choices.values.get(CHOSEN_COPIED, 1.0))
 
 
 def _shown(value: Any) -> str:

@@ -12,6 +12,7 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.choices.settings import ChoicesConfig
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
+from stages.variations.instead import comes_instead
 from stages.variations.settings import CHOSEN_CARCASS, VariationsConfig
 
 __all__ = ["STAGE"]
@@ -33,6 +34,7 @@ def plan(plan: Plan) -> list[Shard]:
                 "kit": kit.model_dump(mode="json"),
                 "digests": [file_digest(shape.path) for shape in kit.shapes],
                 "require": list(left_open),
+                "instead": comes_instead(plan.config),
             },
         )
         for kit in _open_kits(plan.config)
@@ -41,11 +43,23 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Read the models and decide."""
+    from stages.choices.proportioned import instead_of_layouts
+    from stages.choices.prospect import foreseen
     from stages.choices.reading import read_and_choose
+    from stages.exemplars.build import observe_parts
+    from stages.variations.kernels.answers import ContactAnswers
 
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
     limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(ChoicesConfig).tries
-    made = read_and_choose(config, limits, tries, task.shard.params["require"]).choices.as_json()
+    reading = read_and_choose(config, limits, tries, task.shard.params["require"])
+    choices = reading.choices
+    if task.shard.params["instead"] and not choices.enough:
+        built = observe_parts(reading.config.decide(choices.values), reading.models, reading.identified)
+        if not built.refusals:
+            expected = foreseen(config, reading, ContactAnswers(built.kit), tries)
+            instead = instead_of_layouts(reading, expected, shown=0)
+            choices = choices if instead is None else instead.choices
+    made = choices.as_json()
     with task.output(f"{config.name}.json") as stream:
         stream.write(json_bytes(made))
     return Outcome(samples=0, summary=made)

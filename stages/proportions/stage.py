@@ -20,7 +20,7 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
 from stages.proportions.faults import warp_fault
-from stages.proportions.settings import ProportionsConfig
+from stages.proportions.settings import ProportionsConfig, ProportionSplitConfig
 from stages.proportions.text import proportion_text, read_proportions
 from stages.proportions.warp import lattice_of, warped
 from stages.shape.arrays import FloatArray
@@ -31,6 +31,8 @@ from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
+from stages.variations.instead import chosen_instead
+from stages.variations.settings import CHOSEN_INSTEAD_STABLE, VariationsConfig
 
 __all__ = ["STAGE", "farthest_first"]
 
@@ -40,12 +42,14 @@ OVERSAMPLED = 2
 
 
 def plan(plan: Plan) -> list[Shard]:
-    """The lanes of all kits; the choice; when that is made, the shards of the collection."""
-    config = plan.config.section(ProportionsConfig)
+    """The lanes of all kits; the choice; when that is made, the shards of the collection. What they are to make is in
+    their params: it is asked for by the own section, or comes instead of layouts."""
+    config = _wanted(plan)
     if not config.per_kit:
         return []
+    asked = config.model_dump(mode="json", include={"per_kit", "splits", "require"})
     lanes = [
-        Shard(f"{kit}-lane{lane:02}", {"job": "lane", "kit": kit, "lane": lane}, (f"exemplars/{kit}",))
+        Shard(f"{kit}-lane{lane:02}", {"job": "lane", "kit": kit, "lane": lane, "asked": asked}, (f"exemplars/{kit}",))
         for kit in plan.shards("exemplars")
         for lane in range(config.lanes)
     ]
@@ -53,11 +57,32 @@ def plan(plan: Plan) -> list[Shard]:
         *(f"exemplars/{kit}" for kit in plan.shards("exemplars")),
         *(f"proportions/{each.name}" for each in lanes),
     )
-    choice = Shard(choice_name(plan.config.name), {"job": "choice", "lanes": [each.name for each in lanes]}, inputs)
+    params = {"job": "choice", "lanes": [each.name for each in lanes], "asked": asked}
+    choice = Shard(choice_name(plan.config.name), params, inputs)
     summary = plan.summary("proportions", choice.name)
     if summary is None:
         return [*lanes, choice]
     return [*lanes, choice, *made_shards(plan, summary["shards"], (f"proportions/{choice.name}",))]
+
+
+def _wanted(plan: Plan) -> ProportionsConfig:
+    """The section, or where proportions come instead of layouts, with what is asked of these: how many, shared out how,
+    and that they stand where the exemplars do."""
+    own, chosen = plan.config.section(ProportionsConfig), chosen_instead(plan)
+    if own.per_kit or not chosen:
+        return own
+    layouts = plan.config.section(VariationsConfig)
+    shared = ProportionSplitConfig(**layouts.splits.model_dump(include=set(ProportionSplitConfig.model_fields)))
+    stable = own.require.stable or chosen[CHOSEN_INSTEAD_STABLE]
+    require = own.require.model_copy(update={"stable": stable})
+    return own.model_copy(update={"per_kit": layouts.per_kit, "splits": shared, "require": require})
+
+
+def _asked(task: Task) -> ProportionsConfig:
+    """The section, with what the plan has asked for."""
+    asked = ProportionsConfig.model_validate_json(json.dumps(task.shard.params["asked"]))
+    update = {key: getattr(asked, key) for key in ("per_kit", "splits", "require")}
+    return task.config.section(ProportionsConfig).model_copy(update=update)
 
 
 def choice_name(dataset: str) -> str:
@@ -73,7 +98,7 @@ def run_shard(task: Task) -> Outcome:
 
 def run_lane(task: Task) -> Outcome:
     """File of the shard: `.txt`, a text a line of shapes that hold together and are what they must be."""
-    config = task.config.section(ProportionsConfig)
+    config = _asked(task)
     kit = input_kit(task, task.shard.params["kit"])
     exemplars = [each.whole for each in kit.exemplars]
     lattices = [lattice_of(kit, each) for each in exemplars]
@@ -100,7 +125,7 @@ def run_lane(task: Task) -> Outcome:
 def run_choice(task: Task) -> Outcome:
     """Files of the shard: one for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises
     ShardFailed where there are no shapes."""
-    config = task.config.section(ProportionsConfig)
+    config = _asked(task)
     texts: dict[str, list[str]] = {}
     for lane in task.shard.params["lanes"]:
         kit = lane.rpartition("-lane")[0]
@@ -173,7 +198,7 @@ def run_collection(task: Task) -> Outcome:
 
 def report(plan: Plan) -> Sequence[str]:
     """How many shapes each kit has, what was refused, and where there are fewer than wanted."""
-    config = plan.config.section(ProportionsConfig)
+    config = _wanted(plan)
     made = plan.summary("proportions", choice_name(plan.config.name)) if config.per_kit else None
     if made is None:
         return []
@@ -225,6 +250,7 @@ STAGE = Stage(
     module=__name__,
     config=ProportionsConfig,
     inputs=("exemplars",),
+    sections=("variations",),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

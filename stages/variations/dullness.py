@@ -64,7 +64,7 @@ def _remedies(kit: Kit) -> list[str]:
         remedies.append("neighbours by their faces alone (contact.kinds: [face])")
     if not kit.grammar.hubs and not any(len(each.backdrop) for each in kit.exemplars):
         remedies.append("leaving out parts that touch everything (hubs.types: auto)")
-    return remedies
+    return [*remedies, "the same layout in other proportions (proportions.per_kit)"]
 
 
 def _looser(strictness: Strictness) -> Strictness | None:

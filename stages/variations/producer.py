@@ -7,6 +7,7 @@ from typing import Any
 
 from pipeline.config import Config
 from pipeline.stage import Plan
+from stages.exemplars.chosen import chosen_table
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.members import Field
@@ -53,20 +54,7 @@ def _listed(counts: Mapping[str, int]) -> str:
 
 
 def _made(plan: Plan) -> Sequence[str]:
-    return [*_choices(plan), *_endings(plan)]
-
-
-def _choices(plan: Plan) -> Sequence[str]:
-    """What was chosen for each kit whose config left keys open, and why, as a table."""
-    rows = []
-    for kit in plan.shards("exemplars"):
-        summary = plan.summary("exemplars", kit) or {"chosen": {}}
-        for key, value in summary["chosen"].items():
-            shown = ", ".join(value) if isinstance(value, list) else value
-            rows.append(f"| {kit} | `{key}` | {shown} | {summary['why'][key]} |")
-    if not rows:
-        return []
-    return ["\n".join(["| kit | key | chosen | why |", "|---|---|---|---|", *rows])]
+    return [*chosen_table(plan), *_endings(plan)]
 
 
 def _lineage(_: Config) -> Mapping[str, Field]:

@@ -22,7 +22,7 @@ from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
-from stages.variations.advice import what_keeps, what_was_left
+from stages.variations.advice import SAME_LAYOUT, what_keeps, what_was_left
 from stages.variations.archive import cell_of
 from stages.variations.backdrop import NO_BACKDROP, backdrop_of, hubs_by_choice
 from stages.variations.carcass import NO_CARCASS, carcass_test
@@ -274,7 +274,7 @@ def run_pool(task: Task) -> Outcome:
             "curve": [*params["curve"], [tries, total, measures["histograms"]]],
             **counted,
             "left": what_was_left(counted["lists"]),
-            "advice": what_keeps(kit, counted["rejects"], tries) if poor else "",
+            "advice": f"{what_keeps(kit, counted['rejects'], tries)}, or {SAME_LAYOUT}" if poor else "",
             "ended": ended,
             "why": _why(kit, config, total, tries, idle) if ended else "",
         },

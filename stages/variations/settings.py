@@ -14,6 +14,8 @@ __all__ = [
     "CHOSEN_CARCASS",
     "CHOSEN_COPIED",
     "CHOSEN_HUBS",
+    "CHOSEN_INSTEAD",
+    "CHOSEN_INSTEAD_STABLE",
     "CHOSEN_STABLE",
     "GrownConfig",
     "NoveltyConfig",
@@ -28,6 +30,8 @@ CHOSEN_HUBS = 0.5
 bridge."""
 CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS = "require.copied", "require.stable", "require.carcass"
 """What these keys of `require` are called among those that are chosen for a kit."""
+CHOSEN_INSTEAD, CHOSEN_INSTEAD_STABLE = "instead", "proportions.require.stable"
+"""So are called `proportions`, where they come instead of layouts, and what is required of them."""
 
 
 class NoveltyConfig(StrictModel):
@@ -274,6 +278,12 @@ class VariationsConfig(StrictModel):
         ge=0,
         le=1_000_000_000,
         description="Variants wanted of each kit; 0 for a dataset of these kits that is made otherwise.",
+    )
+    instead: Literal["auto", "nothing"] = Field(
+        "auto",
+        description="What is made of exemplars of which a short search finds next to no other layouts, or all of them "
+        "alike. `auto`: of a single kit that leaves a key of its own to be chosen, as many shapes of the same layout "
+        "in other proportions, by the section `proportions`, if these hold together.",
     )
     search: SearchConfig = Field(default_factory=SearchConfig, description="How variants are searched for.")
     selection: SelectionConfig = Field(

@@ -15,6 +15,7 @@ from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.splits import shard_sizes
 from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
 from stages.variations.constraint import unknown_in
+from stages.variations.instead import chosen_instead
 from stages.variations.measures import described, growth
 from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
 from stages.variations.settings import VariationsConfig
@@ -28,7 +29,7 @@ _JOBS = {"lane": run_lane, "pool": run_pool, "assignment": run_assignment, "coll
 
 def plan(plan: Plan) -> list[Shard]:
     """The rounds of every kit as far as they are known, then the assignment and the collection."""
-    if not plan.shards("exemplars") or not plan.config.section(VariationsConfig).per_kit:
+    if not plan.shards("exemplars") or not plan.config.section(VariationsConfig).per_kit or chosen_instead(plan):
         return []
     search: list[Shard] = []
     ended = True

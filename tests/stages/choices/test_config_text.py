@@ -33,9 +33,9 @@ def test_names_that_yaml_reads_as_something_else_come_back_as_they_are() -> None
 
 def test_a_config_of_other_proportions_varies_no_layouts_and_says_why() -> None:
     shapes = [ring(1, 1)]
-    lines = proportions_section(True, "nothing: every part is its own type")
+    lines = proportions_section(90, True, "it does", "nothing: every part is its own type")
     text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), {}, lines, "hundreds")
     said = yaml.safe_load(text)
     assert said["variations"] == {"per_kit": 0}
-    assert said["proportions"] == {"per_kit": 200, "require": {"stable": True}}
+    assert said["proportions"] == {"per_kit": 90, "require": {"stable": True}}
     assert "per_kit: 0   # other layouts: nothing: every part is its own type" in text

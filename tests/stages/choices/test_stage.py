@@ -90,12 +90,33 @@ def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_p
     assert record(tmp_path, "variations", "open-r000-lane00")["rejects"]["too much copied whole"] > 0
 
 
-def test_inspect_chooses_the_same(made: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretells(
+    made: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
+    config = {
+        "name": "toy",
+        "choices": {"tries": 200},
+        "exemplars": {"kits": [{"name": "rings", "shapes": paths}]},
+        "variations": {"per_kit": 12, "splits": {"by": "graph", "val": 0.25, "shards": 1}},
+    }
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    said = run(tmp_path, ("choices", "exemplars", "variations", "proportions"))
+    assert "rings: instead: proportions: 100% of what is drawn holds together; of other layouts about 16" in said
+    work = tmp_path / "out" / ".work" / "toy"
+    assert not list((work / "variations").glob("toy-*.tar"))
+    samples = [each for shard in (work / "proportions").glob("toy-*.tar") for each in read_samples(shard)]
+    assert sorted(each.split for each in samples) == ["test"] + 8 * ["train"] + 3 * ["val"]
+    assert {each.lineage["method"] for each in samples} == {"proportions"}
     capsys.readouterr()
     assert main([*paths, "--json", "--tries", "200"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["choices"]["chosen"] == record(made[0], "choices", "open")["summary"]["chosen"]
+    assert found["choices"]["chosen"] == record(tmp_path, "choices", "rings")["summary"]["chosen"]
+    assert found["choices"]["chosen"]["proportions.require.stable"] is True
+    config["variations"] |= {"instead": "nothing"}
+    (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
+    run(tmp_path, ("choices",))
+    assert "instead" not in record(tmp_path, "choices", "rings")["summary"]["chosen"]
 
 
 def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
