@@ -86,7 +86,8 @@ def choose(
         found = contact_tolerance(identified, STRICTEST["contact.tolerance"])
         values["contact.tolerance"], reasons["contact.tolerance"] = found
     stated = config.decide(values)
-    sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up)
+    fitting = config.fit_tolerance if config.types == "meaning" else None
+    sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up, fitting)
     one_surface = any(each.segmentation in ("symmetry", "sections") for each in models)
     rungs = climb(sight, _rails(stated, sight, open_keys, one_surface), tries)
     for key, (value, why) in _required(sight, rungs).items():
@@ -124,6 +125,8 @@ def most_copied(finds: Finds | None) -> tuple[float, str]:
     found `finds` finds much more, and enough that is none."""
     if finds is None or finds.graphs < GRAPHS:
         return 1.0, "a short search finds too little to refuse any of it"
+    if finds.by_meaning:
+        return 1.0, "a part that takes another's place leaves all others as they stood"
     if finds.telling < TELLING:
         return 1.0, f"only {finds.telling:.0%} of the finds of a short search are no near copies"
     beside = f"{finds.telling:.0%} of the finds of a short search are none"
@@ -176,13 +179,14 @@ def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str], one_surfac
     """What the ladder may choose from: one value of each key that the config states.
 
     Hubs are peeled off because shapes stand without them, and get back those that fit. Pieces of one surface are no
-    such parts: a piece that does not come back is a hole.
+    such parts: a piece that does not come back is a hole. By meaning labels alone say what may stand beside what, and
+    all of them must have been seen: with looser rules a chair has one leg.
     """
     made = stated.decided()
     peels = "hubs.types" in open_keys and stated.types != "meaning" and not one_surface
     return Rails(
         kinds=KINDS if "contact.kinds" in open_keys else (made.kinds,),
-        grammars=GRAMMARS if "grammar" in open_keys else (made.grammar,),
+        grammars=GRAMMARS if "grammar" in open_keys and stated.types != "meaning" else (made.grammar,),
         hubs=None if peels else chosen_hubs(stated, sight.types),
         largest="disconnected" in open_keys or made.disconnected == "largest",
     )

@@ -18,6 +18,10 @@ __all__ = ["config_text", "dataset_name", "proportions_section", "variations_sec
 
 MOST = 200
 """Variants that the config asks for, if there are as many."""
+_DUPLICATES = (
+    ("graph", "distinct shape graphs, not ways to turn a part in its place"),
+    ("histogram", "distinct parts lists; a graph by meaning does not tell a turned leg from a square one"),
+)
 UNSEEN = 3
 """So many times the layouts of the forecast are asked for: some are far rarer than others, and a short search counts
 those that come again and again."""
@@ -92,7 +96,7 @@ def variations_section(
         "variations:",
         _line(1, "per_kit", wanted, "more than there may be" if wanted < MOST else "raise it for more"),
         "  search:",
-        _line(2, "duplicates", "graph", "distinct shape graphs, not ways to turn a part in its place"),
+        _line(2, "duplicates", *_DUPLICATES[config.types == "meaning"]),
         "  require:",
     ]
     if config.decided().hubs and config.hubs.keep == "backdrop":

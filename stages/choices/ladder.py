@@ -31,7 +31,8 @@ FAMILIAR = 0.85
 FEW = 20
 """Fewer graphs than this are next to nothing."""
 PROMISING = 10
-"""A setting that gave so many histograms in the first tries gets more of them."""
+"""A setting that gave so many histograms in the first tries gets more of them; by meaning, where finds build on each
+other, one that gave any."""
 LONGER = 4
 """As many times the tries, for a setting that looks promising."""
 STAY = 0.6
@@ -88,8 +89,8 @@ class Rung:
 
 def is_dull(finds: Finds) -> bool:
     """Whether finds look like an exemplar, or like each other; near copies do no harm where enough are none, for then
-    they are refused."""
-    copies = finds.copied >= COPIED and finds.telling < TELLING
+    they are refused, nor by meaning."""
+    copies = finds.copied >= COPIED and finds.telling < TELLING and not finds.by_meaning
     return finds.distance < DISTANCE or finds.spread < SPREAD or copies
 
 
@@ -132,7 +133,8 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, re
     rng = decision_rng(0, "choices", setting.grammar, *setting.kinds, *names)
     probe = Probe(answers, rng, required if setting.hubs else 0)
     rung = Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept)
-    if rung.finds.histograms >= PROMISING and not rung.gives_enough:
+    promising = rung.finds.histograms >= (1 if rung.finds.by_meaning else PROMISING)
+    if promising and not rung.gives_enough:
         rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS, evenly=True), kept)
     return replace(rung, different=[probe.whole(place) for place in rung.finds.most_different])
 

@@ -22,7 +22,7 @@ from stages.variations.search.search import Search, Variant
 from stages.variations.selection import farthest_first
 from stages.variations.settings import SearchConfig
 
-__all__ = ["SHOWN", "Finds", "Probe"]
+__all__ = ["SHOWN", "Finds", "Probe", "is_by_meaning"]
 
 SHOWN = 24
 """So many of the finds, those most different, say how different finds can be."""
@@ -34,19 +34,21 @@ HUB = 40
 FIRST = 5
 """Growth that finds nothing in one of so many parts of its tries is given up."""
 SEARCH = SearchConfig(duplicates="graph")
-"""A probe counts distinct graphs, whatever the config calls a duplicate."""
+"""A probe counts distinct graphs, whatever the config calls a duplicate. By meaning these do not tell a turned leg from
+a square one, and what counts are parts lists."""
 
 
 @dataclass(frozen=True)
 class Finds:
     """What a probe found.
 
-    tries: how many; graphs, histograms: distinct ones; distance: mean histogram metric E (strings §5.3) of the most
-    different finds to their nearest exemplar; spread: median of E between two of them; copied: median of the largest
-    share of a find that stands just so in an exemplar; telling: share of the finds that are no near copies; familiar:
-    with a grammar of slots the share of their parts of which it was seen just so which slots are filled, else 1;
-    most_different: their places among the variants, most different first; rejects: tries that came to nothing, by
-    reason.
+    tries: how many; graphs, histograms: distinct ones, by meaning only those of different histograms; distance: mean
+    histogram metric E (strings §5.3) of the most different finds to their nearest exemplar; spread: median of E between
+    two of them; copied: median of the largest share of a find that stands just so in an exemplar; telling: share of the
+    finds that are no near copies; familiar: with a grammar of slots the share of their parts of which it was seen just
+    so which slots are filled, else 1; by_meaning: whether one part in another's place is a find, though all others
+    stand as they stood; most_different: their places among the variants, most different first; rejects: tries that came
+    to nothing, by reason.
     """
 
     tries: int
@@ -57,6 +59,7 @@ class Finds:
     copied: float = 1.0
     telling: float = 0.0
     familiar: float = 1.0
+    by_meaning: bool = False
     most_different: tuple[int, ...] = ()
     rejects: Mapping[str, int] = field(default_factory=dict)
 
@@ -82,7 +85,7 @@ class Probe:
         self.kit = answers.kit
         self.variants: list[Variant] = []
         self._rng = rng
-        self._graphs: set[int] = set()
+        self._known: set[int] = set()
         self._copied, self._hubs = copied, hubs
         self._refused = Counter[str]()
         self._has_carcass = carcass_test(self.kit, carcass(self.kit))
@@ -92,8 +95,9 @@ class Probe:
         methods = METHODS if widest <= HUB else METHODS[:1]
         slotted = self.kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(self.kit, answers.dockings, SEARCH.upright) if slotted else None
+        same = {"duplicates": "histogram"} if is_by_meaning(self.kit) else {}
         self._searches = [
-            Search(answers, SEARCH.model_copy(update={"method": method}), self._slots) for method in methods
+            Search(answers, SEARCH.model_copy(update={"method": method, **same}), self._slots) for method in methods
         ]
 
     def go_on(self, tries: int, wanted: int, evenly: bool = False) -> Finds:
@@ -120,8 +124,9 @@ class Probe:
             left[number] = left[number] - used if found else 0
             whole = [each for each in found if self._is_whole(each.assembly)]
             telling = [each for each in whole if each.lineage["copied"]["largest"] <= self._copied]
-            self.variants.extend(each for each in telling if each.graph not in self._graphs)
-            self._graphs.update(each.graph for each in telling)
+            keys = [search.key(each.assembly.types, each.graph, each.graph) for each in telling]
+            self.variants.extend(each for each, key in zip(telling, keys, strict=True) if key not in self._known)
+            self._known.update(keys)
 
     def _is_whole(self, assembly: Assembly) -> bool:
         """Whether a find has what makes it one; what it lacks is counted."""
@@ -158,6 +163,7 @@ class Probe:
             copied=round(float(np.median(whole)), 4),
             telling=round(float(np.mean(whole <= COPIED)), 4),
             familiar=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
+            by_meaning=is_by_meaning(self.kit),
             most_different=tuple(taken.tolist()),
             rejects=dict(rejects.most_common()),
         )
@@ -166,6 +172,11 @@ class Probe:
         if self._slots is None:
             return 1.0
         return round(float(np.mean([self._slots.familiar(each) for each in assemblies])), 4)
+
+
+def is_by_meaning(kit: Kit) -> bool:
+    """Whether parts of several shapes have one label."""
+    return len(kit.labels) < len(kit.types)
 
 
 def _counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:

@@ -10,11 +10,12 @@ from typing import Literal
 import numpy as np
 
 from stages.exemplars.findings import LOOSER, pieces
-from stages.exemplars.grammar import Contacts, observe_contacts, observe_neighbourhoods, observe_nested
+from stages.exemplars.fits import fitting_dockings
+from stages.exemplars.grammar import Contacts, observe_contacts, observe_neighbourhoods, observe_nested, with_depths
 from stages.exemplars.hubs import set_hubs_aside, with_touching
 from stages.exemplars.identify import Identified
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.kit import Assembly, ContactKind, Exemplar, Grammar, Kit, Strictness, labels_of
+from stages.shape.kit import Assembly, ContactKind, Docking, Exemplar, Grammar, Kit, Strictness, labels_of
 
 __all__ = ["Setting", "Sight", "contact_tolerance"]
 
@@ -73,11 +74,20 @@ class Setting:
 class Sight:
     """The parts of some models with all their contacts at one tolerance."""
 
-    def __init__(self, identified: Identified, tolerance: float, pose_tolerance: float, up: Literal["y", "z"]) -> None:
-        """Tolerances are shares of the median part's diagonal."""
+    def __init__(
+        self,
+        identified: Identified,
+        tolerance: float,
+        pose_tolerance: float,
+        up: Literal["y", "z"],
+        fit_tolerance: float | None = None,
+    ) -> None:
+        """Tolerances are shares of the median part's diagonal; `fit_tolerance`: of parts of one meaning, else None."""
         self.types = identified.types
         self.up = up
         self.pose_tolerance = pose_tolerance * identified.median_diagonal
+        self._fit_tolerance = None if fit_tolerance is None else fit_tolerance * identified.median_diagonal
+        self._dockings_by_meaning: dict[tuple[ContactKind, ...], tuple[Docking, ...]] = {}
         self._names = identified.part_names
         self._contact = ContactTest(self.types, tolerance * identified.median_diagonal)
         self._touching = [
@@ -138,7 +148,7 @@ class Sight:
             raise ValueError("nothing stays of a model")
         seen = [with_touching(each, keep, setting.hubs) for each, keep in zip(counted, staying, strict=True)]
         everything = [each.select(parts) for each, parts in zip(counted, seen, strict=True)]
-        dockings = tuple(each for each in self.contacts.dockings if each.kind in setting.kinds)
+        dockings = self._dockings(setting)
         labels = labels_of(self.types)[1]
         labelled = [replace(each, types=labels[each.types]) for each in everything]
         grammar = Grammar(observe_neighbourhoods(labelled), dockings, self._nested, setting.grammar)
@@ -159,6 +169,18 @@ class Sight:
             contact_kinds=setting.kinds,
             up=self.up,
         )
+
+    def _dockings(self, setting: Setting) -> tuple[Docking, ...]:
+        """Those seen, and by meaning those that follow from them."""
+        seen = tuple(each for each in self.contacts.dockings if each.kind in setting.kinds)
+        if self._fit_tolerance is None:
+            return seen
+        if setting.kinds not in self._dockings_by_meaning:
+            assemblies, deep = self.counted(setting), with_depths(self.types, seen)
+            tolerances = (self._fit_tolerance, self.pose_tolerance)
+            fits = fitting_dockings(self.types, assemblies, deep, self._contact, *tolerances)
+            self._dockings_by_meaning[setting.kinds] = (*deep, *fits)
+        return self._dockings_by_meaning[setting.kinds]
 
     def _used(self, setting: Setting, assemblies: Sequence[Assembly]) -> list[int]:
         """The hubs of a setting that touch something which stays."""

@@ -21,6 +21,7 @@ __all__ = [
     "observe_grammar",
     "observe_neighbourhoods",
     "observe_nested",
+    "with_depths",
 ]
 
 IMAGES = 24
@@ -109,15 +110,16 @@ def observe_grammar(
     kinds: Sequence[ContactKind],
 ) -> Grammar:
     """The grammar of `assemblies`, whose `contacts` count where they are of the given `kinds`."""
-    penetration = PenetrationTest(types)
-    dockings = tuple(
-        replace(each, depth=round(_deepest(types, each, penetration), 6))
-        for each in contacts.dockings
-        if each.kind in kinds
-    )
+    dockings = with_depths(types, [each for each in contacts.dockings if each.kind in kinds])
     labels = labels_of(types)[1]
     labelled = [replace(each, types=labels[each.types]) for each in contacts.counted]
     return Grammar(observe_neighbourhoods(labelled), dockings, observe_nested(types, assemblies))
+
+
+def with_depths(types: Sequence[PartType], dockings: Sequence[Docking]) -> tuple[Docking, ...]:
+    """The dockings with how deep their parts reach into each other."""
+    penetration = PenetrationTest(types)
+    return tuple(replace(each, depth=round(_deepest(types, each, penetration), 6)) for each in dockings)
 
 
 def observe_nested(types: Sequence[PartType], assemblies: Sequence[Assembly]) -> dict[tuple[int, int], float]:

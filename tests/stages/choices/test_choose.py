@@ -150,12 +150,19 @@ class TestLadder:
         config = left_open([[], []], types="meaning")
         identified = identify_parts(models, config)
         kinds: tuple[ContactKind, ...] = ("point", "line", "face")
-        probed = Sight(identified, 1e-3, config.pose_tolerance, "y").kit(Setting(kinds, "multiset"))
+        sight = Sight(identified, 1e-3, config.pose_tolerance, "y", config.fit_tolerance)
+        probed = sight.kit(Setting(kinds, "multiset"))
         built, _ = build_kit(config.decide(STRICTEST), models)
         assert probed.grammar.neighbourhoods == built.grammar.neighbourhoods
+        pairs = [(each.a, each.b, each.kind, each.depth) for each in built.grammar.dockings]
+        assert [(each.a, each.b, each.kind, each.depth) for each in probed.grammar.dockings] == pairs
+        assert len(pairs) > len(sight.contacts.dockings)
         made = choose(config, models, identified, TRIES)
         assert set(made.values) == {*config.left_open(), *REQUIREMENTS}
+        assert made.values["grammar"] == "multiset"
         assert made.finds is not None
+        assert made.finds.by_meaning
+        assert made.finds.graphs == made.finds.histograms
 
 
 class TestCopies:
