@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from pipeline.randomness import decision_rng
 from stages.choices.choose import REQUIREMENTS, Choices
 from stages.choices.config_text import MOST
 from stages.choices.forecast import Forecast, rounded
 from stages.choices.reading import Reading
 from stages.exemplars.build import Observation, observe_parts
+from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault
 from stages.proportions.settings import ProportionsConfig
-from stages.proportions.stage import OVERSAMPLED, farthest_first
-from stages.proportions.warp import Warp, lattice_of, warped
+from stages.proportions.stage import OVERSAMPLED
+from stages.proportions.warp import Lattice, lattice_of, warped
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
@@ -99,6 +98,19 @@ def _unvaried(reading: Reading) -> Choices:
     return replace(choices, values=values, reasons=reasons)
 
 
+def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, most: int) -> int:
+    """How many different shapes of an exemplar a run finds that wants `most`, if all of them hold together."""
+    rng = decision_rng(0, "choices", "different", exemplar)
+    drawn = Drawn(lattice, config.apart)
+    for _ in range(config.tries * OVERSAMPLED * most):
+        warp = lattice.draw(rng, config.spread, config.most)
+        if drawn.is_new(warp):
+            drawn.add(warp)
+        if len(drawn) == OVERSAMPLED * most:
+            break
+    return len(drawn.farthest_first(most))
+
+
 def in_proportions(kit: Kit, shown: int) -> Proportioned:
     """A probe of the exemplars of a kit, with all of their parts; what is random depends on the kit alone."""
     config = ProportionsConfig()
@@ -109,21 +121,17 @@ def in_proportions(kit: Kit, shown: int) -> Proportioned:
     found: list[Shape] = []
     for number, exemplar in enumerate(kit.exemplars):
         lattice = lattice_of(kit, exemplar.whole)
-        kept: list[tuple[Warp, Shape]] = []
+        kept: list[Shape] = []
+        drawn = Drawn(lattice, config.apart)
         for place in range(-(-TRIES // len(kit.exemplars))):
             rng = decision_rng(0, "choices", "proportions", number, place)
             warp = lattice.draw(rng, config.spread, config.most)
             shape = warped(kit, exemplar.whole, lattice, warp)
             tried += 1
             if warp_fault(kit, exemplar.whole, shape) is None and unmet(require, shape) is None:
-                kept.append((warp, shape))
+                kept.append(shape)
+                drawn.add(warp)
         held += len(kept)
-        points = np.array([lattice.signature(warp) for warp, _ in kept])
-        origin = lattice.signature([np.ones(len(each)) for each in lattice.lengths])
-        most = len(range(number, shown, len(kit.exemplars)))
-        found += [kept[place][1] for place in farthest_first(points, origin, most, config.apart)]
-        rng, share = decision_rng(0, "choices", "different", number), len(range(number, MOST, len(kit.exemplars)))
-        draws = [lattice.draw(rng, config.spread, config.most) for _ in range(OVERSAMPLED * share)]
-        points = np.array([lattice.signature(each) for each in draws])
-        different += len(farthest_first(points, origin, share, config.apart))
+        found += [kept[place] for place in drawn.farthest_first(len(range(number, shown, len(kit.exemplars))))]
+        different += _different(lattice, config, number, len(range(number, MOST, len(kit.exemplars))))
     return Proportioned(held / max(tried, 1), different, found, stable)

@@ -40,7 +40,7 @@ class ProportionsConfig(StrictModel):
         2.0, gt=1, le=4, description="How many times longer or shorter than it is a length is made at most."
     )
     apart: float = Field(
-        0.02,
+        0.015,
         ge=0,
         lt=1,
         description="How far some end of a part must have moved at least against the exemplar, and against each other "

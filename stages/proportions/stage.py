@@ -19,11 +19,11 @@ from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
+from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault
 from stages.proportions.settings import ProportionsConfig, ProportionSplitConfig
 from stages.proportions.text import proportion_text, read_proportions
 from stages.proportions.warp import lattice_of, warped
-from stages.shape.arrays import FloatArray
 from stages.shape.collection.origin import unstated
 from stages.shape.collection.shards import made_shards
 from stages.shape.graphs.canonical import graph_digest
@@ -34,7 +34,7 @@ from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
 from stages.variations.instead import chosen_instead
 from stages.variations.settings import CHOSEN_INSTEAD_STABLE, VariationsConfig
 
-__all__ = ["STAGE", "farthest_first"]
+__all__ = ["OVERSAMPLED", "STAGE"]
 
 BYTES_A_SAMPLE = 8_000
 OVERSAMPLED = 2
@@ -102,6 +102,7 @@ def run_lane(task: Task) -> Outcome:
     kit = input_kit(task, task.shard.params["kit"])
     exemplars = [each.whole for each in kit.exemplars]
     lattices = [lattice_of(kit, each) for each in exemplars]
+    drawn = [Drawn(each, config.apart) for each in lattices]
     wanted = -(-OVERSAMPLED * config.per_kit // config.lanes)
     found: list[str] = []
     tries = 0
@@ -110,11 +111,16 @@ def run_lane(task: Task) -> Outcome:
         tries += 1
         name, whole, lattice = kit.exemplars[place].name, exemplars[place], lattices[place]
         text = proportion_text(name, lattice.draw(task.rng("factors", tries), config.spread, config.most))
-        shape = warped(kit, whole, lattice, read_proportions(text)[1])
+        warp = read_proportions(text)[1]
+        if not drawn[place].is_new(warp):
+            task.reject(text, "nearly the exemplar, or one drawn before")
+            continue
+        shape = warped(kit, whole, lattice, warp)
         wrong = warp_fault(kit, whole, shape) or unmet(config.require, shape)
         if wrong is not None:
             task.reject(text, wrong)
             continue
+        drawn[place].add(warp)
         found.append(text)
         task.progress(len(found), wanted)
     with task.output(f"{task.shard.name}.txt") as stream:
@@ -137,14 +143,14 @@ def run_choice(task: Task) -> Outcome:
         kit = input_kit(task, name)
         chosen: list[dict[str, Any]] = []
         for number, (exemplar, path) in enumerate(zip(kit.exemplars, files[name], strict=True)):
-            lattice = lattice_of(kit, exemplar.whole)
             own = [text for text in of_kit if read_proportions(text)[0] == exemplar.name]
-            points = np.array([lattice.signature(read_proportions(text)[1]) for text in own])
-            origin = lattice.signature([np.ones(len(each)) for each in lattice.lengths])
+            drawn = Drawn(lattice_of(kit, exemplar.whole), config.apart)
+            for text in own:
+                drawn.add(read_proportions(text)[1])
             share = len(range(number, config.per_kit, len(kit.exemplars)))
             graph = kit.labelled(exemplar.assembly)
             digest = graph_digest(graph.types, graph.edges)
-            for place in farthest_first(points, origin, share, config.apart):
+            for place in drawn.farthest_first(share):
                 parents = ["/".join(path.parts[-2:])]
                 chosen.append({"kit": name, "graph": digest, "parents": parents, "text": own[place]})
         for number, row in enumerate(chosen):
@@ -166,20 +172,6 @@ def run_choice(task: Task) -> Outcome:
             with task.output(f"{task.shard.name}.{title}-{number:06d}.jsonl") as stream:
                 stream.writelines(json_bytes(rows[row]) for row in members[shard_of == number].tolist())
     return Outcome(0, {"shards": shards, "shapes": counts})
-
-
-def farthest_first(points: FloatArray, origin: FloatArray, most: int, apart: float) -> list[int]:
-    """The places of at most `most` of the points (n, d), each in turn the one that is farthest from `origin` (d,) and
-    from those before it, by the greatest difference of a coordinate, as long as that is `apart` at least."""
-    gaps = np.abs(points - origin).max(axis=1) if len(points) else np.empty(0)
-    chosen: list[int] = []
-    while len(chosen) < min(most, len(points)):
-        place = int(gaps.argmax())
-        if gaps[place] < max(apart, 1e-9):
-            break
-        chosen.append(place)
-        gaps = np.minimum(gaps, np.abs(points - points[place]).max(axis=1))
-    return chosen
 
 
 def run_collection(task: Task) -> Outcome:

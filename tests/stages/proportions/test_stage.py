@@ -5,11 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 
-from stages.proportions.stage import farthest_first
 from stages.shape.sample import Sample, read_samples
 from tests.mill import mill
 from tests.stages.proportions.stools import MESHES, STOOL
@@ -74,13 +72,6 @@ def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
     code, said = mill("run", "proportions", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code != 0
     assert "set proportions.spread or proportions.apart smaller" in said
-
-
-def test_the_farthest_come_first_and_none_that_are_alike() -> None:
-    points = np.array([[0.1], [1.0], [0.99], [-0.6], [0.0]])
-    assert farthest_first(points, np.zeros(1), 5, 0.05) == [1, 3, 0]
-    assert farthest_first(points, np.zeros(1), 2, 0.05) == [1, 3]
-    assert farthest_first(np.empty((0, 1)), np.zeros(1), 2, 0.05) == []
 
 
 def test_no_proportions_without_exemplars(tmp_path: Path) -> None:

@@ -1,0 +1,54 @@
+"""Warps of one exemplar that were drawn, and how they differ."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.proportions.warp import Lattice, Warp
+
+__all__ = ["Drawn"]
+
+LEAST = 1e-9
+"""What differs by less is the same."""
+
+
+class Drawn:
+    """Warps of an exemplar, held against it and each other by their signatures: by the greatest difference of one
+    coordinate, where some end of a part lies, as a share of the diagonal."""
+
+    def __init__(self, lattice: Lattice, apart: float) -> None:
+        """apart: so far a warp must be from the exemplar and from all others."""
+        self._lattice, self._apart = lattice, max(apart, LEAST)
+        self._origin = lattice.signature([np.ones(len(each)) for each in lattice.lengths])
+        self._points = np.empty((64, len(self._origin)))
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def is_new(self, warp: Warp) -> bool:
+        """Whether it is far enough from the exemplar and all that were added."""
+        point = self._lattice.signature(warp)
+        gaps = np.abs(self._points[: self._count] - point).max(axis=1, initial=0.0)
+        return bool((gaps >= self._apart).all() and np.abs(self._origin - point).max(initial=0.0) >= self._apart)
+
+    def add(self, warp: Warp) -> None:
+        """Keep a warp, whether it is new or not."""
+        if self._count == len(self._points):
+            self._points = np.concatenate([self._points, np.empty_like(self._points)])
+        self._points[self._count] = self._lattice.signature(warp)
+        self._count += 1
+
+    def farthest_first(self, most: int) -> list[int]:
+        """The places of at most `most` of those added, in the order in which they were: each in turn the one that is
+        farthest from the exemplar and from those before it, as long as that is far enough."""
+        points = self._points[: self._count]
+        gaps = np.abs(points - self._origin).max(axis=1, initial=0.0)
+        chosen: list[int] = []
+        while len(chosen) < min(most, len(points)):
+            place = int(gaps.argmax())
+            if gaps[place] < self._apart:
+                break
+            chosen.append(place)
+            gaps = np.minimum(gaps, np.abs(points - points[place]).max(axis=1, initial=0.0))
+        return chosen
