@@ -11,8 +11,6 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from pipeline.config import Config
 from pipeline.errors import ConfigError, ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
@@ -234,7 +232,7 @@ def trial(config: Config) -> ProportionsConfig:
 
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all texts, in their lanes and in the collection."""
-    return 2 * BYTES_A_SAMPLE * int(np.sum(asked(plan.config)))
+    return 2 * BYTES_A_SAMPLE * _wanted(plan).per_kit * len(plan.shards("exemplars"))
 
 
 STAGE = Stage(
