@@ -47,6 +47,9 @@ ROUND_SHARE = 40
 PATIENCE, LEAST_PATIENCE = 200_000, 40_000
 PATIENT_PARTS = 100
 """A try takes the longer the more parts there are: exemplars of more than so many have less than PATIENCE tries."""
+SLOW, SLOW_CHOICE = 10, 2
+"""Where a search has become slow it ends: when what is missing of the variants wanted would take so many times the
+tries so far, and when there are as many as are wanted, what is missing to choose from."""
 COUNTED = ("crossings", "lists", "rejects", "resized")
 """What lanes count, by name, and pools add up."""
 FEWEST = 32
@@ -259,7 +262,10 @@ def run_pool(task: Task) -> Outcome:
     idle = 0 if kept else params["idle"] + params["tried"]
     telling = params["telling"] + max(len(kept) - params["spares"], 0)
     target = math.ceil(config.selection.oversample * config.per_kit)
-    ended = telling >= target or total >= SPARE * target or idle >= _patience(kit, config) or params["last"]
+    left = target - telling if total >= config.per_kit else config.per_kit - total
+    pace = len(kept) / params["tried"]
+    slow = tries >= _patience(kit, config) and 0 < pace * _slowest(total, config) * tries < left
+    ended = telling >= target or total >= SPARE * target or idle >= _patience(kit, config) or params["last"] or slow
     counted = {key: _added(params[key], params["counted"][key]) for key in COUNTED}
     poor = ended and total < config.per_kit
     return Outcome(
@@ -276,7 +282,7 @@ def run_pool(task: Task) -> Outcome:
             "left": what_was_left(counted["lists"]),
             "advice": f"{what_keeps(kit, counted['rejects'], tries)}, or {SAME_LAYOUT}" if poor else "",
             "ended": ended,
-            "why": _why(kit, config, total, tries, idle) if ended else "",
+            "why": _why(kit, config, total, tries, idle, params["tried"] if slow else 0) if ended else "",
         },
     )
 
@@ -288,13 +294,22 @@ def _added(*counts: Mapping[str, int]) -> dict[str, int]:
     return dict(sorted(total.items()))
 
 
-def _why(kit: Kit, config: VariationsConfig, found: int, tries: int, idle: int) -> str:
+def _slowest(found: int, config: VariationsConfig) -> int:
+    """So many times the tries so far the rest may take, at the pace of the last round."""
+    return SLOW_CHOICE if found >= config.per_kit else SLOW
+
+
+def _why(kit: Kit, config: VariationsConfig, found: int, tries: int, idle: int, slow: int) -> str:
+    """slow: tries of the last round, where its pace was too slow to go on."""
     start = f"{kit.name}: {min(found, config.per_kit):,} of {config.per_kit:,}"
     if found >= config.selection.oversample * config.per_kit:
         return f"{start} variants, chosen from {found:,} after {tries:,} tries"
     chosen = f", chosen from {found:,}" if found > config.per_kit else ""
     if idle >= _patience(kit, config):
         return f"{start}{chosen}: no new variant in the last {idle:,} tries"
+    if slow:
+        longer = f"{_slowest(found, config)} times as long as all {tries:,} so far"
+        return f"{start}{chosen}: at the pace of the last {slow:,} tries the rest would take more than {longer}"
     return f"{start}{chosen}: the search ended after {config.search.rounds} rounds"
 
 

@@ -172,7 +172,9 @@ class SearchConfig(StrictModel):
     patience: Literal["auto"] | Annotated[int, Field(ge=1)] = Field(
         "auto",
         description="Tries of a kit without a new variant after which its search has ended; `auto`: 200,000, and for "
-        "exemplars of over 100 parts the fewer the larger they are, 40,000 at least, which is a minute or two.",
+        "exemplars of over 100 parts the fewer the larger they are, 40,000 at least, which is a minute or two. After "
+        "so many it ends, too, where at the pace of the last round the variants that are missing would take ten times "
+        "the tries so far, or what is missing to choose from twice.",
     )
     rounds: int = Field(200, ge=1, description="Most rounds of a kit's search.")
     novelty: NoveltyConfig = Field(

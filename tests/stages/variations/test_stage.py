@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_a_kit_with_a_finite_language_ends_and_says_so(made: tuple[Path, str]) -> None:
     _, printed = made
     assert "chain: 8 of 2,000: no new variant in the last" in printed
-    assert printed.count(" of 2,000: no new variant in the last") == 2
+
+
+def test_a_search_that_has_become_slow_ends_and_says_so(made: tuple[Path, str]) -> None:
+    _, printed = made
+    (said,) = re.findall(
+        r"road: \d+ of 2,000: at the pace of the last 800 tries the rest .* all ([\d,]+) so far", printed
+    )
+    assert int(said.replace(",", "")) >= 2500
 
 
 def test_every_sample_is_whole_and_equal_graphs_stand_in_one_split(made: tuple[Path, str]) -> None:
