@@ -1,9 +1,10 @@
 """What the search finds in a given CPU time, by each method and by both, or led by its archive beside plain random.
 
-python -m tests.bench.variety [--seconds 120] [--workers 2] [--grammar multiset] [--guidance] [CONFIG...]
+python -m tests.bench.variety [--seconds 120] [--workers 2] [--grammar multiset] [--guidance] [--sheets DIR] [CONFIG...]
 
 CPU seconds of each worker are counted, not those of the clock, so a busy machine changes little. Workers do not
-exchange what they find, as the lanes of a real search do after each round. Prints one Markdown table.
+exchange what they find, as the lanes of a real search do after each round. Prints one Markdown table, and draws the
+most different finds of each way where a folder is named.
 """
 
 from __future__ import annotations
@@ -20,15 +21,19 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from pipeline.config import load_config
+from pipeline.places import write_file
 from pipeline.registry import find_stages
+from stages.choices.sheet import SHOWN, forecast_sheet
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
-from stages.shape.kit import Kit
+from stages.shape.kit import Assembly, Kit
+from stages.shape.shape import kit_shape
 from stages.variations.features import AXES, MIXED
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.search.search import Search
+from stages.variations.search.search import Search, Variant
+from stages.variations.selection import farthest_first
 from stages.variations.settings import SearchConfig, VariationsConfig
 
 __all__ = ["Finds", "configured", "explore"]
@@ -57,7 +62,8 @@ HEADER = (
 @dataclass
 class Finds:
     """What searches have found. keys: graph and histogram of each variant; features: float32 (10,) of each; curve:
-    numbers of variants after each quarter of the time; megabytes: the most memory that a process held."""
+    numbers of variants after each quarter of the time; megabytes: the most memory that a process held; different: the
+    most different of them."""
 
     tries: int = 0
     keys: list[tuple[int, int]] = field(default_factory=list)
@@ -65,6 +71,7 @@ class Finds:
     curve: list[int] = field(default_factory=list)
     crossings: Counter[str] = field(default_factory=Counter)
     megabytes: float = 0.0
+    different: list[Assembly] = field(default_factory=list)
 
 
 def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig]:
@@ -85,17 +92,26 @@ def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int) -> Finds:
     """One worker's search of so many CPU seconds, after a warm-up that is not counted."""
     Search(ContactAnswers(kit), config).run(np.random.default_rng(seed), WARM_UP, 10**9, "warm", lambda count: None)
     line, rng, finds = Search(ContactAnswers(kit), config), np.random.default_rng(seed), Finds()
-    start = time.process_time()
+    start, variants = time.process_time(), list[Variant]()
     for quarter in range(1, 5):
         while time.process_time() - start < seconds * quarter / 4:
             found, tries = line.run(rng, SLICE, 10**9, f"w{seed}", lambda count: None)
             finds.tries += tries
             finds.keys += [(each.graph, each.histogram) for each in found]
             finds.features += [each.features for each in found]
+            variants += found
         finds.curve.append(len(finds.keys))
     finds.crossings = line.crossings
+    lists = _counts(kit, [each.assembly for each in variants]), _counts(kit, [each.assembly for each in kit.exemplars])
+    finds.different = [variants[place].assembly for place in farthest_first(*lists, min(SHOWN, len(variants))).tolist()]
     finds.megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return finds
+
+
+def _counts(kit: Kit, shapes: Sequence[Assembly]) -> np.ndarray:
+    """Parts by type, float64 (k, types)."""
+    counts = [np.bincount(each.types, minlength=len(kit.types)) for each in shapes]
+    return np.array(counts, dtype=np.float64).reshape(-1, len(kit.types))
 
 
 def _row(name: str, how: str, workers: Sequence[Finds], seconds: float) -> str:
@@ -123,6 +139,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=120.0, help="CPU seconds of each worker")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--grammar", choices=(*STRICTNESS, *SLOT_LEVELS))
+    parser.add_argument("--sheets", type=Path, metavar="DIR", help="draw the most different finds of each way there")
     parser.add_argument("--guidance", action="store_true", help="random and led by the archive, instead of methods")
     asked = parser.parse_args()
     print(HEADER, flush=True)
@@ -137,6 +154,10 @@ def main() -> None:
             jobs = [delayed(explore)(kit, asked_for, asked.seconds, seed) for seed in range(asked.workers)]
             workers: list[Finds] = Parallel(n_jobs=asked.workers)(jobs)
             print(_row(name, how, workers, asked.seconds), flush=True)
+            if asked.sheets is not None and workers[0].different:
+                shapes = [kit_shape(kit, each) for each in workers[0].different]
+                path = asked.sheets / f"{name.replace('/', '-')}-{how}.png"
+                write_file(path, forecast_sheet(kit, shapes, "Most different finds", name, how))
         if len(kit.exemplars) > 1:
             crossings = sum((each.crossings for each in workers), Counter[str]()).most_common()
             notes.append(
