@@ -35,6 +35,8 @@ from stages.variations.settings import CHOSEN_INSTEAD_STABLE, VariationsConfig
 __all__ = ["OVERSAMPLED", "STAGE"]
 
 BYTES_A_SAMPLE = 8_000
+MOST = 1_000_000
+"""No more are made of a kit."""
 OVERSAMPLED = 2
 """So many times the shapes wanted are found, for the choice."""
 
@@ -73,7 +75,7 @@ def _wanted(plan: Plan) -> ProportionsConfig:
     shared = ProportionSplitConfig(**layouts.splits.model_dump(include=set(ProportionSplitConfig.model_fields)))
     stable = own.require.stable or chosen[CHOSEN_INSTEAD_STABLE]
     require = own.require.model_copy(update={"stable": stable})
-    return own.model_copy(update={"per_kit": layouts.per_kit, "splits": shared, "require": require})
+    return own.model_copy(update={"per_kit": min(layouts.per_kit, MOST), "splits": shared, "require": require})
 
 
 def _asked(task: Task) -> ProportionsConfig:
