@@ -17,9 +17,10 @@ from pipeline.errors import ConfigError
 from stages.exemplars.build import observe_models
 from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
-from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits, ShapeFile
+from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.points.area_sampling import SurfacePoints, sample_shape
 from stages.shape.arrays import IntArray
+from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
 __all__ = ["Returned", "decomposition_table", "merged", "rand_index", "returned"]
@@ -56,7 +57,7 @@ def merged(shape: Shape, path: Path) -> None:
     vertices, faces, count = [], [], 0
     for kind, pose in zip(shape.assembly.types.tolist(), shape.placements, strict=True):
         mesh = shape.meshes[kind]
-        vertices.append(mesh.vertices @ pose[:3, :3].T + pose[:3, 3])
+        vertices.append(transform_points(pose, mesh.vertices))
         faces.append(mesh.faces + count)
         count += len(mesh.vertices)
     whole = trimesh.Trimesh(np.concatenate(vertices), np.concatenate(faces), process=False)
@@ -64,12 +65,12 @@ def merged(shape: Shape, path: Path) -> None:
     whole.export(path)
 
 
-def returned(name: str, shape: Shape, cut: Segmentation, limits: ReadLimits | None = None) -> Returned:
+def returned(name: str, shape: Shape, cut: Segmentation) -> Returned:
     """Merge a shape whose parts are known, cut it, and compare. What no parts can be made of has none."""
     known = (len(shape.assembly), len(np.unique(shape.assembly.types)))
     begun = time.perf_counter()
     try:
-        found = _cut(shape, cut, limits)
+        found = _cut(shape, cut)
     except ConfigError as error:
         nothing = (known[0], 0), (known[1], 0), 0.0, 0.0, 0.0, 0.0, time.perf_counter() - begun
         return Returned(name, cut, *nothing, why=str(error).partition(": ")[2].partition(";")[0])
@@ -94,13 +95,13 @@ def returned(name: str, shape: Shape, cut: Segmentation, limits: ReadLimits | No
     )
 
 
-def _cut(shape: Shape, cut: Segmentation, limits: ReadLimits | None) -> Shape:
+def _cut(shape: Shape, cut: Segmentation) -> Shape:
     """What Shapemill makes of the merged shape."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "merged.glb"
         merged(shape, path)
         config = KitConfig(name="merged", shapes=(ShapeFile(path=path),), parts=cut, up=shape.up).decide(STRICTEST)
-        kit = observe_models(config, [read_model(path, cut, limits)]).kit
+        kit = observe_models(config, [read_model(path, cut)]).kit
     return Shape(kit.types, kit.exemplars[0].whole, kit.up, kit.type_names())
 
 
@@ -129,7 +130,7 @@ def _scene(shape: Shape) -> tuple[o3d.t.geometry.RaycastingScene, dict[int, int]
     part_of: dict[int, int] = {}
     for part, (kind, pose) in enumerate(zip(shape.assembly.types.tolist(), shape.placements, strict=True)):
         mesh = shape.meshes[kind]
-        placed = (mesh.vertices @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32)
+        placed = transform_points(pose, mesh.vertices).astype(np.float32)
         part_of[scene.add_triangles(placed, mesh.faces.astype(np.uint32))] = part
     return scene, part_of
 

@@ -22,7 +22,7 @@ from stages.variations.search.search import Search, Variant
 from stages.variations.selection import farthest_first
 from stages.variations.settings import SearchConfig
 
-__all__ = ["SHOWN", "Finds", "Probe", "is_by_meaning"]
+__all__ = ["SHOWN", "Finds", "Probe", "type_counts"]
 
 SHOWN = 24
 """So many of the finds, those most different, say how different finds can be."""
@@ -95,7 +95,7 @@ class Probe:
         methods = METHODS if widest <= HUB else METHODS[:1]
         slotted = self.kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(self.kit, answers.dockings, SEARCH.upright) if slotted else None
-        same = {"duplicates": "histogram"} if is_by_meaning(self.kit) else {}
+        same = {"duplicates": "histogram"} if self.kit.by_meaning else {}
         self._searches = [
             Search(answers, SEARCH.model_copy(update={"method": method, **same}), self._slots) for method in methods
         ]
@@ -145,8 +145,8 @@ class Probe:
     def finds(self) -> Finds:
         """What was found so far."""
         rejects = sum((each.rejects for each in self._searches), self._refused)
-        counts = _counts(self.kit, [each.assembly.types for each in self.variants])
-        exemplars = _counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
+        counts = type_counts(self.kit, [each.assembly.types for each in self.variants])
+        exemplars = type_counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:
             return Finds(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
         whole = np.array([each.lineage["copied"]["largest"] for each in self.variants])
@@ -163,7 +163,7 @@ class Probe:
             copied=round(float(np.median(whole)), 4),
             telling=round(float(np.mean(whole <= COPIED)), 4),
             familiar=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
-            by_meaning=is_by_meaning(self.kit),
+            by_meaning=self.kit.by_meaning,
             most_different=tuple(taken.tolist()),
             rejects=dict(rejects.most_common()),
         )
@@ -174,11 +174,7 @@ class Probe:
         return round(float(np.mean([self._slots.familiar(each) for each in assemblies])), 4)
 
 
-def is_by_meaning(kit: Kit) -> bool:
-    """Whether parts of several shapes have one label."""
-    return len(kit.labels) < len(kit.types)
-
-
-def _counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:
+def type_counts(kit: Kit, shapes: Sequence[np.ndarray]) -> FloatArray:
     """Parts by type, float64 (k, types)."""
-    return np.array([np.bincount(each, minlength=len(kit.types)) for each in shapes], dtype=np.float64)
+    counts = [np.bincount(each, minlength=len(kit.types)) for each in shapes]
+    return np.array(counts, dtype=np.float64).reshape(-1, len(kit.types))

@@ -7,7 +7,10 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 
-__all__ = ["ProportionSplitConfig", "ProportionsConfig"]
+__all__ = ["MOST", "ProportionSplitConfig", "ProportionsConfig"]
+
+MOST = 1_000_000
+"""No more are made of a kit."""
 
 
 class ProportionSplitConfig(StrictModel):
@@ -25,7 +28,7 @@ class ProportionsConfig(StrictModel):
     per_kit: int = Field(
         0,
         ge=0,
-        le=1_000_000,
+        le=MOST,
         description="Shapes wanted of each kit, its exemplars taking turns; 0 for a dataset that is made in another "
         "way.",
     )

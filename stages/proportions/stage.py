@@ -19,7 +19,7 @@ from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
 from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault
-from stages.proportions.settings import ProportionsConfig, ProportionSplitConfig
+from stages.proportions.settings import MOST, ProportionsConfig, ProportionSplitConfig
 from stages.proportions.text import proportion_text, read_proportions
 from stages.proportions.warp import lattice_of, warped
 from stages.shape.collection.origin import unstated
@@ -35,8 +35,6 @@ from stages.variations.settings import CHOSEN_INSTEAD_STABLE, VariationsConfig
 __all__ = ["OVERSAMPLED", "STAGE"]
 
 BYTES_A_SAMPLE = 8_000
-MOST = 1_000_000
-"""No more are made of a kit."""
 OVERSAMPLED = 2
 """So many times the shapes wanted are found, for the choice."""
 

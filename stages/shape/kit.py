@@ -251,6 +251,11 @@ class Kit:
         """What parts of the kit are called, each once; without types by meaning these are the names of the types."""
         return labels_of(self.types)[0]
 
+    @property
+    def by_meaning(self) -> bool:
+        """Whether parts of several shapes have one label."""
+        return len(self.labels) < len(self.types)
+
     @cached_property
     def label_of(self) -> TypeArray:
         """For each type the place of its label in `labels`, int16 (types,)."""

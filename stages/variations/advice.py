@@ -49,7 +49,7 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
         return f"{pinned}; split it into several parts in the model, or bring {another}"
     most = max(map(len, labelled))
     if most <= SMALL:
-        by_meaning = "" if len(kit.labels) < len(kit.types) else f", or name types {fitting}"
+        by_meaning = "" if kit.by_meaning else f", or name types {fitting}"
         return f"of {most} parts hardly any can be exchanged; bring more models of the same parts{by_meaning}"
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
     if known > REGULAR * tries:

@@ -23,6 +23,7 @@ from joblib import Parallel, delayed
 from pipeline.config import load_config
 from pipeline.places import write_file
 from pipeline.registry import find_stages
+from stages.choices.probe import type_counts
 from stages.choices.sheet import SHOWN, forecast_sheet
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
@@ -52,6 +53,7 @@ CONFIGS = (
 )
 SLICE = 2000
 WARM_UP = 300
+KEPT = 2000
 HEADER = (
     "| kit | search | tries | variants | a CPU s | graphs | histograms | at quarters | mixed | blended | E | copied "
     "| MB |\n"
@@ -88,8 +90,9 @@ def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig
     return kit, config.section(VariationsConfig).search
 
 
-def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int) -> Finds:
-    """One worker's search of so many CPU seconds, after a warm-up that is not counted."""
+def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int, shown: bool = False) -> Finds:
+    """One worker's search of so many CPU seconds, after a warm-up that is not counted; where they are `shown`, the
+    first KEPT variants are kept to choose from."""
     Search(ContactAnswers(kit), config).run(np.random.default_rng(seed), WARM_UP, 10**9, "warm", lambda count: None)
     line, rng, finds = Search(ContactAnswers(kit), config), np.random.default_rng(seed), Finds()
     start, variants = time.process_time(), list[Variant]()
@@ -99,19 +102,13 @@ def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int) -> Finds:
             finds.tries += tries
             finds.keys += [(each.graph, each.histogram) for each in found]
             finds.features += [each.features for each in found]
-            variants += found
+            variants += found[: KEPT - len(variants)] if shown else []
         finds.curve.append(len(finds.keys))
     finds.crossings = line.crossings
-    lists = _counts(kit, [each.assembly for each in variants]), _counts(kit, [each.assembly for each in kit.exemplars])
+    lists = (type_counts(kit, [each.assembly.types for each in of]) for of in (variants, kit.exemplars))
     finds.different = [variants[place].assembly for place in farthest_first(*lists, min(SHOWN, len(variants))).tolist()]
     finds.megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return finds
-
-
-def _counts(kit: Kit, shapes: Sequence[Assembly]) -> np.ndarray:
-    """Parts by type, float64 (k, types)."""
-    counts = [np.bincount(each.types, minlength=len(kit.types)) for each in shapes]
-    return np.array(counts, dtype=np.float64).reshape(-1, len(kit.types))
 
 
 def _row(name: str, how: str, workers: Sequence[Finds], seconds: float) -> str:
@@ -151,10 +148,13 @@ def main() -> None:
         if asked.guidance:
             ways = {"random": config.model_copy(update={"novelty": random}), "novelty": config}
         for how, asked_for in ways.items():
-            jobs = [delayed(explore)(kit, asked_for, asked.seconds, seed) for seed in range(asked.workers)]
+            jobs = [
+                delayed(explore)(kit, asked_for, asked.seconds, seed, bool(asked.sheets))
+                for seed in range(asked.workers)
+            ]
             workers: list[Finds] = Parallel(n_jobs=asked.workers)(jobs)
             print(_row(name, how, workers, asked.seconds), flush=True)
-            if asked.sheets is not None and workers[0].different:
+            if asked.sheets and workers[0].different:
                 shapes = [kit_shape(kit, each) for each in workers[0].different]
                 path = asked.sheets / f"{name.replace('/', '-')}-{how}.png"
                 write_file(path, forecast_sheet(kit, shapes, "Most different finds", name, how))

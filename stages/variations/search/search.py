@@ -128,7 +128,7 @@ class Search:
         self._grower = self._made_grower() if config.method in ("both", "growth", "all") else None
         self._replacer = self._made_replacer() if config.method in ("substructures", "all") else None
         self.archive = Archive(config.novelty.quota)
-        by_meaning = len(kit.labels) < len(kit.types)
+        by_meaning = kit.by_meaning
         self.steering = Steering(config, by_meaning)
         self._ground = GroundTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
         self._features = FeatureTest(kit)

@@ -97,7 +97,7 @@ class Replacer:
         self.blends, self.most = config.blend, config.stretch.most
         kit = answers.kit
         self._rigid = rigid_types(kit, config.stretch.rigid)
-        self._by_meaning = len(kit.labels) < len(kit.types)
+        self._by_meaning = kit.by_meaning
         self._by_docking = config.matching == "pose" and not self._by_meaning and self.most == 1
         self.lists: Counter[str] = Counter()
         self.known: set[int] = set()
