@@ -128,6 +128,21 @@ def test_chosen_is_the_best_of_what_is_allowed(seed: int, name: str, cycles: int
         acceptor.take(np.where(wanted == NONE, END, wanted))
 
 
+@given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.sampled_from([False, True]))
+def test_what_is_known_of_open_cycles_changes_no_answer(seed: int, name: str, partial: bool) -> None:
+    rng = np.random.default_rng(seed)
+    acceptor = Acceptor(make_rules(GRAMMARS[name], 3, 4, partial), 4, 1, 40)
+    for _ in range(40):
+        allowed = acceptor.allowed()
+        acceptor._state.witness[:] = NONE
+        assert (acceptor.allowed() == allowed).all()
+        ways = np.flatnonzero(allowed[0])
+        if not len(ways) or ways.tolist() == [END]:
+            break
+        numbers = ways[ways > 5]  # cycles are what this is about
+        acceptor.take(np.array([rng.choice(numbers if len(numbers) and rng.random() < 0.5 else ways)]))
+
+
 @given(st.integers(0, 2**32), st.integers(0, len(toy.graphs()) - 1), st.sampled_from(ALL_LEVELS))
 def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, strictness: Strictness) -> None:
     types, edges = toy.graphs()[number]
