@@ -66,7 +66,7 @@ class TrainedRecovery:
     @torch.no_grad()
     def _guess(self, inputs: Tensor) -> Guess:
         device = next(self.module.parameters()).device
-        outputs, answers = self.module(inputs.to(device)), Answers.of(self.entry, self.program.parameters)
+        outputs, answers = self.module(inputs.to(device)), Answers.of(self.entry, self.program.parameters).to(device)
         chances = answers.chances(outputs).mean(dim=0).double().cpu().numpy()
         probabilities = {}
         for parameter, row in zip(self.program.parameters, chances, strict=True):

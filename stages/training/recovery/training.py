@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from typing import Any
 
@@ -137,15 +138,19 @@ class RecoveryLearner:
     texts: Sequence[str]
 
     @property
+    def device(self) -> torch.device:
+        """Where it learns."""
+        return next(self.module.parameters()).device
+
+    @cached_property
     def answers(self) -> Answers:
-        """What the outputs of the network say."""
-        return Answers.of(self.entry, self.program.parameters)
+        """What the outputs of the network say, on its device."""
+        return Answers.of(self.entry, self.program.parameters).to(self.device)
 
     def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
         """Clouds of shapes that are made meanwhile, or drawings of the pool, changed at random."""
-        device = next(self.module.parameters()).device
         batches = self._clouds(rng) if self.entry.input == "points" else self._drawings(rng)
-        return ((inputs.to(device), classes.to(device)) for inputs, classes in batches)
+        return ((inputs.to(self.device), classes.to(self.device)) for inputs, classes in batches)
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
         """That of all parameters together, in nats of an input."""
@@ -156,13 +161,12 @@ class RecoveryLearner:
         """On shapes that are never learnt from: nats; of the parameters that are visible, the share that is right and
         that within one class; and the mean and the 95th percentile of how far the shapes that come out are from the
         true ones, squared, in sides of their boxes."""
-        device = next(self.module.parameters()).device
         val = self.splits["val"]
         outputs = []
         for start in range(0, len(val["classes"]), self.entry.batch):
             inputs = val["inputs"][start : start + self.entry.batch]
-            outputs.append(self.module(_input_tensor(inputs, self.entry.input).to(device)).cpu())
-        found, classes = torch.cat(outputs), torch.from_numpy(val["classes"].astype(np.int64))
+            outputs.append(self.module(_input_tensor(inputs, self.entry.input).to(self.device)))
+        found, classes = torch.cat(outputs), torch.from_numpy(val["classes"].astype(np.int64)).to(self.device)
         counts = self.answers.counts
         best, visible = self.answers.chances(found).argmax(dim=-1), classes < counts
         near = (best - classes).abs() <= 1
