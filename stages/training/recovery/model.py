@@ -67,8 +67,12 @@ class Dgcnn(nn.Module):
 
     def forward(self, points: Tensor) -> Tensor:
         neighbors = nearest_neighbors(points, min(self.neighbors, points.shape[1]))
-        features, found = points, []
-        for convolution in self.convolutions:
+        first, *others = self.convolutions
+        # bfloat16 would move points by up to a thousandth of the box, a good part of the way to the next
+        with torch.autocast(points.device.type, enabled=False):
+            features = first(points, neighbors)
+        found = [features]
+        for convolution in others:
             features = convolution(features, neighbors)
             found.append(features)
         mixed = leaky_relu(_normed(self.norm, self.mixed(torch.cat(found, dim=-1))), SLOPE)
