@@ -69,7 +69,7 @@ class ProgramVae(nn.Module):
                 children = self.read_child(codes)
                 seen = seen.index_put((below[:, 0], below[:, 1]), children, accumulate=True)
             read, _ = self.reader(seen)
-            codes = torch.take_along_dim(read, level.lengths[:, None, None] - 1, dim=1)[:, 0]
+            codes = read[torch.arange(len(read), device=read.device), level.lengths - 1]
         assert codes is not None
         return self.mean(codes), self.log_variance(codes)
 
