@@ -1,5 +1,5 @@
-"""How a VAE of part graphs learns: each part of a shape is compared with the part that the model says is most like
-it."""
+"""How a VAE of part graphs learns: by the parts of each node in the order of its program, so that none has to be
+assigned, for which StructureNet looks for the cheapest assignment of unordered ones."""
 
 from __future__ import annotations
 
@@ -15,15 +15,12 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.training.loop import device_of
-from stages.training.part_graph_vae.batches import MOST_CHILDREN, Batch, Graphs, Level, batches
+from stages.training.part_graph_vae.batches import Batch, Graphs, batches
 from stages.training.part_graph_vae.corpus import prepare_corpus, read_corpus
 from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 
-__all__ = ["PartGraphVaeLearner", "entry", "learner", "matched", "new_model", "prepare"]
-
-FAR = 1e6
-"""Further apart than any two boxes; and from twice as far nothing is taken again."""
+__all__ = ["PartGraphVaeLearner", "entry", "learner", "new_model", "prepare"]
 
 
 def prepare(task: Task) -> Outcome:
@@ -103,35 +100,12 @@ def reconstruction(module: PartGraphVae, levels: Batch, points: Tensor) -> tuple
     codes = module.root(points)
     for level in levels:
         said = module.decode(codes)
-        taken = matched(said.boxes, level)
-        # Of each part that the model was shown: what is said of the part that was taken for it. A product, for on a GPU
-        # it is many times faster than to index, and as exact.
-        flags = taken @ torch.stack([said.there, said.inner], dim=-1)
-        touching = taken @ said.touching @ taken.transpose(1, 2)
         both = torch.triu(level.there[:, :, None] * level.there[:, None], diagonal=1)
-        nats = nats + _nats(flags[..., 0], level.there, None) + _nats(flags[..., 1], level.inner, level.there)
-        nats = nats + _nats(touching, level.touching, both)
-        errors = errors + ((taken @ said.boxes - level.boxes).abs().sum(dim=-1) * level.there).sum()
-        codes = (taken @ said.codes).flatten(0, 1)[level.opened]
+        nats = nats + _nats(said.there, level.there, None) + _nats(said.inner, level.inner, level.there)
+        nats = nats + _nats(said.touching, level.touching, both)
+        errors = errors + ((said.boxes - level.boxes).abs().sum(dim=-1) * level.there).sum()
+        codes = said.codes.flatten(0, 1)[level.opened]
     return nats, errors
-
-
-@torch.no_grad()
-def matched(boxes: Tensor, level: Level) -> Tensor:
-    """Which of the boxes (n, MOST_CHILDREN, 9) is taken for each part of a level, float (n, MOST_CHILDREN,
-    MOST_CHILDREN), 1 in each row and column once: again and again the part and the box that are nearest each other.
-    Boxes of no part are left for last."""
-    away = (level.boxes[:, :, None] - boxes[:, None]).abs().sum(dim=-1)
-    away = away + FAR * (1.0 - level.there[:, :, None])
-    numbers = torch.arange(MOST_CHILDREN, device=boxes.device)
-    taken = torch.zeros_like(away)
-    for _ in range(MOST_CHILDREN):
-        nearest = away.flatten(1).argmin(dim=1, keepdim=True)
-        part = (nearest // MOST_CHILDREN == numbers)[:, :, None]
-        box = (nearest % MOST_CHILDREN == numbers)[:, None]
-        taken = taken.masked_fill(part & box, 1.0)
-        away = away.masked_fill(part | box, 4 * FAR)
-    return taken
 
 
 def _nats(logits: Tensor, flags: Tensor, weights: Tensor | None) -> Tensor:
