@@ -71,7 +71,7 @@ class PartGraphVae(Standing):
 
     def decode(self, codes: Tensor) -> Parts:
         """What nodes of codes (n, hidden) say of their parts; those of roots are `root` of a point."""
-        seen: Tensor = leaky_relu(self.parts(codes), 0.2).unflatten(1, (MOST_CHILDREN, codes.shape[1]))
+        seen: Tensor = leaky_relu(self.parts(codes), 0.2).view(len(codes), MOST_CHILDREN, codes.shape[1])
         there = self.there(seen)[..., 0]
         ends = self.edges(seen)
         touching = ends @ ends.transpose(1, 2) / ends.shape[-1] ** 0.5
