@@ -19,7 +19,7 @@ class CuboidRnnEntry(KitModelEntry):
 
     kind: Literal["cuboid_rnn"] = Field(description="a recurrent network that writes cuboids, in the way of 3D-PRNN")
     hidden: int = Field(256, ge=2, le=8192, description="size of the GRU")
-    mixtures: int = Field(20, ge=1, le=256, description="Gaussians of which the numbers of a step are a mixture")
+    mixtures: int = Field(20, ge=1, le=256, description="the numbers of a step are a mixture of so many Gaussians")
     precision: Literal["auto", "float32", "bfloat16"] = Field(
         "float32",
         description="numbers of the forward pass; narrow Gaussians need float32; `auto`: bfloat16 where the processor "
