@@ -15,7 +15,7 @@ from stages.shape.arrays import FloatArray
 from stages.training.boxes import TURN, WIDTH
 from stages.training.pooling import pooled
 
-__all__ = ["FLAGS", "MOST_BOXES", "NUMBERS", "SHOWN", "Batch", "Cuboids", "batch_of", "batches"]
+__all__ = ["END", "FLAGS", "KINDS", "MOST_BOXES", "NUMBERS", "SHOWN", "Batch", "Cuboids", "batch_of", "batches"]
 
 MOST_BOXES = 32
 """Cuboids of a shape, mirror images counted once."""
@@ -23,8 +23,13 @@ MOST_BOXES = 32
 NUMBERS = 3
 """Of a step: where the cuboid stands along its axis, its size, and how far it is turned about it."""
 
-FLAGS = 3
-"""Of a cuboid: whether the shape ends instead; whether it is there mirrored, too; whether it is turned."""
+FLAGS = 2
+"""Of a cuboid: whether it is there mirrored, too; whether it is turned."""
+
+END = 4
+"""The kind of what ends a shape; that of a cuboid is twice its first flag and its second."""
+
+KINDS = 5
 
 SHOWN = NUMBERS + FLAGS + 3
 """What the network sees before a step: the numbers and the flags of the one before it, and which axis comes."""
@@ -57,12 +62,14 @@ class Cuboids:
 
 @dataclass(frozen=True)
 class Batch:
-    """shown: float (n, steps, SHOWN); numbers: float (n, steps, NUMBERS), of each step; flags: float (n, cuboids,
-    FLAGS), the end among the cuboids; there, asked: float (n, cuboids), 1 for cuboids, and for these and the end."""
+    """shown: float (n, steps, SHOWN); numbers, flags: float (n, steps, NUMBERS) and (n, steps, FLAGS), of each step;
+    kinds: int64 (n, cuboids), the end among the cuboids; there: float (n, steps), 1 for those of cuboids; asked: float
+    (n, cuboids), 1 for cuboids and the end."""
 
     shown: Tensor
     numbers: Tensor
     flags: Tensor
+    kinds: Tensor
     there: Tensor
     asked: Tensor
 
@@ -84,16 +91,19 @@ def batch_of(cuboids: Cuboids, rows: npt.NDArray[np.int64]) -> Batch:
     at = np.where(there, cuboids.first[rows][:, None] + place, 0)
     found = np.where(there[..., None], cuboids.rows[at], np.float32(0))
     turned = (found[..., TURN] != 0).any(axis=-1)
-    flags = np.stack([place == lengths[:, None], found[..., WIDTH] > 0, turned], axis=-1).astype(np.float32)
+    flags = np.stack([found[..., WIDTH] > 0, turned], axis=-1)
+    kinds = np.where(there, flags @ np.array([2, 1]), END)
     # The numbers of a cuboid by what they say and by axis; a step has one axis.
     steps = found[..., :WIDTH].reshape(*at.shape, NUMBERS, 3).swapaxes(2, 3).reshape(len(rows), -1, NUMBERS)
-    said = np.concatenate([steps, flags.repeat(3, axis=1)], axis=-1)
+    flags = flags.repeat(3, axis=1).astype(np.float32)
+    said = np.concatenate([steps, flags], axis=-1)
     before = np.concatenate([np.zeros_like(said[:, :1]), said[:, :-1]], axis=1)
     axes = np.broadcast_to(np.tile(np.eye(3, dtype=np.float32), (len(place), 1)), (*steps.shape[:2], 3))
     return Batch(
         shown=torch.from_numpy(np.concatenate([before, axes], axis=-1)),
         numbers=torch.from_numpy(steps),
         flags=torch.from_numpy(flags),
-        there=torch.from_numpy(there.astype(np.float32)),
+        kinds=torch.from_numpy(kinds),
+        there=torch.from_numpy(there.repeat(3, axis=1).astype(np.float32)),
         asked=torch.from_numpy((place <= lengths[:, None]).astype(np.float32)),
     )

@@ -1,4 +1,4 @@
-"""A GRU that says of each step what it writes: a mixture of Gaussians of its numbers, and flags (3D-PRNN)."""
+"""A GRU that says of each cuboid of which kind it is, and of each of its axes a mixture of Gaussians (3D-PRNN)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
-from stages.training.cuboid_rnn.batches import FLAGS, NUMBERS, SHOWN
+from stages.training.cuboid_rnn.batches import FLAGS, KINDS, NUMBERS, SHOWN
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
 
 __all__ = ["CuboidRnn", "density"]
@@ -24,17 +24,26 @@ class CuboidRnn(nn.Module):
         super().__init__()
         self.mixtures = entry.mixtures
         self.reader = nn.GRU(SHOWN, entry.hidden, batch_first=True)
-        self.said = nn.Linear(entry.hidden, entry.mixtures * (1 + 2 * NUMBERS))
-        self.flags = nn.Linear(entry.hidden, FLAGS)
+        self.kinds = nn.Linear(entry.hidden, KINDS)
+        self.said = nn.Sequential(
+            nn.Linear(entry.hidden + FLAGS, entry.hidden),
+            nn.LeakyReLU(0.2),
+            nn.Linear(entry.hidden, entry.mixtures * (1 + 2 * NUMBERS)),
+        )
 
-    def forward(self, shown: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """Of each step that follows what is `shown`, float (n, steps, SHOWN): the logits of the Gaussians (n, steps,
-        mixtures), their means and deviations (n, steps, mixtures, NUMBERS), the logits of flags (n, steps, FLAGS), and
-        the state behind the last."""
+    def read(self, shown: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """The states behind what is `shown`, float (n, steps, SHOWN), in which each step is written: float (n, steps,
+        hidden), and the last of them, (1, n, hidden)."""
         states, last = self.reader(shown, state)
-        weights, rest = self.said(states).float().split([self.mixtures, 2 * NUMBERS * self.mixtures], dim=-1)
+        return states, last
+
+    def numbers(self, states: Tensor, flags: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """The logits of the Gaussians (n, steps, mixtures), their means and deviations (n, steps, mixtures, NUMBERS),
+        of cuboids with these flags, float (n, steps, FLAGS)."""
+        found = self.said(torch.cat([states, flags], dim=-1)).float()
+        weights, rest = found.split([self.mixtures, 2 * NUMBERS * self.mixtures], dim=-1)
         means, deviations = rest.view(*rest.shape[:2], self.mixtures, 2 * NUMBERS).chunk(2, dim=-1)
-        return weights, means, softplus(deviations) + NARROWEST, self.flags(states).float(), last
+        return weights, means, softplus(deviations) + NARROWEST
 
 
 def density(weights: Tensor, means: Tensor, deviations: Tensor, numbers: Tensor, turned: Tensor) -> Tensor:

@@ -14,7 +14,7 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.training.boxes import WIDTH, box_of_numbers
 from stages.training.checkpoint import CheckpointError, load_checkpoint
-from stages.training.cuboid_rnn.batches import FLAGS, MOST_BOXES, NUMBERS, SHOWN
+from stages.training.cuboid_rnn.batches import END, FLAGS, KINDS, MOST_BOXES, NUMBERS, SHOWN
 from stages.training.cuboid_rnn.corpus import mirrored
 from stages.training.cuboid_rnn.model import CuboidRnn
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
@@ -52,7 +52,7 @@ class TrainedCuboidRnn:
 def _written(module: CuboidRnn, count: int, rng: np.random.Generator, temperature: float) -> list[tuple[Box, ...]]:
     """The cuboids of so many shapes, mirror images among them."""
     found = np.zeros((MOST_BOXES, count, WIDTH))
-    flags: BoolArray = np.zeros((count, FLAGS), np.bool_)
+    flags = np.zeros((count, FLAGS), np.float32)
     pairs = np.zeros((MOST_BOXES, count), np.bool_)
     lengths = np.full(count, MOST_BOXES)
     shown = np.zeros((count, SHOWN), np.float32)
@@ -60,16 +60,19 @@ def _written(module: CuboidRnn, count: int, rng: np.random.Generator, temperatur
     for step in range(3 * MOST_BOXES):
         place, axis = divmod(step, 3)
         shown[:, NUMBERS + FLAGS :] = np.eye(3)[axis]
-        weights, means, deviations, logits, state = module(torch.from_numpy(shown)[:, None], state)
+        states, state = module.read(torch.from_numpy(shown)[:, None], state)
         if axis == 0:
-            flags = rng.random((count, FLAGS)) < torch.sigmoid(logits[:, 0]).double().numpy()
-            lengths = np.where(flags[:, 0], np.minimum(lengths, place), lengths)
-            pairs[place] = flags[:, 1]
+            kinds = (module.kinds(states[:, 0]).double().numpy() + rng.gumbel(size=(count, KINDS))).argmax(axis=1)
+            lengths = np.where(kinds == END, np.minimum(lengths, place), lengths)
+            pairs[place], turned = kinds // 2 == 1, kinds % 2 == 1
+            flags = np.stack([pairs[place], turned], axis=1).astype(np.float32)
             if (lengths <= place).all():
                 break
-        said, mean, deviation = (each[:, 0].double().numpy() for each in (weights, means, deviations))
+        said, mean, deviation = (
+            each[:, 0].double().numpy() for each in module.numbers(states, torch.from_numpy(flags)[:, None])
+        )
         numbers = _drawn(said, mean, deviation, temperature, rng)
-        numbers[~flags[:, 2], 2] = 0
+        numbers[flags[:, 1] == 0, 2] = 0
         found[place, :, axis::3] = numbers
         shown[:, :NUMBERS], shown[:, NUMBERS : NUMBERS + FLAGS] = numbers, flags
     return [_boxes(found[: lengths[row], row], pairs[: lengths[row], row]) for row in range(count)]

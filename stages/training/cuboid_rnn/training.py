@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Generator, Tensor
-from torch.nn.functional import binary_cross_entropy_with_logits
+from torch.nn.functional import cross_entropy
 
 from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
@@ -67,16 +67,14 @@ class CuboidRnnLearner:
                 yield batch.to(device)
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
-        """Means over shapes: nats of the numbers, which may be negative, for they are densities, and of the flags."""
-        weights, means, deviations, logits, _ = self.module(batch.shown)
-        turned = (batch.flags[..., 2]).repeat_interleave(3, dim=1)
-        there = batch.there.repeat_interleave(3, dim=1)
-        numbers = -(density(weights, means, deviations, batch.numbers, turned) * there).sum()
-        said = binary_cross_entropy_with_logits(logits[:, ::3], batch.flags, reduction="none")
-        # Where the shape ends there is no cuboid, of which the other flags could be.
-        flags = (said[..., 0] * batch.asked).sum() + (said[..., 1:].sum(dim=-1) * batch.there).sum()
-        numbers, flags = numbers / len(batch.shown), flags / len(batch.shown)
-        return {"loss": numbers + flags, "numbers": numbers, "flags": flags}
+        """Means over shapes: nats of the numbers, which may be negative, for they are densities, and of the kinds."""
+        states, _ = self.module.read(batch.shown)
+        gaussians = self.module.numbers(states, batch.flags)
+        numbers = -(density(*gaussians, batch.numbers, batch.flags[..., 1]) * batch.there).sum() / len(batch.shown)
+        logits = self.module.kinds(states[:, ::3]).float()
+        said = cross_entropy(logits.flatten(0, 1), batch.kinds.flatten(), reduction="none")
+        kinds = (said * batch.asked.flatten()).sum() / len(batch.shown)
+        return {"loss": numbers + kinds, "numbers": numbers, "kinds": kinds}
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val."""

@@ -10,7 +10,7 @@ from stages.shapeassembly import execute, parse
 from stages.shapeassembly.extraction.boxes import box_corners, same_box
 from stages.shapeassembly.extraction.validity import boxes_of
 from stages.training.boxes import box_of_numbers, numbers_of_box
-from stages.training.cuboid_rnn.batches import Cuboids, batch_of
+from stages.training.cuboid_rnn.batches import END, Cuboids, batch_of
 from stages.training.cuboid_rnn.corpus import mirrored, rows_of
 from stages.training.cuboid_rnn.model import density
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
@@ -48,12 +48,13 @@ def test_a_batch_says_axis_after_axis_and_what_stood_before() -> None:
     batch = batch_of(cuboids, np.array([0, 1]))
     assert batch.numbers.shape == (2, 9, 3)
     np.testing.assert_allclose(batch.numbers[0, :6].reshape(2, 3, 3).mT.flatten(1), rows[:, :9], atol=1e-6)
-    assert batch.flags.tolist() == [[[0, 1, 1], [0, 0, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0], [0, 0, 0]]]
-    assert batch.there.sum(dim=1).tolist() == [2, 1]
+    assert batch.kinds.tolist() == [[3, 0, END], [0, END, END]]
+    assert batch.flags[:, ::3].tolist() == [[[1, 1], [0, 0], [0, 0]], [[0, 0], [0, 0], [0, 0]]]
+    assert batch.there.sum(dim=1).tolist() == [6, 3]
     assert batch.asked.sum(dim=1).tolist() == [3, 2]
-    assert not batch.shown[:, 0, :6].any()
+    assert not batch.shown[:, 0, :5].any()
     assert (batch.shown[:, 1:, :3] == batch.numbers[:, :-1]).all()
-    assert (batch.shown[0, :, 6:].argmax(dim=-1) == torch.arange(9) % 3).all()
+    assert (batch.shown[0, :, 5:].argmax(dim=-1) == torch.arange(9) % 3).all()
 
 
 def test_a_density_is_that_of_the_mixture_and_an_upright_cuboid_has_no_turn() -> None:
@@ -72,10 +73,10 @@ def test_a_network_learns_two_shapes_and_writes_them() -> None:
     shapes = [rows_of(boxes_of(execute(parse(text)))) for text in (BOX, TWO_LEGS)]
     cuboids = Cuboids.of(shapes)
     learner = CuboidRnnLearner(new_model(ENTRY, 0), {}, ENTRY, cuboids, cuboids)
-    optimizer = torch.optim.Adam(learner.module.parameters(), lr=1e-2)
+    optimizer = torch.optim.Adam(learner.module.parameters(), lr=4e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
-    for step in range(300):
+    for step in range(600):
         optimizer.zero_grad()
         torch.autograd.backward(learner.losses(next(stream), step, noise)["loss"])
         torch.nn.utils.clip_grad_norm_(learner.module.parameters(), 1.0)
