@@ -82,7 +82,10 @@ def _trained_of(kinds: tuple[str, ...], what: str) -> Need:
 STRING_VAE = _trained("string_vae", "string VAE")
 EDGE_CATEGORIES = _trained("edge_categories", "model of edge categories")
 RECOVERY = _trained("recovery", "recovery model")
-PROGRAM_WRITERS = _trained_of(("program_vae", "program_lm"), "model of ShapeAssembly programs")
+PROGRAM_WRITERS = _trained_of(
+    ("program_vae", "program_lm", "cuboid_rnn", "part_graph_vae"),
+    "model of ShapeAssembly programs, or of their cuboids",
+)
 
 
 def _program(subject: Subject) -> str:

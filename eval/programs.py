@@ -1,8 +1,9 @@
-"""What models of ShapeAssembly programs write: quality, editability, variability, smoothness (shapeassembly §7)."""
+"""What models of ShapeAssembly programs write, and models of the cuboids that these make: quality, variability,
+smoothness (shapeassembly §7)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
@@ -10,37 +11,35 @@ import numpy as np
 
 from eval.nearest import nearest
 from eval.physical import judge_all, stays_up
-from eval.realism import Realism
-from eval.table import Cell, Published, Table
+from eval.shapes import box_shape
+from eval.table import Cell
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.settings import PhysicsConfig
+from stages.shape.shape import Shape
+from stages.shapeassembly.extraction.boxes import box_corners
+from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import boxes_of, surface_points
 from stages.shapeassembly.interpreter import execute_all
 from stages.shapeassembly.program import Program
-from stages.shapeassembly.shape import shape_of_execution
-from stages.shapeassembly.statistics import program_statistics
 from stages.shapeassembly.structure import program_distance, signature
 from stages.training.program_vae.trained import TrainedProgramVae
 
 __all__ = [
     "POINTS",
     "Physics",
+    "Variability",
+    "boxes_of_programs",
     "clouds_of",
-    "editability_table",
     "novelty",
     "physics_of",
-    "quality_table",
+    "shape_of_boxes",
     "smoothness",
-    "smoothness_table",
+    "unrejected",
     "variability",
-    "variability_table",
 ]
 
 POINTS = 256
 """Points of a shape's surface that Chamfer distances are measured with."""
-
-_CATEGORIES = ("chair", "table", "storage")
-_METHODS = ("3D-PRNN", "StructureNet", "ShapeAssembly", "validation")
 
 
 @dataclass(frozen=True)
@@ -51,19 +50,29 @@ class Physics:
     stable: float
 
 
-def physics_of(programs: Sequence[Program]) -> Physics:
-    """Of the executed programs."""
-    shapes = [shape_of_execution(each) for each in execute_all(programs)]
+def boxes_of_programs(programs: Sequence[Program]) -> list[list[Box]]:
+    """The cuboids of each executed program."""
+    return [boxes_of(execution) for execution in execute_all(programs)]
+
+
+def shape_of_boxes(boxes: Sequence[Box]) -> Shape:
+    """The shape of some cuboids."""
+    return box_shape(np.stack([box_corners(box) for box in boxes]), "y")
+
+
+def physics_of(samples: Sequence[Sequence[Box]]) -> Physics:
+    """Of shapes of some cuboids each."""
+    shapes = [shape_of_boxes(boxes) for boxes in samples]
     config = PhysicsConfig()
     rooted = fmean(each.rooted for each in judge_all(shapes, config))
     return Physics(100 * rooted, 100 * fmean(stays_up(shapes, config)))
 
 
-def clouds_of(programs: Sequence[Program], count: int = POINTS) -> FloatArray:
-    """Points on the surface of each executed program, float64 (n, count, 3), in the program's own units."""
+def clouds_of(samples: Sequence[Sequence[Box]], count: int = POINTS) -> FloatArray:
+    """Points on the surface of the cuboids of each shape, float64 (n, count, 3)."""
     clouds = []
-    for execution in execute_all(programs):
-        points = surface_points(boxes_of(execution), 2 * count)
+    for boxes in samples:
+        points = surface_points(boxes, 2 * count)
         clouds.append(points[np.linspace(0, len(points) - 1, count).astype(int)])
     return np.stack(clouds)
 
@@ -80,14 +89,15 @@ class Variability:
     leaf_parts: float
 
 
-def variability(samples: Sequence[Program], train: FloatArray, val: FloatArray | None) -> Variability:
-    """Of programs beside the clouds (n, POINTS, 3) of train and, if they are not val themselves, of val."""
+def variability(samples: Sequence[Sequence[Box]], train: FloatArray, val: FloatArray | None) -> Variability:
+    """Of shapes of some cuboids each, beside the clouds (n, POINTS, 3) of train and, if they are not val themselves, of
+    val."""
     clouds = clouds_of(samples)
     return Variability(
         float(nearest(clouds, train, False).mean()),
         "" if val is None else float(nearest(val, clouds, False).mean()),
         float(nearest(clouds, clouds, True).mean()),
-        program_statistics(samples).leaf_parts,
+        fmean(map(len, samples)),
     )
 
 
@@ -95,6 +105,19 @@ def novelty(samples: Sequence[Program], train: Sequence[Program]) -> float:
     """Percent of samples whose structure train has not (§7.1.3)."""
     known = {signature(each) for each in train}
     return 100 * fmean(signature(each) not in known for each in samples)
+
+
+def unrejected(model: TrainedProgramVae, count: int, rng: np.random.Generator, temperature: float) -> list[Program]:
+    """So many programs of random points, none of which is rejected for a line that breaks a rule: its assembly ends
+    before that line (§7.1.1, "no reject"). Points that give no cuboid at all are passed over. Raises ValueError where
+    nearly all do."""
+    kept: list[Program] = []
+    for _ in range(50):
+        found = model.decode(model.points(count, rng, temperature), reject=False)
+        kept += [each for each in found if each is not None]
+        if len(kept) >= count:
+            return kept[:count]
+    raise ValueError(f"{len(kept)} of {50 * count} random points gave a program; train the model longer")
 
 
 def smoothness(
@@ -110,7 +133,7 @@ def smoothness(
         found = model.decode(first + shares * (last - first), reject=False)
         programs = [each for each in found if each is not None]
         none += steps - len(programs)
-        clouds = clouds_of(programs) if programs else np.empty((0, POINTS, 3))
+        clouds = clouds_of(boxes_of_programs(programs)) if programs else np.empty((0, POINTS, 3))
         for place in range(1, len(programs)):
             one, other = programs[place - 1 : place + 1]
             diagonal = float(np.linalg.norm(one.root.bbox.dims))
@@ -118,103 +141,3 @@ def smoothness(
             structure.append(program_distance(one, other))
     share = 100 * none / (sequences * steps)
     return (fmean(geometry), fmean(structure), share) if geometry else ("", "", share)
-
-
-def quality_table(rows: Mapping[str, Physics], realisms: Mapping[str, Realism], rejected: Mapping[str, float]) -> Table:
-    """Table 2 of the paper."""
-    figures: dict[str, Sequence[Sequence[Cell]]] = {
-        "chair": ((73.1, 50.9, 12.6, 39.3), (89.7, 74.9, 4.04, 64.79), (94.5, 84.7, 25.06, 22.34),
-                  (100.0, 88.0, "", "")),
-        "table": ((71.2, 29.4, 2.12, 140.07), (94.4, 76.8, 3.94, 173.35), (96.2, 85.9, 33.21, 49.07),
-                  (100.0, 93.1, "", "")),
-        "storage": ((44.8, 20.8, 4.62, 94.08), (96.2, 75.0, 5.04, 92.85), (95.3, 83.7, 13.5, 31.72),
-                    (100.0, 87.0, "", "")),
-    }  # fmt: skip
-    cells: tuple[tuple[Cell, ...], ...] = tuple(
-        (name, each.rooted, each.stable, realisms[name].fool, realisms[name].fd, rejected.get(name, ""))
-        for name, each in rows.items()
-    )
-    notes = (
-        "Rooted and stable: as in App. E; stability by settling on the convex hull and a push of a tenth of the weight "
-        "instead of a simulation. Rejected: programs that were begun and given up.",
-        "Fool: percent of shapes, none of which it has learnt from, that a PointNet takes for real. FD: Fréchet "
-        "distance to train, of features of the encoder that comes with Shapemill for clouds of chairs. Both depend on "
-        "the networks: compare them with the row of val, not with the paper's.",
-    )
-    columns = ("rooted %", "stable %", "fool %", "FD")
-    published = _published("shapeassembly Table 2, by simulation", columns, figures)
-    return Table("Quality of programs", ("programs", *columns, "rejected %"), cells, notes, published)
-
-
-def editability_table(rows: Mapping[str, Sequence[Program]]) -> Table:
-    """Tables 3 of the paper: lines, and macros a line."""
-    figures = {
-        "chair": ((15.7, 0.11, 0.002, 0.024), (27.1, 0.06, 0.0004, 0.07), (20.4, 0.088, 0.0054, 0.092),
-                  (24.4, 0.08, 0.009, 0.113)),
-        "table": ((13.1, 0.13, 0.001, 0.068), (24.8, 0.027, 0.0006, 0.062), (19.0, 0.099, 0.0002, 0.144),
-                  (20.0, 0.095, 0.005, 0.145)),
-        "storage": ((22.6, 0.017, 0.006, 0.053), (30.7, 0.039, 0.004, 0.077), (19.8, 0.082, 0.008, 0.144),
-                    (24.7, 0.065, 0.0147, 0.151)),
-    }  # fmt: skip
-    columns = ("lines", "reflect", "translate", "squeeze")
-    cells: list[tuple[Cell, ...]] = []
-    for name, programs in rows.items():
-        found = program_statistics(programs)
-        cells.append((name, found.lines, found.reflects, found.translates, found.squeezes))
-    notes = ("Macros are shares of all lines.",)
-    published = _published("shapeassembly Table 3", columns, figures)
-    return Table("Editability of programs", ("programs", *columns), tuple(cells), notes, published)
-
-
-def variability_table(rows: Mapping[str, Variability], novel: Mapping[str, float]) -> Table:
-    """Tables 4 and 5 of the paper, and the structures that train has not (§7.1.3)."""
-    figures = {
-        "chair": ((0.111, 0.123, 0.104, 8.6), (0.104, 0.119, 0.087, 8.7), (0.108, 0.118, 0.104, 7.9),
-                  (0.105, "", 0.114, 9.7)),
-        "table": ((0.095, 0.13, 0.086, 7.07), (0.129, 0.141, 0.0925, 8.16), (0.101, 0.108, 0.102, 7.84),
-                  (0.09, "", 0.099, 8.4)),
-        "storage": ((0.134, 0.132, 0.119, 10.6), (0.129, 0.135, 0.107, 12.3), (0.125, 0.129, 0.119, 8.4),
-                    (0.11, "", 0.125, 10.8)),
-    }  # fmt: skip
-    columns = ("generalization", "coverage", "variety", "leaf parts")
-    cells: tuple[tuple[Cell, ...], ...] = tuple(
-        (name, each.generalization, each.coverage, each.variety, each.leaf_parts, novel.get(name, ""))
-        for name, each in rows.items()
-    )
-    notes = (
-        f"Mean Chamfer distances to the nearest, the mean of both ways between {POINTS} points of the surface; the "
-        "published ones were measured with other clouds. Novel: structures that train has not; the paper has 65, 85 "
-        "and 53 % for chairs, tables and storages.",
-    )
-    published = _published("shapeassembly Tables 4 and 5", columns, figures)
-    return Table("Variability of programs", ("programs", *columns, "novel %"), cells, notes, published)
-
-
-def smoothness_table(rows: Mapping[str, tuple[Cell, Cell, float]]) -> Table:
-    """Table 6 of the paper."""
-    figures = {
-        "chair": ((0.0384, 3.9), (0.0384, 1.33)),
-        "table": ((0.0474, 4.75), (0.0389, 2.48)),
-        "storage": ((0.0512, 4.29), (0.0482, 2.6)),
-    }
-    columns = ("geometry", "program")
-    published = _published("shapeassembly Table 6", columns, figures, _METHODS[1:3])
-    cells: tuple[tuple[Cell, ...], ...] = tuple((name, *each) for name, each in rows.items())
-    notes = (
-        "Mean change from step to step between random points: Chamfer distance by the diagonal, edit distance of the "
-        "programs' tokens. No program: points that gave none.",
-    )
-    return Table("Smoothness of the latent space", ("model", *columns, "no program %"), cells, notes, published)
-
-
-def _published(
-    source: str,
-    columns: Sequence[str],
-    figures: Mapping[str, Sequence[Sequence[Cell]]],
-    methods: Sequence[str] = _METHODS,
-) -> list[Published]:
-    return [
-        Published(f"{category}, {method}", source, dict(zip(columns, row, strict=True)))
-        for category in _CATEGORIES
-        for method, row in zip(methods, figures[category], strict=True)
-    ]

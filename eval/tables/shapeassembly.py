@@ -3,75 +3,120 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eval.evaluation import Answer, Curve, Evaluation, Strip
+from eval.models import Trained, trained_models, training_curve
 from eval.needs import PROGRAM_WRITERS, PROGRAMS
 from eval.subject import Subject
 from stages.shapeassembly.settings import NUCLEUS
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from stages.shapeassembly.extraction.hierarchy import Box
     from stages.shapeassembly.program import Program
 
 __all__ = ["TABLE"]
 
 SHOWN = 16
+PROGRAM_KINDS = ("program_vae", "program_lm")
+SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part_graph_vae": 120.0}
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.models import Trained, trained_models, training_curve
-    from eval.programs import (
-        clouds_of,
-        editability_table,
-        novelty,
-        physics_of,
-        quality_table,
-        smoothness,
-        smoothness_table,
-        variability,
-        variability_table,
-    )
+    from eval.program_tables import editability_table, quality_table, smoothness_table, variability_table
+    from eval.programs import boxes_of_programs, clouds_of, novelty, physics_of, smoothness, variability
     from eval.realism import POINTS, realism
     from pipeline.randomness import decision_rng
-    from stages.training.program_lm.trained import load_program_lm
-    from stages.training.program_vae.trained import TrainedProgramVae, load_program_vae
+    from stages.training.program_vae.trained import TrainedProgramVae
 
-    models: list[Trained[Any]] = [
-        *trained_models(subject.models, "program_vae", load_program_vae),
-        *trained_models(subject.models, "program_lm", partial(load_program_lm, nucleus=asked.nucleus)),
-    ]
-    quality, seen, written, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, {}, []
-    for each in models:
+    quality, seen, told, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, {}, []
+    for each in _models(subject, asked.nucleus):
         train, val = (_programs(subject, each.kit, split) for split in ("train", "val"))
-        clouds = {split: clouds_of(programs) for split, programs in (("train", train), ("val", val))}
+        learnt = boxes_of_programs(train)
+        clouds = {"train": clouds_of(learnt), "val": clouds_of(boxes_of_programs(val))}
         rng = decision_rng(subject.config.seed, "shapeassembly", each.folder)
-        samples, drawn = each.model.sample(asked.samples, rng, asked.temperature)
-        real = f"{each.kit}, val"
-        for name, programs in ((each.folder, samples), (real, val[: asked.samples])):
-            if name not in quality:
-                quality[name] = physics_of(programs)
-                shown, learnt = clouds_of(programs, POINTS), clouds_of(train[: len(programs)], POINTS)
-                seen[name] = realism(shown, learnt, subject.config.seed)
-                written[name] = programs
-                varied[name] = variability(programs, clouds["train"], None if name == real else clouds["val"])
-                novel[name] = novelty(programs, train)
-        rejected[each.folder] = 100 * (1 - len(samples) / drawn)
-        if isinstance(each.model, TrainedProgramVae):
+        without = each.model.header["settings"].get("without", "nothing")
+        real = Written(f"{each.kit}, val", boxes_of_programs(val[: asked.samples]), val[: asked.samples])
+        for row in (*_written(each, asked, rng), real):
+            if row.name not in quality:
+                count = len(row.samples)
+                quality[row.name] = physics_of(row.samples)
+                shown = clouds_of(row.samples, POINTS), clouds_of(learnt[:count], POINTS)
+                seen[row.name] = realism(*shown, subject.config.seed)
+                varied[row.name] = variability(row.samples, clouds["train"], None if row is real else clouds["val"])
+                if row.begun:
+                    rejected[row.name] = 100 * (1 - count / row.begun)
+                if row.programs:
+                    told[row.name] = row.programs
+                    # What is told in another way is new whatever it is.
+                    if row is real or without == "nothing":
+                        novel[row.name] = novelty(row.programs, train)
+                if row is not real:
+                    strips.append(Strip(f"Samples of {row.name}", _pictures(row.samples[:SHOWN])))
+        if isinstance(each.model, TrainedProgramVae) and without == "nothing":
             smooth[each.folder] = smoothness(each.model, asked.sequences, asked.steps, rng)
         curves[each.folder] = training_curve(subject.models / each.folder, "val_loss")
-        strips.append(Strip(f"Samples of {each.folder}", _pictures(samples[:SHOWN])))
     return Answer(
         [
             quality_table(quality, seen, rejected),
-            editability_table(written),
+            editability_table(told),
             variability_table(varied, novel),
             smoothness_table(smooth),
         ],
-        [Curve("How well programs that were not learnt are written", "steps of training", "loss", curves)],
+        [Curve("How well shapes that were not learnt are written", "steps of training", "loss", curves)],
         strips,
     )
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a row of the tables is about: the cuboids of each shape, and the programs that made them, if any. begun: how
+    many were begun, or 0 where none is given up."""
+
+    name: str
+    samples: Sequence[Sequence[Box]]
+    programs: Sequence[Program] = ()
+    begun: int = 0
+
+
+def _models(subject: Subject, nucleus: float) -> list[Trained[Any]]:
+    from stages.training.cuboid_rnn.trained import load_cuboid_rnn
+    from stages.training.part_graph_vae.trained import load_part_graph_vae
+    from stages.training.program_lm.trained import load_program_lm
+    from stages.training.program_vae.trained import load_program_vae
+
+    loaders: dict[str, Callable[[Path, Mapping[str, Any]], Any]] = {
+        "program_vae": load_program_vae,
+        "program_lm": partial(load_program_lm, nucleus=nucleus),
+        "cuboid_rnn": load_cuboid_rnn,
+        "part_graph_vae": load_part_graph_vae,
+    }
+    return [each for kind, load in loaders.items() for each in trained_models(subject.models, kind, load)]
+
+
+def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> Iterator[Written]:
+    """What a model writes; and, of one of whole programs, what it writes where nothing is rejected."""
+    from eval.programs import boxes_of_programs, unrejected
+    from stages.training.program_vae.trained import TrainedProgramVae
+
+    header = trained.model.header
+    found, begun = trained.model.sample(asked.samples, rng, asked.temperature)
+    if header["kind"] not in PROGRAM_KINDS:
+        yield Written(trained.folder, found, begun=begun)
+        return
+    without = header["settings"].get("without", "nothing")
+    name = trained.folder if without == "nothing" else f"{trained.folder}, without {without}"
+    yield Written(name, boxes_of_programs(found), found, begun)
+    if isinstance(trained.model, TrainedProgramVae) and without == "nothing":
+        programs = unrejected(trained.model, asked.samples, rng, asked.temperature)
+        yield Written(f"{trained.folder}, no reject", boxes_of_programs(programs), programs)
 
 
 def _programs(subject: Subject, category: str, split: str) -> list[Program]:
@@ -83,12 +128,11 @@ def _programs(subject: Subject, category: str, split: str) -> list[Program]:
     return [parse(each.text) for shard in shards for each in read_samples(shard) if each.kit == category]
 
 
-def _pictures(programs: list[Program]) -> list[tuple[str, bytes]]:
+def _pictures(samples: Sequence[Sequence[Box]]) -> list[tuple[str, bytes]]:
     from eval.pictures import shape_picture
-    from stages.shapeassembly.interpreter import execute
-    from stages.shapeassembly.shape import shape_of_execution
+    from eval.programs import shape_of_boxes
 
-    return [("", shape_picture(shape_of_execution(execute(each)))) for each in programs]
+    return [("", shape_picture(shape_of_boxes(boxes))) for boxes in samples]
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -100,12 +144,9 @@ def _options(parser: ArgumentParser) -> None:
 
 
 TABLE = Evaluation(
-    question="Do programs that a model writes stand, can they be edited, how much do they vary, and how smoothly?",
+    question="Do shapes stand whose programs or cuboids a model writes, how much do they vary, can programs be edited?",
     needs=(PROGRAM_WRITERS, PROGRAMS),
-    seconds=lambda subject: sum(
-        each * len(weights_of_kind(subject.models, kind))
-        for kind, each in (("program_vae", 900.0), ("program_lm", 300.0))
-    ),
+    seconds=lambda subject: sum(each * len(weights_of_kind(subject.models, kind)) for kind, each in SECONDS.items()),
     answer=_answer,
     options=_options,
 )

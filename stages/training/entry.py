@@ -67,3 +67,9 @@ class KitModelEntry(ModelEntry):
     learns_from: ClassVar[Source] = "strings"
 
     kits: tuple[str, ...] = Field((), description="the kits that it is trained on, each by itself; all if empty")
+
+    @property
+    def prepared(self) -> dict[str, str]:
+        """What `prepare` is asked for, beside the samples of a kit: entries that ask for the same share what it
+        makes."""
+        return {}

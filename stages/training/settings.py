@@ -7,7 +7,9 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
+from stages.training.cuboid_rnn.settings import CuboidRnnEntry
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
+from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 from stages.training.program_lm.settings import ProgramLmEntry
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.recovery.settings import RecoveryEntry
@@ -16,7 +18,13 @@ from stages.training.string_vae.settings import StringVaeEntry
 __all__ = ["AnyEntry", "TrainingConfig"]
 
 AnyEntry = Annotated[
-    StringVaeEntry | EdgeCategoriesEntry | RecoveryEntry | ProgramVaeEntry | ProgramLmEntry,
+    StringVaeEntry
+    | EdgeCategoriesEntry
+    | RecoveryEntry
+    | ProgramVaeEntry
+    | ProgramLmEntry
+    | CuboidRnnEntry
+    | PartGraphVaeEntry,
     Field(discriminator="kind"),
 ]
 """An entry of any kind, which its key `kind` tells."""

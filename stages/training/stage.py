@@ -158,6 +158,7 @@ def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
         "job": "data",
         "kind": kind,
         "kit": kit,
+        **entry.prepared,
         "longest": plan.config.section(TrainingConfig).longest,
     }
     if entry.learns_from == "strings":
@@ -173,7 +174,9 @@ def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
             params |= {"edges": strings.edges, "strings": strings.strings_per_shape}
     exemplars = () if entry.learns_from == "programs" else (f"exemplars/{kit}",)
     inputs = (*exemplars, *(f"{stage}/{name}" for name in splits))
-    return Shard(f"{kit}-{kind}", {**params, "splits": splits}, inputs, (module_of(kind),))
+    return Shard(
+        "-".join((kit, kind, *entry.prepared.values())), {**params, "splits": splits}, inputs, (module_of(kind),)
+    )
 
 
 def _program_shards(plan: Plan, entry: RecoveryEntry, program: str) -> list[Shard]:

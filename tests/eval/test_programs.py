@@ -6,17 +6,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from eval.nearest import nearest
+from eval.program_tables import editability_table, quality_table, smoothness_table, variability_table
 from eval.programs import (
     POINTS,
+    boxes_of_programs,
     clouds_of,
-    editability_table,
     novelty,
     physics_of,
-    quality_table,
     smoothness,
-    smoothness_table,
+    unrejected,
     variability,
-    variability_table,
 )
 from eval.realism import Realism
 from stages.shapeassembly import parse
@@ -49,33 +48,36 @@ def test_nearest_is_the_nearest_by_trees() -> None:
 
 def test_physics_counts_what_is_rooted_and_what_of_it_stays_up() -> None:
     """The stool has two legs in a line."""
-    found = physics_of([*PROGRAMS, parse(FALLS), parse(FLOATS)])
+    found = physics_of(boxes_of_programs([*PROGRAMS, parse(FALLS), parse(FLOATS)]))
     assert (found.rooted, found.stable) == (75, 25)
 
 
 def test_a_cloud_lies_on_the_surface_and_what_train_has_is_not_new() -> None:
-    (cloud,) = clouds_of(PROGRAMS[:1])
+    (cloud,) = clouds_of(boxes_of_programs(PROGRAMS[:1]))
     assert cloud.shape == (POINTS, 3)
     np.testing.assert_allclose(np.abs(cloud - [0, -0.25, 0]).max(axis=1), 0.25)
     assert novelty(PROGRAMS, PROGRAMS[:1]) == 50
-    clouds = clouds_of(PROGRAMS)
-    found = variability(PROGRAMS, clouds, clouds[:1])
+    boxes = boxes_of_programs(PROGRAMS)
+    clouds = clouds_of(boxes)
+    found = variability(boxes, clouds, clouds[:1])
     assert (found.generalization, found.coverage, found.leaf_parts) == (0, 0, 4)
     assert found.variety > 0.05
-    assert variability(PROGRAMS, clouds, None).coverage == ""
+    assert variability(boxes, clouds, None).coverage == ""
 
 
 def test_steps_between_points_are_measured_and_tables_hold_the_published_rows() -> None:
     entry = ProgramVaeEntry(name="tiny", kind="program_vae", latent=8, hidden=16)
     module = new_model(entry, 0)
     model = TrainedProgramVae(module.eval(), {"settings": entry.model_dump()})
+    assert len(unrejected(model, 5, np.random.default_rng(0), 1.0)) == 5
+    boxes = boxes_of_programs(PROGRAMS)
     smooth = smoothness(model, 2, 5, np.random.default_rng(0))
     assert smooth[0] == "" or float(smooth[0]) >= 0
     tables = [
-        quality_table({"a": physics_of(PROGRAMS)}, {"a": Realism(20.0, 3.5)}, {"a": 12.5}),
+        quality_table({"a": physics_of(boxes)}, {"a": Realism(20.0, 3.5)}, {"a": 12.5}),
         editability_table({"a": PROGRAMS}),
-        variability_table({"a": variability(PROGRAMS, clouds_of(PROGRAMS), None)}, {"a": 50.0}),
+        variability_table({"a": variability(boxes, clouds_of(boxes), None)}, {"a": 50.0}),
         smoothness_table({"a": smooth}),
     ]
-    assert [len(each.published) for each in tables] == [12, 12, 12, 6]
+    assert [len(each.published) for each in tables] == [27, 12, 12, 6]
     assert all("chair, ShapeAssembly" in each.markdown() for each in tables)

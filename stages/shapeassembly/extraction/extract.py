@@ -80,6 +80,7 @@ class _Steps:
 
     shorten: bool
     arrange: bool
+    pool: bool
     groups: Groups
 
 
@@ -87,7 +88,7 @@ def _attempts(cleaning: Cleaning) -> list[_Steps]:
     """The steps that are wanted, then what is tried on a shape whose program fails by them: groups of parts attached to
     a common part, for more are made by macros; without shortening, for sunk ends may be what holds a shape together;
     without groups, for a part between two that a group makes of one may have nothing to stand on."""
-    asked = _Steps(cleaning.shorten, cleaning.arrange, "alike" if cleaning.group else "none")
+    asked = _Steps(cleaning.shorten, cleaning.arrange, cleaning.pool, "alike" if cleaning.group else "none")
     if not cleaning.group:
         return [asked]
     fewer = [replace(asked, groups="common"), replace(asked, groups="none")]
@@ -110,7 +111,7 @@ def _attempt(shape: _Shape, root: Part, rules: Rules, gates: Gates, steps: _Step
     root = frame_parts(arrange_parts(root, rules) if steps.arrange else root)
     if not root.children:
         raise Rejected("too few parts", f"{shape.name} is one box")
-    program = rounded(write_program(root, order_of(rules), steps.groups))
+    program = rounded(write_program(root, order_of(rules), steps.groups, steps.pool))
     named = set(program.named)
     leaves = sum(cuboid.name not in named for block in program.blocks for cuboid in block.cuboids)
     if leaves < gates.fewest_leaves:

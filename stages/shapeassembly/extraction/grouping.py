@@ -42,15 +42,17 @@ class _Formed:
     ends: frozenset[int]
 
 
-def form_groups(layout: Layout, order: Callable[[Part], Any], *, strict: bool) -> tuple[Layout, list[Symmetry | None]]:
+def form_groups(
+    layout: Layout, order: Callable[[Part], Any], *, strict: bool, pool: bool
+) -> tuple[Layout, list[Symmetry | None]]:
     """The layout of the parts that remain when groups are formed, and for each the macro that makes the others.
 
-    Connected components that repeat become one sub-part each, before groups of single parts are formed. `order` is
-    the key of the canonical order of parts; `strict`: the members of a group must be attached alike. A part with a
-    macro is anchored where its copies are attached too.
+    With `pool` connected components that repeat become one sub-part each, before groups of single parts are formed.
+    `order` is the key of the canonical order of parts; `strict`: the members of a group must be attached alike. A part
+    with a macro is anchored where its copies are attached too.
     """
     formed: list[_Formed] = []
-    while (pooled := _pool_components(layout, {id(each.part) for each in formed}, strict)) is not None:
+    while pool and (pooled := _pool_components(layout, {id(each.part) for each in formed}, strict)) is not None:
         parts, each = pooled
         formed.append(each)
         layout = lay_out(sorted(parts, key=order), layout.bbox.size)

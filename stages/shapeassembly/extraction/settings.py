@@ -86,6 +86,9 @@ class Cleaning(StrictModel):
         True, description="Nodes are flattened, collapsed and gathered by the rules of their category."
     )
     group: bool = Field(True, description="Parts that repeat are made by reflect and translate.")
+    pool: bool = Field(
+        True, description="Of parts that hang together and repeat together, one assembly is made before, and repeated."
+    )
 
 
 EVERY_STEP = Cleaning()

@@ -42,10 +42,10 @@ class _Node:
     expanded: dict[str, Part]
 
 
-def write_program(root: Part, order: Order, groups: Groups) -> Program:
+def write_program(root: Part, order: Order, groups: Groups, pool: bool) -> Program:
     """The program of an arranged hierarchy, root first, assemblies numbered in breadth-first order.
 
-    groups: which parts that repeat are made by macros.
+    groups: which parts that repeat are made by macros; pool: whether of what repeats together an assembly is made.
 
     Raises Rejected where the parts of a node do not hang together, or are too many.
     """
@@ -53,7 +53,7 @@ def write_program(root: Part, order: Order, groups: Groups) -> Program:
     waiting = deque([root])
     count = 0
     while waiting:
-        node = _write_node(waiting.popleft(), order, groups)
+        node = _write_node(waiting.popleft(), order, groups, pool)
         names = {}
         for name, part in node.expanded.items():
             count += 1
@@ -64,13 +64,15 @@ def write_program(root: Part, order: Order, groups: Groups) -> Program:
     return Program(tuple(blocks))
 
 
-def _write_node(part: Part, order: Order, groups: Groups) -> _Node:
+def _write_node(part: Part, order: Order, groups: Groups, pool: bool) -> _Node:
     children = sorted((localised(child, part.box) for child in part.children), key=order)
     if len(children) > MOST_CHILDREN:
         raise Rejected("too many parts", f"{len(children)} below {part.label!r}, at most {MOST_CHILDREN} are looked at")
     whole = lay_out(children, part.box.size)
     layout, symmetries = (
-        (whole, [None] * len(children)) if groups == "none" else form_groups(whole, order, strict=groups == "alike")
+        (whole, [None] * len(children))
+        if groups == "none"
+        else form_groups(whole, order, strict=groups == "alike", pool=pool)
     )
     if len(layout.parts) > MOST_CUBOIDS:
         raise Rejected("too many parts", f"{len(layout.parts)} below {part.label!r}, at most {MOST_CUBOIDS} are wanted")

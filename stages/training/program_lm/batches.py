@@ -64,16 +64,16 @@ class Texts:
 
 @dataclass(frozen=True)
 class Batch:
-    """words: int64 (n, longest); cues: int64 (n, longest, 4); seen: float (n, longest, SEEN); there: which words are,
-    bool (n, longest)."""
+    """words: int64 (n, longest); cues: int64 (n, longest, 4); seen: float (n, longest, SEEN); places: int64 (k,),
+    where in programs x longest the words are that a program has."""
 
     words: Tensor
     cues: Tensor
     seen: Tensor
-    there: Tensor
+    places: Tensor
 
     def to(self, device: torch.device) -> Batch:
-        return Batch(**{name: tensor.to(device) for name, tensor in vars(self).items()})
+        return Batch(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
 
     @property
     def before(self) -> Tensor:
@@ -92,5 +92,5 @@ def batches(texts: Texts, size: int, rng: np.random.Generator | None) -> Iterato
             words=torch.from_numpy(texts.words[at].astype(np.int64)),
             cues=torch.from_numpy(texts.cues[at].astype(np.int64)),
             seen=torch.from_numpy(texts.seen[at]).view(*at.shape, SEEN),
-            there=torch.from_numpy(there),
+            places=torch.from_numpy(np.flatnonzero(there)),
         )

@@ -39,13 +39,13 @@ class ProgramLm(nn.Module):
         self.barred: Tensor
         self.register_buffer("barred", torch.from_numpy(~words_of_fields()), persistent=False)
 
-    def forward(self, before: Tensor, cues: Tensor, seen: Tensor, there: Tensor) -> Tensor:
-        """Logits float (k, WORDS) of the words that are `there`, bool (n, longest), from the words before each, int64
-        (n, longest), and what is known of each, int64 (n, longest, 4) and float (n, longest, SEEN)."""
+    def forward(self, before: Tensor, cues: Tensor, seen: Tensor, places: Tensor) -> Tensor:
+        """Logits float (k, WORDS) of the words at `places` in programs x longest, int64 (k,), from the words before
+        each, int64 (n, longest), and what is known of each, int64 (n, longest, 4) and float (n, longest, SEEN)."""
         states = self._embedded(before, cues, seen, torch.arange(before.shape[1], device=before.device))
         for block in self.blocks:
             states, _, _ = block(states, None)
-        return self._said(states[there], cues[there])
+        return self._said(states.flatten(0, 1)[places], cues.flatten(0, 1)[places])
 
     def start(self, count: int) -> Cache:
         """The cache of so many programs."""

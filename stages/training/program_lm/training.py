@@ -87,11 +87,11 @@ class ProgramLmLearner:
         return sums
 
     def _nats(self, batch: Batch, before: Tensor) -> dict[str, Tensor]:
-        logits = self.module(before, batch.cues, batch.seen, batch.there)
-        words = batch.words[batch.there]
+        logits = self.module(before, batch.cues, batch.seen, batch.places)
+        words = batch.words.flatten()[batch.places]
         nats = cross_entropy(logits, words, reduction="none")
         loss = nats.sum() / len(batch.words)
-        return {"loss": loss, "numbers": nats[words >= FIRST_NUMBER].sum() / len(batch.words)}
+        return {"loss": loss, "numbers": (nats * (words >= FIRST_NUMBER)).sum() / len(batch.words)}
 
 
 def jittered(before: Tensor, share: float, noise: Generator) -> Tensor:

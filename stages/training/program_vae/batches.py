@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from stages.training.pooling import pooled
-from stages.training.program_vae.lines import CUBOID, DIMS, SLOTS, START, NodeLines
+from stages.training.program_vae.lines import COMMAND, CUBOID, DIMS, SLOTS, START, WIDTH, NodeLines
 
 __all__ = ["Level", "Programs", "batch_of", "batches"]
 
@@ -70,7 +70,10 @@ class Level:
 
     lines: float (n, longest, 63), nothing behind an end; lengths: int64 (n,), with the end; boxes: float (n, 3);
     sizes: float (n, 11, 3), of the bounding box and the cuboids declared; parents: int64 (n, 2), the row in the level
-    above and the line that each expands; of the root its own row; expanded: bool (n, longest), the lines that are.
+    above and the line that each expands; of the root its own row.
+    places: int64 (k,), where in rows x lines the lines stand, all of a command together and the commands in their
+    order; counts: how many there are of each; expanded: bool (cuboids,), which of the lines that declare one are
+    expanded, and opened: int64, which numbers they have among these. So no step has to wait for what the device counts.
     """
 
     lines: Tensor
@@ -78,15 +81,14 @@ class Level:
     boxes: Tensor
     sizes: Tensor
     parents: Tensor
+    places: Tensor
     expanded: Tensor
+    opened: Tensor
+    counts: tuple[int, ...]
 
     def to(self, device: torch.device) -> Level:
-        return Level(**{name: tensor.to(device) for name, tensor in vars(self).items()})
-
-    @property
-    def there(self) -> Tensor:
-        """Which lines are, bool (n, longest)."""
-        return torch.arange(self.lines.shape[1], device=self.lines.device) < self.lengths[:, None]
+        moved = {name: each.to(device, non_blocking=True) for name, each in vars(self).items() if name != "counts"}
+        return Level(**moved, counts=self.counts)
 
     @property
     def shown(self) -> Tensor:
@@ -132,11 +134,17 @@ def _level(
     row, line = np.nonzero(lines[..., CUBOID])
     slot = np.cumsum(lines[..., CUBOID], axis=1)[row, line].astype(np.int64)
     sizes[row, slot] = lines[row, line, DIMS]
+    flat = np.flatnonzero(there)
+    kinds = lines.reshape(-1, WIDTH)[flat, COMMAND].argmax(axis=1)
+    opens = expanded[row, line]
     return Level(
         lines=torch.from_numpy(lines),
         lengths=torch.from_numpy(lengths),
         boxes=torch.from_numpy(programs.boxes[nodes]),
         sizes=torch.from_numpy(sizes),
         parents=torch.from_numpy(parents),
-        expanded=torch.from_numpy(expanded),
+        places=torch.from_numpy(flat[np.argsort(kinds, kind="stable")]),
+        expanded=torch.from_numpy(opens),
+        opened=torch.from_numpy(np.flatnonzero(opens)),
+        counts=tuple(np.bincount(kinds, minlength=7).tolist()),
     ), expanded

@@ -6,17 +6,22 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.sample import read_samples
 from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.flattening import without_hierarchy
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.program import Program
+from stages.shapeassembly.transforms import unaligned, unordered, without_macros
 from stages.training.program_vae.batches import Programs
 from stages.training.program_vae.lines import NodeLines, node_lines
+from stages.training.program_vae.settings import Without
 
-__all__ = ["category_programs", "prepare_corpus", "read_corpus"]
+__all__ = ["category_programs", "prepare_corpus", "read_corpus", "told_without"]
 
 
 def prepare_corpus(task: Task) -> Outcome:
@@ -33,8 +38,8 @@ def prepare_corpus(task: Task) -> Outcome:
         kept: list[list[NodeLines]] = []
         for key, program in category_programs(task, split):
             try:
-                nodes = node_lines(program)
-            except ProgramError as error:
+                nodes = node_lines(told_without(program, params.get("without", "nothing"), task.rng("order", key)))
+            except (ProgramError, Rejected) as error:
                 task.reject(key, error.reason, str(error))
                 continue
             if sum(len(node.numbers) for node in nodes) > params["longest"]:
@@ -50,6 +55,17 @@ def prepare_corpus(task: Task) -> Outcome:
     with task.output(f"{name}.json") as stream:
         stream.write(json_bytes({"counts": counts}))
     return Outcome(samples=0, summary=counts)
+
+
+def told_without(program: Program, without: Without, rng: np.random.Generator) -> Program:
+    """The program without a part of the language. Raises ProgramError and Rejected where it cannot be told so."""
+    if without == "hierarchy":
+        return without_hierarchy(program)
+    if without == "macros":
+        return without_macros(program)
+    if without == "order":
+        return unordered(program, rng)
+    return unaligned(program) if without == "align" else program
 
 
 def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], dict[str, Programs]]:

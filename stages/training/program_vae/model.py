@@ -9,29 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
 from stages.training.program_vae.batches import Level
 from stages.training.program_vae.lines import SLOTS, WIDTH
 from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.standing import Standing
 
 __all__ = ["LineDecoder", "ProgramVae", "sizes_of"]
 
 COMMANDS = 7
 
 
-class ProgramVae(nn.Module):
-    """Programs to points of a latent space, and back to what a line decoder says of each line.
-
-    `centre` (latent,) and `spread` (latent, latent) say where programs stand: centre + spread @ noise; the prior as
-    long as nothing has been learnt.
-    """
+class ProgramVae(Standing):
+    """Programs to points of a latent space, and back to what a line decoder says of each line."""
 
     def __init__(self, entry: ProgramVaeEntry) -> None:
-        super().__init__()
+        super().__init__(entry.latent)
         hidden, latent = entry.hidden, entry.latent
         self.read_line = nn.Linear(WIDTH + 3, hidden)
         self.read_child = nn.Linear(hidden, hidden)
@@ -42,20 +37,6 @@ class ProgramVae(nn.Module):
         self.first = nn.Linear(latent, hidden)
         self.writer = nn.GRU(WIDTH, hidden, batch_first=True)
         self.lines = LineDecoder(hidden, latent)
-        self.centre: Tensor
-        self.spread: Tensor
-        self.register_buffer("centre", torch.zeros(latent))
-        self.register_buffer("spread", torch.eye(latent))
-
-    def stand_at(self, means: npt.NDArray[np.float32], variances: npt.NDArray[np.float32]) -> None:
-        """Say where programs stand, of which `encode` says these means and variances, float32 (n, latent) each: as the
-        Gaussian with the mean and the covariance of all of them together."""
-        if not (np.isfinite(means).all() and np.isfinite(variances).all()):
-            return  # the training has run away, which whoever trains tells
-        covariance = np.cov(means.T.astype(np.float64), bias=True).reshape(2 * [means.shape[1]])
-        values, axes = np.linalg.eigh(covariance + np.diag(variances.mean(axis=0, dtype=np.float64)))
-        self.centre.copy_(torch.from_numpy(means.mean(axis=0, dtype=np.float64)))
-        self.spread.copy_(torch.from_numpy(axes * np.sqrt(np.maximum(values, 0.0))))
 
     def encode(self, levels: Sequence[Level]) -> tuple[Tensor, Tensor]:
         """Mean and logarithm of the variance, float (programs, latent) each."""
@@ -69,7 +50,7 @@ class ProgramVae(nn.Module):
                 children = self.read_child(codes)
                 seen = seen.index_put((below[:, 0], below[:, 1]), children, accumulate=True)
             read, _ = self.reader(seen)
-            codes = torch.take_along_dim(read, level.lengths[:, None, None] - 1, dim=1)[:, 0]
+            codes = read[torch.arange(len(read), device=read.device), level.lengths - 1]
         assert codes is not None
         return self.mean(codes), self.log_variance(codes)
 

@@ -8,7 +8,10 @@ from pydantic import Field
 
 from stages.training.entry import KitModelEntry, Source
 
-__all__ = ["ProgramVaeEntry"]
+__all__ = ["ProgramVaeEntry", "Without"]
+
+Without = Literal["nothing", "hierarchy", "macros", "order", "align"]
+"""What of the language programs are without (shapeassembly §7.1.1)."""
 
 
 class ProgramVaeEntry(KitModelEntry):
@@ -18,6 +21,12 @@ class ProgramVaeEntry(KitModelEntry):
     learns_from: ClassVar[Source] = "programs"
 
     kind: Literal["program_vae"] = Field(description="a variational autoencoder of ShapeAssembly programs")
+    without: Without = Field(
+        "nothing",
+        description="what of the language it learns without: `hierarchy`, programs of one assembly, extracted again "
+        "from the cuboids; `macros`, cuboids and attachments alone; `order`, lines in random order; `align`, no cuboid "
+        "is aligned",
+    )
     latent: int = Field(256, ge=1, le=4096, description="dimensions of the latent space, and of the code of a node")
     hidden: int = Field(256, ge=2, le=8192, description="size of the GRUs and of the layers of the line decoder")
     number_weight: float = Field(
@@ -29,3 +38,7 @@ class ProgramVaeEntry(KitModelEntry):
         description="numbers of the forward pass; its many small layers gain nothing from bfloat16 and lose by turning "
         "numbers into it; `auto`: bfloat16 where the processor or the GPU reckons with it",
     )
+
+    @property
+    def prepared(self) -> dict[str, str]:
+        return {} if self.without == "nothing" else {"without": self.without}

@@ -16,7 +16,8 @@ from stages.training.program_vae.batches import Programs, batch_of
 from stages.training.program_vae.lines import node_lines
 from stages.training.program_vae.model import ProgramVae
 from stages.training.program_vae.settings import ProgramVaeEntry
-from stages.training.program_vae.writing import Points, write_programs
+from stages.training.program_vae.writing import write_programs
+from stages.training.standing import Points
 
 __all__ = ["TrainedProgramVae", "load_program_vae"]
 
@@ -52,11 +53,8 @@ class TrainedProgramVae:
         return found
 
     def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> Points:
-        """Random points, float32 (count, latent), of the Gaussian that the programs of train are spread as, which the
-        prior is not quite: from the prior come crude shapes. temperature: how far from its centre they spread."""
-        noise = temperature * rng.standard_normal((count, self.latent))
-        found: Points = (self.module.centre.numpy() + noise @ self.module.spread.numpy().T).astype(np.float32)
-        return found
+        """Random points, float32 (count, latent), of where programs stand, as `Standing.points`."""
+        return self.module.points(count, rng, temperature)
 
     def sample(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> tuple[list[Program], int]:
         """So many programs of random `points`, and how many it took: those that are rejected count too. Raises

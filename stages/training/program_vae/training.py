@@ -39,9 +39,6 @@ from stages.training.program_vae.settings import ProgramVaeEntry
 
 __all__ = ["ProgramVaeLearner", "entry", "learner", "new_model", "prepare"]
 
-NAMED = {ATTACH: 2, SQUEEZE: 3, TRANSLATE: 1, REFLECT: 1}
-"""How many cuboids a line of each command names."""
-
 
 def prepare(task: Task) -> Outcome:
     """The programs of a category, as numbers."""
@@ -120,53 +117,59 @@ def reconstruction(module: ProgramVae, levels: Sequence[Level], codes: Tensor) -
     """Sums over all programs, whose roots have `codes`: nats of choices, and absolute errors of numbers."""
     nats = codes.new_zeros(())
     errors = (module.root_box(codes) - levels[0].boxes).abs().sum()
-    for depth, level in enumerate(levels):
+    for level in levels:
         states, _ = module.write(level.shown, module.start(codes))
-        more = _line_losses(module, level, states)
+        more, below = _line_losses(module, level, states, codes)
         nats, errors = nats + more[0], errors + more[1]
-        row, line = (level.lines[..., CUBOID] > 0).nonzero(as_tuple=True)
-        flags, below = module.lines.child(states[row, line], level.lines[row, line, DIMS], codes[row])
-        expanded = level.expanded[row, line]
-        nats = nats + binary_cross_entropy_with_logits(flags.float(), expanded.float(), reduction="sum")
-        if depth + 1 < len(levels):
-            # Rows and lines are in one order here and in the level below.
-            codes = below[expanded]
+        # Rows and lines are in one order here and in the level below.
+        codes = below[level.opened]
     return nats, errors
 
 
-def _line_losses(module: ProgramVae, level: Level, states: Tensor) -> tuple[Tensor, Tensor]:
-    """Nats and errors of all lines of a level, summed."""
-    heads = module.lines
-    row, line = level.there.nonzero(as_tuple=True)
-    lines, boxes, sizes, state = level.lines[row, line], level.boxes[row], level.sizes[row], states[row, line]
+def _line_losses(
+    module: ProgramVae, level: Level, states: Tensor, codes: Tensor
+) -> tuple[tuple[Tensor, Tensor], Tensor]:
+    """Nats and errors of all lines of a level, summed, and what the model would expand each cuboid of it by, float
+    (cuboids, latent). Lines of one command stand together, so that its head reads a slice."""
+    heads, counts = module.lines, level.counts
+    rows = level.places // level.lines.shape[1]
+    lines, state = level.lines.flatten(0, 1)[level.places], states.flatten(0, 1)[level.places]
+    boxes, sizes = level.boxes[rows], level.sizes[rows]
     commands = lines[:, COMMAND]
-    kind = commands.argmax(dim=-1)
-    nats = _nats(heads.command(state, boxes), kind)
-    errors = nats.new_zeros(())
+    nats = _nats(heads.command(state, boxes), commands.argmax(dim=-1))
+    ends = np.cumsum(counts).tolist()
+    cuboid, attach, squeeze, translate, reflect = (
+        slice(ends[each] - counts[each], ends[each]) for each in (CUBOID, ATTACH, SQUEEZE, TRANSLATE, REFLECT)
+    )
     slots = lines[:, INDICES].view(-1, 3, SLOTS)
-    named = torch.tensor([NAMED.get(each, 0) for each in range(7)], device=kind.device)[kind]
-    logits = heads.indices(state[named > 0], commands[named > 0])
-    for place in range(3):
-        at = named > place
-        nats = nats + _nats(logits[at[named > 0], place], slots[at, place].argmax(dim=-1))
-    at = kind == CUBOID
-    dims, aligned = heads.cuboid(state[at], boxes[at])
-    nats = nats + binary_cross_entropy_with_logits(aligned.float(), lines[at, ALIGNED][:, 0], reduction="sum")
-    errors = errors + (dims - lines[at, DIMS]).abs().sum()
-    at = kind == ATTACH
-    two = slots[at, :2]
-    errors = errors + (heads.attach(state[at], two, sizes_of(two, sizes[at])) - lines[at, POINTS]).abs().sum()
-    at = kind == SQUEEZE
-    faces, place_on = heads.squeeze(state[at], slots[at], sizes_of(slots[at], sizes[at]))
-    nats = nats + _nats(faces, lines[at, FACE].argmax(dim=-1))
-    errors = errors + (place_on - lines[at, UV]).abs().sum()
-    at = (kind == TRANSLATE) | (kind == REFLECT)
-    one = slots[at, 0]
-    axes, copies = heads.symmetry(state[at], one, sizes_of(one[:, None], sizes[at])[:, 0], boxes[at])
-    nats = nats + _nats(axes, lines[at, AXIS].argmax(dim=-1))
-    translated = kind[at] == TRANSLATE
-    return nats, errors + (copies[translated] - lines[at, COPIES][translated]).abs().sum()
+    logits = heads.indices(state[attach.start :], commands[attach.start :])
+    # Behind the attachments stand the squeezes, which alone name three cuboids, and what names but one.
+    for place, last in enumerate((reflect.stop, squeeze.stop, squeeze.stop)):
+        named = slice(squeeze.start if place == 2 else attach.start, last)
+        chosen = slots[named, place].argmax(dim=-1)
+        nats = nats + _nats(logits[named.start - attach.start : last - attach.start, place], chosen)
+    dims, aligned = heads.cuboid(state[cuboid], boxes[cuboid])
+    nats = nats + _flag_nats(aligned, lines[cuboid, ALIGNED][:, 0])
+    errors = (dims - lines[cuboid, DIMS]).abs().sum()
+    expanded, below = heads.child(state[cuboid], lines[cuboid, DIMS], codes[rows[cuboid]])
+    nats = nats + _flag_nats(expanded, level.expanded)
+    two = slots[attach, :2]
+    points = heads.attach(state[attach], two, sizes_of(two, sizes[attach]))
+    errors = errors + (points - lines[attach, POINTS]).abs().sum()
+    faces, place_on = heads.squeeze(state[squeeze], slots[squeeze], sizes_of(slots[squeeze], sizes[squeeze]))
+    nats = nats + _nats(faces, lines[squeeze, FACE].argmax(dim=-1))
+    errors = errors + (place_on - lines[squeeze, UV]).abs().sum()
+    macros = slice(translate.start, reflect.stop)
+    one = slots[macros, 0]
+    axes, copies = heads.symmetry(state[macros], one, sizes_of(one[:, None], sizes[macros])[:, 0], boxes[macros])
+    nats = nats + _nats(axes, lines[macros, AXIS].argmax(dim=-1))
+    errors = errors + (copies[: counts[TRANSLATE]] - lines[translate, COPIES]).abs().sum()
+    return (nats, errors), below
 
 
 def _nats(logits: Tensor, chosen: Tensor) -> Tensor:
     return cross_entropy(logits.float(), chosen, reduction="sum")
+
+
+def _flag_nats(logits: Tensor, flags: Tensor) -> Tensor:
+    return binary_cross_entropy_with_logits(logits.float(), flags.float(), reduction="sum")

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 
@@ -32,11 +31,9 @@ from stages.training.program_vae.lines import (
     WIDTH,
 )
 from stages.training.program_vae.model import ProgramVae
+from stages.training.standing import Points
 
-__all__ = ["Points", "write_programs"]
-
-Points = npt.NDArray[np.float32]
-"""Points of the latent space, float32 (n, latent)."""
+__all__ = ["write_programs"]
 
 TRIES = 4
 """Lines of each command that are tried where one breaks a rule."""

@@ -35,12 +35,13 @@ def trained(module: ProgramLm, nucleus: float) -> TrainedProgramLm:
 
 def test_a_batch_holds_each_program_behind_its_start() -> None:
     (batch,) = batches(TEXTS, 2, None)
-    assert batch.there.sum(dim=1).tolist() == [len(each.words) for each in READ]
+    rows = (batch.places // batch.words.shape[1]).tolist()
+    assert [rows.count(row) for row in range(2)] == [len(each.words) for each in READ]
     for row, each in enumerate(READ):
-        np.testing.assert_array_equal(batch.words[row][batch.there[row]], each.words)
+        np.testing.assert_array_equal(batch.words[row, : len(each.words)], each.words)
         assert batch.before[row, 0] == START
         assert batch.before[row, 1] == each.words[0]
-        np.testing.assert_array_equal(batch.cues[row][batch.there[row]], each.cues)
+        np.testing.assert_array_equal(batch.cues[row, : len(each.words)], each.cues)
 
 
 @torch.no_grad()
@@ -48,7 +49,7 @@ def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and
     module = new_model(ENTRY, VALUES, LONGEST, 1)
     (batch,) = batches(TEXTS, 2, None)
     whole = torch.zeros(*batch.words.shape, WORDS)
-    whole[batch.there] = module(batch.before, batch.cues, batch.seen, batch.there)
+    whole.flatten(0, 1)[batch.places] = module(batch.before, batch.cues, batch.seen, batch.places)
     cache = module.start(2)
     # The second program is ahead of the first; the first goes back once, over places that hold other words.
     for first, second in [(0, 0), (1, 1), (2, 2), (3, 3), (1, 4), (2, 5), (3, 6), (4, 7)]:

@@ -10,6 +10,7 @@ from stages.training.program_vae.batches import Programs, batch_of, batches
 from stages.training.program_vae.lines import (
     ALIGNED,
     AXIS,
+    COMMAND,
     COPIES,
     DIMS,
     FACE,
@@ -71,9 +72,13 @@ def test_levels_hold_the_assemblies_of_one_depth_and_know_where_they_stand() -> 
     roots, below = batch_of(programs, np.array([1, 0]))
     assert roots.lengths.tolist() == [7, 3]
     assert not roots.lines[1, 3:].any()
-    assert roots.there.sum() == 10
+    assert len(roots.places) == sum(roots.counts) == 10
+    commands = roots.lines.flatten(0, 1)[roots.places, COMMAND].argmax(dim=-1).tolist()
+    assert commands == sorted(commands)
+    assert [commands.count(each) for each in range(7)] == list(roots.counts)
     assert below.parents.tolist() == [[0, 0]]
-    assert roots.expanded.nonzero().tolist() == [[0, 0]]
+    assert roots.expanded.tolist() == [True, False, False]
+    assert roots.opened.tolist() == [0]
     np.testing.assert_allclose(roots.sizes[0, :3], [[1.0, 1.2, 0.8], [0.9, 0.5, 0.7], [0.4, 0.1, 0.3]])
     assert roots.shown[0, 0].nonzero().flatten().tolist() == [0]
     assert (roots.shown[:, 1:] == roots.lines[:, :-1]).all()

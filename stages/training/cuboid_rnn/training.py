@@ -1,0 +1,86 @@
+"""How a network of cuboids learns: nats of each step after those before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Generator, Tensor
+from torch.nn.functional import cross_entropy
+
+from pipeline.places import file_digest
+from pipeline.stage import Outcome, Task
+from stages.training.cuboid_rnn.batches import Batch, Cuboids, batches
+from stages.training.cuboid_rnn.corpus import prepare_corpus, read_corpus
+from stages.training.cuboid_rnn.model import CuboidRnn, density
+from stages.training.cuboid_rnn.settings import CuboidRnnEntry
+from stages.training.loop import device_of
+
+__all__ = ["CuboidRnnLearner", "entry", "learner", "new_model", "prepare"]
+
+
+def prepare(task: Task) -> Outcome:
+    """The shapes of a category, as sequences of cuboids."""
+    return prepare_corpus(task)
+
+
+def entry(settings: Mapping[str, Any]) -> CuboidRnnEntry:
+    """The entry whose JSON is `settings`."""
+    return CuboidRnnEntry.model_validate(settings)
+
+
+def learner(task: Task, entry: CuboidRnnEntry, seed: int) -> CuboidRnnLearner:
+    """A model with fresh weights beside the shapes of its category."""
+    data = task.shard.params["data"]
+    described, cuboids = read_corpus(task, data)
+    sources = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
+    header = {**described, "data": {split: file_digest(path) for split, path in sources.items()}}
+    module = new_model(entry, seed).to(device_of(entry.device))
+    return CuboidRnnLearner(module, header, entry, cuboids["train"], cuboids["val"])
+
+
+def new_model(entry: CuboidRnnEntry, seed: int) -> CuboidRnn:
+    """A model with random weights, by its seed alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return CuboidRnn(entry)
+
+
+@dataclass(frozen=True)
+class CuboidRnnLearner:
+    """The `Learner` of a network of cuboids."""
+
+    module: CuboidRnn
+    header: Mapping[str, Any]
+    entry: CuboidRnnEntry
+    train: Cuboids
+    val: Cuboids
+
+    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+        """Random batches of train, one pass after another."""
+        device = next(self.module.parameters()).device
+        while True:
+            for batch in batches(self.train, self.entry.batch, rng):
+                yield batch.to(device)
+
+    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+        """Means over shapes: nats of the numbers, which may be negative, for they are densities, and of the kinds."""
+        states, _ = self.module.read(batch.shown)
+        gaussians = self.module.numbers(states, batch.flags)
+        numbers = -(density(*gaussians, batch.numbers, batch.flags[..., 1]) * batch.there).sum() / len(batch.shown)
+        logits = self.module.kinds(states[:, ::3]).float()
+        said = cross_entropy(logits.flatten(0, 1), batch.kinds.flatten(), reduction="none")
+        kinds = (said * batch.asked.flatten()).sum() / len(batch.shown)
+        return {"loss": numbers + kinds, "numbers": numbers, "kinds": kinds}
+
+    def validate(self, noise: Generator) -> dict[str, float]:
+        """The same on val."""
+        sums: dict[str, float] = {}
+        device = next(self.module.parameters()).device
+        for batch in batches(self.val, self.entry.batch, None):
+            for name, value in self.losses(batch.to(device), 0, noise).items():
+                sums[name] = sums.get(name, 0.0) + float(value) * len(batch.shown) / len(self.val)
+        return sums

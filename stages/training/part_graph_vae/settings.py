@@ -1,0 +1,32 @@
+"""What the config says of a VAE of part graphs."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from stages.training.entry import KitModelEntry, Source
+
+__all__ = ["PartGraphVaeEntry"]
+
+
+class PartGraphVaeEntry(KitModelEntry):
+    """A VAE of the part graphs that ShapeAssembly programs make: a baseline that knows parts of parts and what touches,
+    and no attachments. Its kits are the names of `shapeassembly.programs` and `shapeassembly.hierarchies`."""
+
+    learns_from: ClassVar[Source] = "programs"
+
+    kind: Literal["part_graph_vae"] = Field(description="a VAE of graphs of parts, in the way of StructureNet")
+    latent: int = Field(256, ge=1, le=4096, description="dimensions of the latent space")
+    hidden: int = Field(256, ge=2, le=8192, description="numbers that stand for a part")
+    rounds_of_messages: int = Field(2, ge=0, le=16, description="how often parts hear of those that they touch")
+    number_weight: float = Field(
+        50.0, ge=0, le=10_000, description="weight of the absolute error of numbers, beside the nats of choices"
+    )
+    kl_weight: float = Field(0.1, ge=0, le=10, description="weight of the divergence from the prior, in nats")
+    precision: Literal["auto", "float32", "bfloat16"] = Field(
+        "float32",
+        description="numbers of the forward pass; its many small layers gain nothing from bfloat16; `auto`: bfloat16 "
+        "where the processor or the GPU reckons with it",
+    )

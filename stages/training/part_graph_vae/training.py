@@ -1,0 +1,112 @@
+"""How a VAE of part graphs learns: by the parts of each node in the order of its program, so that none has to be
+assigned, for which StructureNet looks for the cheapest assignment of unordered ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Generator, Tensor
+from torch.nn.functional import binary_cross_entropy_with_logits
+
+from pipeline.places import file_digest
+from pipeline.stage import Outcome, Task
+from stages.training.loop import device_of
+from stages.training.part_graph_vae.batches import Batch, Graphs, batches
+from stages.training.part_graph_vae.corpus import prepare_corpus, read_corpus
+from stages.training.part_graph_vae.model import PartGraphVae
+from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+
+__all__ = ["PartGraphVaeLearner", "entry", "learner", "new_model", "prepare"]
+
+
+def prepare(task: Task) -> Outcome:
+    """The shapes of a category, as graphs of parts."""
+    return prepare_corpus(task)
+
+
+def entry(settings: Mapping[str, Any]) -> PartGraphVaeEntry:
+    """The entry whose JSON is `settings`."""
+    return PartGraphVaeEntry.model_validate(settings)
+
+
+def learner(task: Task, entry: PartGraphVaeEntry, seed: int) -> PartGraphVaeLearner:
+    """A model with fresh weights beside the shapes of its category."""
+    data = task.shard.params["data"]
+    described, graphs = read_corpus(task, data)
+    sources = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
+    header = {**described, "data": {split: file_digest(path) for split, path in sources.items()}}
+    module = new_model(entry, seed).to(device_of(entry.device))
+    return PartGraphVaeLearner(module, header, entry, graphs["train"], graphs["val"])
+
+
+def new_model(entry: PartGraphVaeEntry, seed: int) -> PartGraphVae:
+    """A model with random weights, by its seed alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return PartGraphVae(entry)
+
+
+@dataclass(frozen=True)
+class PartGraphVaeLearner:
+    """The `Learner` of a VAE of part graphs."""
+
+    module: PartGraphVae
+    header: Mapping[str, Any]
+    entry: PartGraphVaeEntry
+    train: Graphs
+    val: Graphs
+
+    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+        """Random batches of train, one pass after another."""
+        device = next(self.module.parameters()).device
+        while True:
+            for levels in batches(self.train, self.entry.batch, rng):
+                yield [level.to(device) for level in levels]
+
+    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+        """Means over shapes: nats of what is there, has parts and touches, absolute errors of the numbers of boxes, and
+        the divergence from the prior."""
+        mean, log_variance = self.module.encode(batch)
+        spread = torch.randn(mean.shape, generator=noise, device=mean.device)
+        points = mean + torch.exp(0.5 * log_variance) * spread
+        divergence = 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum() / len(mean)
+        nats, errors = (each / len(mean) for each in reconstruction(self.module, batch, points))
+        loss = nats + self.entry.number_weight * errors + self.entry.kl_weight * divergence
+        return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
+
+    def validate(self, noise: Generator) -> dict[str, float]:
+        """The same on val; and the module learns where the shapes of train stand."""
+        sums: dict[str, float] = {}
+        device = next(self.module.parameters()).device
+        codes = []
+        for levels in batches(self.train, self.entry.batch, None):
+            mean, log_variance = self.module.encode([level.to(device) for level in levels])
+            codes.append(torch.stack([mean, log_variance.exp()]).detach().float().cpu().numpy())
+        self.module.stand_at(*np.concatenate(codes, axis=1))
+        for levels in batches(self.val, self.entry.batch, None):
+            found = self.losses([level.to(device) for level in levels], 0, noise)
+            for name, value in found.items():
+                sums[name] = sums.get(name, 0.0) + float(value) * len(levels[0].boxes) / len(self.val)
+        return sums
+
+
+def reconstruction(module: PartGraphVae, levels: Batch, points: Tensor) -> tuple[Tensor, Tensor]:
+    """Sums over all shapes at these points of the latent space: nats of choices, and absolute errors of numbers."""
+    nats, errors = points.new_zeros(()), points.new_zeros(())
+    codes = module.root(points)
+    for level in levels:
+        said = module.decode(codes)
+        both = torch.triu(level.there[:, :, None] * level.there[:, None], diagonal=1)
+        nats = nats + _nats(said.there, level.there, None) + _nats(said.inner, level.inner, level.there)
+        nats = nats + _nats(said.touching, level.touching, both)
+        errors = errors + ((said.boxes - level.boxes).abs().sum(dim=-1) * level.there).sum()
+        codes = said.codes.flatten(0, 1)[level.opened]
+    return nats, errors
+
+
+def _nats(logits: Tensor, flags: Tensor, weights: Tensor | None) -> Tensor:
+    return binary_cross_entropy_with_logits(logits.float(), flags, weight=weights, reduction="sum")

@@ -1,0 +1,103 @@
+"""Shapes as sequences of cuboids, and the network that learns to write them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from stages.shapeassembly import execute, parse
+from stages.shapeassembly.extraction.boxes import box_corners, same_box
+from stages.shapeassembly.extraction.validity import boxes_of
+from stages.training.boxes import box_of_numbers, numbers_of_box
+from stages.training.cuboid_rnn.batches import END, Cuboids, batch_of
+from stages.training.cuboid_rnn.corpus import mirrored, rows_of
+from stages.training.cuboid_rnn.model import density
+from stages.training.cuboid_rnn.settings import CuboidRnnEntry
+from stages.training.cuboid_rnn.trained import TrainedCuboidRnn
+from stages.training.cuboid_rnn.training import CuboidRnnLearner, new_model
+from tests.stages.training.program_vae.test_lines import BOX, STOOL
+
+TWO_LEGS = """Assembly P { bbox = Cuboid(1.0, 1.0, 0.4, True)
+top = Cuboid(1.0, 0.1, 0.4, True) leg = Cuboid(0.1, 0.9, 0.1, False)
+attach(top, bbox, 0.5, 1.0, 0.5, 0.5, 1.0, 0.5) attach(leg, bbox, 0.5, 0.0, 0.5, 0.05, 0.0, 0.5)
+attach(leg, top, 0.5, 1.0, 0.5, 0.2, 0.0, 0.5) reflect(leg, X) }"""
+ENTRY = CuboidRnnEntry(name="tiny", kind="cuboid_rnn", hidden=48, mixtures=3, batch=2)
+
+
+@pytest.mark.parametrize("text", [BOX, STOOL, TWO_LEGS])
+def test_cuboids_come_back_from_their_numbers(text: str) -> None:
+    for box in boxes_of(execute(parse(text))):
+        again = box_of_numbers(numbers_of_box(box))
+        assert same_box(box_corners(box), box_corners(again), 1e-6)
+
+
+def test_what_is_there_mirrored_is_said_once_and_the_lowest_first() -> None:
+    boxes = boxes_of(execute(parse(TWO_LEGS)))
+    rows = rows_of(boxes)
+    assert rows[:, 9].tolist() == [1, 0]
+    assert (rows[0, 6:9] != 0).any(), "the leg leans"
+    told = [box_of_numbers(row) for row in (*rows[:, :9], *mirrored(rows[:1, :9]))]
+    for box in boxes:
+        assert any(same_box(box_corners(box), box_corners(each), 1e-3) for each in told)
+
+
+def test_a_batch_says_axis_after_axis_and_what_stood_before() -> None:
+    rows = rows_of(boxes_of(execute(parse(TWO_LEGS))))
+    cuboids = Cuboids.of([rows, rows[1:]])
+    batch = batch_of(cuboids, np.array([0, 1]))
+    assert batch.numbers.shape == (2, 9, 3)
+    np.testing.assert_allclose(batch.numbers[0, :6].reshape(2, 3, 3).mT.flatten(1), rows[:, :9], atol=1e-6)
+    assert batch.kinds.tolist() == [[3, 0, END], [0, END, END]]
+    assert batch.flags[:, ::3].tolist() == [[[1, 1], [0, 0], [0, 0]], [[0, 0], [0, 0], [0, 0]]]
+    assert batch.there.sum(dim=1).tolist() == [6, 3]
+    assert batch.asked.sum(dim=1).tolist() == [3, 2]
+    assert not batch.shown[:, 0, :5].any()
+    assert (batch.shown[:, 1:, :3] == batch.numbers[:, :-1]).all()
+    assert (batch.shown[0, :, 5:].argmax(dim=-1) == torch.arange(9) % 3).all()
+
+
+def test_a_density_is_that_of_the_mixture_and_an_upright_cuboid_has_no_turn() -> None:
+    generator = torch.Generator().manual_seed(0)
+    weights = torch.randn(1, 1, 2, generator=generator)
+    means, numbers = torch.randn(1, 1, 2, 3, generator=generator), torch.randn(1, 1, 3, generator=generator)
+    wide = torch.full((1, 1, 2, 3), 0.5)
+    each = torch.distributions.Normal(means, wide).log_prob(numbers[:, :, None]).exp()
+    shares = weights.softmax(dim=-1)
+    for turned, some in ((0.0, each[..., :2]), (1.0, each)):
+        wanted = (shares * some.prod(dim=-1)).sum(dim=-1).log()
+        torch.testing.assert_close(density(weights, means, wide, numbers, torch.full((1, 1), turned)), wanted)
+
+
+def test_a_network_learns_two_shapes_and_writes_them() -> None:
+    shapes = [rows_of(boxes_of(execute(parse(text)))) for text in (BOX, TWO_LEGS)]
+    cuboids = Cuboids.of(shapes)
+    learner = CuboidRnnLearner(new_model(ENTRY, 0), {}, ENTRY, cuboids, cuboids)
+    optimizer = torch.optim.Adam(learner.module.parameters(), lr=4e-3)
+    noise = torch.Generator().manual_seed(0)
+    stream = learner.batches(np.random.default_rng(0))
+    for step in range(400):
+        optimizer.param_groups[0]["lr"] = 8e-3 * (1 - step / 400)
+        optimizer.zero_grad()
+        torch.autograd.backward(learner.losses(next(stream), step, noise)["loss"])
+        torch.nn.utils.clip_grad_norm_(learner.module.parameters(), 1.0)
+        optimizer.step()
+    with torch.no_grad():
+        learner.validate(noise)
+    model = TrainedCuboidRnn(learner.module.eval(), {})
+    found, begun = model.sample(20, np.random.default_rng(0), 0.0)
+    assert begun >= 20
+    wanted = [boxes_of(execute(parse(text))) for text in (BOX, TWO_LEGS)]
+    alike = [
+        sum(
+            len(each) == len(boxes)
+            and all(any(same_box(box_corners(a), box_corners(b), 0.1) for b in each) for a in boxes)
+            for each in found
+        )
+        for boxes in wanted
+    ]
+    assert sum(alike) >= 16
+    assert min(alike) >= 3
+    again, _ = model.sample(20, np.random.default_rng(0), 0.0)
+    for one, two in zip(found, again, strict=True):
+        np.testing.assert_array_equal([each.center for each in one], [each.center for each in two])

@@ -1,0 +1,75 @@
+"""Shapes as graphs of parts, and the VAE that learns to write them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from pipeline.errors import Rejected
+from stages.shapeassembly import execute, parse
+from stages.shapeassembly.extraction.boxes import box_corners, same_box
+from stages.shapeassembly.extraction.validity import boxes_of
+from stages.training.part_graph_vae.batches import Graphs, batch_of
+from stages.training.part_graph_vae.corpus import nodes_of
+from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.training.part_graph_vae.trained import TrainedPartGraphVae
+from stages.training.part_graph_vae.training import PartGraphVaeLearner, new_model, reconstruction
+from tests.stages.training.program_vae.test_lines import BOX, STOOL
+
+ENTRY = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=48, batch=2, kl_weight=0.0)
+GRAPHS = Graphs.of([nodes_of(execute(parse(text))) for text in (BOX, STOOL)])
+
+
+def test_nodes_are_the_assemblies_and_their_parts_the_cuboids_and_copies() -> None:
+    """The stool has its two legs in an assembly of their own, and a top with four copies."""
+    nodes = nodes_of(execute(parse(STOOL)))
+    assert [each.below.tolist() for each in nodes] == [[1, -1, -1, -1, -1, -1], [-1, -1]]
+    leaves = sum(int((each.below == -1).sum()) for each in nodes)
+    assert leaves == len(execute(parse(STOOL)))
+    for each in nodes:
+        assert (each.touching == each.touching.T).all()
+        assert not each.touching.diagonal().any()
+
+
+def test_a_node_with_too_many_parts_is_refused() -> None:
+    many = BOX[:-1] + "translate(c, X, 13, 0.5) }"
+    with pytest.raises(Rejected) as caught:
+        nodes_of(execute(parse(many)))
+    assert caught.value.reason == "too many parts"
+
+
+def test_losses_of_a_batch_are_those_of_its_shapes_one_by_one() -> None:
+    module = new_model(ENTRY, 1)
+    points = torch.randn(2, ENTRY.latent, generator=torch.Generator().manual_seed(0))
+    together = reconstruction(module, batch_of(GRAPHS, np.array([0, 1])), points)
+    alone = [reconstruction(module, batch_of(GRAPHS, np.array([row])), points[row : row + 1]) for row in (0, 1)]
+    for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
+        assert whole.item() == pytest.approx(sum(each.item() for each in parts), rel=1e-5)
+    means = module.encode(batch_of(GRAPHS, np.array([0, 1])))[0]
+    for row in (0, 1):
+        torch.testing.assert_close(module.encode(batch_of(GRAPHS, np.array([row])))[0][0], means[row])
+
+
+def test_a_model_learns_two_shapes_and_writes_them() -> None:
+    learner = PartGraphVaeLearner(new_model(ENTRY, 0), {}, ENTRY, GRAPHS, GRAPHS)
+    optimizer = torch.optim.Adam(learner.module.parameters(), lr=3e-3)
+    noise = torch.Generator().manual_seed(0)
+    stream = learner.batches(np.random.default_rng(0))
+    for step in range(250):
+        optimizer.zero_grad()
+        torch.autograd.backward(learner.losses(next(stream), step, noise)["loss"])
+        torch.nn.utils.clip_grad_norm_(learner.module.parameters(), 1.0)
+        optimizer.step()
+    with torch.no_grad():
+        learner.validate(noise)
+        means = learner.module.encode(batch_of(GRAPHS, np.array([0, 1])))[0].numpy()
+    model = TrainedPartGraphVae(learner.module.eval(), {})
+    for text, found in zip((BOX, STOOL), model.decode(means), strict=True):
+        wanted = boxes_of(execute(parse(text)))
+        assert len(found) == len(wanted)
+        for box in wanted:
+            assert any(same_box(box_corners(box), box_corners(each), 0.15) for each in found)
+    one, other = (model.sample(5, np.random.default_rng(0)) for _ in range(2))
+    assert one[1] == other[1] >= 5
+    assert all(np.array_equal(a[0].center, b[0].center) for a, b in zip(one[0], other[0], strict=True))
