@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from typing import get_args
 
 from eval.evaluation import Answer, Evaluation, Strip
 from eval.needs import CORPUS, KITS
 from eval.subject import Subject
+from stages.synthesis.settings import Way
 
 __all__ = ["TABLE"]
 
@@ -64,7 +66,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         for trained in [each for each in models if each.kit == name]:
             learnt_from = [line for line in train if trained.model.is_valid(line)]
             rng = dream_rng(seed, trained.folder)
-            drawn = sample(trained.model, "gaussian", learnt_from, DRAWS * asked.instantiated, rng)
+            drawn = sample(trained.model, asked.way, learnt_from, DRAWS * asked.instantiated, rng)
             written = [each.string for each in drawn if each.string is not None]
             dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
             if not dreamt:
@@ -95,6 +97,7 @@ def _seconds(subject: Subject) -> float:
 
 def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--instantiated", type=int, default=100, help="graphs of each kit and each model")
+    parser.add_argument("--way", choices=get_args(Way), default="gaussian", help="as in synthesis.sources")
     parser.add_argument("--parts", type=int, default=4000, help="parts put down at most for a graph")
 
 

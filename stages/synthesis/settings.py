@@ -9,7 +9,10 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 
-__all__ = ["DreamSplitConfig", "SourceConfig", "SynthesisConfig"]
+__all__ = ["DreamSplitConfig", "SourceConfig", "SynthesisConfig", "Way"]
+
+Way = Literal["gaussian", "prior", "perturbation", "linear", "path"]
+"""How strings are drawn from a string VAE (strings §5.2)."""
 
 
 class SourceConfig(StrictModel):
@@ -29,7 +32,7 @@ class SourceConfig(StrictModel):
     seed: int = Field(0, ge=0, lt=100, description="Which of its trainings, if it has several seeds.")
     kit: str = Field(description="The kit that it has learnt; the same must stand under exemplars.kits.")
     samples: int = Field(ge=1, le=1_000_000_000, description="Shapes wanted.")
-    way: Literal["gaussian", "prior", "perturbation", "linear", "path"] = Field(
+    way: Way = Field(
         "gaussian",
         description="How points of its latent space are found: drawn where the training strings stand, as a Gaussian, "
         "or from the prior, or by a search around training strings, on lines between them or on paths along them "
