@@ -26,18 +26,22 @@ __all__ = ["END", "NONE", "Acceptor", "follow", "is_followed", "tokens_to_comple
 
 END = 0
 NONE = -1
-"""No token."""
+"""No token, and no node."""
+_AT_CURRENT = -2
+"""The current node, at which a cycle can close, but below which it cannot."""
 _START, _NODE, _OPEN, _CLOSE, _ENDED = range(5)
 """What the last token was; a number counts as its node."""
 
 _State = namedtuple(
     "_State",
-    "kind parent counts pending need left stack depth current previous nodes length opened partners closed",
+    "kind parent counts pending need left stack depth current previous nodes length opened witness partners closed",
 )
 """Of strings by row. Of each node: kind, its type; parent; counts, neighbours by type; pending, cycles that began at it
 and are open; need, the fewest tokens that complete it; left, whether only the ends of its cycles can come to it.
 stack, depth: the nodes of the open branches; current: the node that the next token hangs on; opened: the node of each
-open number, or -1; partners, closed: the nodes that cycles join the current node to, and how many they are."""
+open number, or -1; witness: for each open number a node below which its cycle can close as long as neither that node
+nor the one where it began changes, or -1 where none is known; partners, closed: the nodes that cycles join the current
+node to, and how many they are."""
 
 
 @numba.njit(cache=True)
@@ -172,57 +176,79 @@ def _viable_node(rules, state, i, kind, tokens):
     if previous != _START and rules.arc[state.kind[i, parent], kind] < 0:
         return False
     need = state.need[i, parent] if previous != _START else 0
-    viable = _add_node(rules, state, i, kind) and _viable(rules, state, i, tokens)
+    viable = _add_node(rules, state, i, kind) and _viable(rules, state, i, tokens, parent, parent)
     _remove_node(state, i, previous, need, closed)
     return viable
 
 
 @numba.njit(cache=True)
-def _viable(rules, state, i, tokens):
-    """Whether all that is open can be closed with so many tokens, each by itself."""
+def _viable(rules, state, i, tokens, first, second):
+    """Whether all that is open can be closed with so many tokens, each by itself. first, second: the nodes that a token
+    on trial has changed or left."""
     total = state.need[i, state.current[i]] + _open_cycles(state, i)
     for d in range(state.depth[i]):
         total += state.need[i, state.stack[i, d]] + 1
     if total > tokens:
         return False
     for k in range(state.opened.shape[1]):
-        if state.opened[i, k] >= 0 and not _can_close(rules, state, i, k):
+        origin, witness = state.opened[i, k], state.witness[i, k]
+        if origin < 0 or (witness >= 0 and not _is_either(first, second, origin, witness)):
+            continue
+        if _where_closes(rules, state, i, k) == NONE:
             return False
     return True
 
 
 @numba.njit(cache=True)
-def _can_close(rules, state, i, k):
-    """Whether some node to come, or the current one, can be the other end of open cycle number k."""
+def _is_either(first, second, origin, witness):
+    return first in (origin, witness) or second in (origin, witness)
+
+
+@numba.njit(cache=True)
+def _find_witnesses(rules, state, i):
+    """Find a witness of each open cycle that has none and may have one: then most tokens can be tried at the price of
+    a look at each cycle."""
+    for k in range(state.opened.shape[1]):
+        if state.opened[i, k] >= 0 and state.witness[i, k] < 0:
+            state.witness[i, k] = max(_where_closes(rules, state, i, k), NONE)
+
+
+@numba.njit(cache=True)
+def _forget_witnesses(state, i, first, second):
+    """Of the cycles that begin at one of two nodes, or whose witness is one of them."""
+    for k in range(state.opened.shape[1]):
+        if state.opened[i, k] < 0 or _is_either(first, second, state.opened[i, k], state.witness[i, k]):
+            state.witness[i, k] = NONE
+
+
+@numba.njit(cache=True)
+def _where_closes(rules, state, i, k):
+    """A node below which, in what is to come, open cycle number k can close; else the current node where the cycle can
+    close at it, as _AT_CURRENT; else NONE."""
     origin = state.opened[i, k]
     kind = state.kind[i, origin]
     counts = state.counts[i, origin]
-    types = len(counts)
-    for other in range(types):
+    found = NONE
+    for other in range(len(counts)):
         goal = rules.arc[kind, other]
         if goal < 0:
             continue
         counts[other] += 1
         state.pending[i, origin] -= 1
-        closable = (
-            tokens_to_complete(rules, kind, counts, state.pending[i, origin], state.left[i, origin]) < NEVER
-        ) and _leads_to(rules, state, i, origin, other, goal)
+        if tokens_to_complete(rules, kind, counts, state.pending[i, origin], state.left[i, origin]) < NEVER:
+            place = _where_comes(rules, state, i, origin, other, goal)
+            found = place if place != NONE else found
         counts[other] -= 1
         state.pending[i, origin] += 1
-        if closable:
-            return True
-    return False
+        if found >= 0:
+            break
+    return found
 
 
 @numba.njit(cache=True)
-def _leads_to(rules, state, i, origin, other, goal):
+def _where_comes(rules, state, i, origin, other, goal):
+    """The same for a cycle that closes at a node of type `other`, whose pair of neighbour types is `goal`."""
     current = state.current[i]
-    if state.previous[i] == _NODE and state.kind[i, current] == other and _not_joined(state, i, origin):
-        state.counts[i, current, state.kind[i, origin]] += 1
-        fits = tokens_to_complete(rules, other, state.counts[i, current], state.pending[i, current], False) < NEVER
-        state.counts[i, current, state.kind[i, origin]] -= 1
-        if fits:
-            return True
     for d in range(state.depth[i] + 1):
         node = state.stack[i, d] if d < state.depth[i] else current
         if state.left[i, node]:
@@ -237,8 +263,14 @@ def _leads_to(rules, state, i, origin, other, goal):
             fits = tokens_to_complete(rules, kind, counts, state.pending[i, node], False) < NEVER
             counts[child] -= 1
             if fits:
-                return True
-    return False
+                return node
+    if state.previous[i] == _NODE and state.kind[i, current] == other and _not_joined(state, i, origin):
+        state.counts[i, current, state.kind[i, origin]] += 1
+        fits = tokens_to_complete(rules, other, state.counts[i, current], state.pending[i, current], False) < NEVER
+        state.counts[i, current, state.kind[i, origin]] -= 1
+        if fits:
+            return _AT_CURRENT
+    return NONE
 
 
 @numba.njit(cache=True)
@@ -274,7 +306,7 @@ def _viable_number(rules, state, i, k, tokens):
     if origin < 0:
         state.pending[i, current] += 1
         state.opened[i, k] = current
-        viable = _update(rules, state, i, current) and _viable(rules, state, i, tokens)
+        viable = _update(rules, state, i, current) and _viable(rules, state, i, tokens, current, current)
         state.pending[i, current] -= 1
         state.opened[i, k] = -1
         state.need[i, current] = need
@@ -282,7 +314,7 @@ def _viable_number(rules, state, i, k, tokens):
     if rules.arc[state.kind[i, origin], state.kind[i, current]] < 0 or not _not_joined(state, i, origin):
         return False
     needed = state.need[i, origin]
-    viable = _close_cycle(rules, state, i, k) and _viable(rules, state, i, tokens)
+    viable = _close_cycle(rules, state, i, k) and _viable(rules, state, i, tokens, origin, current)
     state.closed[i] -= 1
     state.counts[i, origin, state.kind[i, current]] -= 1
     state.counts[i, current, state.kind[i, origin]] -= 1
@@ -325,7 +357,7 @@ def _viable_end_of_branch(rules, state, i, tokens):
     state.depth[i] -= 1
     state.current[i] = state.stack[i, state.depth[i]]
     state.previous[i] = _CLOSE
-    viable = _viable(rules, state, i, tokens)
+    viable = _viable(rules, state, i, tokens, node, node)
     state.depth[i] += 1
     state.current[i] = node
     state.previous[i] = previous
@@ -368,6 +400,7 @@ def _allow(rules, state, i, most, allowed):
     """Fill `allowed`, bool (tokens,), for a string of at most `most` tokens."""
     first = len(rules.counted) + 3
     free = -1
+    _find_witnesses(rules, state, i)
     for token in range(len(allowed)):
         is_free = token >= first and state.opened[i, token - first] < 0
         if is_free and free >= 0:
@@ -381,6 +414,7 @@ def _allow(rules, state, i, most, allowed):
 @numba.njit(cache=True)
 def _choose(rules, state, i, most, scores):
     """The token of the highest score that may come next, or NONE; scores of those before it become -inf."""
+    _find_witnesses(rules, state, i)
     while True:
         token = int(scores.argmax())
         if scores[token] == -np.inf:
@@ -398,26 +432,31 @@ def _take(rules, state, i, token):
         state.previous[i] = _ENDED
         return
     state.length[i] += 1
+    current = state.current[i]
     if token <= types:
         _add_node(rules, state, i, token - 1)
+        _forget_witnesses(state, i, current, current)
     elif token == types + 1:
-        state.stack[i, state.depth[i]] = state.current[i]
+        state.stack[i, state.depth[i]] = current
         state.depth[i] += 1
         state.previous[i] = _OPEN
     elif token == types + 2:
-        state.left[i, state.current[i]] = True
-        _update(rules, state, i, state.current[i])
+        state.left[i, current] = True
+        _update(rules, state, i, current)
+        _forget_witnesses(state, i, current, current)
         state.depth[i] -= 1
         state.current[i] = state.stack[i, state.depth[i]]
         state.previous[i] = _CLOSE
     else:
         k = token - types - 3
-        if state.opened[i, k] >= 0:
+        origin = state.opened[i, k]
+        if origin >= 0:
             _close_cycle(rules, state, i, k)
         else:
-            state.pending[i, state.current[i]] += 1
-            state.opened[i, k] = state.current[i]
-            _update(rules, state, i, state.current[i])
+            state.pending[i, current] += 1
+            state.opened[i, k] = current
+            _update(rules, state, i, current)
+        _forget_witnesses(state, i, origin, current)
 
 
 @numba.njit(cache=True)
@@ -442,6 +481,7 @@ def _take_all(rules, state, tokens):
 @numba.njit(cache=True)
 def _is_followed(rules, state, tokens):
     for place in range(len(tokens)):
+        _find_witnesses(rules, state, 0)
         if not _may_come(rules, state, 0, NEVER, tokens[place]):
             return False
         _take(rules, state, 0, tokens[place])
@@ -489,6 +529,7 @@ class Acceptor:
             nodes=np.zeros(strings, np.int32),
             length=np.zeros(strings, np.int32),
             opened=np.full((strings, cycles), -1, np.int32),
+            witness=np.full((strings, cycles), NONE, np.int32),
             partners=np.zeros(shape, np.int32),
             closed=np.zeros(strings, np.int32),
         )

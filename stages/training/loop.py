@@ -28,8 +28,9 @@ _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
 def same_arithmetic(threads: int) -> None:
-    """Let torch sum in one order, with so many threads: equal seeds give equal weights."""
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # cuBLAS sums in one order only if it is asked so
+    """Let torch sum in one order, with so many threads: equal seeds give equal weights. To be called before anything
+    runs on a GPU, whose matrix products read the environment when they are first used."""
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # it only costs time
@@ -103,7 +104,9 @@ def train(
     """One round: `entry.steps` steps. Answers the mean of each figure of the learner."""
     learner, optimizer = trainee.learner, trainee.optimizer
     device = next(learner.module.parameters()).device
-    noise = torch.Generator(device).manual_seed(int(rng.integers(2**63)))
+    seed = int(rng.integers(2**63))
+    noise = torch.Generator(device).manual_seed(seed)
+    torch.manual_seed(seed)  # of what modules draw by themselves: dropout
     stream = learner.batches(rng)
     sums: dict[str, Tensor] = {}
     learner.module.train()

@@ -46,10 +46,13 @@ def kind_of(kind: str) -> Kind:
 class Chain:
     """The rounds of one model as far as they are known.
 
-    best: the number of the round with the best weights; ended: whether another round is none of the plan.
+    pools: what is to be made for them so far, one round ahead, so that other workers make what the next round learns
+    from while one learns; best: the number of the round with the best weights; ended: whether another round is none
+    of the plan.
     """
 
     shards: tuple[Shard, ...]
+    pools: tuple[Shard, ...]
     summaries: tuple[Mapping[str, Any], ...]
     best: int
     ended: bool
@@ -65,9 +68,12 @@ def subject_of(params: Mapping[str, Any]) -> dict[str, Any]:
     return {key: params[key] for key in get_args(Subject) if key in params}
 
 
-def rounds(plan: Plan, entry: ModelEntry, kind: str, subject: str, seed: int, data: str) -> Chain:
+def rounds(
+    plan: Plan, entry: ModelEntry, kind: str, subject: str, seed: int, data: str, pools: Sequence[Shard] = ()
+) -> Chain:
     """The chain of one model: a round follows the one before it, until there are `rounds`, or `patience` of them in a
-    row were no better than the best.
+    row were no better than the best. Where there are `pools`, one for each round, a round reads its own and those of
+    the rounds before.
 
     So a training that ends early has made nothing that says nothing. What decides about the end, and which kits and
     seeds there are besides, is no setting of a round.
@@ -83,17 +89,20 @@ def rounds(plan: Plan, entry: ModelEntry, kind: str, subject: str, seed: int, da
             "job": "round", "kind": kind, entry.subject: subject, "seed": seed, "round": number, "data": data,
             "before": before, "settings": settings,
         }  # fmt: skip
-        inputs = tuple(f"training/{each}" for each in (data, *before))
+        read = [each.name for each in pools[: number + 1]]
+        if read:
+            params["pools"] = read
+        inputs = tuple(f"training/{each}" for each in (data, *read, *before))
         shards.append(Shard(name, params, inputs, _modules(params), entry.threads))
         summary = plan.summary("training", name)
         if summary is None:
-            return Chain(tuple(shards), tuple(summaries), best, ended=False)
+            return Chain(tuple(shards), tuple(pools[: number + 2]), tuple(summaries), best, ended=False)
         summaries.append(summary)
         if summary["loss"] < summaries[best]["loss"]:
             best = number
         if number - best >= entry.patience:
             break
-    return Chain(tuple(shards), tuple(summaries), best, ended=True)
+    return Chain(tuple(shards), tuple(pools[: len(shards) + 1]), tuple(summaries), best, ended=True)
 
 
 def run_round(task: Task) -> Outcome:

@@ -31,7 +31,7 @@ __all__ = ["STAGE"]
 LEARNT = ("train", "val")
 """The splits that models see."""
 BYTES_A_ROUND = 16_000_000
-"""Weights and two moments of a model of about a million parameters."""
+"""Weights and two moments of a model of about a million parameters, and what a round learns from beside them."""
 
 
 def plan(plan: Plan) -> list[Shard]:
@@ -40,11 +40,12 @@ def plan(plan: Plan) -> list[Shard]:
     shards: dict[str, Shard] = {}
     for entry, subject, seed in _models(plan):
         if isinstance(entry, KitModelEntry):
-            data = _kit_shard(plan, entry, entry.kind, subject)
+            data, pools = _kit_shard(plan, entry, entry.kind, subject), []
         else:
-            data = _program_shard(plan, entry, subject)
+            data, *pools = _program_shards(plan, entry, subject)
         shards.setdefault(data.name, data)
-        chain = rounds(plan, entry, entry.kind, subject, seed, data.name)
+        chain = rounds(plan, entry, entry.kind, subject, seed, data.name, pools)
+        shards.update((shard.name, shard) for shard in chain.pools)
         shards.update((shard.name, shard) for shard in chain.shards)
         if chain.ended:
             trained = _trained_shard(plan, entry, subject, seed, chain)
@@ -178,17 +179,21 @@ def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
     )
 
 
-def _program_shard(plan: Plan, entry: RecoveryEntry, program: str) -> Shard:
+def _program_shards(plan: Plan, entry: RecoveryEntry, program: str) -> list[Shard]:
+    """What the models of a program are judged by, and for each round what they learn from."""
     params: dict[str, Any] = {
         "job": "data",
         "kind": entry.kind,
         "program": program,
-        "settings": {key: getattr(entry, key) for key in ("input", "points", "validation", "pool", "views")},
+        "settings": {key: getattr(entry, key) for key in ("input", "points", "views")},
     }
     if entry.input == "sketch":
         params["sketches"] = plan.config.section(SketchesConfig).model_dump(mode="json")
-    code = (module_of(entry.kind), program_module(program))
-    return Shard(model_name(entry, program, 0).removesuffix("0") + "data", params, (), code)
+    name, code = model_name(entry, program, 0).removesuffix("0"), (module_of(entry.kind), program_module(program))
+    judged = {**params, "split": "val", "shapes": entry.validation}
+    learnt = {**params, "split": "train", "shapes": entry.pool}
+    pools = (Shard(f"{name}pool{number:04}", learnt, (), code) for number in range(entry.rounds))
+    return [Shard(f"{name}data", judged, (), code), *pools]
 
 
 def _trained_shard(plan: Plan, entry: AnyEntry, subject: str, seed: int, chain: Chain) -> Shard:

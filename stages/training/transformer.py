@@ -19,8 +19,9 @@ class Block(nn.Module):
 
     HEAD = 32
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, dropout: float = 0.0) -> None:
         super().__init__()
+        self.dropout = nn.Dropout(dropout)
         self.heads = _heads(width, self.HEAD)
         self.attention_norm, self.feed_norm = nn.LayerNorm(width), nn.LayerNorm(width)
         self.projections, self.joined = nn.Linear(width, 3 * width), nn.Linear(width, width)
@@ -50,6 +51,6 @@ class Block(nn.Module):
     ) -> Tensor:
         heads = [each.view(*each.shape[:2], self.heads, -1).transpose(1, 2) for each in (queries, keys, values)]
         mixed = scaled_dot_product_attention(heads[0], heads[1], heads[2], attn_mask=there, is_causal=causal)
-        seen = seen + self.joined(mixed.transpose(1, 2).flatten(2))
-        found: Tensor = seen + self.feed(self.feed_norm(seen))
+        seen = seen + self.dropout(self.joined(mixed.transpose(1, 2).flatten(2)))
+        found: Tensor = seen + self.dropout(self.feed(self.feed_norm(seen)))
         return found

@@ -31,7 +31,7 @@ class ProgramLm(nn.Module):
         self.cues = nn.ModuleList(nn.Embedding(many, entry.width) for many in (len(Field), SLOTS, SLOTS, MOST_DEPTH))
         self.places = nn.Embedding(longest, entry.width)
         self.sizes = nn.Linear(SEEN, entry.width)
-        self.blocks = nn.ModuleList(Block(entry.width) for _ in range(entry.layers))
+        self.blocks = nn.ModuleList(Block(entry.width, entry.dropout) for _ in range(entry.layers))
         self.norm = nn.LayerNorm(entry.width)
         self.logits = nn.Linear(entry.width, WORDS)
         self.values: Tensor

@@ -23,3 +23,10 @@ class ProgramLmEntry(KitModelEntry):
     jitter: float = Field(
         0.1, ge=0, le=1, description="share of numbers that it sees a step beside what they are while it learns"
     )
+    dropout: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="share of what each block adds that is left out while it learns; a wider model, or a longer "
+        "training, learns few programs by heart without it",
+    )

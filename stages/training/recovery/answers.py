@@ -7,7 +7,7 @@ that of the first value is 0, and only the first of its outputs is looked at.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -38,30 +38,35 @@ class Answers:
         counts = torch.tensor([len(each.values) for each in parameters])
         return cls(counts, torch.tensor(regressed(entry, parameters)), entry.existence)
 
+    def to(self, device: torch.device) -> Answers:
+        """The same on a device."""
+        return replace(self, counts=self.counts.to(device), regressed=self.regressed.to(device))
+
     def nats(self, outputs: Tensor, classes: Tensor) -> Tensor:
         """The loss, summed over the parameters, mean over the inputs: cross-entropies, and of what is regressed half
         the squared distance in classes, the nats of a normal distribution as wide as a class. Outputs float (n,
         parameters, most classes); classes int64 (n, parameters)."""
-        counts, numbers = self.counts.to(classes.device), self.regressed.to(classes.device)
-        seen = classes < counts
-        learnt = ~numbers & (seen | self.existence)
-        entropies = cross_entropy(outputs[learnt], classes[learnt], reduction="sum")
-        told = numbers & seen
-        squares = (self.places(outputs)[told] - classes[told]) ** 2
-        return (entropies + 0.5 * squares.sum()) / len(classes)
+        seen = classes < self.counts
+        # what is not learnt is set to nothing, not left out: nobody waits until a GPU has counted what is left
+        entropies = cross_entropy(outputs.flatten(0, 1), classes.flatten(), reduction="none").view(classes.shape)
+        squares = 0.5 * (self.places(outputs) - classes) ** 2
+        nothing = torch.zeros((), device=classes.device)
+        classified = torch.where(~self.regressed & (seen | self.existence), entropies, nothing)
+        told = torch.where(self.regressed & seen, squares, nothing)
+        return (classified.sum() + told.sum()) / len(classes)
 
     def places(self, outputs: Tensor) -> Tensor:
         """Where each parameter lies among its classes, were it regressed, float (n, parameters)."""
-        middle = (self.counts.to(outputs.device) - 1) / 2.0
+        middle = (self.counts - 1) / 2.0
         return middle * (1.0 + outputs[..., 0].float())
 
     def chances(self, outputs: Tensor) -> Tensor:
         """The probability of each class, float (n, parameters, most classes); of what is regressed, of the two that it
         lies between."""
         places = self.places(outputs).clamp(min=0.0)
-        places = torch.minimum(places, (self.counts.to(outputs.device) - 1).float())
+        places = torch.minimum(places, (self.counts - 1).float())
         between = (1.0 - (torch.arange(outputs.shape[-1], device=outputs.device) - places[..., None]).abs()).clamp(
             min=0
         )
-        numbers = self.regressed.to(outputs.device)[:, None]
+        numbers = self.regressed[:, None]
         return torch.where(numbers, between, torch.softmax(outputs.float(), dim=-1))

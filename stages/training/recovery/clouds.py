@@ -1,4 +1,4 @@
-"""Clouds as a network sees them: brought to one place and size, and spoilt as scans are."""
+"""Clouds as a network sees them: brought to one place and size."""
 
 from __future__ import annotations
 
@@ -9,12 +9,7 @@ import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Frame", "frame_of", "spoilt", "taken"]
-
-MOST_NOISE = 0.015
-"""Largest standard deviation of noise, in sides of the box around a shape."""
-LEAST_LEFT = 0.5
-"""So much of a cloud is left at least where a part of it is missing."""
+__all__ = ["Frame", "frame_of", "taken"]
 
 
 @dataclass(frozen=True)
@@ -50,20 +45,3 @@ def taken(points: FloatArray, n: int, rng: np.random.Generator) -> FloatArray:
     chosen: list[npt.NDArray[np.int64]] = [np.arange(len(points))] * whole
     chosen.append(rng.choice(len(points), rest, replace=False, shuffle=False))
     return points[np.concatenate(chosen)]
-
-
-def spoilt(points: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """A cloud (n, 3) as a bad scanner would see it: with noise, denser on one side, or without one side; each by
-    chance, at least one of them."""
-    kinds = int(rng.integers(1, 8))
-    direction = rng.standard_normal(3)
-    along = points @ (direction / np.linalg.norm(direction))
-    if kinds & 1:
-        points = points + rng.normal(0.0, rng.uniform(0.0, MOST_NOISE) * frame_of(points).size, points.shape)
-    keep = np.ones(len(points), dtype=np.bool_)
-    if kinds & 2:
-        ranks = (along - along.min()) / (float(np.ptp(along)) or 1.0)
-        keep &= rng.random(len(points)) < 0.15 + 0.85 * ranks
-    if kinds & 4:
-        keep &= along >= np.quantile(along, rng.uniform(0.0, 1.0 - LEAST_LEFT))
-    return points[keep] if keep.sum() > 1 else points

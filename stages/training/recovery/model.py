@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import torch
 from torch import Generator, Tensor, nn
-from torch.nn.functional import leaky_relu
+from torch.nn.functional import leaky_relu, max_pool2d
 from torch.nn.utils import convert_conv2d_weight_memory_format
 
 from stages.programs.parameters import Parameter
@@ -17,7 +17,7 @@ from stages.training.recovery.drawings import SIDE
 from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
 from stages.training.recovery.settings import RecoveryEntry
 
-__all__ = ["RecoveryNet"]
+__all__ = ["RecoveryNet", "halved"]
 
 SLOPE = 0.2
 
@@ -67,8 +67,12 @@ class Dgcnn(nn.Module):
 
     def forward(self, points: Tensor) -> Tensor:
         neighbors = nearest_neighbors(points, min(self.neighbors, points.shape[1]))
-        features, found = points, []
-        for convolution in self.convolutions:
+        first, *others = self.convolutions
+        # bfloat16 would move points by up to a thousandth of the box, a good part of the way to the next
+        with torch.autocast(points.device.type, enabled=False):
+            features = first(points, neighbors)
+        found = [features]
+        for convolution in others:
             features = convolution(features, neighbors)
             found.append(features)
         mixed = leaky_relu(_normed(self.norm, self.mixed(torch.cat(found, dim=-1))), SLOPE)
@@ -107,7 +111,7 @@ class Vgg(nn.Module):
         for place, (before, after) in enumerate(pairwise((self.PATCH**2, *entry.channels))):
             layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after), nn.ReLU()]
             if place % 2:
-                layers.append(nn.MaxPool2d(2))
+                layers.append(Halved())
         # twice as fast with so few features
         self.layers = convert_conv2d_weight_memory_format(nn.Sequential(*layers), torch.channels_last)
         side = SIDE // self.PATCH // 2 ** (len(entry.channels) // 2)
@@ -117,6 +121,22 @@ class Vgg(nn.Module):
         seen = self.layers(drawings.contiguous(memory_format=torch.channels_last))
         embedded: Tensor = self.embedding(seen.flatten(1)).relu()
         return embedded
+
+
+class Halved(nn.Module):
+    """Of each four pixels the greatest, (n, features, h, w) to (n, features, h / 2, w / 2) rounded down."""
+
+    def forward(self, features: Tensor) -> Tensor:
+        if features.device.type == "cpu":
+            return max_pool2d(features, 2)
+        return halved(features)
+
+
+def halved(features: Tensor) -> Tensor:
+    """What `Halved` says, for a GPU, where the gradient of `max_pool2d` is added up in any order."""
+    even = features[..., : features.shape[-2] // 2 * 2, : features.shape[-1] // 2 * 2]
+    rows = torch.maximum(even[..., ::2, :], even[..., 1::2, :])
+    return torch.maximum(rows[..., ::2], rows[..., 1::2])
 
 
 class Decoders(nn.Module):

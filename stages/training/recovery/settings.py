@@ -63,12 +63,13 @@ class RecoveryEntry(ModelEntry):
         le=1,
         description="share of the inputs that are spoilt as scans and hand drawings are; unit: share",
     )
-    reuse: int = Field(
-        8, ge=1, le=1000, description="clouds that are drawn of a shape while it is at hand; unit: clouds"
-    )
     validation: int = Field(256, ge=1, le=100_000, description="shapes that a round is judged by; unit: shapes")
     pool: int = Field(
-        4000, ge=1, le=1_000_000, description="drawings that a model of drawings learns from; unit: drawings"
+        1600,
+        ge=1,
+        le=1_000_000,
+        description="shapes that are made for each round, beside those of the rounds before: it learns from all of "
+        "them; unit: shapes",
     )
 
     @property

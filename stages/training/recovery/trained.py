@@ -66,7 +66,7 @@ class TrainedRecovery:
     @torch.no_grad()
     def _guess(self, inputs: Tensor) -> Guess:
         device = next(self.module.parameters()).device
-        outputs, answers = self.module(inputs.to(device)), Answers.of(self.entry, self.program.parameters)
+        outputs, answers = self.module(inputs.to(device)), Answers.of(self.entry, self.program.parameters).to(device)
         chances = answers.chances(outputs).mean(dim=0).double().cpu().numpy()
         probabilities = {}
         for parameter, row in zip(self.program.parameters, chances, strict=True):
@@ -94,7 +94,9 @@ def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> Trai
     program = find_program(header["program"])
     if header["parameters"] != described_parameters(program):
         raise CheckpointError(f"{path} is of a {program.name} with other parameters than it has now: train it anew")
-    entry = RecoveryEntry.model_validate({"name": "trained", **header["settings"]})
+    # what a network is has not changed where keys of its training have gone
+    settings = {key: value for key, value in header["settings"].items() if key in RecoveryEntry.model_fields}
+    entry = RecoveryEntry.model_validate({"name": "trained", **settings})
     module = RecoveryNet(entry, program.parameters)
     module.load_state_dict(_in_floats(tensors))
     return TrainedRecovery(module.eval(), program, entry, header)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from typing import Any
 
@@ -12,18 +13,17 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Generator, Tensor
-from torch.nn.functional import max_pool2d
 
 from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.programs.program import Program, find_program
-from stages.shape.arrays import Float32Array
 from stages.sketches.settings import SketchesConfig
 from stages.training.loop import device_of
 from stages.training.recovery.answers import Answers
-from stages.training.recovery.clouds import frame_of, spoilt, taken
-from stages.training.recovery.drawings import SIDE, drawn
+from stages.training.recovery.augmentation import inked, seen_clouds, seen_drawings, stored
+from stages.training.recovery.clouds import frame_of
+from stages.training.recovery.drawings import drawn
 from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TRAIN, VAL, random_shapes, valid_values
@@ -31,12 +31,6 @@ from stages.training.recovery.surface import chamfer_distance, sampled_points, s
 
 __all__ = ["RecoveryLearner", "described_parameters", "entry", "learner", "prepare"]
 
-DENSE = 4096
-"""Points of a shape at hand, of which clouds are drawn."""
-HELD = 512
-"""Shapes at hand at most: clouds of one step are of different ones."""
-BEGINNING = 64
-"""Shapes at hand in the first step of a round."""
 JUDGED = 64
 """Validation shapes whose recovery is measured."""
 MEASURED = 2048
@@ -47,47 +41,43 @@ Batch = tuple[Tensor, Tensor]
 
 
 def prepare(task: Task) -> Outcome:
-    """The validation inputs of a program, and for a model of drawings those that it learns from.
+    """Inputs of a program: those that its models are judged by, or those that they learn from in one round and all
+    after it.
 
-    Files of the shard: `.val.safetensors` and, of drawings, `.train.safetensors`, with `inputs`, clouds float32 (n,
-    points, 3) or the bits of drawings uint8 (n, bytes), and `classes` int16 (n, parameters); `.json`, what they are.
+    Files of the shard: `.safetensors`, with `inputs`, and `classes` int16 (n, parameters); `.json`, what they are.
+    Inputs to be judged by are clouds float32 (n, points, 3), those to learn from `stored` ones of twice as many points;
+    drawings are their bits uint8 (n, bytes).
     """
     from safetensors.numpy import save
 
     params = task.shard.params
-    settings = params["settings"]
+    settings, split = params["settings"], params["split"]
     program = find_program(params["program"])
-    wanted = {"val": (VAL, settings["validation"])}
-    if settings["input"] == "sketch":
-        wanted["train"] = (TRAIN, settings["pool"])
     config = SketchesConfig.model_validate_json(json.dumps(params.get("sketches", {})))
     views = [view for view in config.views if not settings["views"] or view.name in settings["views"]]
-    total = sum(count for _, count in wanted.values())
+    inputs: list[npt.NDArray[Any]] = []
+    classes: list[npt.NDArray[np.int16]] = []
     texts: list[str] = []
-    done = 0
-    for split, (interval, count) in wanted.items():
-        inputs: list[npt.NDArray[Any]] = []
-        classes: list[npt.NDArray[np.int16]] = []
-        for number, shape in enumerate(islice(random_shapes(program, interval, task.rng(split)), count)):
-            rng = task.rng(split, "input", number)
-            if settings["input"] == "points":
-                cloud = sampled_points(shape.parts, settings["points"], rng)
-                inputs.append(frame_of(cloud).normalized(cloud).astype(np.float32))
-            else:
-                view = views[number % len(views)]
-                inputs.append(np.packbits(drawn(program, shape.parts, view, config, rng)))
-            classes.append(shape.classes.astype(np.int16))
-            if split == "val":
-                texts.append(program.schema.text(shape.values))
-            done += 1
-            task.progress(done, total)
-        arrays: dict[str, npt.NDArray[Any]] = {"inputs": np.array(inputs), "classes": np.array(classes)}
-        with task.output(f"{task.shard.name}.{split}.safetensors") as stream:
-            stream.write(save(arrays))
-    counts = {split: {"shapes": count} for split, (_, count) in wanted.items()}
+    shapes = random_shapes(program, VAL if split == "val" else TRAIN, task.rng(split))
+    for number, shape in enumerate(islice(shapes, params["shapes"])):
+        rng = task.rng(split, "input", number)
+        if settings["input"] == "sketch":
+            view = views[number % len(views)]
+            inputs.append(np.packbits(drawn(program, shape.parts, view, config, rng)))
+        elif split == "val":
+            cloud = sampled_points(shape.parts, settings["points"], rng)
+            inputs.append(frame_of(cloud).normalized(cloud).astype(np.float32))
+        else:
+            inputs.append(stored(sampled_points(shape.parts, 2 * settings["points"], rng)))
+        classes.append(shape.classes.astype(np.int16))
+        texts.append(program.schema.text(shape.values))
+        task.progress(number + 1, params["shapes"])
+    arrays: dict[str, npt.NDArray[Any]] = {"inputs": np.array(inputs), "classes": np.array(classes)}
+    with task.output(f"{task.shard.name}.safetensors") as stream:
+        stream.write(save(arrays))
     with task.output(f"{task.shard.name}.json") as stream:
-        stream.write(json_bytes({"counts": counts, "texts": texts, "views": params.get("sketches")}))
-    return Outcome(samples=0, summary=counts)
+        stream.write(json_bytes({"texts": texts, "views": params.get("sketches")}))
+    return Outcome(samples=0, summary={"shapes": params["shapes"]})
 
 
 def entry(settings: Mapping[str, Any]) -> RecoveryEntry:
@@ -99,18 +89,21 @@ def learner(task: Task, entry: RecoveryEntry, seed: int) -> RecoveryLearner:
     """A network with fresh weights beside what it learns from."""
     from safetensors.numpy import load_file
 
-    program, data = find_program(task.shard.params["program"]), task.shard.params["data"]
+    params = task.shard.params
+    program, data, pools = find_program(params["program"]), params["data"], params["pools"]
     described = json.loads(task.input("training", f"{data}.json").read_bytes())
-    paths = {split: task.input("training", f"{data}.{split}.safetensors") for split in described["counts"]}
+    judged = task.input("training", f"{data}.safetensors")
     header = {
         "parameters": described_parameters(program),
-        "counts": described["counts"],
+        # of every round the same: the rounds before are read again by it
+        "counts": {"train, a round": {"shapes": entry.pool}, "val": {"shapes": entry.validation}},
         "sketches": described["views"],
-        "data": {split: file_digest(path) for split, path in paths.items()},
+        "data": {"val": file_digest(judged)},
     }
-    splits = {split: load_file(path) for split, path in paths.items()}
+    learnt = [load_file(task.input("training", f"{pool}.safetensors")) for pool in pools]
+    train = {key: np.concatenate([each[key] for each in learnt]) for key in ("inputs", "classes")}
     module = new_model(entry, program, seed).to(device_of(entry.device))
-    return RecoveryLearner(module, header, entry, program, splits, described["texts"])
+    return RecoveryLearner(module, header, entry, program, train, load_file(judged), described["texts"])
 
 
 def new_model(entry: RecoveryEntry, program: Program, seed: int) -> RecoveryNet:
@@ -127,25 +120,38 @@ def described_parameters(program: Program) -> list[list[Any]]:
 
 @dataclass(frozen=True)
 class RecoveryLearner:
-    """The `Learner` of a recovery model. splits: `inputs` and `classes` by split; texts: the validation shapes."""
+    """The `Learner` of a recovery model. train, val: their `inputs` and `classes`; texts: the validation shapes."""
 
     module: RecoveryNet
     header: Mapping[str, Any]
     entry: RecoveryEntry
     program: Program
-    splits: Mapping[str, Mapping[str, npt.NDArray[Any]]]
+    train: Mapping[str, npt.NDArray[Any]]
+    val: Mapping[str, npt.NDArray[Any]]
     texts: Sequence[str]
 
     @property
+    def device(self) -> torch.device:
+        """Where it learns."""
+        return next(self.module.parameters()).device
+
+    @cached_property
     def answers(self) -> Answers:
-        """What the outputs of the network say."""
-        return Answers.of(self.entry, self.program.parameters)
+        """What the outputs of the network say, on its device."""
+        return Answers.of(self.entry, self.program.parameters).to(self.device)
 
     def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
-        """Clouds of shapes that are made meanwhile, or drawings of the pool, changed at random."""
-        device = next(self.module.parameters()).device
-        batches = self._clouds(rng) if self.entry.input == "points" else self._drawings(rng)
-        return ((inputs.to(device), classes.to(device)) for inputs, classes in batches)
+        """Inputs of shapes by chance, changed by chance; all there are lie on the device."""
+        noise = Generator(self.device).manual_seed(int(rng.integers(2**63)))
+        inputs = torch.from_numpy(self.train["inputs"]).to(self.device)
+        classes = torch.from_numpy(self.train["classes"].astype(np.int64)).to(self.device)
+        while True:
+            rows = torch.from_numpy(rng.integers(len(classes), size=self.entry.batch)).to(self.device)
+            if self.entry.input == "points":
+                seen = seen_clouds(inputs[rows], self.entry.points, self.entry.noise, noise)
+            else:
+                seen = seen_drawings(inputs[rows], self.entry.noise, rng, noise)
+            yield seen, classes[rows]
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
         """That of all parameters together, in nats of an input."""
@@ -156,13 +162,10 @@ class RecoveryLearner:
         """On shapes that are never learnt from: nats; of the parameters that are visible, the share that is right and
         that within one class; and the mean and the 95th percentile of how far the shapes that come out are from the
         true ones, squared, in sides of their boxes."""
-        device = next(self.module.parameters()).device
-        val = self.splits["val"]
-        outputs = []
-        for start in range(0, len(val["classes"]), self.entry.batch):
-            inputs = val["inputs"][start : start + self.entry.batch]
-            outputs.append(self.module(_input_tensor(inputs, self.entry.input).to(device)).cpu())
-        found, classes = torch.cat(outputs), torch.from_numpy(val["classes"].astype(np.int64))
+        inputs = torch.from_numpy(self.val["inputs"]).to(self.device)
+        read = inked if self.entry.input == "sketch" else Tensor.float
+        found = torch.cat([self.module(read(each)) for each in torch.split(inputs, self.entry.batch)])
+        classes = torch.from_numpy(self.val["classes"].astype(np.int64)).to(self.device)
         counts = self.answers.counts
         best, visible = self.answers.chances(found).argmax(dim=-1), classes < counts
         near = (best - classes).abs() <= 1
@@ -182,54 +185,3 @@ class RecoveryLearner:
         recovered = valid_values(self.program, schema.from_classes(classes))
         clouds = (shape_points(self.program.parts(each), MEASURED) for each in (recovered, schema.values(text)))
         return chamfer_distance(*(frame_of(each).normalized(each) for each in clouds))
-
-    def _clouds(self, rng: np.random.Generator) -> Iterator[Batch]:
-        made, chances = rng.spawn(2)
-        shapes = random_shapes(self.program, TRAIN, made)
-        dense: list[Float32Array] = []
-        classes: list[npt.NDArray[np.int64]] = []
-        owed, oldest = float(BEGINNING), 0
-        while True:
-            for shape in islice(shapes, int(owed)):
-                cloud = sampled_points(shape.parts, DENSE, made).astype(np.float32)
-                if len(dense) < HELD:
-                    dense.append(cloud)
-                    classes.append(shape.classes)
-                else:
-                    dense[oldest], classes[oldest] = cloud, shape.classes
-                    oldest = (oldest + 1) % HELD
-            owed = owed % 1.0 + self.entry.batch / self.entry.reuse
-            chosen = chances.integers(len(dense), size=self.entry.batch).tolist()
-            clouds = np.array([self._seen(dense[each], chances) for each in chosen])
-            yield torch.from_numpy(clouds), torch.from_numpy(np.array([classes[each] for each in chosen]))
-
-    def _seen(self, dense: Float32Array, rng: np.random.Generator) -> Float32Array:
-        """A cloud as it is learnt from, float32 (points, 3)."""
-        cloud = taken(dense.astype(np.float64), min(2 * self.entry.points, DENSE), rng)
-        if rng.random() < self.entry.noise:
-            cloud = spoilt(cloud, rng)
-        cloud = taken(cloud, self.entry.points, rng)
-        return frame_of(cloud).normalized(cloud).astype(np.float32)
-
-    def _drawings(self, rng: np.random.Generator) -> Iterator[Batch]:
-        train = self.splits["train"]
-        while True:
-            chosen = rng.integers(len(train["classes"]), size=self.entry.batch)
-            drawings = _input_tensor(train["inputs"][chosen], "sketch")
-            kinds = rng.random((len(chosen), 2))
-            for row, (mirror, morphology) in enumerate(kinds.tolist()):
-                if mirror < 0.5 * self.entry.noise:
-                    drawings[row] = drawings[row].flip(-1)
-                if morphology < 0.5 * self.entry.noise:
-                    drawings[row] = max_pool2d(drawings[row], 3, 1, 1)
-                elif morphology < self.entry.noise:
-                    drawings[row] *= torch.from_numpy(rng.random(drawings[row].shape) < 0.9)
-            yield drawings, torch.from_numpy(train["classes"][chosen].astype(np.int64))
-
-
-def _input_tensor(inputs: npt.NDArray[Any], kind: str) -> Tensor:
-    """What the network reads, of clouds or of the bits of drawings."""
-    if kind == "points":
-        return torch.from_numpy(inputs)
-    ink = np.unpackbits(inputs, axis=1, count=SIDE * SIDE).reshape(-1, 1, SIDE, SIDE)
-    return torch.from_numpy(ink.astype(np.float32))

@@ -128,6 +128,29 @@ def test_chosen_is_the_best_of_what_is_allowed(seed: int, name: str, cycles: int
         acceptor.take(np.where(wanted == NONE, END, wanted))
 
 
+@given(st.integers(0, 2**32), st.booleans())
+def test_what_is_known_of_open_cycles_changes_no_answer(seed: int, partial: bool) -> None:
+    rng = np.random.default_rng(seed)
+    rules = make_rules(grammar_of("A01(A)(AA0)A0(C1)CB0", "A0(C1(C2)(C02CA1)A)C"), 3, 4, partial)
+    knowing, asking = Acceptor(rules, 4, 1, 40), Acceptor(rules, 4, 1, 40)
+    for _ in range(40):
+        allowed = knowing.allowed()
+        asking._state.witness[:] = NONE
+        assert (asking.allowed() == allowed).all()
+        state = knowing._state
+        growing = {int(state.current[0]), *state.stack[0, : state.depth[0]].tolist()}
+        for witness in state.witness[0][state.witness[0] != NONE].tolist():
+            assert witness in growing
+            assert not state.left[0, witness]
+        ways = np.flatnonzero(allowed[0])
+        if not len(ways) or ways.tolist() == [END]:
+            break
+        numbers = ways[ways > 5]  # cycles are what this is about
+        token = np.array([rng.choice(numbers if len(numbers) and rng.random() < 0.5 else ways)])
+        knowing.take(token)
+        asking.take(token)
+
+
 @given(st.integers(0, 2**32), st.integers(0, len(toy.graphs()) - 1), st.sampled_from(ALL_LEVELS))
 def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, strictness: Strictness) -> None:
     types, edges = toy.graphs()[number]

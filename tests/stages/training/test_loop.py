@@ -1,4 +1,4 @@
-"""Rounds of a training, and what it decides by the machine that it runs on."""
+"""What a training decides by the machine that it runs on, and what it draws."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
-from stages.training.entry import ModelEntry
 from stages.training.loop import Trainee, precision_of, train
+from stages.training.program_lm.settings import ProgramLmEntry
 
 
 @pytest.mark.parametrize("asked", ["float32", "bfloat16"])
@@ -26,47 +27,74 @@ def test_half_precision_is_chosen_only_where_the_processor_reckons_with_it() -> 
     assert precision_of("auto", torch.device("cpu")) == ("bfloat16" if knows else "float32")
 
 
-class Half(torch.nn.Module):
-    """Of two layers one is used."""
+@dataclass(frozen=True)
+class _Halving:
+    """A learner that shall halve numbers, with modules that draw by themselves what they leave out."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.used, self.idle = torch.nn.Linear(2, 1), torch.nn.Linear(2, 1)
-
-
-@dataclass
-class Learning:
-    """Makes what the one layer says small."""
-
-    module: Half
+    module: nn.Module
     header: Mapping[str, Any] = field(default_factory=dict)
 
     def batches(self, rng: np.random.Generator) -> Iterator[torch.Tensor]:
         while True:
-            yield torch.from_numpy(rng.random((4, 2))).float()
+            yield torch.from_numpy(rng.random((8, 4), dtype=np.float32))
 
     def losses(self, batch: torch.Tensor, step: int, noise: torch.Generator) -> dict[str, torch.Tensor]:
-        return {"loss": (self.module.used(batch) ** 2).mean()}
+        return {"loss": ((self.module(batch) - 0.5 * batch) ** 2).mean()}
 
     def validate(self, noise: torch.Generator) -> dict[str, float]:
-        return {"loss": 0.0}
+        return {}
+
+
+def _trained(before: int, seed: int) -> torch.Tensor:
+    """The weights after a round, where the process has drawn so many numbers before."""
+    torch.manual_seed(before)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(0)
+        module = nn.Sequential(nn.Linear(4, 4), nn.Dropout(0.5))
+    entry = ProgramLmEntry(name="halving", kind="program_lm", steps=5, rounds=1)
+    trainee = Trainee.of(_Halving(module), entry)
+    train(trainee, entry, np.random.default_rng(seed), lambda done, total: None)
+    return module[0].weight.detach()
+
+
+def test_what_modules_leave_out_hangs_on_the_seed_of_the_round_alone() -> None:
+    assert torch.equal(_trained(before=1, seed=3), _trained(before=2, seed=3))
+    assert not torch.equal(_trained(before=1, seed=3), _trained(before=1, seed=4))
+
+
+class _Half(nn.Module):
+    """Of two layers one is used."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.used, self.idle = nn.Linear(4, 4), nn.Linear(4, 4)
+
+    def forward(self, numbers: torch.Tensor) -> torch.Tensor:
+        found: torch.Tensor = self.used(numbers)
+        return found
+
+
+def _rounds(stops: bool) -> dict[str, torch.Tensor]:
+    """What is kept after two rounds, which are taken up again after each where it `stops`."""
+    entry = ProgramLmEntry(name="halving", kind="program_lm", steps=5, rounds=2)
+
+    def fresh() -> Trainee:
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(0)
+            return Trainee.of(_Halving(_Half()), entry)
+
+    trainee = fresh()
+    for number in range(2):
+        train(trainee, entry, np.random.default_rng(number), lambda done, total: None)
+        if stops:
+            tensors, step = {name: each.clone() for name, each in trainee.tensors().items()}, trainee.step
+            trainee = fresh()
+            trainee.restore(tensors, step)
+    return trainee.tensors()
 
 
 def test_a_training_with_a_layer_that_nothing_uses_goes_on_as_if_it_had_not_stopped() -> None:
-    entry = ModelEntry(name="half", steps=5, rounds=2, device="cpu")
-
-    def trained(stops: bool) -> dict[str, torch.Tensor]:
-        torch.manual_seed(0)
-        trainee = Trainee.of(Learning(Half()), entry)
-        for number in range(2):
-            train(trainee, entry, np.random.default_rng(number), lambda done, of: None)
-            if stops:
-                tensors, step = {name: each.clone() for name, each in trainee.tensors().items()}, trainee.step
-                trainee = Trainee.of(Learning(Half()), entry)
-                trainee.restore(tensors, step)
-        return trainee.tensors()
-
-    through, stopped = trained(False), trained(True)
-    assert {name.partition(".")[0] for name in through if ".idle." in f".{name}."} == {"weights"}
+    through, stopped = _rounds(stops=False), _rounds(stops=True)
+    assert [name for name in through if ".idle." in name] == ["weights.idle.weight", "weights.idle.bias"]
     assert through.keys() == stopped.keys()
     assert all(torch.equal(each, stopped[name]) for name, each in through.items())

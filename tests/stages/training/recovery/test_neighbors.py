@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
+from stages.training.recovery.neighbors import _EdgeMaximumAtOnce, edge_maximum, nearest_neighbors
 
 
 def distances(points: Tensor) -> Tensor:
@@ -28,6 +28,14 @@ def test_neighbors_are_as_near_as_the_nearest(features: int, seed: int, n: int, 
     assert all(len(set(row)) == k for row in found.flatten(0, 1).tolist())
     expected = distances(points).sort(dim=-1).values[..., :k]
     torch.testing.assert_close(distances(points).gather(-1, found).sort(dim=-1).values, expected, atol=2e-3, rtol=0)
+
+
+def test_neighbors_are_told_apart_where_other_numbers_are_short() -> None:
+    line = torch.stack([torch.linspace(0.4, 0.5, 50), torch.zeros(50)], dim=-1)[None]
+    with torch.autocast("cpu", torch.bfloat16):
+        found = nearest_neighbors(line, 3)
+    expected = distances(line).sort(dim=-1).values[..., :3]
+    torch.testing.assert_close(distances(line).gather(-1, found).sort(dim=-1).values, expected, atol=1e-4, rtol=0)
 
 
 def test_neighbors_of_a_cloud_with_one_point_far_away() -> None:
@@ -52,3 +60,20 @@ def test_edge_maximum_and_its_gradient_are_those_of_all_edges() -> None:
     torch.testing.assert_close(found, expected)
     # a neighbour that is listed twice gets its gradient once here, and in two halves there: the same sum
     torch.testing.assert_close(gradient, wanted)
+    at_once = _EdgeMaximumAtOnce.apply(features, neighbors)
+    (gradient,) = torch.autograd.grad((at_once * weight).sum(), features)
+    torch.testing.assert_close(at_once, expected)
+    torch.testing.assert_close(gradient, wanted, atol=1e-4, rtol=0)
+
+
+def test_gradient_of_all_edges_at_once_leaves_determinism_as_it_was() -> None:
+    strict = torch.are_deterministic_algorithms_enabled()
+    torch.use_deterministic_algorithms(True)
+    try:
+        features = torch.randn(1, 9, 4, requires_grad=True)
+        _EdgeMaximumAtOnce.apply(features, torch.arange(9).repeat(1, 9, 1)).sum().backward()
+        assert torch.are_deterministic_algorithms_enabled()
+    finally:
+        torch.use_deterministic_algorithms(strict)
+    # each of the second half is the greatest for all nine or for none
+    assert set((features.grad[0, :, 2:]).round(decimals=4).unique().tolist()) == {0.0, 9.0}

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.training.recovery.clouds import frame_of, spoilt, taken
+from stages.training.recovery.clouds import frame_of, taken
 from stages.training.recovery.surface import chamfer_distance, even_points
 
 SQUARES = np.array([[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]], dtype=np.float64)
@@ -55,12 +55,3 @@ def test_taken_takes_every_point_as_often_as_any(seed: int, n: int) -> None:
     counts = np.bincount(taken(points, n, np.random.default_rng(seed))[:, 0].astype(int), minlength=10)
     assert counts.sum() == n
     assert np.ptp(counts) <= 1
-
-
-@given(seed=st.integers(0, 2**31))
-def test_spoilt_cloud_is_another_with_a_third_of_its_points_at_least(seed: int) -> None:
-    points = np.random.default_rng(1).random((400, 3))
-    found = spoilt(points, np.random.default_rng(seed))
-    assert found.shape != points.shape or not np.array_equal(found, points)
-    assert len(found) > 100
-    assert np.abs(found).max() < 1.2

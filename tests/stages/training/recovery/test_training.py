@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import pytest
@@ -19,13 +20,26 @@ FOLDER = "stools-models/small-tests_stages_programs_stool-0"
 @pytest.mark.parametrize("kind", ["points", "sketch"])
 def test_model_of_a_program_is_published_and_is_the_same_twice(kind: str, tmp_path: Path) -> None:
     wanted = config(input=kind)
-    assert train(wanted, tmp_path / "one").made == 4
+    assert train(wanted, tmp_path / "one").made == 6
     card = (tmp_path / "one" / FOLDER / "README.md").read_text()
     assert "A `recovery` of program `tests.stages.programs.stool`" in card
     rows = list(csv.DictReader((tmp_path / "one" / FOLDER / "curves.csv").read_text().splitlines()))
     assert [int(row["step"]) for row in rows] == [6, 12]
-    assert train(wanted, tmp_path / "two", workers=2).made == 4
+    assert train(wanted, tmp_path / "two", workers=2).made == 6
     assert made(tmp_path / "one/stools-models") == made(tmp_path / "two/stools-models")
+
+
+@pytest.mark.slow
+def test_each_round_learns_from_shapes_of_its_own_and_of_those_before(tmp_path: Path) -> None:
+    train(config(), tmp_path)
+    records = {
+        path.stem: json.loads(path.read_text()) for path in tmp_path.glob(".work/stools/training/records/*.json")
+    }
+    name = "small-tests_stages_programs_stool-"
+    inputs = [sorted(records[f"{name}0-r000{number}"]["inputs"]) for number in (0, 1)]
+    first, second = [[each for each in of_round if "-pool" in each] for of_round in inputs]
+    assert first == [f"training/{name}pool0000.safetensors"]
+    assert second == [*first, f"training/{name}pool0001.safetensors"]
 
 
 @pytest.mark.slow

@@ -1,0 +1,78 @@
+"""Inputs changed by chance, many at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from torch import Generator
+
+from stages.training.recovery.augmentation import inked, seen_clouds, seen_drawings, stored
+from stages.training.recovery.drawings import SIDE
+
+
+def clouds(n: int) -> torch.Tensor:
+    """Cubes of 400 points, stored, all the same."""
+    points = np.random.default_rng(1).random((400, 3)) * 7.0
+    return torch.from_numpy(np.array([stored(points)] * n))
+
+
+def seen(n: int, points: int, share: float) -> torch.Tensor:
+    return seen_clouds(clouds(n), points, share, Generator().manual_seed(2))
+
+
+def test_clouds_that_are_not_spoilt_are_points_of_the_shape_each_once() -> None:
+    found = seen(3, 400, 0.0)
+    assert torch.equal(found.sort(dim=1).values[0], found.sort(dim=1).values[2])
+    assert not torch.equal(found[0], found[2])
+    torch.testing.assert_close(found.abs().amax(dim=(1, 2)), torch.full((3,), 0.5))
+
+
+def test_spoilt_clouds_have_noise_or_have_lost_up_to_two_thirds_of_their_points() -> None:
+    found = seen(64, 400, 1.0)
+    distinct = torch.tensor([len(each.unique(dim=0)) for each in found])
+    assert distinct.min() > 100
+    # a seventh has noise alone
+    assert 3 <= (distinct == 400).sum() <= 20
+    assert found.abs().amax() < 0.5001
+
+
+def test_what_is_lost_comes_again_as_often_as_anything_else() -> None:
+    counts = [each.unique(dim=0, return_counts=True)[1] for each in seen(64, 400, 1.0)]
+    assert all(each.max() - each.min() <= 1 for each in counts)
+
+
+def test_a_share_is_spoilt() -> None:
+    found = seen(200, 400, 0.5)
+    lost = torch.tensor([len(each.unique(dim=0)) < 400 for each in found])
+    assert 0.3 < lost.float().mean() < 0.55
+
+
+def test_precision_of_the_network_is_none_of_the_clouds() -> None:
+    with torch.autocast("cpu", torch.bfloat16):
+        found = seen(8, 200, 1.0)
+    assert torch.equal(found, seen(8, 200, 1.0))
+
+
+@pytest.fixture
+def drawing() -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+    ink = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    ink[20:200, 30] = ink[40, 30:120] = True
+    return ink
+
+
+def test_drawings_come_back_from_their_bits(drawing: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> None:
+    found = inked(torch.from_numpy(np.packbits(drawing)[None]))
+    assert np.array_equal(found[0, 0].numpy() > 0, drawing)
+
+
+def test_drawings_are_mirrored_thick_and_thin(drawing: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> None:
+    bits = torch.from_numpy(np.packbits(drawing)[None]).expand(60, -1)
+    rng, noise = np.random.default_rng(4), Generator().manual_seed(4)
+    found = seen_drawings(bits, 1.0, rng, noise)
+    ink = found.sum(dim=(1, 2, 3)) / drawing.sum()
+    assert 0.3 < (ink > 2.5).float().mean() < 0.7
+    assert ((ink > 2.5) | ((ink > 0.8) & (ink < 1.0))).all()
+    mirrored = found[..., SIDE // 2 + 20 :].sum(dim=(1, 2, 3)) > 0
+    assert 0.3 < mirrored.float().mean() < 0.7
+    assert torch.equal(seen_drawings(bits, 0.0, rng, noise), inked(bits))

@@ -1,0 +1,32 @@
+"""The network on one device and the other."""
+
+from __future__ import annotations
+
+import torch
+from torch.nn.functional import max_pool2d
+
+from stages.training.recovery.model import RecoveryNet, halved
+from stages.training.recovery.settings import RecoveryEntry
+from tests.stages.programs.stool import PROGRAM as STOOL
+
+
+def test_squares_are_halved_on_a_gpu_as_they_are_elsewhere() -> None:
+    generator = torch.Generator().manual_seed(3)
+    features = torch.randn(2, 3, 7, 10, generator=generator, requires_grad=True)
+    weight = torch.randn(2, 3, 3, 5, generator=generator)
+    expected, found = max_pool2d(features, 2), halved(features)
+    assert torch.equal(found, expected)
+    (wanted,) = torch.autograd.grad((expected * weight).sum(), features)
+    (gradient,) = torch.autograd.grad((found * weight).sum(), features)
+    torch.testing.assert_close(gradient, wanted)
+
+
+def test_places_of_points_are_read_in_full_whatever_the_precision() -> None:
+    net = RecoveryNet(RecoveryEntry(name="small", points=64), STOOL.parameters)
+    seen: list[torch.Tensor] = []
+    net.encoder.convolutions[0].register_forward_hook(lambda _, __, features: seen.append(features))
+    clouds = torch.rand(2, 64, 3, generator=torch.Generator().manual_seed(1)) - 0.5
+    net(clouds)
+    with torch.autocast("cpu", torch.bfloat16):
+        net(clouds)
+    assert torch.equal(*seen)
