@@ -41,6 +41,9 @@ __all__ = [
 POINTS = 256
 """Points of a shape's surface that Chamfer distances are measured with."""
 
+AT_ONCE = 128
+"""Points of a latent space that are decoded at once."""
+
 
 @dataclass(frozen=True)
 class Physics:
@@ -112,12 +115,13 @@ def unrejected(model: TrainedProgramVae, count: int, rng: np.random.Generator, t
     before that line (§7.1.1, "no reject"). Points that give no cuboid at all are passed over. Raises ValueError where
     nearly all do."""
     kept: list[Program] = []
-    for _ in range(50):
-        found = model.decode(model.points(count, rng, temperature), reject=False)
+    most = 50 * (1 + count // AT_ONCE)
+    for _ in range(most):
+        found = model.decode(model.points(AT_ONCE, rng, temperature), reject=False)
         kept += [each for each in found if each is not None]
         if len(kept) >= count:
             return kept[:count]
-    raise ValueError(f"{len(kept)} of {50 * count} random points gave a program; train the model longer")
+    raise ValueError(f"{len(kept)} of {most * AT_ONCE} random points gave a program; train the model longer")
 
 
 def smoothness(

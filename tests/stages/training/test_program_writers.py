@@ -29,7 +29,7 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
             text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
             (tmp_path / "programs" / f"{path.stem}-{number}.txt").write_text(text)
     model = {"name": "tiny", "kind": "program_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 30, "rounds": 2}
-    flat = {**model, "name": "flat", "without": "hierarchy", "steps": 10}
+    flat = {**model, "name": "flat", "without": "hierarchy"}
     cuboids = {"name": "cuboids", "kind": "cuboid_rnn", "hidden": 32, "batch": 4, "steps": 60, "rounds": 2}
     parts = {"name": "parts", "kind": "part_graph_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 60, "rounds": 2}
     words = {"name": "words", "kind": "program_lm", "width": 16, "layers": 1, "batch": 4, "steps": 20, "rounds": 2}
