@@ -48,6 +48,9 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
         assert code == 0, printed
     counts = json.loads((out / ".work/toy/training/furniture-program_vae.json").read_text())["counts"]
     assert counts["train"]["programs"] >= 5
+    flattened = json.loads((out / ".work/toy/training/furniture-program_vae-hierarchy.json").read_text())["counts"]
+    assert flattened["train"]["assemblies"] == flattened["train"]["programs"]
+    assert counts["train"]["assemblies"] > counts["train"]["programs"]
     trained = load_program_vae(out / "toy-models/tiny-furniture-0/weights.safetensors", {"kit": "furniture"})
     points = trained.encode([parse(path.read_text()) for path in EXAMPLES[:3]])
     assert points.shape == (3, 8)
