@@ -17,8 +17,13 @@ _METHODS = ("3D-PRNN", "StructureNet", "ShapeAssembly", "validation")
 _ABLATED = (*_METHODS[:2], "flat", "no order", "no align", "no macros", "no reject", *_METHODS[2:])
 
 
-def quality_table(rows: Mapping[str, Physics], realisms: Mapping[str, Realism], rejected: Mapping[str, float]) -> Table:
-    """Table 2 of the paper."""
+def quality_table(
+    rows: Mapping[str, Physics],
+    realisms: Mapping[str, Realism],
+    rejected: Mapping[str, float],
+    silent: Mapping[str, str],
+) -> Table:
+    """Table 2 of the paper. silent: of models that write next to nothing, why."""
     figures: dict[str, Sequence[Sequence[Cell]]] = {
         "chair": ((73.1, 50.9, 12.6, 39.3), (89.7, 74.9, 4.04, 64.79), (95.0, 60.0, 11.58, 77.45),
                   (82.4, 58.4, 12.36, 64.17), (94.6, 84.6, 28.68, 29.32), (92.0, 77.9, 19.56, 36.78),
@@ -40,6 +45,7 @@ def quality_table(rows: Mapping[str, Physics], realisms: Mapping[str, Realism], 
         "Fool: percent of shapes, none of which it has learnt from, that a PointNet takes for real. FD: Fréchet "
         "distance to train, of features of the encoder that comes with Shapemill for clouds of chairs. Both depend on "
         "the networks: compare them with the row of val, not with the paper's.",
+        *(f"Not here: {name}, {reason}." for name, reason in silent.items()),
     )
     columns = ("rooted %", "stable %", "fool %", "FD")
     published = _published("shapeassembly Table 2, by simulation", columns, figures, _ABLATED)
@@ -102,9 +108,9 @@ def smoothness_table(rows: Mapping[str, tuple[Cell, Cell, float]]) -> Table:
     cells: tuple[tuple[Cell, ...], ...] = tuple((name, *each) for name, each in rows.items())
     notes = (
         "Mean change from step to step between random points: Chamfer distance by the diagonal, edit distance of the "
-        "programs' tokens. No program: points that gave none.",
+        "programs' tokens. No shape: points that gave none.",
     )
-    return Table("Smoothness of the latent space", ("model", *columns, "no program %"), cells, notes, published)
+    return Table("Smoothness of the latent space", ("model", *columns, "no shape %"), cells, notes, published)
 
 
 def _published(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from statistics import fmean
 
 import numpy as np
@@ -22,7 +23,9 @@ from stages.shapeassembly.extraction.validity import boxes_of, surface_points
 from stages.shapeassembly.interpreter import execute_all
 from stages.shapeassembly.program import Program
 from stages.shapeassembly.structure import program_distance, signature
+from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
+from stages.training.standing import Points
 
 __all__ = [
     "POINTS",
@@ -40,6 +43,9 @@ __all__ = [
 
 POINTS = 256
 """Points of a shape's surface that Chamfer distances are measured with."""
+
+AT_ONCE = 128
+"""Points of a latent space that are decoded at once."""
 
 
 @dataclass(frozen=True)
@@ -112,32 +118,43 @@ def unrejected(model: TrainedProgramVae, count: int, rng: np.random.Generator, t
     before that line (§7.1.1, "no reject"). Points that give no cuboid at all are passed over. Raises ValueError where
     nearly all do."""
     kept: list[Program] = []
-    for _ in range(50):
-        found = model.decode(model.points(count, rng, temperature), reject=False)
+    most = 50 * (1 + count // AT_ONCE)
+    for _ in range(most):
+        found = model.decode(model.points(AT_ONCE, rng, temperature), reject=False)
         kept += [each for each in found if each is not None]
         if len(kept) >= count:
             return kept[:count]
-    raise ValueError(f"{len(kept)} of {50 * count} random points gave a program; train the model longer")
+    raise ValueError(f"{len(kept)} of {most * AT_ONCE} random points gave a program; train the model longer")
 
 
 def smoothness(
-    model: TrainedProgramVae, sequences: int, steps: int, rng: np.random.Generator
+    model: TrainedProgramVae | TrainedPartGraphVae, sequences: int, steps: int, rng: np.random.Generator
 ) -> tuple[Cell, Cell, float]:
     """How much changes from step to step on straight ways between random points (§7.2): Chamfer distance as a share of
-    the diagonal of the bounding box, edit distance of programs; and the percent of points that gave no program, and are
-    passed over. The first two are empty where no two points in a row gave programs."""
+    the diagonal of the bounding box, edit distance of programs; and the percent of points that gave no shape, and are
+    passed over. The first two are empty where no two points in a row gave one, the second of cuboids without
+    programs."""
     ends = model.points(2 * sequences, rng).reshape(sequences, 2, model.latent)
     shares = np.linspace(0, 1, steps, dtype=np.float32)[:, None]
     geometry, structure, none = [], [], 0
     for first, last in ends:
-        found = model.decode(first + shares * (last - first), reject=False)
-        programs = [each for each in found if each is not None]
-        none += steps - len(programs)
-        clouds = clouds_of(boxes_of_programs(programs)) if programs else np.empty((0, POINTS, 3))
-        for place in range(1, len(programs)):
-            one, other = programs[place - 1 : place + 1]
-            diagonal = float(np.linalg.norm(one.root.bbox.dims))
+        programs, samples = _decoded(model, first + shares * (last - first))
+        none += steps - len(samples)
+        clouds = clouds_of(samples) if samples else np.empty((0, POINTS, 3))
+        for place in range(1, len(samples)):
+            corners = np.concatenate([box_corners(box) for box in samples[place - 1]])
+            diagonal = float(np.linalg.norm(np.ptp(corners, axis=0)))
             geometry.append(nearest(clouds[place : place + 1], clouds[place - 1 : place], False)[0] / diagonal)
-            structure.append(program_distance(one, other))
+        structure += [program_distance(one, other) for one, other in pairwise(programs)]
     share = 100 * none / (sequences * steps)
-    return (fmean(geometry), fmean(structure), share) if geometry else ("", "", share)
+    return fmean(geometry) if geometry else "", fmean(structure) if structure else "", share
+
+
+def _decoded(
+    model: TrainedProgramVae | TrainedPartGraphVae, points: Points
+) -> tuple[list[Program], Sequence[Sequence[Box]]]:
+    """The programs at points that give any, nothing rejected, and the cuboids at those that give any."""
+    if isinstance(model, TrainedPartGraphVae):
+        return [], [each for each in model.decode(points) if each]
+    programs = [each for each in model.decode(points, reject=False) if each is not None]
+    return programs, boxes_of_programs(programs)

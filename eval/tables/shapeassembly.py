@@ -34,17 +34,25 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from eval.programs import boxes_of_programs, clouds_of, novelty, physics_of, smoothness, variability
     from eval.realism import POINTS, realism
     from pipeline.randomness import decision_rng
+    from stages.training.part_graph_vae.trained import TrainedPartGraphVae
     from stages.training.program_vae.trained import TrainedProgramVae
 
     quality, seen, told, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, {}, []
+    silent: dict[str, str] = {}
     for each in _models(subject, asked.nucleus):
         train, val = (_programs(subject, each.kit, split) for split in ("train", "val"))
         learnt = boxes_of_programs(train)
         clouds = {"train": clouds_of(learnt), "val": clouds_of(boxes_of_programs(val))}
         rng = decision_rng(subject.config.seed, "shapeassembly", each.folder)
         without = each.model.header["settings"].get("without", "nothing")
+        curves[each.folder] = training_curve(subject.models / each.folder, "val_loss")
+        try:
+            rows = list(_written(each, asked, rng))
+        except ValueError as error:
+            silent[each.folder] = str(error)
+            continue
         real = Written(f"{each.kit}, val", boxes_of_programs(val[: asked.samples]), val[: asked.samples])
-        for row in (*_written(each, asked, rng), real):
+        for row in (*rows, real):
             if row.name not in quality:
                 count = len(row.samples)
                 quality[row.name] = physics_of(row.samples)
@@ -60,12 +68,11 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
                         novel[row.name] = novelty(row.programs, train)
                 if row is not real:
                     strips.append(Strip(f"Samples of {row.name}", _pictures(row.samples[:SHOWN])))
-        if isinstance(each.model, TrainedProgramVae) and without == "nothing":
+        if isinstance(each.model, TrainedProgramVae | TrainedPartGraphVae) and without == "nothing":
             smooth[each.folder] = smoothness(each.model, asked.sequences, asked.steps, rng)
-        curves[each.folder] = training_curve(subject.models / each.folder, "val_loss")
     return Answer(
         [
-            quality_table(quality, seen, rejected),
+            quality_table(quality, seen, rejected, silent),
             editability_table(told),
             variability_table(varied, novel),
             smoothness_table(smooth),
@@ -102,7 +109,8 @@ def _models(subject: Subject, nucleus: float) -> list[Trained[Any]]:
 
 
 def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> Iterator[Written]:
-    """What a model writes; and, of one of whole programs, what it writes where nothing is rejected."""
+    """What a model writes; and, of one of whole programs, what it writes where nothing is rejected. Raises ValueError
+    for a model that writes next to nothing."""
     from eval.programs import boxes_of_programs, unrejected
     from stages.training.program_vae.trained import TrainedProgramVae
 

@@ -75,11 +75,12 @@ class Trainee:
         return cls(learner, torch.optim.Adam(learner.module.parameters(), lr=entry.learning_rate))
 
     def tensors(self) -> dict[str, Tensor]:
-        """Weights as `weights.<name>` and the optimiser's moments as `exp_avg.<name>` and `exp_avg_sq.<name>`."""
+        """Weights as `weights.<name>` and the optimiser's moments as `exp_avg.<name>` and `exp_avg_sq.<name>`; what no
+        sample has used yet has none."""
         module = self.learner.module
         tensors = {f"weights.{name}": tensor for name, tensor in module.state_dict().items()}
         for name, parameter in module.named_parameters():
-            for moment in _MOMENTS:
+            for moment in _MOMENTS if parameter in self.optimizer.state else ():
                 tensors[f"{moment}.{name}"] = self.optimizer.state[parameter][moment]
         return tensors
 
@@ -91,6 +92,7 @@ class Trainee:
         state = {
             number: {"step": torch.tensor(float(step)), **{moment: moments[moment][name] for moment in _MOMENTS}}
             for number, (name, _) in enumerate(module.named_parameters())
+            if name in moments[_MOMENTS[0]]
         }
         self.optimizer.load_state_dict({"state": state, "param_groups": self.optimizer.state_dict()["param_groups"]})
         self.step = step

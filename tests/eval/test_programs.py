@@ -19,6 +19,9 @@ from eval.programs import (
 )
 from eval.realism import Realism
 from stages.shapeassembly import parse
+from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.training.part_graph_vae.trained import TrainedPartGraphVae
+from stages.training.part_graph_vae.training import new_model as new_part_graph_vae
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.program_vae.training import new_model
@@ -73,11 +76,15 @@ def test_steps_between_points_are_measured_and_tables_hold_the_published_rows() 
     boxes = boxes_of_programs(PROGRAMS)
     smooth = smoothness(model, 2, 5, np.random.default_rng(0))
     assert smooth[0] == "" or float(smooth[0]) >= 0
+    drawn = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
+    parts = TrainedPartGraphVae(new_part_graph_vae(drawn, 0).eval(), {"settings": drawn.model_dump()})
+    assert smoothness(parts, 2, 5, np.random.default_rng(0))[1] == "", "it writes no programs"
     tables = [
-        quality_table({"a": physics_of(boxes)}, {"a": Realism(20.0, 3.5)}, {"a": 12.5}),
+        quality_table({"a": physics_of(boxes)}, {"a": Realism(20.0, 3.5)}, {"a": 12.5}, {"b": "it writes nothing"}),
         editability_table({"a": PROGRAMS}),
         variability_table({"a": variability(boxes, clouds_of(boxes), None)}, {"a": 50.0}),
         smoothness_table({"a": smooth}),
     ]
     assert [len(each.published) for each in tables] == [27, 12, 12, 6]
+    assert "Not here: b, it writes nothing." in tables[0].markdown()
     assert all("chair, ShapeAssembly" in each.markdown() for each in tables)

@@ -30,6 +30,15 @@ class TrainedPartGraphVae:
     module: PartGraphVae
     header: Mapping[str, Any]
 
+    @property
+    def latent(self) -> int:
+        """Dimensions of the latent space."""
+        return int(self.header["settings"]["latent"])
+
+    def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> Points:
+        """Random points, float32 (count, latent), of where shapes stand, as `Standing.points`."""
+        return self.module.points(count, rng, temperature)
+
     def sample(
         self, count: int, rng: np.random.Generator, temperature: float = 1.0
     ) -> tuple[list[tuple[Box, ...]], int]:
@@ -40,7 +49,7 @@ class TrainedPartGraphVae:
         while len(kept) < count:
             if begun > 50 * (count + AT_ONCE):
                 raise ValueError(f"{len(kept)} of {begun} shapes had a cuboid; train the model longer")
-            for each in self.decode(self.module.points(AT_ONCE, rng, temperature)):
+            for each in self.decode(self.points(AT_ONCE, rng, temperature)):
                 if len(kept) < count:
                     begun += 1
                     kept += [each] if each else []

@@ -60,3 +60,41 @@ def _trained(before: int, seed: int) -> torch.Tensor:
 def test_what_modules_leave_out_hangs_on_the_seed_of_the_round_alone() -> None:
     assert torch.equal(_trained(before=1, seed=3), _trained(before=2, seed=3))
     assert not torch.equal(_trained(before=1, seed=3), _trained(before=1, seed=4))
+
+
+class _Half(nn.Module):
+    """Of two layers one is used."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.used, self.idle = nn.Linear(4, 4), nn.Linear(4, 4)
+
+    def forward(self, numbers: torch.Tensor) -> torch.Tensor:
+        found: torch.Tensor = self.used(numbers)
+        return found
+
+
+def _rounds(stops: bool) -> dict[str, torch.Tensor]:
+    """What is kept after two rounds, which are taken up again after each where it `stops`."""
+    entry = ProgramLmEntry(name="halving", kind="program_lm", steps=5, rounds=2)
+
+    def fresh() -> Trainee:
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(0)
+            return Trainee.of(_Halving(_Half()), entry)
+
+    trainee = fresh()
+    for number in range(2):
+        train(trainee, entry, np.random.default_rng(number), lambda done, total: None)
+        if stops:
+            tensors, step = {name: each.clone() for name, each in trainee.tensors().items()}, trainee.step
+            trainee = fresh()
+            trainee.restore(tensors, step)
+    return trainee.tensors()
+
+
+def test_a_training_with_a_layer_that_nothing_uses_goes_on_as_if_it_had_not_stopped() -> None:
+    through, stopped = _rounds(stops=False), _rounds(stops=True)
+    assert [name for name in through if ".idle." in name] == ["weights.idle.weight", "weights.idle.bias"]
+    assert through.keys() == stopped.keys()
+    assert all(torch.equal(each, stopped[name]) for name, each in through.items())

@@ -29,13 +29,16 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
             text = path.read_text().replace("0.5, 0.0, 0.5, 0.5, 1.0, 0.5", f"0.5, 0.0, 0.5, 0.5, 1.0, 0.5{number}")
             (tmp_path / "programs" / f"{path.stem}-{number}.txt").write_text(text)
     model = {"name": "tiny", "kind": "program_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 30, "rounds": 2}
+    flat = {**model, "name": "flat", "without": "hierarchy"}
+    cuboids = {"name": "cuboids", "kind": "cuboid_rnn", "hidden": 32, "batch": 4, "steps": 60, "rounds": 2}
+    parts = {"name": "parts", "kind": "part_graph_vae", "latent": 8, "hidden": 32, "batch": 4, "steps": 60, "rounds": 2}
     words = {"name": "words", "kind": "program_lm", "width": 16, "layers": 1, "batch": 4, "steps": 20, "rounds": 2}
     sections = {
         "shapeassembly": {
             "programs": [{"name": "furniture", "path": str(tmp_path / "programs")}],
             "splits": {"shards": 1, "val": 0.2, "test": 0.2},
         },
-        "training": {"longest": 1000, "models": [model, words]},
+        "training": {"longest": 1000, "models": [model, flat, cuboids, parts, words]},
     }
     config = tmp_path / "toy.yaml"
     config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, **sections}))
@@ -45,6 +48,9 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
         assert code == 0, printed
     counts = json.loads((out / ".work/toy/training/furniture-program_vae.json").read_text())["counts"]
     assert counts["train"]["programs"] >= 5
+    flattened = json.loads((out / ".work/toy/training/furniture-program_vae-hierarchy.json").read_text())["counts"]
+    assert flattened["train"]["assemblies"] == flattened["train"]["programs"]
+    assert counts["train"]["assemblies"] > counts["train"]["programs"]
     trained = load_program_vae(out / "toy-models/tiny-furniture-0/weights.safetensors", {"kit": "furniture"})
     points = trained.encode([parse(path.read_text()) for path in EXAMPLES[:3]])
     assert points.shape == (3, 8)
@@ -65,7 +71,18 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
     assert evaluate(["shapeassembly", *asked]) == 0
     table = (out / "toy-eval/shapeassembly.md").read_text()
     assert all(
-        row in table for row in ("tiny-furniture-0", "words-furniture-0", "furniture, val", "storage, ShapeAssembly")
+        row in table
+        for row in (
+            "| tiny-furniture-0 |",
+            "| tiny-furniture-0, no reject |",
+            "| flat-furniture-0, without hierarchy |",
+            "| words-furniture-0 |",
+            "| cuboids-furniture-0 |",
+            "| parts-furniture-0 |",
+            "furniture, val",
+            "storage, ShapeAssembly",
+            "chair, no macros",
+        )
     )
     for name, workers in {"tiny": (1, 2), "words": (1,)}.items():
         (tmp_path / name).mkdir()

@@ -1,0 +1,43 @@
+"""Programs as models learn them that are to do without a part of the language."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from stages.shapeassembly import parse
+from stages.shapeassembly.program import Attach, Cuboid
+from stages.training.program_vae.corpus import told_without
+from stages.training.program_vae.lines import ALIGNED, CUBOID, node_lines
+from stages.training.program_vae.settings import ProgramVaeEntry, Without
+from tests.stages.shapeassembly.test_flattening import BENCH
+
+PROGRAM = parse(BENCH)
+
+
+@pytest.mark.parametrize("without", get_args(Without))
+def test_what_a_model_is_to_do_without_is_not_in_its_programs(without: Without) -> None:
+    found = told_without(PROGRAM, without, np.random.default_rng(0))
+    nodes = node_lines(found)
+    kinds = {type(line) for block in found.blocks for line in block.lines}
+    assert (found == PROGRAM) == (without == "nothing") or without == "order"
+    assert (len(nodes) == 1) == (without == "hierarchy")
+    assert (kinds == {Cuboid, Attach}) == (without == "macros")
+    aligned = any(((node.numbers[:, CUBOID] == 1) & (node.numbers[:, ALIGNED][:, 0] == 1)).any() for node in nodes)
+    assert aligned == (without != "align")
+
+
+def test_order_is_drawn_from_the_generator_alone() -> None:
+    told = [told_without(PROGRAM, "order", np.random.default_rng(seed)) for seed in (1, 1, *range(2, 9))]
+    assert told[0] == told[1]
+    assert any(each != told[0] for each in told)
+
+
+def test_models_that_learn_the_same_share_what_is_made_ready() -> None:
+    def entry(without: Without) -> ProgramVaeEntry:
+        return ProgramVaeEntry(name="any", kind="program_vae", without=without)
+
+    assert entry("nothing").prepared == {}
+    assert entry("macros").prepared == {"without": "macros"}
