@@ -36,7 +36,7 @@ def quality_table(
                     (94.3, 80.9, 11.66, 31.69), (95.3, 83.7, 13.5, 31.72), (100.0, 87.0, "", "")),
     }  # fmt: skip
     cells: tuple[tuple[Cell, ...], ...] = tuple(
-        (name, each.rooted, each.stable, realisms[name].fool, realisms[name].fd, rejected.get(name, ""))
+        (name, each.rooted, each.stable, *_realism(realisms.get(name)), rejected.get(name, ""))
         for name, each in rows.items()
     )
     notes = (
@@ -50,6 +50,10 @@ def quality_table(
     columns = ("rooted %", "stable %", "fool %", "FD")
     published = _published("shapeassembly Table 2, by simulation", columns, figures, _ABLATED)
     return Table("Quality of shapes", ("shapes", *columns, "rejected %"), cells, notes, published)
+
+
+def _realism(seen: Realism | None) -> tuple[Cell, Cell]:
+    return ("", "") if seen is None else (seen.fool, seen.fd)
 
 
 def editability_table(rows: Mapping[str, Sequence[Program]]) -> Table:

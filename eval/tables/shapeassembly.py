@@ -39,10 +39,13 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 
     quality, seen, told, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, {}, []
     silent: dict[str, str] = {}
-    for each in _models(subject, asked.nucleus):
-        train, val = (_programs(subject, each.kit, split) for split in ("train", "val"))
-        learnt = boxes_of_programs(train)
-        clouds = {"train": clouds_of(learnt), "val": clouds_of(boxes_of_programs(val))}
+    category = ""
+    for each in sorted(_models(subject, asked.nucleus), key=lambda each: each.kit):
+        if each.kit != category:  # thousands of programs: one category at a time
+            category = each.kit
+            train, val = (_programs(subject, category, split) for split in ("train", "val"))
+            learnt = boxes_of_programs(train)
+            clouds = {"train": clouds_of(learnt), "val": clouds_of(boxes_of_programs(val))}
         rng = decision_rng(subject.config.seed, "shapeassembly", each.folder)
         without = each.model.header["settings"].get("without", "nothing")
         curves[each.folder] = training_curve(subject.models / each.folder, "val_loss")
@@ -56,8 +59,9 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             if row.name not in quality:
                 count = len(row.samples)
                 quality[row.name] = physics_of(row.samples)
-                shown = clouds_of(row.samples, POINTS), clouds_of(learnt[:count], POINTS)
-                seen[row.name] = realism(*shown, subject.config.seed)
+                if judged := min(count, len(learnt), asked.judged):
+                    shown = clouds_of(row.samples[:judged], POINTS), clouds_of(learnt[:judged], POINTS)
+                    seen[row.name] = realism(*shown, subject.config.seed)
                 varied[row.name] = variability(row.samples, clouds["train"], None if row is real else clouds["val"])
                 if row.begun:
                     rejected[row.name] = 100 * (1 - count / row.begun)
@@ -145,6 +149,12 @@ def _pictures(samples: Sequence[Sequence[Box]]) -> list[tuple[str, bytes]]:
 
 def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--samples", type=int, default=1000, help="programs that each model writes")
+    parser.add_argument(
+        "--judged",
+        type=int,
+        default=1000,
+        help="of these, how many networks look at, for fool and FD, which takes longest",
+    )
     parser.add_argument("--temperature", type=float, default=1.0, help="as in shapeassembly.written")
     parser.add_argument("--nucleus", type=float, default=NUCLEUS, help="as in shapeassembly.written")
     parser.add_argument("--sequences", type=int, default=100, help="straight ways in the latent space of each model")
