@@ -28,6 +28,8 @@ RAYS = np.array(
 )
 """Directions in which a probe looks for surfaces, askew to what people model along."""
 MAJORITY = len(RAYS) // 2 + 1
+ROUNDING = 1e-9
+"""Points so near to a box, as a share of its size, are looked at once more."""
 
 
 def depth_bound(first: FloatArray, second: FloatArray) -> float:
@@ -53,15 +55,13 @@ class PenetrationTest:
         The points are a regular sample of both surfaces; inside is decided by the majority of several rays, so a
         mesh with holes has an inside where most rays see one.
         """
-        into_a = self._depth_of(a, transform_points(pose, self._points(b)))
-        into_b = self._depth_of(b, transform_points(invert(pose), self._points(a)))
-        return max(into_a, into_b)
+        return max(self._depth_of(a, b, pose), self._depth_of(b, a, invert(pose)))
 
-    def _depth_of(self, index: int, points: FloatArray) -> float:
+    def _depth_of(self, index: int, other: int, pose: FloatArray) -> float:
+        """How deep points of a part of type `other`, at `pose`, lie in one of type `index`."""
         import open3d as o3d
 
-        low, high = self.types[index].bounds
-        near = points[np.all((points > low) & (points < high), axis=1)].astype(np.float32)
+        near = _inside_box(self._points(other), pose, self.types[index].bounds).astype(np.float32)
         if len(near) == 0:
             return 0.0
         scene = self._scene(index)
@@ -98,6 +98,7 @@ class PenetrationTest:
         return self._scenes[index]
 
     def _points(self, index: int) -> FloatArray:
+        """The probes of a type, a column each, float64 (3, p)."""
         if index not in self._probes:
             part = self.types[index]
             corners = part.vertices[part.faces]
@@ -108,5 +109,20 @@ class PenetrationTest:
                 weights = [(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]
                 barycentric = (np.array(weights) + 1 / 3) / (count + 1)
                 points.append(np.einsum("kc,fcd->fkd", barycentric, corners[steps == count]).reshape(-1, 3))
-            self._probes[index] = np.concatenate(points)
+            self._probes[index] = np.ascontiguousarray(np.concatenate(points).T)
         return self._probes[index]
+
+
+def _inside_box(columns: FloatArray, pose: FloatArray, box: FloatArray) -> FloatArray:
+    """Those of the points `columns` (3, p), float64 (k, 3), that lie in a `box` (2, 3) once they are moved by `pose`.
+
+    An axis at a time: a large part has hundreds of thousands, of which few are near.
+    """
+    slack = ROUNDING * float(np.abs(box).max())
+    for axis, (low, high) in enumerate(box.T):
+        places = pose[axis, :3] @ columns + pose[axis, 3]
+        columns = columns[:, (places > low - slack) & (places < high + slack)]
+    points = transform_points(pose, columns.T)
+    inside = (points > box[0]) & (points < box[1])
+    found: FloatArray = points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
+    return found
