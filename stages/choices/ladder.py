@@ -110,22 +110,41 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     """The rungs that were tried, the chosen one last.
 
     Chosen is the first that gives enough; where none does, the one of the best score, the stricter one of equals.
-    Each has `tries` by each method, and more if it looks promising; after so much WORK none but slots are tried.
+    Each has `tries` by each method, and more if it looks promising; after so much WORK none but slots are tried. A
+    level of slots admits nothing that the loosest of them does not: where that finds next to nothing it is the only
+    one that is tried.
     """
     tried: list[Rung] = []
     known: dict[tuple[ContactKind, ...], ContactAnswers] = {}
-    for setting in _settings(sight, rails):
-        if setting.grammar not in SLOT_LEVELS and sum(each.finds.tries for each in tried) * sight.parts > WORK:
-            continue
+    looked: dict[Setting, Rung | None] = {}
+
+    def look(setting: Setting) -> Rung | None:
+        """The rung of a setting; None where too little of the models stays."""
         staying = sight.staying(setting)
         kept = sum(map(len, staying)) / sight.parts
         if min(map(len, staying)) < 2 or (kept < 1.0 and (not rails.largest or (tried and kept < STAY))):
-            continue
+            return None
         kit = sight.kit(setting)
         if setting.kinds not in known:
             known[setting.kinds] = ContactAnswers(kit)
-        tried.append(_rung(known[setting.kinds].under(kit), setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS))
-        if tried[-1].gives_enough:
+        return _rung(known[setting.kinds].under(kit), setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS)
+
+    for setting in _settings(sight, rails):
+        if setting.grammar not in SLOT_LEVELS:
+            if sum(each.finds.tries for each in tried) * sight.parts > WORK:
+                continue
+        else:
+            loosest = replace(setting, grammar=rails.grammars[-1])
+            if loosest not in looked:
+                looked[loosest] = look(loosest)
+            found = looked[loosest]
+            if setting != loosest and (found is None or found.finds.histograms < PROMISING):
+                continue
+        rung = looked[setting] if setting in looked else look(setting)
+        if rung is None:
+            continue
+        tried.append(rung)
+        if rung.gives_enough:
             return tried
     if tried:
         best = max(range(len(tried)), key=lambda place: (tried[place].score, -place))
