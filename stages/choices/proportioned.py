@@ -11,7 +11,7 @@ from stages.choices.config_text import MOST
 from stages.choices.forecast import LOOK, Forecast, rounded
 from stages.choices.plain import is_closed_box
 from stages.choices.reading import Reading
-from stages.exemplars.build import Observation, observe_parts
+from stages.exemplars.build import Observation
 from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault
 from stages.proportions.settings import ProportionsConfig
@@ -75,7 +75,7 @@ def instead_of_layouts(reading: Reading, expected: Forecast, shown: int) -> Inst
     if reading.choices.enough or not expected.is_poor:
         return None
     unvaried = _unvaried(reading)
-    built = observe_parts(reading.config.decide(unvaried.values), reading.models, reading.identified)
+    built = reading.observe(unvaried.values)
     found = in_proportions(built.kit, shown) if not built.refusals else None
     if found is None or not found.enough:
         return None
@@ -98,7 +98,7 @@ def _unvaried(reading: Reading) -> Choices:
     kept = [key for key in choices.values if key not in REQUIREMENTS]
     values = {key: others[key][0] if key in open_keys else choices.values[key] for key in kept}
     reasons = {key: others[key][1] if key in open_keys else choices.reasons[key] for key in kept}
-    if observe_parts(reading.config.decide(values), reading.models, reading.identified).refusals:
+    if reading.observe(values).refusals:
         values["disconnected"], reasons["disconnected"] = "largest", "parts stand apart from the largest piece"
     return replace(choices, values=values, reasons=reasons)
 
