@@ -33,7 +33,7 @@ def bared(kit: Kit, shapes: Sequence[Assembly]) -> tuple[str, ...]:
     if not shapes:
         return ()
     wholes = [each.whole for each in kit.exemplars]
-    counts = sum(np.bincount(kit.label_of[each.types], minlength=len(kit.labels)) for each in wholes)
+    counts = np.sum([np.bincount(kit.label_of[each.types], minlength=len(kit.labels)) for each in wholes], axis=0)
     asked = counts > 0
     asked[kit.label_of[list(kit.grammar.hubs)]] = False
     found = np.zeros(len(kit.labels), dtype=bool)
@@ -61,8 +61,8 @@ def _shares(kit: Kit, assembly: Assembly) -> Iterator[FloatArray]:
         yield np.bincount(labels, weights=covered, minlength=len(kit.labels)) / there
 
 
-def _covered(boxes: FloatArray, up: int, tolerance: float) -> tuple[BoolArray, BoolArray]:
-    """Which of some boxes (n, 2, 3) have another close above them, and which close below, bool (n,) each."""
+def _covered(boxes: FloatArray, up: int, tolerance: float) -> BoolArray:
+    """Which of some boxes (n, 2, 3) have another close above them, and which close below, bool (2, n)."""
     low, high = boxes[:, 0], boxes[:, 1]
     beside = ~np.eye(len(boxes), dtype=bool)
     for axis in {0, 1, 2} - {up}:
@@ -72,6 +72,6 @@ def _covered(boxes: FloatArray, up: int, tolerance: float) -> tuple[BoolArray, B
         width = high[:, axis] - low[:, axis]
         beside &= shared > BESIDE * np.minimum(width[:, None], width[None])
     near = np.maximum(GAP * (high[:, up] - low[:, up]), tolerance)[:, None]
-    gap = np.abs(low[None, :, up] - high[:, None, up])
-    above, below = beside & (gap <= near), beside & (near >= gap.T)
-    return above.any(axis=1), below.any(axis=1)
+    gaps = np.abs(low[None, :, up] - high[:, None, up])
+    found: BoolArray = np.any([beside & (gaps <= near), beside & (near >= gaps.T)], axis=2)
+    return found

@@ -21,7 +21,7 @@ __all__ = ["LOOK", "Forecast", "forecast", "rounded"]
 
 MANY = 300
 """The search for a forecast ends at so many distinct graphs."""
-LISTS = 60
+LISTS = 50
 """With fewer parts lists than this a dataset of MANY shapes has each of them many times."""
 LOOK = "look at the sheet before you make many"
 NAMED = 2
