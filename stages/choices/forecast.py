@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.randomness import decision_rng
+from stages.choices.bared import bared
 from stages.choices.ladder import FEW, is_dull
 from stages.choices.probe import Finds, Probe
 from stages.shape.graphs.patterns import observed_patterns, seen_once
@@ -16,10 +17,15 @@ from stages.variations.advice import another_model, what_keeps
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import DUPLICATE, Variant
 
-__all__ = ["Forecast", "forecast", "rounded"]
+__all__ = ["LOOK", "Forecast", "forecast", "rounded"]
 
 MANY = 300
 """The search for a forecast ends at so many distinct graphs."""
+LISTS = 50
+"""With fewer parts lists than this a dataset of MANY shapes has each of them many times."""
+LOOK = "look at the sheet before you make many"
+NAMED = 2
+"""So many labels are named in a sentence."""
 LONG = 4
 """It has so many times the tries of a probe, as long as it finds something in the first."""
 
@@ -30,7 +36,8 @@ class Forecast:
 
     layouts: about how many distinct graphs there are, None where the end is not in sight; parts: fewest and most parts
     of the finds; seen_once: share of parts whose pattern occurs once; sentence: what to expect, mend; variants: the
-    finds; chosen: those that differ most, most different first.
+    finds; chosen: those that differ most, most different first; bared: the labels whose parts lose what stands close
+    above or below them.
     """
 
     finds: Finds
@@ -39,11 +46,13 @@ class Forecast:
     seen_once: float
     sentence: str
     variants: Sequence[Variant]
+    bared: tuple[str, ...] = ()
 
     @property
     def is_poor(self) -> bool:
-        """Whether it is no dataset: next to nothing, or all of it alike."""
-        return not self.finds.graphs or (self.layouts is not None and self.layouts < FEW) or is_dull(self.finds)
+        """Whether it is no dataset: next to nothing, or all of it alike, or broken."""
+        few = not self.finds.graphs or (self.layouts is not None and self.layouts < FEW)
+        return few or is_dull(self.finds) or bool(self.bared)
 
     @property
     def chosen(self) -> list[Variant]:
@@ -65,7 +74,9 @@ def forecast(
     sizes = [len(each.assembly) for each in probe.variants]
     parts = (min(sizes, default=0), max(sizes, default=0))
     once = seen_once(observed_patterns(kit, answers.dockings, upright=True))
-    return Forecast(finds, layouts, parts, once, _sentence(kit, finds, layouts, parts), probe.variants)
+    broken = bared(kit, [probe.whole(place) for place in finds.most_different])
+    said = _sentence(kit, finds, layouts, parts, broken)
+    return Forecast(finds, layouts, parts, once, said, probe.variants, broken)
 
 
 def _layouts(finds: Finds) -> int | None:
@@ -83,7 +94,7 @@ def _layouts(finds: Finds) -> int | None:
     return round(low)
 
 
-def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int]) -> str:
+def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int], broken: tuple[str, ...] = ()) -> str:
     if not finds.graphs:
         return f"nothing: {what_keeps(kit, finds.rejects, finds.tries)}"
     size = f"{parts[0]} to {parts[1]} parts" if parts[0] < parts[1] else f"{parts[0]} parts each"
@@ -92,10 +103,16 @@ def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int
         return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
     if layouts is not None:  # at least: some are far rarer than others, and a long search builds on what it found
         count = f"{rounded(layouts)} or more layouts"
+    if broken:
+        names = " and ".join(broken[:NAMED]) + (" and others" if len(broken) > NAMED else "")
+        why = f"nothing stands close above or below {names}, as it does in the exemplar"
+        return f"{count} of {size} that look broken, for {why}; {LOOK}, and bring {another_model(kit)}"
     if is_dull(finds):
         alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
-        looked = f"{count} of {size} that look {alike}; look at the sheet before you make many"
-        return f"{looked}, and bring {another_model(kit)}"
+        return f"{count} of {size} that look {alike}; {LOOK}, and bring {another_model(kit)}"
+    if finds.histograms < LISTS and not finds.by_meaning:
+        few = f"about {rounded(finds.histograms)} parts lists, so that many will look alike"
+        return f"{count} of {size}, but only of {few}; {LOOK}, and bring {another_model(kit)}"
     return f"{count} of {size}, {rounded(finds.histograms)} or more of them of different parts lists"
 
 

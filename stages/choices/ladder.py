@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.randomness import decision_rng
+from stages.choices.bared import bared
 from stages.choices.probe import HUB, Finds, Probe
 from stages.choices.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
@@ -59,31 +60,37 @@ class Rails:
 @dataclass(frozen=True)
 class Rung:
     """A setting, what a probe found under it, and the share of all parts that stay; different: the most different
-    finds, with their hubs where they are left out."""
+    finds, with their hubs where they are left out; bared: the labels whose parts lose what stands close above or below
+    them in these."""
 
     setting: Setting
     finds: Finds
     kept: float
     different: Sequence[Assembly] = ()
+    bared: tuple[str, ...] = ()
 
     @property
     def score(self) -> tuple[float, ...]:
         """By which rungs that give too little are compared: histograms at their distances, in what is left of the
-        exemplars; then graphs. For next to nothing no hubs are left out."""
+        exemplars; then graphs. For next to nothing no hubs are left out. What looks broken is hardly worth more than
+        nothing."""
         finds, kept = self.finds, self.kept
         if (self.setting.hubs and finds.graphs < FEW) or finds.familiar < FAMILIAR:
             return (0.0, 0.0)
+        if self.bared:
+            return (0.0, finds.graphs * kept)
         return (finds.histograms * min(finds.distance, 0.2) * min(finds.spread, 0.2) * kept, finds.graphs * kept)
 
     @property
     def gives_enough(self) -> bool:
-        """Whether it promises a pool of some size that is not dull."""
+        """Whether it promises a pool of some size that is not dull, nor broken."""
         finds = self.finds
         return (
             finds.graphs >= GRAPHS
             and finds.histograms >= HISTOGRAMS
             and finds.familiar >= FAMILIAR
             and not is_dull(finds)
+            and not self.bared
         )
 
 
@@ -103,22 +110,41 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     """The rungs that were tried, the chosen one last.
 
     Chosen is the first that gives enough; where none does, the one of the best score, the stricter one of equals.
-    Each has `tries` by each method, and more if it looks promising; after so much WORK none but slots are tried.
+    Each has `tries` by each method, and more if it looks promising; after so much WORK none but slots are tried. A
+    level of slots admits nothing that the loosest of them does not: where that finds next to nothing it is the only
+    one that is tried.
     """
     tried: list[Rung] = []
     known: dict[tuple[ContactKind, ...], ContactAnswers] = {}
-    for setting in _settings(sight, rails):
-        if setting.grammar not in SLOT_LEVELS and sum(each.finds.tries for each in tried) * sight.parts > WORK:
-            continue
+    looked: dict[Setting, Rung | None] = {}
+
+    def look(setting: Setting) -> Rung | None:
+        """The rung of a setting; None where too little of the models stays."""
         staying = sight.staying(setting)
         kept = sum(map(len, staying)) / sight.parts
         if min(map(len, staying)) < 2 or (kept < 1.0 and (not rails.largest or (tried and kept < STAY))):
-            continue
+            return None
         kit = sight.kit(setting)
         if setting.kinds not in known:
             known[setting.kinds] = ContactAnswers(kit)
-        tried.append(_rung(known[setting.kinds].under(kit), setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS))
-        if tried[-1].gives_enough:
+        return _rung(known[setting.kinds].under(kit), setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS)
+
+    for setting in _settings(sight, rails):
+        if setting.grammar not in SLOT_LEVELS:
+            if sum(each.finds.tries for each in tried) * sight.parts > WORK:
+                continue
+        else:
+            loosest = replace(setting, grammar=rails.grammars[-1])
+            if loosest not in looked:
+                looked[loosest] = look(loosest)
+            found = looked[loosest]
+            if setting != loosest and (found is None or found.finds.histograms < PROMISING):
+                continue
+        rung = looked[setting] if setting in looked else look(setting)
+        if rung is None:
+            continue
+        tried.append(rung)
+        if rung.gives_enough:
             return tried
     if tried:
         best = max(range(len(tried)), key=lambda place: (tried[place].score, -place))
@@ -132,11 +158,18 @@ def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, re
     names = [answers.kit.types[index].name for index in setting.hubs]
     rng = decision_rng(0, "choices", setting.grammar, *setting.kinds, *names)
     probe = Probe(answers, rng, required if setting.hubs else 0)
-    rung = Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept)
+    rung = _looked_at(Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept), probe)
     promising = rung.finds.histograms >= (1 if rung.finds.by_meaning else PROMISING)
-    if promising and not rung.gives_enough:
-        rung = Rung(setting, probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS, evenly=True), kept)
-    return replace(rung, different=[probe.whole(place) for place in rung.finds.most_different])
+    if promising and not rung.gives_enough and not rung.bared:
+        more = probe.go_on((LONGER - 1) * tries, LONGER * GRAPHS, evenly=True)
+        rung = _looked_at(Rung(setting, more, kept), probe)
+    return rung
+
+
+def _looked_at(rung: Rung, probe: Probe) -> Rung:
+    """A rung with the most different finds of its probe, and what is bared in them."""
+    different = [probe.whole(place) for place in rung.finds.most_different]
+    return replace(rung, different=different, bared=bared(probe.kit, different))
 
 
 def _settings(sight: Sight, rails: Rails) -> Iterator[Setting]:

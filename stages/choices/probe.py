@@ -33,6 +33,8 @@ HUB = 40
 """Where a part has more neighbours than this, nothing is grown: all around it is a copy, and dear."""
 FIRST = 5
 """Growth that finds nothing in one of so many parts of its tries is given up."""
+VAIN = 4
+"""As many times sooner where the exchange found nothing either, by a grammar that has nothing but what was observed."""
 SEARCH = SearchConfig(duplicates="graph")
 """A probe counts distinct graphs, whatever the config calls a duplicate. By meaning these do not tell a turned leg from
 a square one, and what counts are parts lists."""
@@ -117,7 +119,9 @@ class Probe:
         search = self._searches[number]
         while left[number] > 0 and len(self.variants) < wanted:
             is_first = search.config.method == "growth" and left[number] == tries
-            asked = max(tries // FIRST, 1) if is_first else left[number]
+            is_vain = not self.variants and self._slots is None and len(self._searches) > 1
+            first = tries // (FIRST * VAIN if is_vain else FIRST)
+            asked = max(first, 1) if is_first else left[number]
             missing = wanted - len(self.variants)
             found, used = search.run(self._rng, asked, missing, f"probe-{self._tries}", lambda _: None)
             self._tries += used

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from pipeline.randomness import decision_rng
 from stages.choices.choose import REQUIREMENTS, Choices
 from stages.choices.config_text import MOST
-from stages.choices.forecast import Forecast, rounded
+from stages.choices.forecast import LOOK, Forecast, rounded
+from stages.choices.plain import is_closed_box
 from stages.choices.reading import Reading
-from stages.exemplars.build import Observation, observe_parts
+from stages.exemplars.build import Observation
 from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault
 from stages.proportions.settings import ProportionsConfig
@@ -36,13 +37,14 @@ class Proportioned:
 
     holds: share of the draws that hold together; different: how many that differ a dataset finds, of MOST at most;
     shapes: the most different of the draws, at most as many as asked for; stable: whether a dataset should ask that
-    shapes stand, for all exemplars do; enough: whether it is worth one.
+    shapes stand, for all exemplars do; plain: whether all exemplars are closed boxes; enough: whether it is worth one.
     """
 
     holds: float
     different: int
     shapes: Sequence[Shape]
     stable: bool
+    plain: bool
 
     @property
     def enough(self) -> bool:
@@ -50,9 +52,12 @@ class Proportioned:
 
     @property
     def sentence(self) -> str:
-        """How many there are."""
+        """How many there are, and whether they differ to the eye."""
         many = "hundreds" if self.different >= MOST else f"about {rounded(self.different)}"
-        return f"{many} of the same layout in other proportions"
+        said = f"{many} of the same layout in other proportions"
+        if not self.plain:
+            return said
+        return f"{said} that look alike, for it is a closed box with plain sides, whatever is in it; {LOOK}"
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,7 @@ def instead_of_layouts(reading: Reading, expected: Forecast, shown: int) -> Inst
     if reading.choices.enough or not expected.is_poor:
         return None
     unvaried = _unvaried(reading)
-    built = observe_parts(reading.config.decide(unvaried.values), reading.models, reading.identified)
+    built = reading.observe(unvaried.values)
     found = in_proportions(built.kit, shown) if not built.refusals else None
     if found is None or not found.enough:
         return None
@@ -93,7 +98,7 @@ def _unvaried(reading: Reading) -> Choices:
     kept = [key for key in choices.values if key not in REQUIREMENTS]
     values = {key: others[key][0] if key in open_keys else choices.values[key] for key in kept}
     reasons = {key: others[key][1] if key in open_keys else choices.reasons[key] for key in kept}
-    if observe_parts(reading.config.decide(values), reading.models, reading.identified).refusals:
+    if reading.observe(values).refusals:
         values["disconnected"], reasons["disconnected"] = "largest", "parts stand apart from the largest piece"
     return replace(choices, values=values, reasons=reasons)
 
@@ -134,4 +139,5 @@ def in_proportions(kit: Kit, shown: int) -> Proportioned:
         held += len(kept)
         found += [kept[place] for place in drawn.farthest_first(len(range(number, shown, len(kit.exemplars))))]
         different += _different(lattice, config, number, len(range(number, MOST, len(kit.exemplars))))
-    return Proportioned(held / max(tried, 1), different, found, stable)
+    plain = all(is_closed_box(kit_shape(kit, each.whole)) for each in kit.exemplars)
+    return Proportioned(held / max(tried, 1), different, found, stable, plain)

@@ -13,7 +13,7 @@ from stages.choices.forecast import Forecast, forecast
 from stages.choices.proportioned import Proportioned, instead_of_layouts
 from stages.choices.reading import Reading, cut_if_nothing_comes
 from stages.choices.sheet import SHOWN
-from stages.exemplars.build import Observation, observe_parts
+from stages.exemplars.build import Observation
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig, ReadLimits
@@ -110,12 +110,11 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
     identified = identify_parts(models, config)
     first = Reading(config, models, identified, choose(config, models, identified, tries))
     reading = cut_if_nothing_comes(first, limits or ReadLimits(), tries, REQUIREMENTS)
-    models, identified, choices = reading.models, reading.identified, reading.choices
+    models, choices = reading.models, reading.choices
     decided = reading.config.decide(choices.values)
-    built = seen = observe_parts(decided, models, identified)
+    built = seen = reading.observe(choices.values)
     if decided.decided().hubs or decided.decided().disconnected == "largest":
-        whole = reading.config.decide({**choices.values, "hubs.types": "none", "disconnected": "error"})
-        seen = observe_parts(whole, models, identified)
+        seen = reading.observe({**choices.values, "hubs.types": "none", "disconnected": "error"})
     expected, assemblies, rate = None, [], 0.0
     if not built.refusals:
         answers = ContactAnswers(built.kit)

@@ -3,11 +3,13 @@ those."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from pipeline.errors import ConfigError
 from stages.choices.choose import Choices, choose
+from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import Identified, identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
@@ -29,6 +31,15 @@ class Reading:
     models: Sequence[Model]
     identified: Identified
     choices: Choices
+    _observed: dict[str, Observation] = field(default_factory=dict, compare=False, repr=False)
+
+    def observe(self, values: Mapping[str, Any]) -> Observation:
+        """What a run builds of the models where the keys left open come to `values`; built once for the same."""
+        config = self.config.decide(values)
+        told = config.model_dump_json()
+        if told not in self._observed:
+            self._observed[told] = observe_parts(config, self.models, self.identified)
+        return self._observed[told]
 
 
 def read_and_choose(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> Reading:

@@ -46,7 +46,6 @@ def run_shard(task: Task) -> Outcome:
     from stages.choices.proportioned import instead_of_layouts
     from stages.choices.prospect import foreseen
     from stages.choices.reading import read_and_choose
-    from stages.exemplars.build import observe_parts
     from stages.variations.kernels.answers import ContactAnswers
 
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
@@ -54,7 +53,7 @@ def run_shard(task: Task) -> Outcome:
     reading = read_and_choose(config, limits, tries, task.shard.params["require"])
     choices = reading.choices
     if task.shard.params["instead"] and not choices.enough:
-        built = observe_parts(reading.config.decide(choices.values), reading.models, reading.identified)
+        built = reading.observe(choices.values)
         if not built.refusals:
             expected = foreseen(config, reading, ContactAnswers(built.kit), tries)
             instead = instead_of_layouts(reading, expected, shown=0)

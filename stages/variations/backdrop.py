@@ -79,13 +79,18 @@ class Backdrop:
         fitted = whole.types[np.isin(whole.types, kit.grammar.hubs)]
         if not 0 < required < 1:
             return len(fitted) >= required
-        if any((fitted == hub).sum() < count for hub, count in spanning_hubs(kit).items()):
+        if any((fitted == hub).sum() < count for hub, count in self._spanning.items()):
             return False
         widest, share = self._widest
         if int((fitted == widest).sum()) < max(1.0, required * share * len(whole)):
             return False
         beside = zip(whole.types.tolist(), self._hubs_beside(whole), strict=True)
         return sum(not self._always[part_type] <= found for part_type, found in beside) <= LACKING * len(whole)
+
+    @cached_property
+    def _spanning(self) -> dict[int, int]:
+        """`spanning_hubs` of the kit."""
+        return spanning_hubs(self.kit)
 
     @cached_property
     def _widest(self) -> tuple[int, float]:

@@ -28,6 +28,8 @@ RAYS = np.array(
 )
 """Directions in which a probe looks for surfaces, askew to what people model along."""
 MAJORITY = len(RAYS) // 2 + 1
+ROUNDING = 1e-9
+"""Points so near to a box, as a share of its size, are looked at once more."""
 
 
 def depth_bound(first: FloatArray, second: FloatArray) -> float:
@@ -45,35 +47,47 @@ class PenetrationTest:
         self.types = tuple(types)
         self._scenes: dict[int, Any] = {}
         self._probes: dict[int, FloatArray] = {}
+        self._centres: dict[int, FloatArray] = {}
 
-    def depth(self, a: int, b: int, pose: FloatArray) -> float:
+    def depth(self, a: int, b: int, pose: FloatArray, apart: bool = False) -> float:
         """How far a part of type `b`, at `pose` (4, 4) in coordinates of a part of type `a`, and that part reach into
         each other: the greatest distance to the other's surface of a point that lies inside the other.
 
         The points are a regular sample of both surfaces; inside is decided by the majority of several rays, so a
-        mesh with holes has an inside where most rays see one.
+        mesh with holes has an inside where most rays see one. `apart`: their surfaces are known not to meet; then each
+        triangle is inside or outside as a whole, and where none is inside by one point of it, there is no depth.
         """
-        into_a = self._depth_of(a, transform_points(pose, self._points(b)))
-        into_b = self._depth_of(b, transform_points(invert(pose), self._points(a)))
-        return max(into_a, into_b)
+        if apart and not self._holds_any(a, b, pose) and not self._holds_any(b, a, invert(pose)):
+            return 0.0
+        return max(self._depth_of(a, b, pose), self._depth_of(b, a, invert(pose)))
 
-    def _depth_of(self, index: int, points: FloatArray) -> float:
+    def _depth_of(self, index: int, other: int, pose: FloatArray) -> float:
+        """How deep points of a part of type `other`, at `pose`, lie in one of type `index`."""
         import open3d as o3d
 
-        low, high = self.types[index].bounds
-        near = points[np.all((points > low) & (points < high), axis=1)].astype(np.float32)
-        if len(near) == 0:
-            return 0.0
-        scene = self._scene(index)
-        # Four of seven are a majority: only points on which the first four disagree need the others.
-        odd = self._odd(scene, near, RAYS[:MAJORITY])
-        doubtful = (odd > 0) & (odd < MAJORITY)
-        odd[doubtful] += self._odd(scene, near[doubtful], RAYS[MAJORITY:])
-        inside = odd >= MAJORITY
+        near = _inside_box(self._points(other), pose, self.types[index].bounds).astype(np.float32)
+        inside = self._inside(index, near)
         if not inside.any():
             return 0.0
-        distances = scene.compute_distance(o3d.core.Tensor(near[inside]), nthreads=1).numpy()
+        distances = self._scene(index).compute_distance(o3d.core.Tensor(near[inside]), nthreads=1).numpy()
         return float(distances.max())
+
+    def _holds_any(self, index: int, other: int, pose: FloatArray) -> bool:
+        """Whether the middle of any triangle of a part of type `other`, at `pose`, lies in one of type `index`."""
+        near = _inside_box(self._middles(other), pose, self.types[index].bounds).astype(np.float32)
+        return bool(self._inside(index, near).any())
+
+    def _inside(self, index: int, points: np.ndarray) -> np.ndarray:
+        """Which of the points, float32 (p, 3), lie in a part of type `index`, bool (p,)."""
+        if len(points) == 0:
+            return np.zeros(0, dtype=bool)
+        scene = self._scene(index)
+        # Four of seven are a majority: only points on which the first four disagree need the others.
+        odd = self._odd(scene, points, RAYS[:MAJORITY])
+        doubtful = (odd > 0) & (odd < MAJORITY)
+        odd[doubtful] += self._odd(scene, points[doubtful], RAYS[MAJORITY:])
+        found: np.ndarray = odd >= MAJORITY
+        return found
 
     def _odd(self, scene: Any, points: np.ndarray, directions: FloatArray) -> np.ndarray:
         """Along how many of the `directions` (d, 3) each of the points (p, 3) sees an odd number of surfaces, (p,)."""
@@ -97,7 +111,15 @@ class PenetrationTest:
             self._scenes[index] = scene
         return self._scenes[index]
 
+    def _middles(self, index: int) -> FloatArray:
+        """The middles of the triangles of a type, a column each, float64 (3, f)."""
+        if index not in self._centres:
+            part = self.types[index]
+            self._centres[index] = np.ascontiguousarray(part.vertices[part.faces].mean(axis=1).T)
+        return self._centres[index]
+
     def _points(self, index: int) -> FloatArray:
+        """The probes of a type, a column each, float64 (3, p)."""
         if index not in self._probes:
             part = self.types[index]
             corners = part.vertices[part.faces]
@@ -108,5 +130,20 @@ class PenetrationTest:
                 weights = [(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]
                 barycentric = (np.array(weights) + 1 / 3) / (count + 1)
                 points.append(np.einsum("kc,fcd->fkd", barycentric, corners[steps == count]).reshape(-1, 3))
-            self._probes[index] = np.concatenate(points)
+            self._probes[index] = np.ascontiguousarray(np.concatenate(points).T)
         return self._probes[index]
+
+
+def _inside_box(columns: FloatArray, pose: FloatArray, box: FloatArray) -> FloatArray:
+    """Those of the points `columns` (3, p), float64 (k, 3), that lie in a `box` (2, 3) once they are moved by `pose`.
+
+    An axis at a time: a large part has hundreds of thousands, of which few are near.
+    """
+    slack = ROUNDING * float(np.abs(box).max())
+    for axis, (low, high) in enumerate(box.T):
+        places = pose[axis, :3] @ columns + pose[axis, 3]
+        columns = columns[:, (places > low - slack) & (places < high + slack)]
+    points = transform_points(pose, columns.T)
+    inside = (points > box[0]) & (points < box[1])
+    found: FloatArray = points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
+    return found

@@ -126,7 +126,8 @@ class ContactAnswers:
 
     def _ask_geometry(self, a: int, b: int, pose: FloatArray) -> int:
         self.asked += 1
-        if self.contact.touches(a, b, pose):
+        touching = self.contact.touches(a, b, pose)
+        if touching:
             label = int(self.dockings.label(a, b, pose[None])[0])
             back = int(self.dockings.label(b, a, invert(pose)[None])[0])
             # Seen from the smaller part a turn moves the larger one farther: within tolerance from one side alone.
@@ -141,21 +142,22 @@ class ContactAnswers:
                 return FORBIDDEN
         elif self.contact.touches(a, b, pose, BORDERLINE * self.contact.tolerance):
             return FORBIDDEN
-        return FORBIDDEN if self._nested(a, b, pose) else NONE
+        return FORBIDDEN if self._nested(a, b, pose, not touching) else NONE
 
-    def _nested(self, a: int, b: int, pose: FloatArray) -> bool:
-        """Whether a part lies in the other without contact that counts, deeper than any of their types did before."""
+    def _nested(self, a: int, b: int, pose: FloatArray, apart: bool) -> bool:
+        """Whether a part lies in the other without contact that counts, deeper than any of their types did before.
+        `apart`: whether they do not touch at all."""
         allowed = self.kit.grammar.nested.get((min(a, b), max(a, b)), 0.0) + self.contact.tolerance
-        return self._is_deeper(a, b, pose, allowed)
+        return self._is_deeper(a, b, pose, allowed, apart)
 
-    def _is_deeper(self, a: int, b: int, pose: FloatArray, allowed: float) -> bool:
-        """Whether one of the parts lies deeper in the other than is allowed."""
+    def _is_deeper(self, a: int, b: int, pose: FloatArray, allowed: float, apart: bool = False) -> bool:
+        """Whether one of the parts lies deeper in the other than is allowed; as `PenetrationTest.depth`."""
         first, second = self.kit.types[a].bounds, self.kit.types[b].bounds
         centre = pose[:3, :3] @ second.mean(axis=0) + pose[:3, 3]
         half = np.abs(pose[:3, :3]) @ (second[1] - second[0]) / 2
         if depth_bound(first, np.stack([centre - half, centre + half])) <= allowed:
             return False
-        return self._penetration.depth(a, b, pose) > allowed
+        return self._penetration.depth(a, b, pose, apart) > allowed
 
     def _pose(self, b: int, quanta: np.ndarray) -> FloatArray:
         pose = np.eye(4)

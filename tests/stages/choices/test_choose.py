@@ -228,7 +228,19 @@ class TestForecast:
         found = forecast(kit, ContactAnswers(kit), 2000)
         assert found.layouts is not None
         assert 20 <= found.finds.graphs <= found.layouts <= 32
-        assert re.match(r"[23]0 or more layouts of \d+ to \d+ parts", found.sentence)
+        assert re.match(
+            r"[23]0 or more layouts of \d+ to \d+ parts, but only of about [23]0 parts lists", found.sentence
+        )
+        assert not found.is_poor
+
+    def test_layouts_that_look_broken_are_no_dataset_and_it_is_said_what_they_lack(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("stages.choices.forecast.bared", lambda *_: ("link", "cap", "ring"))
+        kit = self.kit([chain(13), chain(15)], CHAIN)
+        found = forecast(kit, ContactAnswers(kit), 2000)
+        assert found.is_poor
+        assert "look broken, for nothing stands close above or below link and cap and others" in found.sentence
 
     def test_what_will_be_refused_for_what_it_copies_does_not_count(self) -> None:
         kit = self.kit([ring(1, 1), ring(2, 3)], ROAD)

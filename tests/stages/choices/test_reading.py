@@ -93,3 +93,11 @@ def test_a_cut_that_cannot_be_made_or_gives_too_little_changes_nothing(
 
     monkeypatch.setattr(reading, "read_model", refuse)
     assert cut(first) is first
+
+
+def test_what_a_run_builds_is_built_once_for_the_same_values() -> None:
+    first = read_first()
+    values = {key: STRICTEST[key] for key in first.config.left_open()}
+    built = first.observe(values)
+    assert first.observe(dict(values)) is built
+    assert first.observe({**values, "up": "z"}) is not built

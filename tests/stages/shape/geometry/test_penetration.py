@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.shape.geometry.penetration import PenetrationTest, depth_bound
-from stages.shape.geometry.pose import invert
+from stages.shape.geometry.penetration import PenetrationTest, _inside_box, depth_bound
+from stages.shape.geometry.pose import invert, transform_points
 from tests.stages.shape.geometry.bodies import Body, box, part, placed, prism, random_rotation
 
 
@@ -64,3 +64,25 @@ def test_no_depth_of_a_solid_exceeds_the_bound() -> None:
         shift = rng.uniform(-1, 1, 3)
         bound = depth_bound(types[0].bounds, types[1].bounds + shift)
         assert test.depth(0, 1, placed(*shift)) <= max(bound, 0.0) + 1e-4
+
+
+@pytest.mark.parametrize(
+    ("pose", "deep"),
+    [(placed(1.5, 0, 0), 0.0), (placed(0.1, 0.2, -0.1), 0.95), (placed(2.6, 0, 0), 0.0)],
+)
+def test_surfaces_that_are_apart_are_as_deep_in_each_other_as_all_their_points_say(
+    pose: np.ndarray, deep: float
+) -> None:
+    test = PenetrationTest([part(box(2, 2, 2)), part(box(0.5, 0.5, 0.5))])
+    assert test.depth(0, 1, pose, apart=True) == test.depth(0, 1, pose) == pytest.approx(deep, abs=1e-4)
+    assert test.depth(1, 0, invert(pose), apart=True) == pytest.approx(deep, abs=1e-4)
+
+
+def test_probes_near_a_box_are_those_that_lie_in_it_once_they_are_moved() -> None:
+    rng = np.random.default_rng(4)
+    points, limits = rng.normal(size=(500, 3)), np.array([[-0.5, -0.2, 0.0], [0.4, 0.9, 1.0]])
+    for _ in range(20):
+        pose = placed(*rng.normal(size=3) / 2, rotation=random_rotation(rng))
+        moved = transform_points(pose, points)
+        inside = np.all((moved > limits[0]) & (moved < limits[1]), axis=1)
+        np.testing.assert_allclose(_inside_box(np.ascontiguousarray(points.T), pose, limits), moved[inside])

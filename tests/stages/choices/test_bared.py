@@ -1,0 +1,78 @@
+"""What stands close above and below parts in exemplars, without any contact, is missed where it is gone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from stages.choices.bared import bared
+from stages.choices.ladder import Rung
+from stages.choices.probe import Finds
+from stages.choices.sight import Setting
+from stages.exemplars.settings import ContactConfig
+from stages.shape.kit import Assembly, Kit
+from tests.stages.variations.toy import Placed, box, kit_of, pose
+
+HALL = {
+    "floor": box(1, 0.1, 1),
+    "wall": box(1, 1, 0.2),
+    "column": box(0.2, 0.96, 0.2),
+    "roof": box(1, 0.12, 1),
+    "lamp": box(0.1, 0.3, 0.1),
+}
+"""A column ends .04 below a roof that rests on walls: without contact."""
+
+LOOSE = ContactConfig(tolerance=0.05, kinds=("face",))
+
+
+def hall(bays: int, storeys: int = 1, columns: bool = True) -> list[Placed]:
+    """A row of bays: a floor, a wall behind it as high as some storeys, a roof; a column of one storey in front."""
+    placed: list[Placed] = []
+    for k in range(bays):
+        placed += [("floor", pose(k, -0.05, 0)), ("roof", pose(k, storeys + 0.06, 0))]
+        placed += [("wall", pose(k, 0.5 + storey, -0.4)) for storey in range(storeys)]
+        placed += [("column", pose(k, 0.48, 0.4))] if columns else []
+    return placed
+
+
+def put(kit: Kit, shape: Sequence[Placed]) -> Assembly:
+    names = [each.name for each in kit.types]
+    types = np.array([names.index(name) for name, _ in shape], dtype=np.int16)
+    return Assembly(types, np.array([at for _, at in shape]), np.empty((0, 2), dtype=np.int32))
+
+
+def test_columns_are_bared_where_the_walls_grow_past_them() -> None:
+    kit = kit_of(HALL, [hall(4)])
+    low, high = put(kit, hall(6)), put(kit, hall(4, 2))
+    assert bared(kit, [high, high, low]) == ("column",)
+    assert bared(kit, [low, low, high]) == ()  # most of the shapes are whole
+    assert bared(kit, [put(kit, hall(4, 2, columns=False))]) == ()  # what is not there is not bared
+    assert bared(kit, []) == ()
+
+
+def test_what_hung_close_below_something_and_what_stood_close_above_it_are_both_missed() -> None:
+    shelf = {"board": box(1, 0.1, 1), "jar": box(0.3, 0.6, 0.3), "side": box(0.1, 2, 1)}
+    row = [("board", pose(1.5 * k, 0, 0)) for k in range(4)] + [("jar", pose(1.5 * k, 0.36, 0)) for k in range(4)]
+    lifted = [(name, pose(0, 3.0, 0) @ at if name == "jar" else at) for name, at in row]
+    kit = kit_of(shelf, [row], disconnected="largest", contact=LOOSE)
+    assert bared(kit, [put(kit, row)]) == ()
+    assert set(bared(kit, [put(kit, lifted)])) == {"jar", "board"}
+
+
+def test_a_lamp_among_many_parts_does_not_count() -> None:
+    lamp: Placed = ("lamp", pose(0, 0.85, 0.2))
+    kit = kit_of(HALL, [[*hall(8), lamp]])
+    lower: Placed = ("lamp", pose(0, 0.5, 0.2))
+    assert bared(kit, [put(kit, [*hall(8), lower])]) == ()
+
+
+@pytest.mark.parametrize(("names", "enough"), [((), True), (("column",), False)])
+def test_what_looks_broken_is_not_enough_and_hardly_more_than_nothing(names: tuple[str, ...], enough: bool) -> None:
+    setting = Setting(("face",), "multiset")
+    found = Rung(setting, Finds(2500, 100, 90, 0.2, 0.1, 0.5, 1.0), 1.0, (), names)
+    nothing, few = Rung(setting, Finds(2500, 0, 0, 0.0, 0.0), 1.0), Rung(setting, Finds(2500, 3, 3, 0.1, 0.1), 1.0)
+    assert found.gives_enough == enough
+    assert found.score > nothing.score
+    assert (found.score > few.score) == enough

@@ -1,0 +1,61 @@
+"""A closed box is told from what is open, or has something standing out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.choices.plain import is_closed_box, plain_shares
+from stages.choices.proportioned import in_proportions
+from stages.shape.shape import Shape, kit_shape
+from tests.stages.proportions.stools import kit as stools
+from tests.stages.variations.toy import Placed, box, kit_of, pose
+
+PANELS = {
+    "lid": box(2, 0.1, 1),
+    "side": box(0.1, 0.8, 1),
+    "back": box(1.8, 0.8, 0.1),
+    "board": box(1.8, 0.1, 0.8),
+    "handle": box(0.4, 0.1, 0.05),
+}
+WITHOUT_FRONT: list[Placed] = [
+    ("lid", pose(0, 0.45, 0)),
+    ("lid", pose(0, -0.45, 0)),
+    ("side", pose(-0.95, 0, 0)),
+    ("side", pose(0.95, 0, 0)),
+    ("back", pose(0, 0, -0.45)),
+    ("board", pose(0, 0, 0)),
+]
+
+
+def whole(placed: list[Placed]) -> Shape:
+    kit = kit_of(PANELS, [placed])
+    return kit_shape(kit, kit.exemplars[0].whole)
+
+
+@pytest.mark.parametrize(
+    ("more", "boxed"),
+    [
+        ([("back", pose(0, 0, 0.45))], True),
+        (
+            [("back", pose(0, 0, 0.45)), ("handle", pose(0, 0, 0.525))],
+            True,
+        ),  # a door with a handle, which hides the board
+        ([("back", pose(0, 0, 0.45)), ("handle", pose(0, 0, 0.525)), ("handle", pose(1.025, 0, 0, 1))], False),
+    ],
+)
+def test_a_box_is_closed_with_one_side_that_has_something_on_it(more: list[Placed], boxed: bool) -> None:
+    assert is_closed_box(whole([*WITHOUT_FRONT, *more])) == boxed
+
+
+def test_shares_are_those_of_the_sides_of_the_box_around_a_shape() -> None:
+    front, right, back, left, top, bottom = plain_shares(whole(WITHOUT_FRONT))
+    np.testing.assert_allclose([right, back, left, top, bottom], 1.0)
+    # of 2 x 1 the edges of two lids and two sides
+    assert front == pytest.approx((2 * 2 * 0.1 + 2 * 0.1 * 0.8) / 2, abs=0.03)
+
+
+def test_other_proportions_of_a_closed_box_are_said_to_look_alike() -> None:
+    kit = kit_of(PANELS, [[*WITHOUT_FRONT, ("back", pose(0, 0, 0.45))]])
+    assert "look alike, for it is a closed box with plain sides" in in_proportions(kit, 2).sentence
+    assert "alike" not in in_proportions(stools(), 2).sentence
