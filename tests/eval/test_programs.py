@@ -88,3 +88,4 @@ def test_steps_between_points_are_measured_and_tables_hold_the_published_rows() 
     assert [len(each.published) for each in tables] == [27, 12, 12, 6]
     assert "Not here: b, it writes nothing." in tables[0].markdown()
     assert all("chair, ShapeAssembly" in each.markdown() for each in tables)
+    assert quality_table({"a": physics_of(boxes)}, {}, {}, {}).rows[0][3:] == ("", "", ""), "nothing was judged"
