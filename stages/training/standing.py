@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 import torch
-from torch import Tensor, nn
+from torch import Generator, Tensor, nn
 
-__all__ = ["Points", "Standing"]
+__all__ = ["Points", "Standing", "drawn"]
 
 Points = npt.NDArray[np.float32]
 """Points of the latent space, float32 (n, latent)."""
@@ -34,9 +36,21 @@ class Standing(nn.Module):
         self.centre.copy_(torch.from_numpy(means.mean(axis=0, dtype=np.float64)))
         self.spread.copy_(torch.from_numpy(axes * np.sqrt(np.maximum(values, 0.0))))
 
+    def stand_where(self, encoded: Iterable[tuple[Tensor, Tensor]]) -> None:
+        """`stand_at` of all batches of samples: means and logarithms of the variances, float (n, latent) each."""
+        codes = [torch.stack([mean, spread.exp()]).detach().float().cpu().numpy() for mean, spread in encoded]
+        self.stand_at(*np.concatenate(codes, axis=1))
+
     def points(self, count: int, rng: np.random.Generator, temperature: float) -> Points:
         """Random points, float32 (count, latent), of that Gaussian, which the prior is not quite: from the prior come
         crude shapes. temperature: how far from its centre they spread."""
         noise = temperature * rng.standard_normal((count, len(self.centre)))
         found: Points = (self.centre.cpu().numpy() + noise @ self.spread.cpu().numpy().T).astype(np.float32)
         return found
+
+
+def drawn(mean: Tensor, log_variance: Tensor, noise: Generator) -> tuple[Tensor, Tensor]:
+    """A point of each sample's Gaussian, float (n, latent), and the divergence of these from the prior, in nats, mean
+    over the samples."""
+    points = mean + torch.exp(0.5 * log_variance) * torch.randn(mean.shape, generator=noise, device=mean.device)
+    return points, 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum() / len(mean)

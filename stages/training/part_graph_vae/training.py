@@ -19,6 +19,7 @@ from stages.training.part_graph_vae.batches import Batch, Graphs, batches
 from stages.training.part_graph_vae.corpus import prepare_corpus, read_corpus
 from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.training.standing import drawn
 
 __all__ = ["PartGraphVaeLearner", "entry", "learner", "new_model", "prepare"]
 
@@ -70,11 +71,8 @@ class PartGraphVaeLearner:
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
         """Means over shapes: nats of what is there, has parts and touches, absolute errors of the numbers of boxes, and
         the divergence from the prior."""
-        mean, log_variance = self.module.encode(batch)
-        spread = torch.randn(mean.shape, generator=noise, device=mean.device)
-        points = mean + torch.exp(0.5 * log_variance) * spread
-        divergence = 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum() / len(mean)
-        nats, errors = (each / len(mean) for each in reconstruction(self.module, batch, points))
+        points, divergence = drawn(*self.module.encode(batch), noise)
+        nats, errors = (each / len(points) for each in reconstruction(self.module, batch, points))
         loss = nats + self.entry.number_weight * errors + self.entry.kl_weight * divergence
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
 
@@ -82,11 +80,8 @@ class PartGraphVaeLearner:
         """The same on val; and the module learns where the shapes of train stand."""
         sums: dict[str, float] = {}
         device = next(self.module.parameters()).device
-        codes = []
-        for levels in batches(self.train, self.entry.batch, None):
-            mean, log_variance = self.module.encode([level.to(device) for level in levels])
-            codes.append(torch.stack([mean, log_variance.exp()]).detach().float().cpu().numpy())
-        self.module.stand_at(*np.concatenate(codes, axis=1))
+        train = batches(self.train, self.entry.batch, None)
+        self.module.stand_where(self.module.encode([level.to(device) for level in levels]) for levels in train)
         for levels in batches(self.val, self.entry.batch, None):
             found = self.losses([level.to(device) for level in levels], 0, noise)
             for name, value in found.items():

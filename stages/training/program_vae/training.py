@@ -36,6 +36,7 @@ from stages.training.program_vae.lines import (
 )
 from stages.training.program_vae.model import ProgramVae, sizes_of
 from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.standing import drawn
 
 __all__ = ["ProgramVaeLearner", "entry", "learner", "new_model", "prepare"]
 
@@ -89,11 +90,8 @@ class ProgramVaeLearner:
     def losses(self, batch: Sequence[Level], step: int, noise: Generator) -> dict[str, Tensor]:
         """Means over programs: nats of what lines choose, absolute errors of their numbers, and the divergence from
         the prior."""
-        mean, log_variance = self.module.encode(batch)
-        spread = torch.randn(mean.shape, generator=noise, device=mean.device)
-        codes = mean + torch.exp(0.5 * log_variance) * spread
-        divergence = 0.5 * (mean**2 + log_variance.exp() - 1.0 - log_variance).sum() / len(mean)
-        nats, errors = (each / len(mean) for each in reconstruction(self.module, batch, codes))
+        codes, divergence = drawn(*self.module.encode(batch), noise)
+        nats, errors = (each / len(codes) for each in reconstruction(self.module, batch, codes))
         loss = nats + self.entry.number_weight * errors + self.entry.kl_weight * divergence
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
 
@@ -101,11 +99,8 @@ class ProgramVaeLearner:
         """The same on val; and the module learns where the programs of train stand."""
         sums: dict[str, float] = {}
         device = next(self.module.parameters()).device
-        codes = []
-        for levels in batches(self.train, self.entry.batch, None):
-            mean, log_variance = self.module.encode([level.to(device) for level in levels])
-            codes.append(torch.stack([mean, log_variance.exp()]).detach().float().cpu().numpy())
-        self.module.stand_at(*np.concatenate(codes, axis=1))
+        train = batches(self.train, self.entry.batch, None)
+        self.module.stand_where(self.module.encode([level.to(device) for level in levels]) for levels in train)
         for levels in batches(self.val, self.entry.batch, None):
             found = self.losses([level.to(device) for level in levels], 0, noise)
             for name, value in found.items():
