@@ -13,7 +13,7 @@ from torch import Tensor
 
 from stages.training.pooling import pooled
 
-__all__ = ["Batch", "Strings", "batches"]
+__all__ = ["Batch", "Strings", "batches", "open_until"]
 
 
 @dataclass(frozen=True)
@@ -57,13 +57,15 @@ class Strings:
 class Batch:
     """read: int64 (n, longest read), the strings that the encoder reads, END behind their ends; codes: int64 (n,
     longest), those that the decoder is to write; read_lengths, lengths: int64 (n,), with their ends; allowed: bool (n,
-    longest, vocabulary), of `codes`; histograms: float (n, types)."""
+    longest, vocabulary), of `codes`; open_until: int64 (n, longest), for each of `codes` at which a cycle begins the
+    place where it ends, else 0; histograms: float (n, types)."""
 
     read: Tensor
     read_lengths: Tensor
     codes: Tensor
     lengths: Tensor
     allowed: Tensor
+    open_until: Tensor
     histograms: Tensor
 
     def to(self, device: torch.device) -> Batch:
@@ -90,12 +92,14 @@ def _batch(strings: Strings, read: npt.NDArray[np.int64], written: npt.NDArray[n
     there, at = _padded(strings, written)
     allowed = np.unpackbits(strings.masks[at], axis=-1, count=vocabulary, bitorder="little").astype(np.bool_)
     allowed[~there] = True
+    codes = _codes(strings, there, at)
     return Batch(
         read=_codes(strings, *_padded(strings, read)),
         read_lengths=torch.from_numpy(strings.lengths[read]),
-        codes=_codes(strings, there, at),
+        codes=codes,
         lengths=torch.from_numpy(strings.lengths[written]),
         allowed=torch.from_numpy(allowed),
+        open_until=torch.from_numpy(open_until(codes.numpy(), strings.histograms.shape[1] + 3)),
         histograms=torch.from_numpy(strings.histograms[strings.graph[read]].astype(np.float32)),
     )
 
@@ -111,3 +115,21 @@ def _padded(strings: Strings, rows: npt.NDArray[np.int64]) -> tuple[npt.NDArray[
 
 def _codes(strings: Strings, there: npt.NDArray[np.bool_], at: npt.NDArray[np.int64]) -> Tensor:
     return torch.from_numpy(np.where(there, strings.tokens[at], 0).astype(np.int64))
+
+
+def open_until(codes: npt.NDArray[np.int64], first: int) -> npt.NDArray[np.int64]:
+    """For each token of strings int64 (n, longest) at which a cycle begins the place where it ends, else 0: int64 (n,
+    longest). Tokens from `first` on are cycle numbers; what does not end is open to the last place."""
+    until = np.zeros_like(codes)
+    row, place = np.nonzero(codes >= first)
+    order = np.lexsort((place, codes[row, place], row))
+    row, place = row[order], place[order]
+    number = codes[row, place]
+    is_first = np.ones(len(row), np.bool_)
+    is_first[1:] = (row[1:] != row[:-1]) | (number[1:] != number[:-1])
+    seen = np.arange(len(row)) - np.maximum.accumulate(np.where(is_first, np.arange(len(row)), 0))
+    begins = np.flatnonzero(seen % 2 == 0)
+    until[row[begins], place[begins]] = codes.shape[1] - 1
+    ended = begins[~np.append(is_first, True)[begins + 1]]
+    until[row[ended], place[ended]] = place[ended + 1]
+    return until

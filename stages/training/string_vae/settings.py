@@ -32,6 +32,12 @@ class StringVaeEntry(KitModelEntry):
         256, ge=2, le=8192, multiple_of=2, description="size of the GRUs, or width of the transformer; even"
     )
     layers: int = Field(1, ge=1, le=24, description="layers of the decoder")
+    look_back: bool = Field(
+        False,
+        description="whether the decoder judges the end of an open cycle by what it wrote where the cycle began, too: "
+        "for strings of a hundred parts and more",
+    )
+    dropout: float = Field(0.0, ge=0, lt=1, description="share of what the transformer's layers say that is left out")
     kl_weight: float = Field(
         0.01, ge=0, le=10, description="weight of the divergence from the prior, in nats, beside that of a whole string"
     )

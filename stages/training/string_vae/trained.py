@@ -105,6 +105,6 @@ def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> Tr
     tensors, header = load_checkpoint(path, {"kind": "string_vae", **(expected or {})})
     vocabulary = Vocabulary(make_alphabet(header["names"]), header["cycles"])
     entry = StringVaeEntry.model_validate({"name": "trained", **header["settings"]})
-    module = StringVae(entry, len(vocabulary), header["most"] + 1)
+    module = StringVae(entry, len(vocabulary), header["cycles"], header["most"] + 1)
     module.load_state_dict(tensors)
     return TrainedStringVae(module.eval(), vocabulary, rules_of(header["patterns"], header["cycles"]), header)

@@ -20,7 +20,7 @@ from stages.training.string_vae.batches import Batch, Strings, batches
 from stages.training.string_vae.corpus import prepare_corpus, read_corpus
 from stages.training.string_vae.model import StringVae, shifted
 from stages.training.string_vae.settings import StringVaeEntry
-from stages.training.string_vae.vocabulary import END, Vocabulary
+from stages.training.string_vae.vocabulary import Vocabulary
 
 __all__ = ["StringVaeLearner", "entry", "learner", "new_model", "prepare"]
 
@@ -61,7 +61,7 @@ def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, most: int, seed: in
     """A model of strings of at most `most` tokens with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return StringVae(entry, len(vocabulary), most + 1)
+        return StringVae(entry, len(vocabulary), vocabulary.cycles, most + 1)
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class StringVaeLearner:
         points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
         shown = shifted(batch.codes)
         hidden = torch.rand(shown.shape, generator=noise, device=shown.device) < self.entry.word_dropout
-        logits = self.module.decode(shown.masked_fill(hidden, END), points)
+        logits = self.module.decode(shown, points, batch.open_until, hidden)
         nats, _ = self._reconstruction(logits, batch)
         divergence = _divergence(mean, log_variance)
         losses = {"nats": nats, "divergence": divergence}
@@ -110,7 +110,7 @@ class StringVaeLearner:
         for batch in (each.to(device) for each in self._batches(self.val, None)):
             mean, log_variance = self.module.encode(batch.read, batch.read_lengths)
             points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
-            logits = self.module.decode(shifted(batch.codes), points)
+            logits = self.module.decode(shifted(batch.codes), points, batch.open_until)
             nats, accuracy = self._reconstruction(logits, batch)
             divergence = _divergence(mean, log_variance)
             loss = nats + self.entry.kl_weight * divergence

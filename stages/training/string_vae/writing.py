@@ -112,13 +112,13 @@ def _write(
     device = next(module.parameters()).device
     points = points.to(device)
     acceptor = None if rules is None else Acceptor(rules, cycles, len(drafts), most)
-    state = module.decoder.start(points)
+    state = module.start(points)
     shown = torch.full((len(drafts),), END, device=device)
     ended, dead = np.zeros(len(drafts), np.bool_), np.zeros(len(drafts), np.bool_)
     for draft in drafts:
         draft.codes = []
     for place in range(most + 1):
-        logits, state = module.decoder.step(shown, points, state)
+        logits, state = module.step(shown, points, state)
         scores = logits.double().cpu().numpy()
         if rng is not None:
             scores += temperature * rng.gumbel(size=scores.shape)

@@ -65,9 +65,9 @@ def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringV
     return TrainedStringVae(module.eval(), VOCABULARY, RULES, header)
 
 
-def random_vae(decoder: str, seed: int = 0) -> TrainedStringVae:
+def random_vae(decoder: str, seed: int = 0, look_back: bool = False) -> TrainedStringVae:
     """A model with random weights, which are larger than fresh ones, so that it has preferences."""
-    settings = entry(decoder=decoder)
+    settings = entry(decoder=decoder, look_back=look_back)
     module = new_model(settings, VOCABULARY, MOST, seed)
     with torch.no_grad():
         for parameter in module.parameters():

@@ -11,7 +11,7 @@ import torch
 from stages.strings.grammar import check
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.loop import Trainee, train
-from stages.training.string_vae.batches import batches
+from stages.training.string_vae.batches import batches, open_until
 from stages.training.string_vae.model import shifted
 from stages.training.string_vae.trained import load_string_vae
 from stages.training.string_vae.training import StringVaeLearner, annealed, new_model, triplet_loss
@@ -30,27 +30,56 @@ from tests.stages.training.string_vae.models import (
 DECODERS = ("plain", "masked", "transformer")
 
 
+def until_of(codes: torch.Tensor) -> torch.Tensor:
+    return torch.from_numpy(open_until(codes.numpy(), len(VOCABULARY) - VOCABULARY.cycles))
+
+
+def test_a_cycle_is_open_from_its_number_to_the_same_number_again() -> None:
+    codes = np.array([[1, 7, 2, 8, 7, 1, 7, 8, 7, 0], [8, 1, 1, 8, 1, 0, 0, 0, 0, 0], [1, 9, 0, 0, 0, 0, 0, 0, 0, 0]])
+    wanted = np.zeros_like(codes)
+    wanted[0, [1, 3, 6]] = [4, 7, 8]
+    wanted[1, 0] = 3
+    wanted[2, 1] = 9  # is never ended
+    np.testing.assert_array_equal(open_until(codes, 7), wanted)
+    np.testing.assert_array_equal(open_until(codes[:, :0], 7), wanted[:, :0])
+
+
+def test_looking_back_bears_on_open_cycles_alone_each_by_where_it_began() -> None:
+    module = random_vae("masked", look_back=True).module
+    assert module.ends is not None
+    codes, points = torch.tensor([[1, 7, 2, 6, 1, 6, 1, 7, 1]]), torch.zeros((1, 8))
+    before = module.decode(shifted(codes), points, until_of(codes))
+    plain, _ = module.decoder(shifted(codes), points)
+    changed = (before != plain)[0]
+    numbers = [[each in opened for each in (6, 7)] for opened in ((), (), (7,), (7,), (6, 7), (6, 7), (7,), (7,), ())]
+    np.testing.assert_array_equal(changed[:, -2:].numpy(), numbers)
+    assert not changed[:, :-2].any()
+
+
+@pytest.mark.parametrize("look_back", [False, True])
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str) -> None:
-    module = random_vae(decoder).module
+def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str, look_back: bool) -> None:
+    module = random_vae(decoder, look_back=look_back).module
     rng = np.random.default_rng(1)
     codes = torch.from_numpy(rng.integers(0, len(VOCABULARY), (3, 11)))
     points = torch.from_numpy(rng.standard_normal((3, 8)).astype(np.float32))
-    whole = module.decode(shifted(codes), points)
-    state = module.decoder.start(points)
+    whole = module.decode(shifted(codes), points, until_of(codes))
+    state = module.start(points)
     for place in range(11):
-        logits, state = module.decoder.step(shifted(codes)[:, place], points, state)
+        logits, state = module.step(shifted(codes)[:, place], points, state)
         torch.testing.assert_close(logits, whole[:, place], rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.parametrize("look_back", [False, True])
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_a_token_is_told_by_those_before_it_alone(decoder: str) -> None:
-    module = random_vae(decoder).module
+def test_a_token_is_told_by_those_before_it_alone(decoder: str, look_back: bool) -> None:
+    module = random_vae(decoder, look_back=look_back).module
     codes = torch.ones((1, 9), dtype=torch.int64)
+    codes[0, [1, 7]] = len(VOCABULARY) - 1
     changed = codes.clone()
     changed[0, 5] = 2
     points = torch.zeros((1, 8))
-    before, after = (module.decode(shifted(each), points)[0] for each in (codes, changed))
+    before, after = (module.decode(shifted(each), points, until_of(each))[0] for each in (codes, changed))
     torch.testing.assert_close(before[:6], after[:6])
     assert not torch.allclose(before[6], after[6])
 
