@@ -36,7 +36,7 @@ class DockingTable:
     """
 
     def __init__(self, types: Sequence[PartType], dockings: Sequence[Docking], tolerance: float) -> None:
-        from scipy.spatial import cKDTree
+        from stages.shape.geometry.images import distinct_images
 
         self.types = tuple(types)
         self.tolerance = tolerance
@@ -54,30 +54,16 @@ class DockingTable:
             backward = symmetric_images(self.types[docking.b], self.types[docking.a], invert(docking.pose))
             entries.setdefault((docking.b, docking.a), []).append((backward, 2 * index + 1))
         self.images: dict[tuple[int, int], tuple[FloatArray, IntArray]] = {}
+        self._vectors: dict[tuple[int, int], FloatArray] = {}
         for pair, found in sorted(entries.items()):
             poses = np.concatenate([images for images, _ in found])
             labels = np.concatenate([np.full(len(images), label, dtype=np.int32) for images, label in found])
             vectors = pose_vectors(poses, self.types[pair[1]].diagonal / 2)
-            kept: list[int] = []
-            place = np.full(len(vectors), -1)
-            is_written = np.zeros(len(vectors), dtype=bool)
-            tree = cKDTree(vectors)
             # Equal images are written once. Where two images of one docking are within tolerance both get the lower
             # label, so that a docking that is nearly its own inverse is even; both stay, for what lies at their sides.
-            for candidate in np.argsort(labels, kind="stable").tolist():
-                if is_written[candidate]:
-                    continue
-                beside = np.array(tree.query_ball_point(vectors[candidate], (1.0 + SAME_IMAGE) * tolerance))
-                gaps = np.linalg.norm(vectors[beside] - vectors[candidate], axis=1)
-                is_written[beside[gaps <= SAME_IMAGE * tolerance]] = True
-                near = (place[beside] >= 0) & (gaps <= tolerance)
-                if near.any():
-                    nearest = beside[near][np.lexsort((place[beside[near]], gaps[near]))[0]]
-                    if labels[nearest] // 2 == labels[candidate] // 2:
-                        labels[candidate] = labels[nearest]
-                place[candidate] = len(kept)
-                kept.append(candidate)
+            kept = distinct_images(vectors, labels, tolerance, SAME_IMAGE * tolerance)
             self.images[pair] = poses[kept], labels[kept]
+            self._vectors[pair] = vectors[kept]
 
     @classmethod
     def of(cls, kit: Kit) -> DockingTable:
@@ -88,11 +74,11 @@ class DockingTable:
         """Directed labels int32 (m,), seen from the part of type `a`, of a part of type `b` at `poses` (m, 4, 4)."""
         if (a, b) not in self.images:
             return np.full(len(poses), -1, dtype=np.int32)
-        length = self.types[b].diagonal / 2
-        known, labels = self.images[a, b]
-        gaps = np.linalg.norm(pose_vectors(known, length)[None] - pose_vectors(poses, length)[:, None], axis=2)
-        nearest = gaps.argmin(axis=1)
-        within = gaps[np.arange(len(poses)), nearest] <= (1.0 + SAME_IMAGE) * self.tolerance
+        from stages.shape.geometry.images import nearest_image
+
+        vectors = pose_vectors(poses, self.types[b].diagonal / 2)
+        nearest, gaps = nearest_image(self._vectors[a, b], vectors)
+        labels, within = self.images[a, b][1], gaps <= (1.0 + SAME_IMAGE) * self.tolerance
         return np.where(within, labels[nearest], -1).astype(np.int32)
 
     def _add_fit(self, index: int, docking: Docking) -> None:

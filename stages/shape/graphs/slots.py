@@ -15,7 +15,7 @@ of neighbour types that the other levels of strictness ask for.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations, product
 
@@ -55,7 +55,8 @@ class _Stance:
     up: float64 (3,), what is up in part coordinates; turns: float64 (k, 3, 3), symmetries that keep it; types int64
     (p,), poses float64 (p, 4, 4) of the places, in cells by type and position; slot_of: int64 (p,); images: (k, p),
     where each turn takes each place; seen: observed neighbourhoods as sorted places, in all images where it is closed,
-    with how often, and what exemplar showed it first.
+    with how often, and what exemplar showed it first; states: of each slot, each with how often it was seen; odds: the
+    same in the order of the states, float64.
     """
 
     part_type: int
@@ -70,6 +71,7 @@ class _Stance:
     images: np.ndarray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     seen: dict[State, tuple[float, int]] = field(default_factory=dict)
     states: list[dict[State, float]] = field(default_factory=list)
+    odds: list[FloatArray] = field(default_factory=list)
     fillings: set[tuple[int, int, bool, bool]] = field(default_factory=set)
     pairs: set[tuple[int, int, State, State]] = field(default_factory=set)
     vectors: set[tuple[bool, ...]] = field(default_factory=set)
@@ -156,6 +158,8 @@ class SlotGrammar:
             for i, j in combinations(range(stance.slots), 2):
                 stance.fillings.add((i, j, bool(split[i]), bool(split[j])))
                 stance.pairs.add((i, j, split[i], split[j]))
+        stance.states = [dict(sorted(states.items())) for states in stance.states]
+        stance.odds = [np.array(list(states.values())) for states in stance.states]
 
     def _place(self, stance: _Stance, kind: int, pose: FloatArray, add: bool = False) -> int:
         """The number of a place, new if it may be added, else -1."""
@@ -210,8 +214,7 @@ class SlotGrammar:
         for stance, places in self.around(assembly, part, neighbours):
             split = stance.split(places)
             known = all(state in states for state, states in zip(split, stance.states, strict=True))
-            pairs = combinations(range(stance.slots), 2)
-            if known and all(self._together(stance, split, i, j) for i, j in pairs):
+            if known and all(self._fits(stance, split, slot, range(slot)) for slot in range(stance.slots)):
                 return True
         return False
 
@@ -283,12 +286,12 @@ class SlotGrammar:
             if slot == stance.slots:
                 yield tuple(sorted(place for state in split for place in state))
                 return
-            for state in sorted(stance.states[slot]):
+            for state in stance.states[slot]:
                 steps += 1
                 if steps > STEPS:
                     return
                 split[slot] = state
-                if all(self._together(stance, split, other, slot) for other in range(slot)):
+                if self._fits(stance, split, slot, range(slot)):
                     yield from fill(slot + 1)
 
         yield from fill(0)
@@ -298,25 +301,33 @@ class SlotGrammar:
         split: list[State] = [()] * stance.slots
         done: list[int] = []
         for slot in rng.permutation(stance.slots).tolist():
-            states = sorted(stance.states[slot])
-            fitting = []
-            for state in states:
-                split[slot] = state
-                if all(self._together(stance, split, *sorted((other, slot))) for other in done):
-                    fitting.append(state)
-            if not fitting:
-                return None
-            odds = np.array([stance.states[slot][state] for state in fitting])
-            split[slot] = fitting[int(np.searchsorted(odds.cumsum(), rng.random() * odds.sum()).clip(0, len(odds) - 1))]
+            states, odds = list(stance.states[slot]), stance.odds[slot]
+            if self.level != "slots":
+                fitting = []
+                for number, state in enumerate(states):
+                    split[slot] = state
+                    if self._fits(stance, split, slot, done):
+                        fitting.append(number)
+                if not fitting:
+                    return None
+                states, odds = [states[number] for number in fitting], odds[fitting]
+            place = int(odds.cumsum().searchsorted(rng.random() * odds.sum()))
+            split[slot] = states[min(place, len(states) - 1)]
             done.append(slot)
         return tuple(sorted(place for state in split for place in state))
 
-    def _together(self, stance: _Stance, split: list[State], i: int, j: int) -> bool:
+    def _fits(self, stance: _Stance, split: list[State], slot: int, others: Iterable[int]) -> bool:
+        """Whether the level admits the state of a slot beside those of some others."""
         if self.level == "slots":
             return True
+        own, filled = split[slot], bool(split[slot])
         if self.level == "slot_fillings":
-            return (i, j, bool(split[i]), bool(split[j])) in stance.fillings
-        return (i, j, split[i], split[j]) in stance.pairs
+            return all(
+                ((i, slot, bool(split[i]), filled) if i < slot else (slot, i, filled, bool(split[i])))
+                in stance.fillings
+                for i in others
+            )
+        return all(((i, slot, split[i], own) if i < slot else (slot, i, own, split[i])) in stance.pairs for i in others)
 
 
 def _canonical(stance: _Stance, places: State) -> State:

@@ -1,0 +1,80 @@
+"""Compiled kernels on poses as points (`pose_vectors`): which of many images are distinct, and which is nearest."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+__all__ = ["distinct_images", "nearest_image"]
+
+_PRIMES = (73856093, 19349663, 83492791)
+
+
+@numba.njit(cache=True)
+def _gap(one, other):
+    total = 0.0
+    for k in range(len(one)):
+        total += (one[k] - other[k]) ** 2
+    return total**0.5
+
+
+@numba.njit(cache=True)
+def distinct_images(vectors, labels, tolerance, same):
+    """The places int64 (k,) of the images `vectors`, float64 (n, 12), that are kept, in the order of their `labels`,
+    int32 (n,), which are changed.
+
+    An image within `same` of one that is kept is not. Where the nearest kept one within `tolerance` is of the same
+    docking, `label // 2`, an image gets its label, the lower one.
+    """
+    reach = 1.01 * max(tolerance, same)
+    size = 1
+    while size < 2 * len(vectors):
+        size *= 2
+    heads, following = np.full(size, -1), np.full(len(vectors), -1)
+    kept = np.empty(len(vectors), dtype=np.int64)
+    count = 0
+    for candidate in np.argsort(labels, kind="mergesort"):
+        vector = vectors[candidate]
+        x, y, z = np.int64(vector[0] // reach), np.int64(vector[1] // reach), np.int64(vector[2] // reach)
+        nearest, least, is_written = -1, np.inf, False
+        for turn in range(27):
+            dx, dy, dz = turn // 9 - 1, turn // 3 % 3 - 1, turn % 3 - 1
+            cell = ((x + dx) * _PRIMES[0] ^ (y + dy) * _PRIMES[1] ^ (z + dz) * _PRIMES[2]) & (size - 1)
+            place = heads[cell]
+            while place >= 0 and not is_written:
+                gap = _gap(vectors[kept[place]], vector)
+                is_written = gap <= same
+                if gap <= tolerance and (gap < least or (gap == least and place < nearest)):
+                    nearest, least = place, gap
+                place = following[place]
+            if is_written:
+                break
+        if is_written:
+            continue
+        if nearest >= 0 and labels[kept[nearest]] // 2 == labels[candidate] // 2:
+            labels[candidate] = labels[kept[nearest]]
+        cell = (x * _PRIMES[0] ^ y * _PRIMES[1] ^ z * _PRIMES[2]) & (size - 1)
+        following[count] = heads[cell]
+        heads[cell] = count
+        kept[count] = candidate
+        count += 1
+    return kept[:count].copy()
+
+
+@numba.njit(cache=True)
+def nearest_image(known, vectors):
+    """For each of the `vectors` (m, 12) the place int64 (m,) of the nearest of the images `known` (n, 12), of which
+    there are some, and the gap float64 (m,) between them."""
+    places, gaps = np.empty(len(vectors), dtype=np.int64), np.empty(len(vectors))
+    for number in range(len(vectors)):
+        best, least = 0, np.inf
+        for place in range(len(known)):
+            total = 0.0
+            for k in range(12):
+                total += (known[place, k] - vectors[number, k]) ** 2
+                if total >= least:
+                    break
+            if total < least:
+                best, least = place, total
+        places[number], gaps[number] = best, least**0.5
+    return places, gaps
