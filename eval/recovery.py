@@ -275,7 +275,8 @@ def parameters_table(found: Mapping[str, tuple[Found, BoolArray]]) -> Table:
     notes = (
         "Of the network alone; of the parameters that are seen in the true shape. alike: right, or wrong by so little "
         f"that in the true shape it moves no point of the surface by more than {STEP:.2%} of the diagonal, which no "
-        "cloud or drawing tells. Most often unlike: the parameters of which that is rarest.",
+        "cloud or drawing tells. Most often unlike: the parameters of which that is rarest. Inputs have no size: what "
+        "makes a shape larger as a whole, its height and widths together, only what does not grow with it tells.",
     )
     columns = ("input", "shapes", "exact %", "near %", "alike %", "most often unlike")
     return Table("Parameters that are right, or as good as right", columns, tuple(rows), notes)
@@ -326,7 +327,7 @@ def _nearest(program: Program, rng: np.random.Generator) -> Method:
         points = frame_of(given.points).normalized(given.points[:GLIMPSE])
         distances = [chamfer_distance(points, each) for _, each in known()]
         values, _ = known()[int(np.argmin(distances))]
-        return Recovered(program, values, min(distances), min(distances), 0.0, None, None, "y", NEIGHBORS, ())
+        return Recovered(program, values, min(distances), min(distances), 0.0, None, None, None, "y", NEIGHBORS, ())
 
     return method
 

@@ -23,10 +23,11 @@ CELL = 200
 COLUMNS, WIDE = 8, 15
 
 
-def shape_picture(program: Program, values: Values) -> ByteArray:
-    """A portrait of the shape at `values`, uint8 (CELL, CELL, 3), the same bytes on every machine."""
-    camera = Camera(azimuth=AZIMUTH, elevation=program.elevation)
-    return portrait(scene_of(shape_of(program, values)), camera, (CELL, CELL))
+def shape_picture(program: Program, values: Values, camera: Camera | None = None) -> ByteArray:
+    """A portrait of the shape at `values`, uint8 (CELL, CELL, 3), the same bytes on every machine; from half its side
+    unless a camera says otherwise."""
+    seen = camera or Camera(azimuth=AZIMUTH, elevation=program.elevation)
+    return portrait(scene_of(shape_of(program, values)), seen, (CELL, CELL))
 
 
 def row_sheet(program: Program, shapes: Sequence[Values], captions: Sequence[str], title: str) -> ByteArray:

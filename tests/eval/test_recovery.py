@@ -40,7 +40,7 @@ def model() -> TrainedRecovery:
 
 
 def result(values: Values) -> Recovered:
-    return Recovered(STOOL, values, 0.0, 0.0, 0.0, None, None, "y", 1, ())
+    return Recovered(STOOL, values, 0.0, 0.0, 0.0, None, None, None, "y", 1, ())
 
 
 def test_published_chamfer_is_of_the_unit_sphere_and_the_mean_of_both_ways() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,9 @@ def write_recovery(folder: Path, given: Input, found: Recovered) -> list[Path]:
 def recovery_picture(given: Input, found: Recovered) -> ByteArray:
     """The input beside the shape that was recovered, seen alike; what speaks against it stands below."""
     program = found.program
-    shape = shape_picture(program, found.values)
+    camera = found.camera or Camera(azimuth=35.0, elevation=program.elevation)
+    # the input fills the frame, and so does the shape
+    shape = shape_picture(program, found.values, replace(camera, distance=None))
     if given.ink is not None:
         seen = np.where(given.ink, 0, 255).astype(np.uint8)
     else:
@@ -45,7 +48,6 @@ def recovery_picture(given: Input, found: Recovered) -> ByteArray:
         assert found.placement is not None
         step = max(len(given.points) // SHOWN, 1)
         turned = (given.points[::step] - found.placement[:3, 3]) @ np.linalg.inv(found.placement[:3, :3]).T
-        camera = Camera(azimuth=35.0, elevation=program.elevation)
         seen = points_portrait(turned, np.zeros(len(turned), np.int32), camera, (CELL, CELL), "y")
     cells = [Cell(seen, given.name), Cell(shape, f"{program.name}, distance {found.distance:.2g}")]
     return contact_sheet([Section("", [cells], "; ".join(found.warnings))], "", CELL)

@@ -10,12 +10,13 @@ import numpy as np
 
 from stages.programs.program import Program
 from stages.shape.arrays import FloatArray
+from stages.shape.views.camera import Camera
 from stages.sketches.settings import SketchesConfig
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.partial import PartialTarget, partial_target
 from stages.training.recovery.reading import Input
 from stages.training.recovery.refinement import Guess, Refined, base_guess, refine
-from stages.training.recovery.targets import CloudTarget, Target, cloud_target, drawing_target
+from stages.training.recovery.targets import CloudTarget, DrawingTarget, Target, cloud_target, drawing_target
 from stages.training.recovery.trained import TrainedRecovery
 
 __all__ = ["Fit", "Look", "Up", "best_fit", "first_look"]
@@ -115,6 +116,12 @@ class Fit:
         matrix[:3, :3] = self.look.rotation.T * scale
         matrix[:3, 3] = self.look.rotation.T @ (outer.centre - inner.centre * scale)
         return matrix
+
+    @property
+    def camera(self) -> Camera | None:
+        """From where a drawing is seen; None of a cloud."""
+        target = self.refined.target
+        return target.camera if isinstance(target, DrawingTarget) else None
 
 
 def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: int) -> Fit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from pipeline.errors import ConfigError
 from stages.programs.parameters import Value
 from stages.programs.program import Program, find_program, program_names
 from stages.shape.arrays import ByteArray, FloatArray
+from stages.shape.views.camera import Camera
 from stages.training.checkpoint import CheckpointError, weights_of_kind
 from stages.training.recovery.fitting import Fit, Up, best_fit, first_look
 from stages.training.recovery.reading import Input, checked_cloud, ink_of
@@ -44,8 +45,8 @@ class Recovered:
     program's base shape. missing: the share of the shape's surface that a torn cloud says nothing of, and which its
     distances leave out; 0 of a whole one and of a drawing. confidence: of each visible parameter the probability that
     the network gave to its value; None without a network. placement: float64 (4, 4), from the program's coordinates to
-    the input's; None of a drawing. up: the axis of the input that points up. warnings: what speaks against the result,
-    in words.
+    the input's; None of a drawing. camera: from where a drawing is seen; None of a cloud. up: the axis of the input
+    that points up. warnings: what speaks against the result, in words.
     """
 
     program: Program
@@ -55,6 +56,7 @@ class Recovered:
     missing: float
     confidence: Mapping[str, float] | None
     placement: FloatArray | None
+    camera: Camera | None
     up: str
     tried: int
     warnings: tuple[str, ...]
@@ -72,6 +74,7 @@ class Recovered:
             "missing": round(self.missing, 3),
             "confidence": None if self.confidence is None else dict(self.confidence),
             "placement": None if self.placement is None else self.placement.tolist(),
+            "camera": None if self.camera is None else asdict(self.camera),
             "up": self.up,
             "shapes_tried": self.tried,
             "warnings": list(self.warnings),
@@ -177,8 +180,8 @@ def _told(fit: Fit, kind: str, guessed_program: bool) -> Recovered:
         warnings.append(f"the result is no better than the base shape of the program ({fit.base:.2g})")
     confidence = None if look.model is None else _confidence(program, look.guess, refined)
     return Recovered(
-        program, refined.values, fit.distance, fit.base, fit.missing, confidence, fit.placement, look.up, fit.tried,
-        tuple(warnings),
+        program, refined.values, fit.distance, fit.base, fit.missing, confidence, fit.placement, fit.camera, look.up,
+        fit.tried, tuple(warnings),
     )  # fmt: skip
 
 

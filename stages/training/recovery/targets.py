@@ -12,6 +12,8 @@ import numpy as np
 from stages.programs.curves.part import Part
 from stages.programs.program import Program
 from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.views.camera import Camera
+from stages.sketches.draw import jittered_camera
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.drawings import SIDE, drawn
@@ -119,6 +121,11 @@ class DrawingTarget:
     step: float
     pixels: FloatArray
     tree: Any
+
+    @property
+    def camera(self) -> Camera:
+        """That of the view, which does not wander."""
+        return jittered_camera(self.view, np.random.default_rng(0))
 
     def compared(self, parts: Sequence[Part]) -> tuple[float, DrawingTarget]:
         from scipy.spatial import cKDTree

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from stages.programs.parameters import Parameter
 from stages.programs.program import Program, find_program
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.sketches.settings import SketchesConfig
@@ -72,15 +73,10 @@ class TrainedRecovery:
         for parameter, row in zip(self.program.parameters, chances, strict=True):
             shown = row[: len(parameter.values)]
             probabilities[parameter.name] = shown / max(float(shown.sum()), 1e-300)
-        guess = Guess(probabilities)
-        if not answers.regressed.any():
-            return guess
-        places = answers.places(outputs).mean(dim=0).cpu().tolist()
-        start = guess.values(self.program)
-        for parameter, place, number in zip(self.program.parameters, places, answers.regressed.tolist(), strict=True):
-            if number:
-                values = np.array(parameter.values, dtype=np.float64)
-                start[parameter.name] = float(np.interp(place, np.arange(len(values)), values))
+        start = Guess(probabilities).values(self.program)
+        for parameter in self.program.parameters:
+            if parameter.kind == "continuous":
+                start[parameter.name] = _expected(parameter, probabilities[parameter.name])
         return Guess(probabilities, start)
 
 
@@ -117,3 +113,10 @@ def _in_floats(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
         elif not name.endswith(STEP):
             found[name] = each.float() if each.is_floating_point() else each
     return found
+
+
+def _expected(parameter: Parameter, probabilities: FloatArray) -> float:
+    """The mean of a continuous parameter's values, by their probabilities (values,). Of many values that are nearly as
+    likely it is wrong by less than the likeliest."""
+    low, *_, high = parameter.values
+    return float(np.clip(probabilities @ np.array(parameter.values, dtype=np.float64), low, high))

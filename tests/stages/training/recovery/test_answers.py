@@ -61,8 +61,9 @@ def test_two_networks_share_no_weight_but_see_the_same_cloud() -> None:
     assert any(each.grad is not None and each.grad.any() for each in net.other.parameters())
 
 
-def test_a_regressed_guess_may_lie_between_the_classes() -> None:
-    entry = RecoveryEntry.model_validate({**SMALL, "answers": "values"}, strict=False)
+@pytest.mark.parametrize("answer", ["classes", "values"])
+def test_a_guess_is_the_mean_of_what_is_likely(answer: str) -> None:
+    entry = RecoveryEntry.model_validate({**SMALL, "answers": answer}, strict=False)
     trained = TrainedRecovery(new_model(entry, STOOL, 0).eval(), STOOL, entry, {})
     guess = trained.guess_cloud(np.random.default_rng(0).random((100, 3)), np.random.default_rng(0))
     values = guess.values(STOOL)
