@@ -5,7 +5,8 @@ python -m eval TABLE [--config YAML] [--out FOLDER] [OPTION...]   prints one and
 python -m eval TABLE [OPTION...] FILE...                          prints one about files, if it can be made of files
 python -m eval all [--config YAML] [--out FOLDER] [OPTION...]     makes every table that can be made, and the report
 
-A table is kept as `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`, the report as `OUT/<dataset>-eval/report.html`.
+A table is kept as `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`, its sheets of pictures beside it as `.png`, the
+report as `OUT/<dataset>-eval/report.html`.
 """
 
 from __future__ import annotations
@@ -149,12 +150,15 @@ def _markdown(answer: Answer) -> str:
 
 
 def _keep(subject: Subject, name: str, answer: Answer) -> None:
-    """Write the tables of an answer: the first as `<name>`, others as `<name>_2` and so on, but all in one `.md`."""
+    """Write the tables of an answer: the first as `<name>`, others as `<name>_2` and so on, but all in one `.md`; and
+    its sheets, as `<name>_<sheet>.png`."""
     write_file(subject.results / f"{name}.md", _markdown(answer).encode())
     for place, table in enumerate(answer.tables):
         stem = name if place == 0 else f"{name}_{place + 1}"
         write_file(subject.results / f"{stem}.csv", table.csv().encode())
         write_file(subject.results / f"{stem}.tex", table.latex().encode())
+    for sheet in answer.sheets:
+        write_file(subject.results / f"{name}_{sheet.name}.png", sheet.picture)
 
 
 if __name__ == "__main__":
