@@ -136,7 +136,7 @@ def f_score(boxes: Sequence[Box], cloud: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """The shapes of a row, with the clouds that they are of."""
+    """The shapes of a row, and beside each points (n, 3) on the surface that it should have."""
 
     boxes: list[Sequence[Box]]
     clouds: list[FloatArray]

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import io
+from functools import partial
 
 import numpy as np
+import torch
 from PIL import Image
 
 from eval.evaluation import Sheet
 from eval.models import Trained
 from eval.nearest import nearest, nearest_and_which, nearest_programs
+from eval.part_surfaces import curve_parts, surface_of, surfaces_sheet, trained_surfaces
 from eval.program_figures import beside_sheet, edits_sheet, journey_sheet, neighbours, neighbours_table
 from eval.programs import boxes_of_programs, clouds_of
 from stages.shapeassembly import execute_all, parse
+from stages.shapeassembly.extraction.boxes import box_corners
 from stages.shapeassembly.structure import program_distance
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
@@ -22,6 +26,7 @@ from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.program_vae.training import new_model
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
+BOUNDS = (partial(np.min, axis=0), partial(np.max, axis=0))
 PROGRAMS = [parse(text) for text in (BOX, STOOL)]
 
 
@@ -69,3 +74,18 @@ def test_figure_12_goes_from_shape_to_shape_by_every_model() -> None:
     both, one = (journey_sheet("box", each, [(PROGRAMS[0], PROGRAMS[1])]) for each in (models, models[:1]))
     assert both.name == "figure12_box"
     assert _size(both)[1] > 1.5 * _size(one)[1]
+
+
+def test_figure_11_keeps_surfaces_within_their_cuboids() -> None:
+    parts = curve_parts("chair", 2, np.random.default_rng(0))
+    assert parts.points.shape == (len(parts.places), 256, 3)
+    assert np.abs(parts.points).max() < 0.501, "a part lies in its cuboid"
+    module = trained_surfaces(parts, 3, 0)
+    again = trained_surfaces(parts, 3, 0).state_dict()
+    assert all(torch.equal(each, again[name]) for name, each in module.state_dict().items())
+    boxes = boxes_of_programs(PROGRAMS)
+    cloud = surface_of(module, boxes[0], np.random.default_rng(0))
+    low, high = (bound(np.concatenate([box_corners(each) for each in boxes[0]])) for bound in BOUNDS)
+    assert (cloud >= low - 1e-6).all()
+    assert (cloud <= high + 1e-6).all()
+    assert surfaces_sheet("tiny", "chair", module, boxes, np.random.default_rng(0)).name == "figure11_tiny"
