@@ -77,11 +77,12 @@ def listing(subject: Subject, tables: Mapping[str, Evaluation]) -> str:
     """Every table with its question, and what it needs that is not there, or how long it takes."""
     where = f"{subject.folder}, {subject.samples:,} shapes" if subject.manifest else f"nothing in {subject.folder} yet"
     lines = [f"Tables about {subject.config.name} ({where}):", ""]
+    width = max(map(len, tables)) + 2
     for name, each in tables.items():
         missing = each.missing(subject)
         state = f"missing: {missing}" if missing else f"can be made, takes about {_duration(each.seconds(subject))}"
-        lines += [f"  {name:<20}{each.question}", f"  {'':<20}{state}"]
-        lines += [f"  {'':<20}needs {', '.join(need.what for need in each.needs)}", ""]
+        lines += [f"  {name:<{width}}{each.question}", f"  {'':<{width}}{state}"]
+        lines += [f"  {'':<{width}}needs {', '.join(need.what for need in each.needs)}", ""]
     lines.append(f"make eval TABLE=<name> prints one; TABLE={ALL} makes all that can be made, and {REPORT}")
     return "\n".join(lines) + "\n"
 
