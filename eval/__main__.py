@@ -5,7 +5,8 @@ python -m eval TABLE [--config YAML] [--out FOLDER] [OPTION...]   prints one and
 python -m eval TABLE [OPTION...] FILE...                          prints one about files, if it can be made of files
 python -m eval all [--config YAML] [--out FOLDER] [OPTION...]     makes every table that can be made, and the report
 
-A table is kept as `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`, the report as `OUT/<dataset>-eval/report.html`.
+A table is kept as `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`, its sheets of pictures beside it as `.png`, the
+report as `OUT/<dataset>-eval/report.html`.
 """
 
 from __future__ import annotations
@@ -76,11 +77,12 @@ def listing(subject: Subject, tables: Mapping[str, Evaluation]) -> str:
     """Every table with its question, and what it needs that is not there, or how long it takes."""
     where = f"{subject.folder}, {subject.samples:,} shapes" if subject.manifest else f"nothing in {subject.folder} yet"
     lines = [f"Tables about {subject.config.name} ({where}):", ""]
+    width = max(map(len, tables)) + 2
     for name, each in tables.items():
         missing = each.missing(subject)
         state = f"missing: {missing}" if missing else f"can be made, takes about {_duration(each.seconds(subject))}"
-        lines += [f"  {name:<20}{each.question}", f"  {'':<20}{state}"]
-        lines += [f"  {'':<20}needs {', '.join(need.what for need in each.needs)}", ""]
+        lines += [f"  {name:<{width}}{each.question}", f"  {'':<{width}}{state}"]
+        lines += [f"  {'':<{width}}needs {', '.join(need.what for need in each.needs)}", ""]
     lines.append(f"make eval TABLE=<name> prints one; TABLE={ALL} makes all that can be made, and {REPORT}")
     return "\n".join(lines) + "\n"
 
@@ -149,12 +151,15 @@ def _markdown(answer: Answer) -> str:
 
 
 def _keep(subject: Subject, name: str, answer: Answer) -> None:
-    """Write the tables of an answer: the first as `<name>`, others as `<name>_2` and so on, but all in one `.md`."""
+    """Write the tables of an answer: the first as `<name>`, others as `<name>_2` and so on, but all in one `.md`; and
+    its sheets, as `<name>_<sheet>.png`."""
     write_file(subject.results / f"{name}.md", _markdown(answer).encode())
     for place, table in enumerate(answer.tables):
         stem = name if place == 0 else f"{name}_{place + 1}"
         write_file(subject.results / f"{stem}.csv", table.csv().encode())
         write_file(subject.results / f"{stem}.tex", table.latex().encode())
+    for sheet in answer.sheets:
+        write_file(subject.results / f"{name}_{sheet.name}.png", sheet.picture)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from pathlib import Path
 from eval.subject import Subject
 from eval.table import Table
 
-__all__ = ["Answer", "Curve", "Evaluation", "Need", "Strip"]
+__all__ = ["Answer", "Curve", "Evaluation", "Need", "Sheet", "Strip"]
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,24 @@ class Strip:
 
 
 @dataclass(frozen=True)
+class Sheet:
+    """A picture as wide as the page, such as rows of shapes one below the other. name: of its file, in small letters;
+    title: what it shows; picture: a PNG."""
+
+    name: str
+    title: str
+    picture: bytes
+
+
+@dataclass(frozen=True)
 class Answer:
-    """tables: at least one, the first under the evaluation's own name; curves and strips for the pages alone."""
+    """tables: at least one, the first under the evaluation's own name; curves and strips for the pages alone; sheets
+    for the pages, and as files beside them."""
 
     tables: Sequence[Table]
     curves: Sequence[Curve] = ()
     strips: Sequence[Strip] = ()
+    sheets: Sequence[Sheet] = ()
 
 
 @dataclass(frozen=True)

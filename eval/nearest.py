@@ -1,11 +1,16 @@
-"""The nearest of many clouds by Chamfer distance, compiled."""
+"""The nearest of many clouds by Chamfer distance, and of many programs by their words."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numba
 import numpy as np
 
-__all__ = ["nearest"]
+from stages.shapeassembly.program import Program
+from stages.shapeassembly.structure import token_distance, tokens
+
+__all__ = ["nearest", "nearest_and_which", "nearest_programs"]
 
 
 @numba.njit(cache=True)
@@ -24,10 +29,11 @@ def _one_way(first, second, limit):
 
 
 @numba.njit(cache=True)
-def nearest(clouds, others, itself):
+def nearest_and_which(clouds, others, itself):
     """For each cloud (n, k, 3) the Chamfer distance, the mean of both ways, to the nearest of the others (m, k, 3),
-    float64 (n,); `itself`: both are the same clouds, and none is its own neighbour."""
+    float64 (n,), and which that is, int64 (n,); `itself`: both are the same clouds, and none is its own neighbour."""
     found = np.full(len(clouds), np.inf)
+    which = np.full(len(clouds), -1)
     for n in range(len(clouds)):
         for m in range(len(others)):
             if itself and n == m:
@@ -35,5 +41,30 @@ def nearest(clouds, others, itself):
             there = _one_way(clouds[n], others[m], 2 * found[n])
             if there < 2 * found[n]:
                 back = _one_way(others[m], clouds[n], 2 * found[n] - there)
-                found[n] = min(found[n], (there + back) / 2)
+                if there + back < 2 * found[n]:
+                    found[n], which[n] = (there + back) / 2, m
+    return found, which
+
+
+@numba.njit(cache=True)
+def nearest(clouds, others, itself):
+    """The distances alone of `nearest_and_which`."""
+    return nearest_and_which(clouds, others, itself)[0]
+
+
+def nearest_programs(programs: Sequence[Program], others: Sequence[Program]) -> list[tuple[int, int]]:
+    """For each program the distance (`program_distance`) to the nearest of the others, the first of several, and which
+    that is."""
+    known = [tokens(each) for each in others]
+    found = []
+    for words in map(tokens, programs):
+        # Every word more or less is an edit: those of like length come first, and most others need no look.
+        best, which = len(words) + max(map(len, known)), -1
+        for place in sorted(range(len(known)), key=lambda place: abs(len(known[place]) - len(words))):
+            if abs(len(known[place]) - len(words)) >= best:
+                break
+            distance = token_distance(words, known[place])
+            if distance < best:
+                best, which = distance, place
+        found.append((best, which))
     return found

@@ -4,28 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.shape import Shape
 from stages.shape.views.picture import ABOVE
 
-__all__ = ["cloud_picture", "shape_picture"]
+__all__ = ["SIZE", "cloud_picture", "cloud_portrait", "shape_picture", "shape_portrait"]
 
 SIZE = (264, 264)
 
 
 def shape_picture(shape: Shape) -> bytes:
-    """A portrait of a shape as PNG, its parts told by colour where its model tells them by none."""
+    """The portrait of a shape as PNG."""
+    from stages.shape.views.sheet import picture_png
+
+    return picture_png(shape_portrait(shape))
+
+
+def shape_portrait(shape: Shape) -> ByteArray:
+    """A portrait of a shape, uint8 (h, w, 3), its parts told by colour where its model tells them by none."""
     from stages.shape.views.paint import part_paint
     from stages.shape.views.portrait import portrait
     from stages.shape.views.scene import scene_of
-    from stages.shape.views.sheet import picture_png
 
-    return picture_png(portrait(scene_of(shape), ABOVE, SIZE, part_paint(shape)))
+    return portrait(scene_of(shape), ABOVE, SIZE, part_paint(shape))
 
 
 def cloud_picture(points: FloatArray) -> bytes:
-    """A portrait of a cloud (n, 3), y up, as PNG."""
-    from stages.shape.views.portrait import points_portrait
+    """The portrait of a cloud (n, 3), y up, as PNG."""
     from stages.shape.views.sheet import picture_png
 
-    return picture_png(points_portrait(points, np.zeros(len(points), np.int32), ABOVE, SIZE, "y"))
+    return picture_png(cloud_portrait(points))
+
+
+def cloud_portrait(points: FloatArray) -> ByteArray:
+    """A portrait of a cloud (n, 3), y up, uint8 (h, w, 3)."""
+    from stages.shape.views.portrait import points_portrait
+
+    return points_portrait(points, np.zeros(len(points), np.int32), ABOVE, SIZE, "y")

@@ -78,6 +78,7 @@ def _shown(made: Made) -> Mapping[str, object]:
             for each in answer.strips
             if each.pictures
         ],
+        "sheets": [(each.title, _inlined(each.picture)) for each in answer.sheets],
     }
 
 

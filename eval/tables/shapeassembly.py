@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eval.evaluation import Answer, Curve, Evaluation, Strip
-from eval.models import Trained, trained_models, training_curve
+from eval.models import Trained, training_curve
 from eval.needs import PROGRAM_WRITERS, PROGRAMS
 from eval.subject import Subject
 from stages.shapeassembly.settings import NUCLEUS
@@ -25,11 +23,11 @@ if TYPE_CHECKING:
 __all__ = ["TABLE"]
 
 SHOWN = 16
-PROGRAM_KINDS = ("program_vae", "program_lm")
 SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part_graph_vae": 120.0}
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
+    from eval.program_models import category_programs, program_models, told_without
     from eval.program_tables import editability_table, quality_table, smoothness_table, variability_table
     from eval.programs import boxes_of_programs, clouds_of, novelty, physics_of, smoothness, variability
     from eval.realism import POINTS, realism
@@ -40,14 +38,14 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     quality, seen, told, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, {}, []
     silent: dict[str, str] = {}
     category = ""
-    for each in sorted(_models(subject, asked.nucleus), key=lambda each: each.kit):
+    for each in program_models(subject, asked.nucleus):
         if each.kit != category:  # thousands of programs: one category at a time
             category = each.kit
-            train, val = (_programs(subject, category, split) for split in ("train", "val"))
+            train, val = (category_programs(subject, category, split) for split in ("train", "val"))
             learnt = boxes_of_programs(train)
             clouds = {"train": clouds_of(learnt), "val": clouds_of(boxes_of_programs(val))}
         rng = decision_rng(subject.config.seed, "shapeassembly", each.folder)
-        without = each.model.header["settings"].get("without", "nothing")
+        without = told_without(each)
         curves[each.folder] = training_curve(subject.models / each.folder, "val_loss")
         try:
             rows = list(_written(each, asked, rng))
@@ -97,47 +95,23 @@ class Written:
     begun: int = 0
 
 
-def _models(subject: Subject, nucleus: float) -> list[Trained[Any]]:
-    from stages.training.cuboid_rnn.trained import load_cuboid_rnn
-    from stages.training.part_graph_vae.trained import load_part_graph_vae
-    from stages.training.program_lm.trained import load_program_lm
-    from stages.training.program_vae.trained import load_program_vae
-
-    loaders: dict[str, Callable[[Path, Mapping[str, Any]], Any]] = {
-        "program_vae": load_program_vae,
-        "program_lm": partial(load_program_lm, nucleus=nucleus),
-        "cuboid_rnn": load_cuboid_rnn,
-        "part_graph_vae": load_part_graph_vae,
-    }
-    return [each for kind, load in loaders.items() for each in trained_models(subject.models, kind, load)]
-
-
 def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> Iterator[Written]:
     """What a model writes; and, of one of whole programs, what it writes where nothing is rejected. Raises ValueError
     for a model that writes next to nothing."""
+    from eval.program_models import PROGRAM_KINDS, told_without
     from eval.programs import boxes_of_programs, unrejected
     from stages.training.program_vae.trained import TrainedProgramVae
 
-    header = trained.model.header
     found, begun = trained.model.sample(asked.samples, rng, asked.temperature)
-    if header["kind"] not in PROGRAM_KINDS:
+    if trained.model.header["kind"] not in PROGRAM_KINDS:
         yield Written(trained.folder, found, begun=begun)
         return
-    without = header["settings"].get("without", "nothing")
+    without = told_without(trained)
     name = trained.folder if without == "nothing" else f"{trained.folder}, without {without}"
     yield Written(name, boxes_of_programs(found), found, begun)
     if isinstance(trained.model, TrainedProgramVae) and without == "nothing":
         programs = unrejected(trained.model, asked.samples, rng, asked.temperature)
         yield Written(f"{trained.folder}, no reject", boxes_of_programs(programs), programs)
-
-
-def _programs(subject: Subject, category: str, split: str) -> list[Program]:
-    """The programs of a category in a split of the dataset."""
-    from stages.shape.sample import read_samples
-    from stages.shapeassembly.parser import parse
-
-    shards = sorted(subject.places.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
-    return [parse(each.text) for shard in shards for each in read_samples(shard) if each.kit == category]
 
 
 def _pictures(samples: Sequence[Sequence[Box]]) -> list[tuple[str, bytes]]:

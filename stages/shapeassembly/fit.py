@@ -1,7 +1,8 @@
-"""Fit the continuous parameters of a program to a point cloud; its structure stays (shapeassembly §7.3)."""
+"""Fit the continuous parameters of a program, or cuboids without one, to a point cloud (shapeassembly §7.3)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +13,14 @@ from torch import Tensor
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.differentiable import DifferentiableProgram
 from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.interpreter import Execution, execute
-from stages.shapeassembly.parameters import parameter_ranges, parameters, with_parameters
+from stages.shapeassembly.parameters import SMALLEST, parameter_ranges, parameters, with_parameters
 from stages.shapeassembly.program import Program
 
-__all__ = ["FitResult", "chamfer_distance", "fit", "surface_points"]
+__all__ = ["FitResult", "chamfer_distance", "fit", "fit_cuboids", "surface_points"]
+
+_SIGNS = torch.tensor([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)], dtype=torch.float64)
 
 RESAMPLED = 20
 """Steps for which the same points of the cuboids are followed."""
@@ -47,11 +51,69 @@ def fit(
     step leads to a program that cannot be executed, the fit ends with what it has.
     Raises ProgramError if the program itself cannot be executed, ValueError if there are no points, or it has no parts.
     """
+    own = DifferentiableProgram(program)
+    low, high = parameter_ranges(program)
+    fitted = with_parameters(
+        program, _descended(own.corners, parameters(program), low, high, points, rng, steps, rate, samples)
+    )
+    states = rng.spawn(2)
+    before, after = (
+        chamfer_distance(surface_points(execute(each), samples, state), points)
+        for each, state in zip((program, fitted), states, strict=True)
+    )
+    return FitResult(fitted, before, after)
+
+
+def fit_cuboids(
+    boxes: Sequence[Box],
+    points: FloatArray,
+    rng: np.random.Generator,
+    steps: int = 200,
+    rate: float = 0.01,
+    samples: int = 2000,
+) -> list[Box]:
+    """Move, stretch and turn each of some cuboids by itself so that their surface comes near `points`, float64 (n, 3),
+    as `fit` does with a program: what was attached need not stay so (§7.3, "Opt Cuboids"). Raises ValueError if there
+    are no points, or no cuboids."""
+    if not boxes:
+        raise ValueError("there are no cuboids to fit")
+    start = np.stack([np.concatenate([box.center, box.size, np.zeros(3)]) for box in boxes])
+    axes = torch.from_numpy(np.stack([box.axes for box in boxes]))
+    low = np.full(start.shape, -np.inf)
+    low[:, 3:6] = np.minimum(start[:, 3:6], SMALLEST)
+
+    def placed(values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Centres (n, 3), sizes (n, 3) and axes (n, 3, 3), in rows."""
+        centres, sizes, turns = values.view(-1, 3, 3).unbind(1)
+        skew = torch.linalg.cross(turns[:, None], torch.eye(3, dtype=torch.float64)[None], dim=-1)
+        return centres, sizes, axes @ torch.linalg.matrix_exp(skew)
+
+    def corners(values: Tensor) -> Tensor:
+        centres, sizes, turned = placed(values)
+        return centres[:, None] + (_SIGNS * sizes[:, None]) @ turned
+
+    best = _descended(corners, start.ravel(), low.ravel(), np.inf, points, rng, steps, rate, samples)
+    found = (each.numpy() for each in placed(torch.from_numpy(best)))
+    return [Box(*each) for each in zip(*found, strict=True)]
+
+
+def _descended(
+    corners_of: Callable[[Tensor], Tensor],
+    start: FloatArray,
+    low: FloatArray | float,
+    high: FloatArray | float,
+    points: FloatArray,
+    rng: np.random.Generator,
+    steps: int,
+    rate: float,
+    samples: int,
+) -> FloatArray:
+    """The values, (k,), between `low` and `high`, at which the cuboids with corners `corners_of` them, (n, 8, 3), were
+    nearest to the points on the way down from `start`."""
     if not len(points):
         raise ValueError("there are no points to fit to")
-    target, own = cKDTree(points), DifferentiableProgram(program)
-    low, high = (torch.from_numpy(bound) for bound in parameter_ranges(program))
-    values = torch.tensor(parameters(program), requires_grad=True)
+    target = cKDTree(points)
+    values = torch.tensor(start, requires_grad=True)
     optimiser = torch.optim.Adam([values], lr=rate)
     falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps, eta_min=rate / 10)
     seen = torch.from_numpy(np.asarray(points, dtype=np.float64))
@@ -59,7 +121,7 @@ def fit(
     which, weights = np.empty(0, np.int64), torch.empty(0, 8)
     for step in range(steps):
         try:
-            corners = own.corners(values)
+            corners = corners_of(values)
         except ProgramError:
             if step == 0:
                 raise
@@ -77,14 +139,12 @@ def fit(
         optimiser.step()
         falling.step()
         with torch.no_grad():
-            values.copy_(torch.minimum(torch.maximum(values, low), high))
-    fitted = with_parameters(program, best_values.numpy())
-    states = rng.spawn(2)
-    before, after = (
-        chamfer_distance(surface_points(execute(each), samples, state), points)
-        for each, state in zip((program, fitted), states, strict=True)
-    )
-    return FitResult(fitted, before, after)
+            values.copy_(torch.minimum(torch.maximum(values, _bound(low)), _bound(high)))
+    return best_values.numpy()
+
+
+def _bound(values: FloatArray | float) -> Tensor:
+    return torch.as_tensor(values, dtype=torch.float64)
 
 
 def chamfer_distance(a: FloatArray, b: FloatArray) -> float:

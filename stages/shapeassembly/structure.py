@@ -15,7 +15,7 @@ from stages.shapeassembly.flat import copy_name
 from stages.shapeassembly.limits import MAX_DEPTH, MAX_TEXT
 from stages.shapeassembly.program import BBOX, Attach, Block, Cuboid, Program, Reflect, Squeeze
 
-__all__ = ["block_signatures", "program_distance", "signature", "tokens"]
+__all__ = ["block_signatures", "program_distance", "signature", "token_distance", "tokens"]
 
 
 def tokens(program: Program) -> list[str]:
@@ -79,9 +79,13 @@ def block_signatures(program: Program) -> tuple[str, ...]:
 
 def program_distance(a: Program, b: Program) -> int:
     """How many words must be put in, taken out or changed to make the tokens of one program those of the other."""
+    return token_distance(tokens(a), tokens(b))
+
+
+def token_distance(first: Sequence[str], second: Sequence[str]) -> int:
+    """The same of their tokens."""
     from stages.shapeassembly.editing import edit_distance
 
-    first, second = tokens(a), tokens(b)
     codes = {word: index for index, word in enumerate(dict.fromkeys([*first, *second]))}
     distance: int = edit_distance(np.array([codes[w] for w in first]), np.array([codes[w] for w in second]))
     return distance

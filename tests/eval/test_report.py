@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from eval.chart import chart_svg, ticks
-from eval.evaluation import Answer, Curve, Strip
+from eval.evaluation import Answer, Curve, Sheet, Strip
 from eval.report import Made, report_html
 from eval.subject import load_subject
 from eval.table import Published, Table
@@ -43,7 +43,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     line = [(float(x), float(x * x)) for x in range(30)]
     curve = Curve("Growth", "round", "shapes", {f"kit {number} {HOSTILE}": line for number in range(10)})
-    answer = Answer([table], [curve], [Strip("Shapes", [(f"shape {number} {HOSTILE}", png()) for number in range(9)])])
+    strip = Strip("Shapes", [(f"shape {number} {HOSTILE}", png()) for number in range(9)])
+    answer = Answer([table], [curve], [strip], [Sheet("figure7", f"A sheet {HOSTILE}", png())])
     subject = load_subject(ROOT / "configs" / "default.yaml", tmp_path_factory.mktemp("none"))
     made = [
         Made("wide_ones", "How wide?", answer, 1.5),
@@ -56,7 +57,14 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_report_says_what_was_made_of_what_and_what_was_not(page: Path) -> None:
     text = page.read_text()
-    for said in ("A wide table", "How wide?", "Published, strings Table 2", "4.71", "no trained model; make train"):
+    for said in (
+        "A wide table",
+        "How wide?",
+        "Published, strings Table 2",
+        "4.71",
+        "A sheet",
+        "no trained model; make train",
+    ):
         assert said in text
     for said in ("cores", "UTC", "seed 1", "Python 3.11", "numpy", "name: shapemill-default"):
         assert said in text, "how it was made"

@@ -116,12 +116,14 @@ def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -
     house = tmp_path / "house" / "eval" / "tables"
     house.mkdir(parents=True)
     text = (
-        "from eval.evaluation import Answer, Evaluation, Need\nfrom eval.table import Table\n"
+        "from eval.evaluation import Answer, Evaluation, Need, Sheet\nfrom eval.table import Table\n"
         "def answer(subject, asked):\n    {}\n"
         "TABLE = Evaluation('Is it?', (Need('nothing', lambda _: ''),), lambda _: 1.0, answer)\n"
     )
     (house / "broken.py").write_text(text.format("raise ValueError('no such luck')"))
-    (house / "sound.py").write_text(text.format("return Answer([Table('T', ('a', 'b'), (('one', 2),))])"))
+    (house / "sound.py").write_text(
+        text.format("return Answer([Table('T', ('a', 'b'), (('one', 2),))], sheets=[Sheet('drawn', 'D', b'png')])")
+    )
     command = [sys.executable, "-m", "eval", "all", "--config", str(DEFAULT), "--out", str(tmp_path / "out")]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "house")}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
@@ -129,6 +131,7 @@ def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -
     assert "ValueError: no such luck" in done.stderr
     results = tmp_path / "out" / "shapemill-default-eval"
     assert (results / "sound.csv").read_text() == "a,b\none,2\n"
+    assert (results / "sound_drawn.png").read_bytes() == b"png"
     report = (results / "report.html").read_text()
     assert "it failed: ValueError: no such luck" in report
     assert 'id="sound"' in report

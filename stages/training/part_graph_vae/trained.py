@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,11 @@ import numpy as np
 import torch
 
 from stages.shapeassembly.extraction.hierarchy import Box
+from stages.shapeassembly.interpreter import Execution
 from stages.training.boxes import box_of_numbers
 from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.part_graph_vae.batches import Graphs, batch_of
+from stages.training.part_graph_vae.corpus import nodes_of
 from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 from stages.training.program_vae.draft import MOST_DEPTH
@@ -34,6 +37,13 @@ class TrainedPartGraphVae:
     def latent(self) -> int:
         """Dimensions of the latent space."""
         return int(self.header["settings"]["latent"])
+
+    @torch.no_grad()
+    def encode(self, shapes: Sequence[Execution]) -> Points:
+        """The mean of each executed program in the latent space, float32 (n, latent). Raises Rejected as `nodes_of`."""
+        graphs = Graphs.of([nodes_of(each) for each in shapes])
+        found: Points = self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
+        return found
 
     def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> Points:
         """Random points, float32 (count, latent), of where shapes stand, as `Standing.points`."""

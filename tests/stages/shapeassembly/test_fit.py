@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.fit import chamfer_distance, fit, surface_points
+from stages.shapeassembly.extraction.hierarchy import Box
+from stages.shapeassembly.extraction.validity import boxes_of
+from stages.shapeassembly.fit import chamfer_distance, fit, fit_cuboids, surface_points
 from stages.shapeassembly.parameters import parameter_ranges, parameters, with_parameters
 from stages.shapeassembly.structure import signature
 
@@ -28,6 +31,24 @@ def test_a_perturbed_chair_is_fitted_back() -> None:
     assert signature(done.program) == signature(CHAIR)
     low, high = parameter_ranges(start)
     assert ((low <= parameters(done.program)) & (parameters(done.program) <= high)).all()
+
+
+def test_cuboids_are_fitted_each_by_itself() -> None:
+    """Moved, turned and too thick, and back: what was attached need not be so any more."""
+    rng = np.random.default_rng(4)
+    wanted = boxes_of(execute(CHAIR))
+    points = surface_points(execute(CHAIR), 3000, rng)
+    turn = Rotation.from_rotvec([0.05, 0.1, 0.0]).as_matrix()
+    moved = [Box(each.center + rng.normal(0, 0.03, 3), 1.1 * each.size, each.axes @ turn) for each in wanted]
+    found = fit_cuboids(moved, points, rng, steps=120, samples=800)
+    apart = [
+        np.mean([np.abs(a.center - b.center) for a, b in zip(each, wanted, strict=True)]) for each in (moved, found)
+    ]
+    assert apart[1] < 0.6 * apart[0]
+    for each in found:
+        np.testing.assert_allclose(each.axes @ each.axes.T, np.eye(3), atol=1e-9)
+    with pytest.raises(ValueError, match="no cuboids"):
+        fit_cuboids([], points, rng)
 
 
 def test_surface_points_lie_on_all_faces_by_area() -> None:
