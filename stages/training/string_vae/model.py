@@ -33,7 +33,8 @@ class StringVae(nn.Module):
             self.decoder = TransformerDecoder(entry, tokens, longest)
         else:
             self.decoder = GruDecoder(entry, tokens)
-        self.ends = CycleEnds(entry.hidden, tokens, cycles) if entry.look_back else None
+        looks_back = entry.look_back and entry.decoder != "plain"
+        self.ends = CycleEnds(entry.hidden, tokens, cycles) if looks_back else None
 
     def encode(self, codes: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """Mean and logarithm of the variance, float (n, latent) each, of strings int64 (n, longest) of these lengths

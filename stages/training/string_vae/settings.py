@@ -33,9 +33,9 @@ class StringVaeEntry(KitModelEntry):
     )
     layers: int = Field(1, ge=1, le=24, description="layers of the decoder")
     look_back: bool = Field(
-        False,
-        description="whether the decoder judges the end of an open cycle by what it wrote where the cycle began, too: "
-        "for strings of a hundred parts and more",
+        True,
+        description="whether a masked decoder judges the end of an open cycle by what it wrote where the cycle began, "
+        "too; strings of a hundred parts need it",
     )
     dropout: float = Field(0.0, ge=0, lt=1, description="share of what the transformer's layers say that is left out")
     kl_weight: float = Field(

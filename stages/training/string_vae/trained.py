@@ -104,7 +104,8 @@ def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> Tr
     """
     tensors, header = load_checkpoint(path, {"kind": "string_vae", **(expected or {})})
     vocabulary = Vocabulary(make_alphabet(header["names"]), header["cycles"])
-    entry = StringVaeEntry.model_validate({"name": "trained", **header["settings"]})
+    # weights from before there was `look_back` have none
+    entry = StringVaeEntry.model_validate({"name": "trained", "look_back": False, **header["settings"]})
     module = StringVae(entry, len(vocabulary), header["cycles"], header["most"] + 1)
     module.load_state_dict(tensors)
     return TrainedStringVae(module.eval(), vocabulary, rules_of(header["patterns"], header["cycles"]), header)

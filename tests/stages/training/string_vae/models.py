@@ -65,7 +65,7 @@ def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringV
     return TrainedStringVae(module.eval(), VOCABULARY, RULES, header)
 
 
-def random_vae(decoder: str, seed: int = 0, look_back: bool = False) -> TrainedStringVae:
+def random_vae(decoder: str, seed: int = 0, look_back: bool = True) -> TrainedStringVae:
     """A model with random weights, which are larger than fresh ones, so that it has preferences."""
     settings = entry(decoder=decoder, look_back=look_back)
     module = new_model(settings, VOCABULARY, MOST, seed)

@@ -45,6 +45,7 @@ def test_a_cycle_is_open_from_its_number_to_the_same_number_again() -> None:
 
 
 def test_looking_back_bears_on_open_cycles_alone_each_by_where_it_began() -> None:
+    assert random_vae("plain", look_back=True).module.ends is None
     module = random_vae("masked", look_back=True).module
     assert module.ends is not None
     codes, points = torch.tensor([[1, 7, 2, 6, 1, 6, 1, 7, 1]]), torch.zeros((1, 8))
