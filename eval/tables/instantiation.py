@@ -41,6 +41,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.shape.shape import kit_shape
     from stages.strings.alphabet import make_alphabet
     from stages.strings.decoder import decode
+    from stages.synthesis.mending import mended
     from stages.training.string_vae.sampling import sample
 
     outcomes: list[tuple[str, Sequence[Attempt]]] = []
@@ -67,13 +68,15 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             learnt_from = [line for line in train if trained.model.is_valid(line)]
             rng = dream_rng(seed, trained.folder)
             drawn = sample(trained.model, asked.way, learnt_from, DRAWS * asked.instantiated, rng)
-            written = [each.string for each in drawn if each.string is not None]
-            dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
-            if not dreamt:
-                continue
-            found = attempts(maker, dreamt, standard, seed)
-            outcomes.append((f"{name}, new graphs of {trained.name}", found))
-            good = [each.assembly for each in found if each.good and each.assembly is not None]
+            tried: list[Attempt] = []
+            for title, times in (("new graphs of", 0), ("the same, mended, of", asked.mends)):
+                strings = mended(trained.model, drawn, maker, standard, times, seed)
+                written = [each for each in strings if each is not None]
+                dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
+                if dreamt:
+                    tried = attempts(maker, dreamt, standard, seed)
+                    outcomes.append((f"{name}, {title} {trained.name}", tried))
+            good = [each.assembly for each in tried if each.good and each.assembly is not None]
             pictures = [(f"{len(each)} parts", shape_picture(kit_shape(kit, each))) for each in good[:SHOWN]]
             strips.append(Strip(f"What {trained.folder} dreamt", pictures))
     return Answer([outcome_table(outcomes), methods_table(compared)], strips=strips)
@@ -98,6 +101,7 @@ def _seconds(subject: Subject) -> float:
 def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--instantiated", type=int, default=100, help="graphs of each kit and each model")
     parser.add_argument("--way", choices=get_args(Way), default="gaussian", help="as in synthesis.sources")
+    parser.add_argument("--mends", type=int, default=24, help="as in synthesis")
     parser.add_argument("--parts", type=int, default=4000, help="parts put down at most for a graph")
 
 

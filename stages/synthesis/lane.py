@@ -83,7 +83,7 @@ def _dreams(
     alphabet, exemplars = make_alphabet(kit.labels), _exemplar_graphs(kit)
     writer = KitStrings(kit, source.edges)
     method = Method(whole=source.whole, budget=config.tries)
-    for number, string in enumerate(_drawn(task, config, asked, source)):
+    for number, string in enumerate(_drawn(task, config, asked, source, instantiator, method)):
         task.progress(number + 1, config.draws)
         item = f"{task.shard.name}/{number}"
         if string is None:
@@ -120,12 +120,15 @@ def _dreams(
         yield _Dream(found.assembly, string, graph, known, found.tries)
 
 
-def _drawn(task: Task, config: SynthesisConfig, asked: SourceConfig, source: Source) -> list[str | None]:
+def _drawn(
+    task: Task, config: SynthesisConfig, asked: SourceConfig, source: Source, maker: Instantiator, method: Method
+) -> list[str | None]:
     """What each draw of a lane answers: a string of the grammar, or None."""
+    from stages.synthesis.mending import mended
     from stages.training.string_vae.sampling import sample
 
     found = sample(source.model, asked.way, source.strings, config.draws, task.rng("strings"), asked.temperature)
-    return [each.string for each in found]
+    return mended(source.model, found, maker, method, config.mends, int(task.rng("mending").integers(1 << 31)))
 
 
 def _is_told(writer: KitStrings, assembly: Assembly, source: Source) -> bool:

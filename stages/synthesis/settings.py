@@ -70,6 +70,12 @@ class SynthesisConfig(StrictModel):
     tries: int = Field(
         4000, ge=1, description="Parts that are put down at most until a string has become a shape; unit: parts."
     )
+    mends: int = Field(
+        24,
+        ge=0,
+        description="How often at most a string of which no shape can come is written anew, from the first token that "
+        "no arrangement of its parts allows; 0: such strings are refused.",
+    )
     upright: bool = Field(
         True, description="Whether every part stands as parts of its type stood in the exemplars, or however it docks."
     )

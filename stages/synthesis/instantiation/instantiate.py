@@ -49,6 +49,11 @@ class Instantiation:
     reason: str
     tries: int
 
+    @property
+    def is_impossible(self) -> bool:
+        """Whether no arrangement of the graph is left, as far as the kit's known places go."""
+        return self.reason == REASONS[IMPOSSIBLE]
+
 
 class Instantiator:
     """Puts graphs of one kit together; what it learns of contacts is kept from graph to graph and changes no answer."""
@@ -140,7 +145,7 @@ class Instantiator:
         there, asked = assembly.edges @ (n, 1), np.asarray(edges) @ (n, 1)
         if not np.isin(asked, there).all() or (method.whole and len(there) != len(asked)):
             return CLASH
-        if not method.whole and not self._admitted(np.asarray(labels), assembly.edges):
+        if method.ended and not method.whole and not self._admitted(np.asarray(labels), assembly.edges):
             return NOT_ADMITTED
         return SLOTS if self._slots is not None and self._slots.misfits(assembly) else ""
 

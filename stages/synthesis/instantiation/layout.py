@@ -35,7 +35,8 @@ class Method(NamedTuple):
     """How to go about it. checked: parts are checked as they are put down; constrained: the node with fewest values is
     next, and the values of all that may be next are held against every part that stands; else a random one;
     backtracks: dead ends are taken back, step by step; else the shape is begun anew; closes: values from which a cycle
-    cannot be closed any more are not tried; whole: the graph tells of all contacts; budget: parts put down at most.
+    cannot be closed any more are not tried; whole: the graph tells of all contacts; ended: every part has all that the
+    grammar asks for beside it, or else, where the graph is not whole, may still get it; budget: parts put down at most.
     """
 
     checked: bool = True
@@ -43,6 +44,7 @@ class Method(NamedTuple):
     backtracks: bool = True
     closes: bool = True
     whole: bool = True
+    ended: bool = True
     budget: int = 4000
 
 

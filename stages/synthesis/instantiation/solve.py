@@ -54,7 +54,7 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, guide, method, reach,
     while True:
         if outcome == FINE:
             if s.counts[PLACED] == n:
-                if method.whole or not method.checked or _all_complete(rules, graph, s):
+                if method.whole or not method.checked or not method.ended or _all_complete(rules, graph, s):
                     return SOLVED
                 outcome = CONFLICT
                 continue

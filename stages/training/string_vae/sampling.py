@@ -38,11 +38,12 @@ MOST_READ = 2048
 @dataclass(frozen=True)
 class Found:
     """What a search has found: a valid string, not known where it started, or None; `asked`: strings that were decoded,
-    `valid`: how many of them were valid."""
+    `valid`: how many of them were valid; point: float32 (latent,), where the last was."""
 
     string: str | None
     asked: int
     valid: int
+    point: Points
 
 
 def perturb(
@@ -56,18 +57,19 @@ def perturb(
 
     Each offset is larger than the one before in every dimension, of random sign. Strings are the likeliest of a point.
     """
-    found: list[Found] = [Found(None, 0, 0)] * len(points)
+    found = [Found(None, 0, 0, each) for each in points]
     searching = list(range(len(points)))
     bounds = np.linspace(0, largest, GROWTH + 1)
     for low, high in pairwise(bounds.tolist()):
         shape = (len(searching), points.shape[1])
         offsets = rng.uniform(low, high, shape) * rng.choice([-1.0, 1.0], shape)
-        strings = model.decode((points[searching] + offsets).astype(np.float32), None)
+        moved = (points[searching] + offsets).astype(np.float32)
         still = []
-        for place, string in zip(searching, strings, strict=True):
+        for place, string, point in zip(searching, model.decode(moved, None), moved, strict=True):
             valid = model.is_valid(string)
             is_new = valid and string not in known[place]
-            found[place] = Found(string if is_new else None, found[place].asked + 1, found[place].valid + valid)
+            before = found[place]
+            found[place] = Found(string if is_new else None, before.asked + 1, before.valid + valid, point)
             if not is_new:
                 still.append(place)
         searching = still
@@ -130,8 +132,12 @@ def sample(
     """
     if way in _SEARCHES:
         return _SEARCHES[way](model, strings, count, rng)
-    decoded = model.decode(_DRAWS[way](model, strings, count, rng), rng, temperature)
-    return [Found(each if model.is_valid(each) else None, 1, int(model.is_valid(each))) for each in decoded]
+    points = _DRAWS[way](model, strings, count, rng)
+    found = []
+    for string, point in zip(model.decode(points, rng, temperature), points, strict=True):
+        valid = model.is_valid(string)
+        found.append(Found(string if valid else None, 1, int(valid), point))
+    return found
 
 
 def _prior(model: TrainedStringVae, strings: Sequence[str], count: int, rng: np.random.Generator) -> Points:

@@ -20,7 +20,7 @@ from stages.training.checkpoint import load_checkpoint
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import END, Vocabulary
-from stages.training.string_vae.writing import write_codes
+from stages.training.string_vae.writing import Draft, write_codes
 
 __all__ = ["Points", "TrainedStringVae", "load_string_vae"]
 
@@ -76,13 +76,21 @@ class TrainedStringVae:
             means.append(mean.cpu().numpy())
         return np.concatenate(means)
 
-    def decode(self, points: Points, rng: np.random.Generator | None, temperature: float = 1.0) -> list[str]:
-        """A string for each point: each token drawn at a temperature, or, without `rng`, the likeliest.
+    def decode(
+        self,
+        points: Points,
+        rng: np.random.Generator | None,
+        temperature: float = 1.0,
+        begun: Sequence[Draft] = (),
+    ) -> list[str]:
+        """A string for each point: each token drawn at a temperature, or, without `rng`, the likeliest. Those that are
+        `begun`, one for each point, go on from there.
 
         A plain decoder may answer what is no string; a masked one does so only if no string of the grammar is a tree.
         """
         rules = self.rules if self.is_masked else None
-        written = write_codes(self.module, points, self.header["most"], rules, self.vocabulary.cycles, rng, temperature)
+        most, cycles = self.header["most"], self.vocabulary.cycles
+        written = write_codes(self.module, points, most, rules, cycles, rng, temperature, begun)
         return [self.vocabulary.string(each) for each in written]
 
     def is_valid(self, string: str) -> bool:

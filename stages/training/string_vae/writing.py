@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +14,7 @@ from stages.strings.rules import Rules
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.vocabulary import END
 
-__all__ = ["write_codes"]
+__all__ = ["Draft", "write_codes"]
 
 AT_ONCE = 256
 """Strings that are written side by side."""
@@ -22,7 +23,7 @@ TRIES = 8
 
 
 @dataclass
-class _Draft:
+class Draft:
     """One string on its way. kept: its tokens up to where it was cut; banned: tokens that must not come next there;
     acyclic: whether no cycle may begin any more; ends: dead ends so far."""
 
@@ -69,18 +70,20 @@ def write_codes(
     cycles: int,
     rng: np.random.Generator | None,
     temperature: float,
+    begun: Sequence[Draft] = (),
 ) -> list[list[int]]:
     """The tokens of a string for each point, float32 (n, latent), at most `most`, without an end.
 
     Each token is drawn by its probability, at a temperature, or, without an `rng`, is the likeliest. With `rules`, only
     tokens that can still lead to a string of the grammar are taken; where none is left, the string goes back and on by
-    another way, so that all are strings of the grammar, if some of its strings are trees.
+    another way, so that all are strings of the grammar, if some of its strings are trees. Strings that are `begun`, one
+    for each point, go on from there.
     """
     module.eval()
     found: list[list[int]] = []
     for start in range(0, len(points), AT_ONCE):
         here = torch.from_numpy(points[start : start + AT_ONCE])
-        drafts = [_Draft() for _ in range(len(here))]
+        drafts = list(begun[start : start + AT_ONCE]) or [Draft() for _ in range(len(here))]
         waiting = list(range(len(drafts)))
         for _ in range(TRIES + 1 if rules is not None else 1):
             ended = _write(
@@ -99,7 +102,7 @@ def write_codes(
 def _write(
     module: StringVae,
     points: Tensor,
-    drafts: list[_Draft],
+    drafts: list[Draft],
     most: int,
     rules: Rules | None,
     cycles: int,
