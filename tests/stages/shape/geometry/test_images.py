@@ -1,5 +1,7 @@
 """Images of dockings as points: which are written, and which is nearest."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from stages.shape.geometry.images import distinct_images, nearest_image
