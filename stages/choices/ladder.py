@@ -13,6 +13,7 @@ from stages.choices.probe import HUB, Finds, Probe
 from stages.choices.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
+from stages.variations.copied import CopyTest
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import CHOSEN_HUBS
@@ -116,6 +117,7 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     """
     tried: list[Rung] = []
     known: dict[tuple[ContactKind, ...], ContactAnswers] = {}
+    copies: dict[Setting, CopyTest] = {}
     looked: dict[Setting, Rung | None] = {}
 
     def look(setting: Setting) -> Rung | None:
@@ -127,7 +129,11 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
         kit = sight.kit(setting)
         if setting.kinds not in known:
             known[setting.kinds] = ContactAnswers(kit)
-        return _rung(known[setting.kinds].under(kit), setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS)
+        answers = known[setting.kinds].under(kit)
+        any_grammar = replace(setting, grammar=GRAMMARS[0])
+        if any_grammar not in copies:
+            copies[any_grammar] = CopyTest(kit, answers.dockings)
+        return _rung(answers, setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS, copies[any_grammar])
 
     for setting in _settings(sight, rails):
         if setting.grammar not in SLOT_LEVELS:
@@ -152,12 +158,14 @@ def climb(sight: Sight, rails: Rails, tries: int) -> list[Rung]:
     return tried
 
 
-def _rung(answers: ContactAnswers, setting: Setting, tries: int, kept: float, required: float) -> Rung:
+def _rung(
+    answers: ContactAnswers, setting: Setting, tries: int, kept: float, required: float, copies: CopyTest
+) -> Rung:
     """The first tries, and more where they found something that differs. Where hubs are left out, finds must get back
-    those that are `required` of a variant."""
+    those that are `required` of a variant. `copies`: as for Search."""
     names = [answers.kit.types[index].name for index in setting.hubs]
     rng = decision_rng(0, "choices", setting.grammar, *setting.kinds, *names)
-    probe = Probe(answers, rng, required if setting.hubs else 0)
+    probe = Probe(answers, rng, required if setting.hubs else 0, copies=copies)
     rung = _looked_at(Rung(setting, probe.go_on(tries, GRAPHS, evenly=True), kept), probe)
     promising = rung.finds.histograms >= (1 if rung.finds.by_meaning else PROMISING)
     if promising and not rung.gives_enough and not rung.bared:

@@ -16,6 +16,7 @@ from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 from stages.variations.backdrop import NO_BACKDROP, Backdrop
 from stages.variations.carcass import NO_CARCASS, carcass, carcass_test
+from stages.variations.copied import CopyTest
 from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
@@ -81,9 +82,16 @@ class Finds:
 class Probe:
     """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone. What lacks the
     kit's carcass is no find, nor is that which does not get back the `hubs` that are required, as `Backdrop.has_hubs`
-    says, or of which a greater share than `copied` is copied whole."""
+    says, or of which a greater share than `copied` is copied whole. `copies`: as for Search."""
 
-    def __init__(self, answers: ContactAnswers, rng: np.random.Generator, hubs: float = 0, copied: float = 1.0) -> None:
+    def __init__(
+        self,
+        answers: ContactAnswers,
+        rng: np.random.Generator,
+        hubs: float = 0,
+        copied: float = 1.0,
+        copies: CopyTest | None = None,
+    ) -> None:
         self.kit = answers.kit
         self.variants: list[Variant] = []
         self._rng = rng
@@ -98,8 +106,10 @@ class Probe:
         slotted = self.kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(self.kit, answers.dockings, SEARCH.upright) if slotted else None
         same = {"duplicates": "histogram"} if self.kit.by_meaning else {}
+        copies = copies or CopyTest(self.kit, answers.dockings)
         self._searches = [
-            Search(answers, SEARCH.model_copy(update={"method": method, **same}), self._slots) for method in methods
+            Search(answers, SEARCH.model_copy(update={"method": method, **same}), self._slots, copies)
+            for method in methods
         ]
 
     def go_on(self, tries: int, wanted: int, evenly: bool = False) -> Finds:

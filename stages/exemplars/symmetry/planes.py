@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -106,19 +107,27 @@ class _Model:
     way: FloatArray
     extent: float
 
-    @property
+    @cached_property
     def heights(self) -> FloatArray:
         """Of each corner along the direction, float64 (f, 3)."""
         found: FloatArray = self.corners @ self.way
         return found
 
+    @cached_property
+    def spans(self) -> tuple[FloatArray, FloatArray]:
+        """The lowest and the highest corner of each triangle along the direction, float64 (f,) each."""
+        return self.heights.min(axis=1), self.heights.max(axis=1)
+
     def section(self, offset: float) -> Section:
-        return section(self.corners, self.normals, self.way, offset, STEP * self.extent)
+        low, high = self.spans
+        crossed = np.flatnonzero((low <= offset) & (high > offset))
+        heights = self.heights[crossed] - offset
+        return section(self.corners[crossed], self.normals[crossed], heights, STEP * self.extent)
 
     def alike(self, one: Section, other: Section, shift: float) -> float:
         """The share of the one section, moved by so much along the direction, and the other that they have in common,
         from 0, where they are not alike, to 1."""
-        return max(0.0, alike(one, other, shift * self.way, NEAR * self.extent) - SAME) / (1 - SAME)
+        return max(0.0, alike(one, other, shift * self.way, NEAR * self.extent, SAME) - SAME) / (1 - SAME)
 
     def kinds(self, offsets: FloatArray) -> np.ndarray:
         """For each of ascending offsets the first before it with a section like its own, int64 (n,); itself where there
@@ -178,10 +187,9 @@ def _ways(edges: FloatArray) -> list[FloatArray]:
 
 def _plain(model: _Model) -> FloatArray:
     """Stretches along which the section stays the same, float64 (n, 2), ascending."""
-    heights = model.heights
+    heights, (low, high) = model.heights, model.spans
     _, first = np.unique(np.round(heights / (FINE * model.extent)), return_index=True)
     levels = heights.reshape(-1)[first]
-    low, high = heights.min(axis=1), heights.max(axis=1)
     slanted = np.abs(model.normals @ model.way) > SAME_ANGLE
     slanted &= high - low > FINE * model.extent
     opened = np.searchsorted(np.sort(low[slanted]), levels[:-1] + FINE / 2 * model.extent)
@@ -242,8 +250,7 @@ def _rows(model: _Model, plain: FloatArray, vertices: FloatArray) -> Cuts:
 
     Shifts are ranked by the signatures of their sections, and looked at until none that is left can be better.
     """
-    heights = model.heights
-    begin, end = float(heights.min()), float(heights.max())
+    begin, end = float(model.heights.min()), float(model.heights.max())
     hopes = []
     for shift in _shifts(model, vertices):
         for phase in range(PHASES):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
@@ -12,6 +13,9 @@ __all__ = ["Section", "alike", "section"]
 
 TURNED = 0.3
 """Normals that are farther apart than this are of different sides."""
+ROUNDING = 1e-9
+"""By so much, as a share, a sum of lengths may be off."""
+_PRIMES = (73856093, 19349663, 83492791)
 
 
 @dataclass(frozen=True)
@@ -32,51 +36,80 @@ class Section:
         return float(self.lengths.sum())
 
 
-def section(corners: FloatArray, normals: FloatArray, way: FloatArray, offset: float, step: float) -> Section:
-    """The section of triangles (f, 3, 3) with unit `normals` (f, 3) by the plane of points x with `way` (3,) times x =
-    `offset`, with a point for each `step` of a line."""
-    height = corners @ way - offset
-    above = height > 0
-    crossing = above.any(axis=1) & ~above.all(axis=1)
-    corners, height, above = corners[crossing], height[crossing], above[crossing]
+def section(corners: FloatArray, normals: FloatArray, heights: FloatArray, step: float) -> Section:
+    """The section of triangles (f, 3, 3) with unit `normals` (f, 3) by a plane that each of them crosses, over which
+    their corners lie at `heights` (f, 3), with a point for each `step` of a line."""
+    above = heights > 0
     alone = np.where(above.sum(axis=1) == 2, above.argmin(axis=1), above.argmax(axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3
     tips = np.take_along_axis(corners, turn[..., None], axis=1)
-    height = np.take_along_axis(height, turn, axis=1)
-    share = (height[:, :1] / (height[:, :1] - height[:, 1:]))[..., None]
+    heights = np.take_along_axis(heights, turn, axis=1)
+    share = (heights[:, :1] / (heights[:, :1] - heights[:, 1:]))[..., None]
     ends = tips[:, :1] + share * (tips[:, 1:] - tips[:, :1])
     line = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     count = np.maximum(1, np.ceil(line / step)).astype(np.int64)
     of = np.repeat(np.arange(len(line)), count)
     place = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
     points = ends[of, 0] + place[:, None] * (ends[of, 1] - ends[of, 0])
-    return Section(points, normals[crossing][of], (line / count)[of])
+    return Section(points, normals[of], (line / count)[of])
 
 
-def alike(one: Section, other: Section, shift: FloatArray, tolerance: float) -> float:
+def alike(one: Section, other: Section, shift: FloatArray, tolerance: float, least: float) -> float:
     """The share of two sections that they have in common once `one` is moved by `shift` (3,): of the one that has less
-    in common. Points count that have one of the other within `tolerance`, on a side that looks the same way."""
+    in common; 0 if that is less than `least`. Points count that have one of the other within `tolerance`, on a side
+    that looks the same way."""
     if not len(one.points) or not len(other.points):
         return 0.0
-    moved = one.points + shift
-    return min(
-        _covered(moved, one.normals, one.lengths, other.points, other.normals, tolerance),
-        _covered(other.points, other.normals, other.lengths, moved, one.normals, tolerance),
-    )
-
-
-def _covered(
-    points: FloatArray,
-    normals: FloatArray,
-    lengths: FloatArray,
-    others: FloatArray,
-    other_normals: FloatArray,
-    tolerance: float,
-) -> float:
-    from scipy.spatial import KDTree
-
     weight = tolerance / TURNED
-    near, _ = KDTree(np.column_stack([others, weight * other_normals])).query(
-        np.column_stack([points, weight * normals]), distance_upper_bound=tolerance
-    )
-    return float(lengths[near < tolerance].sum() / lengths.sum())
+    moved = np.column_stack([one.points + shift, weight * one.normals])
+    others = np.column_stack([other.points, weight * other.normals])
+    shares = []
+    for points, lengths, onto in ((moved, one.lengths, others), (others, other.lengths, moved)):
+        most = (1 - least) * (1 + ROUNDING) * float(lengths.sum())
+        covered, enough = _covered(points, lengths, onto, tolerance, most)
+        if not enough:
+            return 0.0
+        shares.append(float(lengths[covered].sum() / lengths.sum()))
+    return min(shares)
+
+
+@numba.njit(cache=True)
+def _covered(points, lengths, others, tolerance, most):
+    """Which of `points` (n, 6) have one of `others` (k, 6) within `tolerance`, bool (n,), and whether the `lengths` of
+    those that have none come to `most` at most; as soon as they do not, it looks no further."""
+    size = 1
+    while size < 2 * len(others):
+        size *= 2
+    heads, following = np.full(size, -1), np.full(len(others), -1)
+    for place in range(len(others)):
+        cell = _cell(others[place], 0, 0, 0, tolerance) & (size - 1)
+        following[place] = heads[cell]
+        heads[cell] = place
+    covered = np.zeros(len(points), dtype=np.bool_)
+    bare = 0.0
+    for number in range(len(points)):
+        for turn in range(27):
+            # The point's own cell first, which is that with number 13.
+            around = (turn + 13) % 27
+            cell = _cell(points[number], around // 9 - 1, around // 3 % 3 - 1, around % 3 - 1, tolerance) & (size - 1)
+            place = heads[cell]
+            while place >= 0 and not covered[number]:
+                total = 0.0
+                for k in range(6):
+                    total += (others[place, k] - points[number, k]) ** 2
+                covered[number] = total < tolerance**2
+                place = following[place]
+            if covered[number]:
+                break
+        if not covered[number]:
+            bare += lengths[number]
+            if bare > most:
+                return covered, False
+    return covered, True
+
+
+@numba.njit(cache=True)
+def _cell(point, dx, dy, dz, side):
+    """The hash of the cell of a point, or of one that is so many cells away."""
+    x, y, z = np.int64(point[0] // side) + dx, np.int64(point[1] // side) + dy, np.int64(point[2] // side) + dz
+    return x * _PRIMES[0] ^ y * _PRIMES[1] ^ z * _PRIMES[2]

@@ -191,9 +191,10 @@ class SlotGrammar:
             boxes[number] = middle - half, middle + half
         owner = np.arange(count)
         volumes = np.prod(boxes[:, 1] - boxes[:, 0], axis=1)
-        for i, j in combinations(range(count), 2):
-            shared = np.minimum(boxes[i, 1], boxes[j, 1]) - np.maximum(boxes[i, 0], boxes[j, 0])
-            if (shared > 0).all() and np.prod(shared) > OVERLAP * min(volumes[i], volumes[j]):
+        for i in range(count - 1):
+            shared = np.minimum(boxes[i, 1], boxes[i + 1 :, 1]) - np.maximum(boxes[i, 0], boxes[i + 1 :, 0])
+            much = np.prod(shared, axis=1) > OVERLAP * np.minimum(volumes[i], volumes[i + 1 :])
+            for j in (np.flatnonzero((shared > 0).all(axis=1) & much) + i + 1).tolist():
                 owner[owner == owner[j]] = owner[i]
         _, slot_of = np.unique(owner, return_inverse=True)
         return slot_of.astype(np.int64), int(slot_of.max()) + 1 if count else 0

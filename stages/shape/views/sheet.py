@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -55,9 +55,11 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
     width = 2 * margin + columns * cell_width + (columns - 1) * gap
     widths = [section.span * (cell_width + gap) - gap for section in sections]
     heights = _row_heights(sections, widths, unit)
-    head = round(66 * unit)
+    notes = [_note_lines(each, fonts, width - 2 * margin, unit) for each in sections]
+    leading = round(19 * unit)
+    heads = [round(66 * unit) + leading * (len(lines) - 1) for lines in notes]
     height = 2 * margin + (round(62 * unit) if title else 0)
-    for section, rows in zip(sections, heights, strict=True):
+    for section, rows, head in zip(sections, heights, heads, strict=True):
         height += (head if section.title else 0) + sum(rows) + gap * len(rows)
     sheet = Image.new("RGB", (width, height), PAPER)
     pen = ImageDraw.Draw(sheet)
@@ -65,12 +67,13 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
     if title:
         pen.text((margin, y), title, TITLE_INK, fonts["title"])
         y += round(62 * unit)
-    for section, across, section_heights in zip(sections, widths, heights, strict=True):
+    for section, across, section_heights, lines, head in zip(sections, widths, heights, notes, heads, strict=True):
         if section.title:
             pen.line([(margin, y + round(8 * unit)), (width - margin, y + round(8 * unit))], RULE, max(1, round(unit)))
             pen.text((margin, y + round(24 * unit)), section.title, TITLE_INK, fonts["head"])
-            after = margin + pen.textlength(section.title, fonts["head"]) + 14 * unit
-            pen.text((after, y + round(28.5 * unit)), section.note, CAPTION_INK, fonts["note"])
+            after = margin + _after(section, fonts, unit)
+            for number, line in enumerate(lines):
+                pen.text((after, y + round(28.5 * unit) + number * leading), line, CAPTION_INK, fonts["note"])
             y += head
         for row, row_height in zip(section.rows, section_heights, strict=True):
             for index, cell in enumerate(row):
@@ -119,6 +122,25 @@ def _scaled(picture: ByteArray, width: int) -> Any:
         light = np.asarray(image)[..., None] / 255.0
         image = Image.fromarray(np.rint(light * np.array(PAPER)).astype(np.uint8))
     return image
+
+
+def _after(section: Section, fonts: Mapping[str, Any], unit: float) -> float:
+    """Where the note of a section begins, from where its title does."""
+    length: float = fonts["head"].getlength(section.title) + 14 * unit
+    return length
+
+
+def _note_lines(section: Section, fonts: Mapping[str, Any], width: int, unit: float) -> list[str]:
+    """The note of a section in lines that fit beside its title; a word that is longer stands alone."""
+    room = width - _after(section, fonts, unit)
+    lines: list[str] = []
+    for word in section.note.split(" "):
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and fonts["note"].getlength(longer) <= room:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
 
 
 def _fitting(pen: Any, text: str, font: Any, width: int) -> str:

@@ -106,10 +106,17 @@ class Variant:
 class Search:
     """One line of search: its parents, what it has seen, what it has learnt about contacts.
 
-    slots: what the kit shows of slots, where its grammar is one of slots and somebody knows them already.
+    slots: what the kit shows of slots, where its grammar is one of slots and somebody knows them already; copies: the
+    test for what is copied of its exemplars, where somebody has it.
     """
 
-    def __init__(self, answers: ContactAnswers, config: SearchConfig, slots: SlotGrammar | None = None) -> None:
+    def __init__(
+        self,
+        answers: ContactAnswers,
+        config: SearchConfig,
+        slots: SlotGrammar | None = None,
+        copies: CopyTest | None = None,
+    ) -> None:
         kit = answers.kit
         self.kit = kit
         self.answers = answers
@@ -132,7 +139,7 @@ class Search:
         self.steering = Steering(config, by_meaning)
         self._ground = GroundTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
         self._features = FeatureTest(kit)
-        self._copies = CopyTest(kit, answers.dockings)
+        self._copies = copies or CopyTest(kit, answers.dockings)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
         self.seen: set[int] = set()
         for each in self.parents.exemplars:

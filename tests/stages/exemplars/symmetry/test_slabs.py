@@ -12,7 +12,6 @@ from stages.exemplars.parse import parse_model
 from stages.exemplars.segment import segment
 from stages.exemplars.settings import ReadLimits
 from stages.exemplars.symmetry.planes import parallel_cuts
-from stages.exemplars.symmetry.sections import alike, section
 from stages.exemplars.symmetry.slabs import slab_pieces
 from tests.stages.exemplars.symmetry.planted import blocks, box, mesh, one_object, wall
 
@@ -33,34 +32,6 @@ def tetrahedron() -> np.ndarray:
     """A block of which no two sections are alike."""
     corners = np.array([[0.0, 0.1, 0.2], [3.0, 0.5, 0.0], [1.0, 2.0, 0.3], [1.2, 0.9, 1.7]])
     return corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]]
-
-
-def normals_of(triangles: np.ndarray) -> np.ndarray:
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
-
-
-class TestSections:
-    def test_a_section_of_a_box_is_as_long_as_the_way_around_it(self) -> None:
-        corners = box((0, 0, 0), (4, 2, 3))
-        found = section(corners, normals_of(corners), np.array([1.0, 0, 0]), 1.7, 0.01)
-        assert found.length == pytest.approx(10.0)
-        assert np.allclose(found.points[:, 0], 1.7)
-
-    def test_sections_are_alike_by_the_share_of_both_that_they_have_in_common(self) -> None:
-        corners = np.concatenate([box((0, 0, 0), (4, 2, 3)), box((2, 5, 0), (4, 6, 1.5))])
-        way = np.array([1.0, 0, 0])
-        alone, both = (section(corners, normals_of(corners), way, offset, 0.01) for offset in (1.0, 3.0))
-        assert alike(alone, alone, np.zeros(3), 0.01) == 1.0
-        assert alike(alone, both, 2 * way, 0.01) == pytest.approx(10 / 15, abs=0.01)
-        assert alike(alone, both, np.zeros(3), 0.01) == 0.0
-
-    def test_the_two_sides_of_a_plate_are_not_one(self) -> None:
-        corners = box((0, 0, 0), (4, 1, 1))
-        way = np.array([1.0, 0, 0])
-        one = section(corners, normals_of(corners), way, 1.0, 0.01)
-        inside_out = section(corners[:, ::-1], -normals_of(corners), way, 1.0, 0.01)
-        assert alike(one, inside_out, np.zeros(3), 0.01) == 0.0
 
 
 class TestCuts:

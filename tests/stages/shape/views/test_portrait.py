@@ -73,3 +73,14 @@ def test_a_sheet_holds_each_picture_in_its_place():
 def test_a_sheet_without_pictures_is_refused():
     with pytest.raises(ValueError, match="at least one picture"):
         contact_sheet([Section("Title", [])])
+
+
+def test_a_note_that_is_longer_than_the_sheet_is_wrapped():
+    picture = np.zeros((40, 400, 3), dtype=np.uint8)
+    short, long = (
+        contact_sheet([Section("Title", [[Cell(picture)]], " ".join(["note"] * words))], cell_width=400)
+        for words in (3, 60)
+    )
+    assert long.shape[1] == short.shape[1]
+    assert long.shape[0] > short.shape[0]
+    assert (long[:, -10:] == PAPER).all()
