@@ -43,15 +43,14 @@ def mended(
         for number in wrong:
             string = strings[number]
             assert string is not None
-            graph, kept = decode(string, model.vocabulary.alphabet), drafts[number].kept
-            place = first_impossible(maker, graph, method, seed, max(len(kept), 1))
+            codes, before = model.vocabulary.codes(string).tolist(), drafts[number]
+            possible = len(before.kept) if codes[: len(before.kept)] == before.kept else 0  # less after a dead end
+            place = first_impossible(maker, decode(string, model.vocabulary.alphabet), method, seed, possible)
             if place is None:
                 continue
             stuck[number] = stuck[number] + 1 if place <= farthest[number] else 0
             farthest[number] = max(place, farthest[number])
-            codes = model.vocabulary.codes(string).tolist()
-            cut = max(place - 2 ** stuck[number] + 1, 1)
-            before = drafts[number]
+            cut = max(place - 2 ** stuck[number] + 1, 0)
             banned = before.banned if codes[:cut] == before.kept else set()
             drafts[number] = Draft(codes[:cut], banned | {codes[cut]})
             still.append(number)
@@ -65,7 +64,7 @@ def mended(
     return strings
 
 
-def first_impossible(maker: Instantiator, graph: Decoded, method: Method, seed: int, possible: int = 1) -> int | None:
+def first_impossible(maker: Instantiator, graph: Decoded, method: Method, seed: int, possible: int = 0) -> int | None:
     """The place of the first token of a string after which no beginning of a shape is left; of one of which nothing
     comes but for its end, the last. None where a shape comes of it, or where TRIED parts do not tell. With the first
     `possible` tokens something is known to be left.

@@ -45,6 +45,7 @@ def place_of(roads: Instantiator, names: str) -> int | None:
         ("c0scscscs0", None),
         ("c0scssscscsss0", None),
         ("cscscs", 5),  # has ends
+        ("c", 0),  # stands alone
         ("c0scscs0", 7),  # a triangle
         ("c0scscscss0", 9),  # where it began
         ("c0scs0cs", 5),  # closes at once, and goes on
@@ -73,3 +74,7 @@ def test_what_goes_wrong_goes_on_otherwise_from_its_first_wrong_token(
     assert mended(model, found, roads, LOOSE, 1, 0) == once
     assert mended(model, found, roads, LOOSE, 0, 0) == drawn
     assert mended(model, [Found(None, 1, 0, found[0].point)], roads, LOOSE, 8, 0) == [None]
+    lone = model.vocabulary.alphabet.tokens[0]
+    (other,) = mended(model, [Found(lone, 1, 1, found[0].point)], roads, LOOSE, 1, 0)
+    assert other is not None
+    assert not other.startswith(lone)
