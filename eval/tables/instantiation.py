@@ -68,9 +68,12 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             learnt_from = [line for line in train if trained.model.is_valid(line)]
             rng = dream_rng(seed, trained.folder)
             drawn = sample(trained.model, asked.way, learnt_from, DRAWS * asked.instantiated, rng)
+            mends = mended(trained.model, drawn[: asked.instantiated], maker, standard, asked.mends, seed)
             tried: list[Attempt] = []
-            for title, times in (("new graphs of", 0), ("the same, mended, of", asked.mends)):
-                strings = mended(trained.model, drawn, maker, standard, times, seed)
+            for title, strings in (
+                ("new graphs of", [each.string for each in drawn]),
+                ("new graphs, mended, of", mends),
+            ):
                 written = [each for each in strings if each is not None]
                 dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
                 if dreamt:
@@ -95,7 +98,7 @@ def _tells_all(subject: Subject, kit: str) -> bool:
 
 def _seconds(subject: Subject) -> float:
     kits, models = (len(list(folder)) for folder in (subject.corpus.glob("*-test.txt"), subject.models.glob("*")))
-    return 30.0 + 90.0 * kits + 25.0 * models
+    return 30.0 + 90.0 * kits + 150.0 * models
 
 
 def _options(parser: ArgumentParser) -> None:

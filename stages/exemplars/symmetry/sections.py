@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.cells import OWN, cell_hash
 
 __all__ = ["Section", "alike", "section"]
 
@@ -15,7 +16,6 @@ TURNED = 0.3
 """Normals that are farther apart than this are of different sides."""
 ROUNDING = 1e-9
 """By so much, as a share, a sum of lengths may be off."""
-_PRIMES = (73856093, 19349663, 83492791)
 
 
 @dataclass(frozen=True)
@@ -82,16 +82,14 @@ def _covered(points, lengths, others, tolerance, most):
         size *= 2
     heads, following = np.full(size, -1), np.full(len(others), -1)
     for place in range(len(others)):
-        cell = _cell(others[place], 0, 0, 0, tolerance) & (size - 1)
+        cell = cell_hash(others[place], OWN, tolerance) & (size - 1)
         following[place] = heads[cell]
         heads[cell] = place
     covered = np.zeros(len(points), dtype=np.bool_)
     bare = 0.0
     for number in range(len(points)):
         for turn in range(27):
-            # The point's own cell first, which is that with number 13.
-            around = (turn + 13) % 27
-            cell = _cell(points[number], around // 9 - 1, around // 3 % 3 - 1, around % 3 - 1, tolerance) & (size - 1)
+            cell = cell_hash(points[number], (turn + OWN) % 27, tolerance) & (size - 1)  # its own first
             place = heads[cell]
             while place >= 0 and not covered[number]:
                 total = 0.0
@@ -106,10 +104,3 @@ def _covered(points, lengths, others, tolerance, most):
             if bare > most:
                 return covered, False
     return covered, True
-
-
-@numba.njit(cache=True)
-def _cell(point, dx, dy, dz, side):
-    """The hash of the cell of a point, or of one that is so many cells away."""
-    x, y, z = np.int64(point[0] // side) + dx, np.int64(point[1] // side) + dy, np.int64(point[2] // side) + dz
-    return x * _PRIMES[0] ^ y * _PRIMES[1] ^ z * _PRIMES[2]

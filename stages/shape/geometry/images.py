@@ -5,9 +5,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["distinct_images", "nearest_image"]
+from stages.shape.geometry.cells import OWN, cell_hash
 
-_PRIMES = (73856093, 19349663, 83492791)
+__all__ = ["distinct_images", "nearest_image"]
 
 
 @numba.njit(cache=True)
@@ -35,12 +35,9 @@ def distinct_images(vectors, labels, tolerance, same):
     count = 0
     for candidate in np.argsort(labels, kind="mergesort"):
         vector = vectors[candidate]
-        x, y, z = np.int64(vector[0] // reach), np.int64(vector[1] // reach), np.int64(vector[2] // reach)
         nearest, least, is_written = -1, np.inf, False
         for turn in range(27):
-            dx, dy, dz = turn // 9 - 1, turn // 3 % 3 - 1, turn % 3 - 1
-            cell = ((x + dx) * _PRIMES[0] ^ (y + dy) * _PRIMES[1] ^ (z + dz) * _PRIMES[2]) & (size - 1)
-            place = heads[cell]
+            place = heads[cell_hash(vector, turn, reach) & (size - 1)]
             while place >= 0 and not is_written:
                 gap = _gap(vectors[kept[place]], vector)
                 is_written = gap <= same
@@ -53,7 +50,7 @@ def distinct_images(vectors, labels, tolerance, same):
             continue
         if nearest >= 0 and labels[kept[nearest]] // 2 == labels[candidate] // 2:
             labels[candidate] = labels[kept[nearest]]
-        cell = (x * _PRIMES[0] ^ y * _PRIMES[1] ^ z * _PRIMES[2]) & (size - 1)
+        cell = cell_hash(vector, OWN, reach) & (size - 1)
         following[count] = heads[cell]
         heads[cell] = count
         kept[count] = candidate

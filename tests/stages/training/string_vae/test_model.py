@@ -215,3 +215,14 @@ def test_low_temperature_writes_the_likeliest_string_and_a_higher_one_others_mor
     ]
     assert same[0] == 64
     assert same[0] > same[1] > same[2]
+
+
+def test_weights_from_before_models_looked_back_are_read_as_they_are(tmp_path: Path) -> None:
+    model = random_vae("masked", look_back=False)
+    settings = {key: value for key, value in model.header["settings"].items() if key not in ("look_back", "dropout")}
+    path = tmp_path / "weights.safetensors"
+    path.write_bytes(
+        checkpoint_bytes(model.module.state_dict(), {**model.header, "kind": "string_vae", "settings": settings})
+    )
+    points = np.random.default_rng(0).standard_normal((5, 8)).astype(np.float32)
+    assert load_string_vae(path).decode(points, None) == model.decode(points, None)
