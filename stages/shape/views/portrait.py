@@ -42,10 +42,12 @@ def portrait(
     faces' own. Raises ShardFailed for a blank picture.
     """
     from stages.shape.views.screen import surface_buffers
+    from stages.shape.views.smooth import smooth_normals
 
     width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
     seen = visible_triangles(scene, camera, (width, height), backend)
-    depth, normal, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
+    depth, _, part, color = surface_buffers(scene, seen.view, seen.triangles, seen.screen, seen.normals)
+    normal = smooth_normals(seen)
     if part_colors is not None:
         color = np.where(part[..., None] >= 0, part_colors[part], color)
     light = key_light(scene, camera.azimuth - 52.0, 52.0, backend)
@@ -117,9 +119,10 @@ def _ground_light(scene: Scene, view: View, light: KeyLight, hidden: BoolArray) 
 def _ink(seen: Visible, size: tuple[int, int]) -> FloatArray:
     """Thin lines over the picture, (height, width) 0..1."""
     from stages.shape.views.ink import ink_strokes
+    from stages.shape.views.smooth import SHARP
     from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
 
-    strokes = find_strokes(seen, 35.0, 0.5 * SUPERSAMPLE, 4.0 * SUPERSAMPLE)
+    strokes = find_strokes(seen, SHARP, 0.5 * SUPERSAMPLE, 4.0 * SUPERSAMPLE)
     widths = {OUTLINE: 1.1, CONTOUR: 0.9, BOUNDARY: 0.7, CREASE: 0.35}
     return 0.62 * ink_strokes(strokes, widths, size[0], size[1], 1.0 / SUPERSAMPLE, 4.0)
 

@@ -9,14 +9,15 @@ from typing import Literal
 
 import numpy as np
 
-from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
 __all__ = ["MeshSet", "Scene", "mesh_scene", "scene_of"]
 
 WELD = 2e-6
-"""Vertices closer than this share of half their mesh's longest side are one vertex to `neighbours`."""
+"""Vertices closer than this share of half their mesh's longest side are one vertex where faces are asked for those
+beside them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,18 +62,30 @@ class MeshSet:
         return unit
 
     @cached_property
+    def corner_normals(self) -> Float32Array:
+        """Unit normal at each corner of each face in mesh coordinates, float32 (f, 3, 3), for smooth shading."""
+        from stages.shape.views.smooth import corner_normals
+
+        return corner_normals(self.vertices, self.faces, self._welded, self.normals)
+
+    @cached_property
+    def _welded(self) -> np.ndarray:
+        """The corners of each face, int64 (f, 3), with one number for all that are at one place."""
+        mesh_of = np.repeat(np.arange(len(self.centers)), np.diff(self.vertex_first))
+        size = np.zeros(len(self.centers))
+        np.maximum.at(size, mesh_of, np.abs(self.vertices).max(axis=1))
+        places = np.rint(self.vertices / np.maximum(size[mesh_of, None] * WELD, np.finfo(float).tiny))
+        welded = np.unique(np.column_stack([mesh_of, places + 0.0]), axis=0, return_inverse=True)[1].ravel()
+        return np.asarray(welded[self.faces])
+
+    @cached_property
     def neighbours(self) -> IntArray:
         """For each face the face across each of its edges (0-1, 1-2, 2-0), int32 (f, 3); -1 where none is alone.
 
         Vertices at the same place (within a millionth of the mesh) count as one, so that seams of texture or
         shading are no borders. An edge of more than two faces has no single surface across it: -1.
         """
-        mesh_of = np.repeat(np.arange(len(self.centers)), np.diff(self.vertex_first))
-        size = np.zeros(len(self.centers))
-        np.maximum.at(size, mesh_of, np.abs(self.vertices).max(axis=1))
-        places = np.rint(self.vertices / np.maximum(size[mesh_of, None] * WELD, np.finfo(float).tiny))
-        welded = np.unique(np.column_stack([mesh_of, places + 0.0]), axis=0, return_inverse=True)[1].ravel()
-        corners = welded[self.faces]
+        corners = self._welded
         starts, ends = corners.ravel(), corners[:, [1, 2, 0]].ravel()
         keys = np.minimum(starts, ends) * (len(self.vertices) + 1) + np.maximum(starts, ends)
         order = np.argsort(keys, kind="stable")
