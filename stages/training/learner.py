@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Protocol
 
 import numpy as np
 from torch import Generator, Tensor, nn
 
-__all__ = ["Learner"]
+from pipeline.places import file_digest
+from pipeline.stage import Task
+
+__all__ = ["Learner", "mean_figures", "sample_digests"]
 
 
 class Learner(Protocol):
@@ -30,3 +33,21 @@ class Learner(Protocol):
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """Figures on the validation split; `loss` says which weights are best, and is the same measure at each step."""
+
+
+def sample_digests(task: Task, suffix: str) -> dict[str, str]:
+    """The sha256 of the prepared samples that a model learns from and of those that judge it, for its header.
+
+    suffix: how their files end.
+    """
+    data = task.shard.params["data"]
+    return {split: file_digest(task.input("training", f"{data}.{split}.{suffix}")) for split in ("train", "val")}
+
+
+def mean_figures(found: Iterable[tuple[Mapping[str, Tensor], int]], count: int) -> dict[str, float]:
+    """The means over `count` samples of figures that come as those of batches of so many samples each."""
+    sums: dict[str, float] = {}
+    for figures, samples in found:
+        for name, value in figures.items():
+            sums[name] = sums.get(name, 0.0) + float(value) * samples / count
+    return sums

@@ -11,12 +11,12 @@ import torch
 from torch import Generator, Tensor
 from torch.nn.functional import cross_entropy
 
-from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.training.cuboid_rnn.batches import Batch, Cuboids, batches
 from stages.training.cuboid_rnn.corpus import prepare_corpus, read_corpus
 from stages.training.cuboid_rnn.model import CuboidRnn, density
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
+from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 
 __all__ = ["CuboidRnnLearner", "entry", "learner", "new_model", "prepare"]
@@ -34,10 +34,8 @@ def entry(settings: Mapping[str, Any]) -> CuboidRnnEntry:
 
 def learner(task: Task, entry: CuboidRnnEntry, seed: int) -> CuboidRnnLearner:
     """A model with fresh weights beside the shapes of its category."""
-    data = task.shard.params["data"]
-    described, cuboids = read_corpus(task, data)
-    sources = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
-    header = {**described, "data": {split: file_digest(path) for split, path in sources.items()}}
+    described, cuboids = read_corpus(task, task.shard.params["data"])
+    header = {**described, "data": sample_digests(task, "safetensors")}
     module = new_model(entry, seed).to(device_of(entry.device))
     return CuboidRnnLearner(module, header, entry, cuboids["train"], cuboids["val"])
 
@@ -78,9 +76,7 @@ class CuboidRnnLearner:
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val."""
-        sums: dict[str, float] = {}
         device = next(self.module.parameters()).device
-        for batch in batches(self.val, self.entry.batch, None):
-            for name, value in self.losses(batch.to(device), 0, noise).items():
-                sums[name] = sums.get(name, 0.0) + float(value) * len(batch.shown) / len(self.val)
-        return sums
+        shown = batches(self.val, self.entry.batch, None)
+        found = ((self.losses(batch.to(device), 0, noise), len(batch.shown)) for batch in shown)
+        return mean_figures(found, len(self.val))

@@ -11,12 +11,12 @@ import torch
 from torch import Generator, Tensor
 from torch.nn.functional import cross_entropy
 
-from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.training.edge_categories.batches import Batch, CategoryTables, Strings, batches
 from stages.training.edge_categories.corpus import prepare_corpus, read_corpus
 from stages.training.edge_categories.model import EdgeCategoriesModel, make_model, masked
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
+from stages.training.learner import sample_digests
 from stages.training.loop import device_of
 
 __all__ = ["EdgeCategoriesLearner", "entry", "learner", "new_model", "prepare"]
@@ -34,10 +34,8 @@ def entry(settings: Mapping[str, Any]) -> EdgeCategoriesEntry:
 
 def learner(task: Task, entry: EdgeCategoriesEntry, seed: int) -> EdgeCategoriesLearner:
     """A model with fresh weights beside the strings of its kit."""
-    data = task.shard.params["data"]
-    described, tables, strings = read_corpus(task, data)
-    sources = {split: task.input("training", f"{data}.{split}.rows") for split in strings}
-    header = {**described, "data": {split: file_digest(path) for split, path in sources.items()}}
+    described, tables, strings = read_corpus(task, task.shard.params["data"])
+    header = {**described, "data": sample_digests(task, "rows")}
     module = new_model(entry, tables, described["cycles"], seed).to(device_of(entry.device))
     return EdgeCategoriesLearner(module, header, entry, tables, strings["train"], strings["val"])
 

@@ -12,8 +12,8 @@ import torch
 from torch import Generator, Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
+from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 from stages.training.part_graph_vae.batches import Batch, Graphs, batches
 from stages.training.part_graph_vae.corpus import prepare_corpus, read_corpus
@@ -36,10 +36,8 @@ def entry(settings: Mapping[str, Any]) -> PartGraphVaeEntry:
 
 def learner(task: Task, entry: PartGraphVaeEntry, seed: int) -> PartGraphVaeLearner:
     """A model with fresh weights beside the shapes of its category."""
-    data = task.shard.params["data"]
-    described, graphs = read_corpus(task, data)
-    sources = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
-    header = {**described, "data": {split: file_digest(path) for split, path in sources.items()}}
+    described, graphs = read_corpus(task, task.shard.params["data"])
+    header = {**described, "data": sample_digests(task, "safetensors")}
     module = new_model(entry, seed).to(device_of(entry.device))
     return PartGraphVaeLearner(module, header, entry, graphs["train"], graphs["val"])
 
@@ -78,15 +76,11 @@ class PartGraphVaeLearner:
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val; and the module learns where the shapes of train stand."""
-        sums: dict[str, float] = {}
         device = next(self.module.parameters()).device
-        train = batches(self.train, self.entry.batch, None)
+        train, val = (batches(each, self.entry.batch, None) for each in (self.train, self.val))
         self.module.stand_where(self.module.encode([level.to(device) for level in levels]) for levels in train)
-        for levels in batches(self.val, self.entry.batch, None):
-            found = self.losses([level.to(device) for level in levels], 0, noise)
-            for name, value in found.items():
-                sums[name] = sums.get(name, 0.0) + float(value) * len(levels[0].boxes) / len(self.val)
-        return sums
+        found = ((self.losses([each.to(device) for each in levels], 0, noise), len(levels[0].boxes)) for levels in val)
+        return mean_figures(found, len(self.val))
 
 
 def reconstruction(module: PartGraphVae, levels: Batch, points: Tensor) -> tuple[Tensor, Tensor]:

@@ -11,9 +11,9 @@ import torch
 from torch import Generator, Tensor
 from torch.nn.functional import cross_entropy
 
-from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import FloatArray
+from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 from stages.training.program_lm.batches import Batch, Texts, batches
 from stages.training.program_lm.corpus import prepare_corpus, read_corpus
@@ -38,10 +38,8 @@ def entry(settings: Mapping[str, Any]) -> ProgramLmEntry:
 
 def learner(task: Task, entry: ProgramLmEntry, seed: int) -> ProgramLmLearner:
     """A model with fresh weights beside the programs of its category."""
-    data = task.shard.params["data"]
-    described, values, texts = read_corpus(task, data)
-    sources = {split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")}
-    header = {**described, "data": {split: file_digest(path) for split, path in sources.items()}}
+    described, values, texts = read_corpus(task, task.shard.params["data"])
+    header = {**described, "data": sample_digests(task, "safetensors")}
     module = new_model(entry, values, described["longest"], seed).to(device_of(entry.device))
     return ProgramLmLearner(module, header, entry, texts["train"], texts["val"])
 
@@ -78,13 +76,9 @@ class ProgramLmLearner:
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val, nothing jittered."""
-        sums: dict[str, float] = {}
         device = next(self.module.parameters()).device
-        for batch in batches(self.val, self.entry.batch, None):
-            found = self._nats(batch.to(device), batch.before.to(device))
-            for name, value in found.items():
-                sums[name] = sums.get(name, 0.0) + float(value) * len(batch.words) / len(self.val)
-        return sums
+        val = (batch.to(device) for batch in batches(self.val, self.entry.batch, None))
+        return mean_figures(((self._nats(each, each.before), len(each.words)) for each in val), len(self.val))
 
     def _nats(self, batch: Batch, before: Tensor) -> dict[str, Tensor]:
         logits = self.module(before, batch.cues, batch.seen, batch.places)

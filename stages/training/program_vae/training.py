@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,8 @@ import torch
 from torch import Generator, Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 
-from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
+from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 from stages.training.program_vae.batches import Level, Programs, batches
 from stages.training.program_vae.corpus import prepare_corpus, read_corpus
@@ -53,12 +52,8 @@ def entry(settings: Mapping[str, Any]) -> ProgramVaeEntry:
 
 def learner(task: Task, entry: ProgramVaeEntry, seed: int) -> ProgramVaeLearner:
     """A model with fresh weights beside the programs of its category."""
-    data = task.shard.params["data"]
-    described, programs = read_corpus(task, data)
-    sources: dict[str, Path] = {
-        split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
-    }
-    header = {"counts": described["counts"], "data": {split: file_digest(path) for split, path in sources.items()}}
+    described, programs = read_corpus(task, task.shard.params["data"])
+    header = {"counts": described["counts"], "data": sample_digests(task, "safetensors")}
     module = new_model(entry, seed).to(device_of(entry.device))
     return ProgramVaeLearner(module, header, entry, programs["train"], programs["val"])
 
@@ -97,15 +92,11 @@ class ProgramVaeLearner:
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """The same on val; and the module learns where the programs of train stand."""
-        sums: dict[str, float] = {}
         device = next(self.module.parameters()).device
-        train = batches(self.train, self.entry.batch, None)
+        train, val = (batches(each, self.entry.batch, None) for each in (self.train, self.val))
         self.module.stand_where(self.module.encode([level.to(device) for level in levels]) for levels in train)
-        for levels in batches(self.val, self.entry.batch, None):
-            found = self.losses([level.to(device) for level in levels], 0, noise)
-            for name, value in found.items():
-                sums[name] = sums.get(name, 0.0) + float(value) * len(levels[0].lines) / len(self.val)
-        return sums
+        found = ((self.losses([each.to(device) for each in levels], 0, noise), len(levels[0].lines)) for levels in val)
+        return mean_figures(found, len(self.val))
 
 
 def reconstruction(module: ProgramVae, levels: Sequence[Level], codes: Tensor) -> tuple[Tensor, Tensor]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,9 @@ import torch
 from torch import Generator, Tensor
 from torch.nn.functional import relu
 
-from pipeline.places import file_digest
 from pipeline.stage import Outcome, Task
 from stages.shape.graphs.histograms import histogram_metric
+from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 from stages.training.string_vae.batches import Batch, Strings, batches
 from stages.training.string_vae.corpus import prepare_corpus, read_corpus
@@ -40,18 +39,14 @@ def entry(settings: Mapping[str, Any]) -> StringVaeEntry:
 
 def learner(task: Task, entry: StringVaeEntry, seed: int) -> StringVaeLearner:
     """A string VAE with fresh weights beside the strings of its kit."""
-    data = task.shard.params["data"]
-    described, vocabulary, strings = read_corpus(task, data)
+    described, vocabulary, strings = read_corpus(task, task.shard.params["data"])
     device = device_of(entry.device)
-    sources: dict[str, Path] = {
-        split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
-    }
     canonical = entry.target == "canonical" and described["edges"] != "tree"  # of a tree's graph there are many trees
     header = {
         **{key: described[key] for key in ("names", "edges", "cycles", "most", "patterns", "counts")},
         "canonical": canonical,
         "tokens": list(vocabulary.texts),
-        "data": {split: file_digest(path) for split, path in sources.items()},
+        "data": sample_digests(task, "safetensors"),
     }
     module = new_model(entry, vocabulary, described["most"], seed).to(device)
     return StringVaeLearner(module, header, entry, vocabulary, canonical, strings["train"], strings["val"])
@@ -105,19 +100,18 @@ class StringVaeLearner:
     def validate(self, noise: Generator) -> dict[str, float]:
         """On val, with the weight that the divergence has at the end; `accuracy`: share of the tokens that are the
         likeliest where all before them are right."""
-        sums = {"loss": 0.0, "nats": 0.0, "divergence": 0.0, "accuracy": 0.0}
         device = next(self.module.parameters()).device
-        for batch in (each.to(device) for each in self._batches(self.val, None)):
-            mean, log_variance = self.module.encode(batch.read, batch.read_lengths)
-            points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
-            logits = self.module.decode(shifted(batch.codes), points, batch.open_until)
-            nats, accuracy = self._reconstruction(logits, batch)
-            divergence = _divergence(mean, log_variance)
-            loss = nats + self.entry.kl_weight * divergence
-            found = {"loss": loss, "nats": nats, "divergence": divergence, "accuracy": accuracy}
-            for name, value in found.items():
-                sums[name] += float(value) * len(batch.codes) / len(self.val)
-        return sums
+        val = (each.to(device) for each in self._batches(self.val, None))
+        return mean_figures(((self._figures(each, noise), len(each.codes)) for each in val), len(self.val))
+
+    def _figures(self, batch: Batch, noise: Generator) -> dict[str, Tensor]:
+        mean, log_variance = self.module.encode(batch.read, batch.read_lengths)
+        points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
+        logits = self.module.decode(shifted(batch.codes), points, batch.open_until)
+        nats, accuracy = self._reconstruction(logits, batch)
+        divergence = _divergence(mean, log_variance)
+        loss = nats + self.entry.kl_weight * divergence
+        return {"loss": loss, "nats": nats, "divergence": divergence, "accuracy": accuracy}
 
     def _batches(self, strings: Strings, rng: np.random.Generator | None) -> Iterator[Batch]:
         return batches(strings, self.entry.batch, len(self.vocabulary), self.canonical, rng)
