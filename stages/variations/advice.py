@@ -72,8 +72,8 @@ def what_was_left(lists: Mapping[str, int]) -> str:
     if not short:
         return ""
     return (
-        f"{short:,} of {short + whole:,} lists of replacements ended at their limit of work: those without dummy edges "
-        "are all there, of those with them the nearest; fewer `variations.search.dummies` make lists whole"
+        f"{short:,} of {short + whole:,} lists of replacements ended at their limit, and what came last is missing; "
+        "fewer `variations.search.dummies` leave less out"
     )
 
 

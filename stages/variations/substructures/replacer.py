@@ -24,6 +24,7 @@ from stages.variations.substitution.pieces import Exchanged
 from stages.variations.substitution.substitute import Docked, find_motion, put_together
 from stages.variations.substructures.blending import blend, is_oriented_alike
 from stages.variations.substructures.embedding import Side, embed, pieces
+from stages.variations.substructures.motions import Moves, find_moves, moved_key
 from stages.variations.substructures.operations import Operations, find_operations
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.recursion import cut_again, cut_farther, growth_of
@@ -55,13 +56,15 @@ DARTS_A_TRY = 4000.0
 
 @dataclass(frozen=True)
 class Pair:
-    """Two shapes, as they were chosen, what can be replaced between them, and what of it is left: numbers of
-    operations, the second half of them the other way round."""
+    """Two shapes, as they were chosen, what can be replaced between them, and what of it is left: numbers of moves, or,
+    once operations are listed, which is when no move is left, of these, of one shape the second half of them the other
+    way round."""
 
     choice: Choice
     sides: tuple[Side, Side]
-    operations: Operations
     left: Iterator[int]
+    moves: Moves | None = None
+    operations: Operations | None = None
 
     @property
     def giver(self) -> Parent:
@@ -120,13 +123,20 @@ class Replacer:
         by `connect`."""
         work = 1.0
         number = next(self._pair.left, None) if self._pair is not None and self._turns > 0 else None
-        if self._pair is None or number is None:
+        if self._pair is None or (number is None and (self._turns <= 0 or self._pair.operations is not None)):
             self._pair, cost = self._opened(rng, choice)
             work += cost
             number = next(self._pair.left, None)
-            if number is None:  # nothing can be replaced, or all has been
-                return Outcome.KNOWN if len(self._pair.operations) else Outcome.NO_MATCH, work
+        if number is None and self._pair.operations is None:
+            self._pair, cost = self._listed(rng, self._pair)
+            work += cost
+            number = next(self._pair.left, None)
         pair = self._pair
+        if number is None:  # nothing can be replaced, or all has been
+            return Outcome.KNOWN if pair.operations or pair.moves else Outcome.NO_MATCH, work
+        if pair.operations is None:
+            outcome, cost = self._move(pair, number, ws)
+            return outcome, work + cost
         count = len(pair.operations)
         boundary = pair.operations.boundary(number % count)[:, :: 1 if number < count else -1]
         self.base, side, self.times = pair.base, pair.sides[0], 1
@@ -140,12 +150,12 @@ class Replacer:
             return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, work
         if not piece.any() or taken.all():
             return Outcome.NOTHING_ATTACHED, work
+        self._turns -= 1
         if not (self._by_meaning or self.blends or self.most > 1):
             key = int(result_key(side.graph, pair.sides[1].graph, taken, piece, boundary))
             if key in self.known:
                 return Outcome.KNOWN, work
             self.known.add(key)
-        self._turns -= 1
         work += EMBEDDING_WORK
         exchanged, found = Exchanged(taken, piece), None
         if not self._by_meaning:
@@ -171,6 +181,28 @@ class Replacer:
         self.base = replace(self.base, assembly=replace(self.base.assembly, poses=poses))
         put_together(self.tables, pair.giver, self.base, exchanged, motion, self._docked, ws)
         return Outcome.OK, work
+
+    def _move(self, pair: Pair, number: int, ws: Workspace) -> tuple[int, float]:
+        """Carry out a replacement along a motion, in the workspace: the outcome and the work."""
+        moves = pair.moves
+        assert moves is not None, "numbers are of moves until operations are listed"
+        taken, piece = moves.pieces(number)
+        base, giver = (each.graph for each in pair.sides)
+        self.base, self.times = pair.base, 1
+        parts = int(piece.sum() + (~taken).sum())
+        if not self.smallest <= parts <= self.largest:
+            return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, 0.0
+        key = int(moved_key(base, giver, taken, piece, moves.images[number]))
+        if key in self.known:
+            return Outcome.KNOWN, 0.0
+        self.known.add(key)
+        self._turns -= 1
+        self._docked = moves.docked(number, giver, pair.giver.assembly.poses)
+        self._bent = self._cut = self.stretches = None
+        put_together(
+            self.tables, pair.giver, self.base, Exchanged(taken, piece), moves.motions[number], self._docked, ws
+        )
+        return Outcome.OK, EMBEDDING_WORK
 
     def _times(self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray) -> int:
         """How often to carry out an operation: a recursive rule at random, as often as limits allow; others once."""
@@ -275,28 +307,49 @@ class Replacer:
         return all(ws.stamp[i, j] == ws.counts[TRY] for i, j in ends)
 
     def _opened(self, rng: np.random.Generator, choice: Choice) -> tuple[Pair, float]:
-        """All operations between two shapes, or within the first, in random order; what is left of them where the pair
-        was drawn before; and what that cost."""
+        """Two shapes, or the first twice, with all moves between them in random order; what is left of them where the
+        pair was drawn before; and what that cost."""
         if rng.random() < WITHIN:
             choice = replace(choice, b=choice.a)
         key = id(choice.b), id(choice.a)  # of shapes that the pair itself keeps
+        self._turns = DRAWS
         if key in self._open:
             known = self._open.pop(key)
             self._open[key] = replace(known, choice=choice)
-            self._turns = DRAWS
             return self._open[key], 0.0
         kit = self.answers.kit
-        sides = _side(kit, choice.b), _side(kit, choice.a)
-        first, second = sides[0].graph, (sides[0] if choice.a is choice.b else sides[1]).graph
-        operations = find_operations(first, second, self.dummies, self._by_docking)
-        ways = len(operations) * (2 if first is second else 1)
-        work = operations.work / DARTS_A_TRY
-        self.lists["whole" if operations.is_whole else "cut short"] += 1
-        self._turns = max(DRAWS, round(work / EMBEDDING_WORK))
-        self._open[key] = Pair(choice, sides, operations, iter(_order(rng, operations, ways)))
+        base = _side(kit, choice.b)
+        giver = base if choice.a is choice.b else _side(kit, choice.a)
+        pair, work = Pair(choice, (base, giver), iter(())), 0.0
+        if self._by_docking:
+            moves = find_moves(kit, self.tables.up, (base.assembly, base.graph), (giver.assembly, giver.graph))
+            pair, work = (
+                replace(pair, moves=moves, left=iter(rng.permutation(len(moves)).tolist())),
+                self._listing(moves),
+            )
+        self._open[key] = pair
         if len(self._open) > MOST_OPEN:
             del self._open[next(iter(self._open))]
-        return self._open[key], work
+        return pair, work
+
+    def _listed(self, rng: np.random.Generator, pair: Pair) -> tuple[Pair, float]:
+        """A pair of which no move is left with all operations between its shapes, in random order; and what that
+        cost."""
+        base, giver = (each.graph for each in pair.sides)
+        operations = find_operations(base, giver, self.dummies, self._by_docking)
+        ways = len(operations) * (2 if base is giver else 1)
+        listed = replace(pair, operations=operations, left=iter(_order(rng, operations, ways)))
+        key = id(pair.base), id(pair.giver)
+        if key in self._open:
+            self._open[key] = listed
+        return listed, self._listing(operations)
+
+    def _listing(self, found: Operations | Moves) -> float:
+        """What a list cost; as much time is given to what it has."""
+        work = found.work / DARTS_A_TRY
+        self.lists["whole" if found.is_whole else "cut short"] += 1
+        self._turns = max(DRAWS, round(work / EMBEDDING_WORK))
+        return work
 
 
 def _order(rng: np.random.Generator, operations: Operations, ways: int) -> list[int]:

@@ -8,9 +8,10 @@ import numpy as np
 
 from stages.variations.kernels.lookup import mix
 
-__all__ = ["result_key"]
+__all__ = ["ODD_TYPE", "refined", "result_key"]
 
 GOLDEN, ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
+ODD_TYPE = np.uint64(0x51ED270B)
 
 
 @numba.njit(cache=True)
@@ -43,7 +44,7 @@ def result_key(base, giver, taken, piece, boundary):
         if place[node] < 0:
             continue
         graph, own = (base, node) if node < stays else (giver, node - stays)
-        colours[place[node]] = mix(np.uint64(graph.types[own]) + np.uint64(0x51ED270B))
+        colours[place[node]] = mix(np.uint64(graph.types[own]) + ODD_TYPE)
         for dart in range(graph.starts[own], graph.starts[own + 1]):
             end, label = np.int64(-1), graph.labels[dart]
             if node >= stays:
@@ -55,7 +56,7 @@ def result_key(base, giver, taken, piece, boundary):
             if end >= 0:
                 edges[filled, 0], edges[filled, 1], labels[filled] = place[node], end, np.uint64(label - 1)
                 filled += 1
-    return _refined(colours, edges[:filled], labels)
+    return refined(colours, edges[:filled], labels)
 
 
 @numba.njit(cache=True)
@@ -69,7 +70,7 @@ def _beyond(base, giver, dart, place, source):
 
 
 @numba.njit(cache=True)
-def _refined(colours, edges, labels):
+def refined(colours, edges, labels):
     """The hash of a graph by colour refinement, as `graph_key` reckons it, from its edges in both directions."""
     classes = 0
     for _ in range(len(colours)):

@@ -14,14 +14,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
 from tests.stages.variations.substructures.graphs import code
 
 Orders = list[list[int]]
 Cut = tuple[int, int]
 """A cut edge: the node inside and that outside."""
+Outside = tuple[tuple[object, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -43,24 +42,30 @@ def results(
 ) -> set[tuple[tuple[int, ...], ...]]:
     """The codes of all that comes of replacing a piece of the graph by one of the giver, where that is simple."""
     found = set()
-    theirs = list(pieces(giver))
+    theirs: dict[Outside, list[tuple[Piece, int]]] = {}
+    for other in pieces(giver):
+        for turn in range(len(other.cuts)):
+            theirs.setdefault(_met(other, turn, same_outside), []).append((other, turn))
     for piece in pieces(graph):
-        for other in theirs:
-            if len(other.cuts) == len(piece.cuts):
-                for turn in range(len(piece.cuts)):
-                    if matches(graph, giver, piece, other, turn, same_outside=same_outside):
-                        made = replaced(graph, giver, piece, other, turn)
-                        if made is None or code(made) in found:
-                            continue
-                        if not one_way or lies_one_way(graph, giver, piece, other, turn):
-                            found.add(code(made))
+        for other, turn in theirs.get(_met(piece, 0, same_outside), ()):
+            if matches(graph, giver, piece, other, turn, same_outside=same_outside):
+                made = replaced(graph, giver, piece, other, turn)
+                key = None if made is None else code(made)
+                if key is None or key in found:
+                    continue
+                if not one_way or lies_one_way(graph, giver, piece, other, turn):
+                    found.add(key)
     return found
 
 
-def is_piece(graph: OrderedGraph, inside: np.ndarray) -> bool:
-    """Whether some nodes, bool (n,), are a piece."""
-    chosen = frozenset(np.flatnonzero(inside).tolist())
-    return any(each.inside == chosen for each in pieces(graph))
+def _met(piece: Piece, turn: int, same_outside: bool) -> Outside:
+    """What is met outside, walking round from one cut edge on: what two pieces must have in common."""
+    count = len(piece.cuts)
+    walk = [(place + turn) % count for place in range(count)]
+    return tuple(
+        (piece.outsides[at][0], (piece.outsides[at][1] - at) % count) if same_outside else piece.outsides[at][0][:2]
+        for at in walk
+    )
 
 
 def pieces(graph: OrderedGraph) -> Iterator[Piece]:
@@ -74,6 +79,17 @@ def pieces(graph: OrderedGraph) -> Iterator[Piece]:
             cuts = _round(orders, inside)
             if len(cuts) == sum(other not in inside for node in inside for other in orders[node]):
                 yield Piece(inside, cuts, tuple(_outside(types, orders, inside, cuts, cut) for cut in cuts))
+
+
+def round_outside(piece: Piece) -> Piece | None:
+    """The piece with its cut edges in the order of the walk round its outside, None where that is no one cycle."""
+    order = [0]
+    while len(order) < len(piece.cuts) and (ahead := piece.outsides[order[-1]][1]) != 0:
+        order.append(ahead)
+    if len(order) < len(piece.cuts):
+        return None
+    outsides = [(piece.outsides[at][0], order.index(piece.outsides[at][1])) for at in order]
+    return Piece(piece.inside, tuple(piece.cuts[at] for at in order), tuple(outsides))
 
 
 def _is_connected(orders: Orders, nodes: frozenset[int]) -> bool:

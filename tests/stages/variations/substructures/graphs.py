@@ -52,6 +52,35 @@ def random_graph(rng: np.random.Generator, most: int) -> OrderedGraph:
     return ordered_graph(rng.integers(types, size=n), [rng.permutation(each).tolist() for each in near])
 
 
+def patterned_graph(rng: np.random.Generator, most: int) -> OrderedGraph:
+    """A random graph whose types follow a pattern, by which pieces of it are alike: the number of docking sites, or the
+    distance from one node modulo two or three."""
+    graph = random_graph(rng, most)
+    node = int(rng.integers(len(graph.types)))
+    distances, waiting = {node: 0}, [node]
+    for each in waiting:
+        fresh = [other for other in graph.neighbours(each) if other not in distances]
+        distances |= dict.fromkeys(fresh, distances[each] + 1)
+        waiting += fresh
+    by_distance = np.array([distances[each] for each in range(len(graph.types))])
+    types = (np.diff(graph.starts), by_distance % 2, by_distance % 3)[int(rng.integers(3))]
+    return graph._replace(types=types.astype(np.int64))
+
+
+def crop(rng: np.random.Generator, graph: OrderedGraph, most: int) -> OrderedGraph:
+    """A connected piece of a graph, of 3 to `most` nodes."""
+    size = int(rng.integers(3, most + 1))
+    chosen = [int(rng.integers(len(graph.types)))]
+    while len(chosen) < size:
+        rim = sorted({other for node in chosen for other in graph.neighbours(node)} - set(chosen))
+        if not rim:
+            break
+        chosen.append(rim[int(rng.integers(len(rim)))])
+    place = {node: at for at, node in enumerate(sorted(chosen))}
+    orders = [[place[other] for other in graph.neighbours(node) if other in place] for node in place]
+    return ordered_graph(graph.types[list(place)], orders)
+
+
 def is_connected(graph: OrderedGraph) -> bool:
     seen, waiting = set(), [0]
     while waiting:
@@ -66,19 +95,25 @@ def code(graph: OrderedGraph) -> tuple[tuple[int, ...], ...]:
     """The same for two connected ordered graphs exactly if one is the other with its nodes named otherwise."""
     if len(graph.types) == 1:
         return ((int(graph.types[0]),),)
-    return min(_code_from(graph, dart) for dart in range(len(graph.tails)))
+    kinds = list(zip(graph.types.tolist(), np.diff(graph.starts).tolist(), strict=True))
+    rarest = min(kinds, key=lambda kind: (kinds.count(kind), kind))
+    starts = [dart for dart, node in enumerate(graph.tails.tolist()) if kinds[node] == rarest]
+    return min(_code_from(graph, dart) for dart in starts)
 
 
 def _code_from(graph: OrderedGraph, dart: int) -> tuple[tuple[int, ...], ...]:
-    first = {int(graph.tails[dart]): dart}
-    order, rows = [int(graph.tails[dart])], []
+    types, starts, tails, twins = (each.tolist() for each in graph[:4])
+    first, place = {tails[dart]: dart}, {tails[dart]: 0}
+    order, rows = [tails[dart]], []
     for node in order:
-        start, end = int(graph.starts[node]), int(graph.starts[node + 1])
-        around = [start + (first[node] - start + step) % (end - start) for step in range(end - start)]
-        for back in (int(graph.twins[each]) for each in around):
-            if int(graph.tails[back]) not in first:
-                first[int(graph.tails[back])] = back
-                order.append(int(graph.tails[back]))
-        heads = [order.index(int(graph.tails[graph.twins[each]])) for each in around]
-        rows.append((int(graph.types[node]), *heads))
+        begin = first[node]
+        row = [types[node]]
+        for each in (*range(begin, starts[node + 1]), *range(starts[node], begin)):
+            back = twins[each]
+            head = tails[back]
+            if head not in first:
+                first[head], place[head] = back, len(order)
+                order.append(head)
+            row.append(place[head])
+        rows.append(tuple(row))
     return tuple(rows)
