@@ -30,8 +30,8 @@ __all__ = ["MOST_MOVES", "Moves", "find_moves", "moved_key"]
 
 MOST_MOVES = 1 << 13
 """Replacements along motions that are listed between two shapes at most: what bounds memory."""
-MOST_WORK = 5_000_000
-"""Darts that are looked at at most: about half a second."""
+MOST_WORK = 1 << 24
+"""Parts that are laid upon others at most, between two shapes: a second or two."""
 SAME_TURN = 1e-3
 """Entries of rotations that differ by less are equal."""
 
@@ -57,7 +57,7 @@ class Moves:
 
     motions: float64 (k, 4, 4), bring each piece into the base; inside: bool (k, n + m), the parts of the base that
     leave and those of the giver that come; images: int16 (k, m), the part of the base that each part of the giver
-    coincides with, or -1; work: how many darts were looked at; is_whole: whether these are all, or what came first
+    coincides with, or -1; work: how many parts were laid upon others; is_whole: whether these are all, or what came first
     until a limit was met.
     """
 
@@ -148,6 +148,7 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same):
                     continue
                 matched = _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited)
                 work += len(here.types)
+                is_whole = work < MOST_WORK
                 if matched == 0:
                     continue
                 regions = _regions(a, b, here, there, turn, shift, image, back, queue, matched, leader)
