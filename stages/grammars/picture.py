@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup, carve
+from stages.exemplars.symmetry.welding import welded
 from stages.grammars.derivation import Piece, Resized, exemplar_shape, pieces_of, shape_of_text
 from stages.grammars.editing import Option, edited, options_of
 from stages.grammars.extraction import Extraction
@@ -137,5 +138,5 @@ def _pictured(shape: Shape) -> ByteArray:
 
 def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:
     colors: ByteArray = np.tile(np.array(color, np.uint8), (len(corners), 1))
-    vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    return PartMesh("part", vertices, place.reshape(-1, 3).astype(np.int32), colors)
+    places, vertices = welded(corners, 0.0)
+    return PartMesh("part", vertices, places, colors)
