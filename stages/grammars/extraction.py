@@ -123,7 +123,7 @@ def extract(
     for each in found:
         called = f"{site_name(each.site)}{counted[each.site]}"
         counted[each.site] += 1
-        rules.append(Rule(called, each.site, each.frame, kept(called, each.terminal), each.places))
+        rules.append(Rule(called, each.site, each.frame, kept(called, each.terminal.soup()), each.places))
     grid_rules = []
     for number, one in enumerate(grids):
         pieces = [(kept(f"G{number}-{'-'.join(map(str, where))}", soup), where) for where, soup in one.pieces]
@@ -147,8 +147,7 @@ def extract(
 
 def _part(name: str, soup: Soup, colors: ByteArray, tolerance: float) -> tuple[FloatArray, PartMesh]:
     """Where the middle of a soup's box is, and its mesh around it, corners at one place one vertex."""
-    points = soup.corners.reshape(-1, 3)
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
     faces, vertices = welded(soup.corners, tolerance)
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     return middle, PartMesh(name, vertices - middle, faces[real], colors[soup.faces[real]])

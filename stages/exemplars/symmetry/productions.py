@@ -7,20 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.exemplars.symmetry.carve import Soup, joined
 from stages.exemplars.symmetry.derivations import START, Derivation, Place
 from stages.exemplars.symmetry.matching import matched_items
 from stages.exemplars.symmetry.places import items_in
-from stages.exemplars.symmetry.seams import Seam, cut_out, seam_of, widened
+from stages.exemplars.symmetry.seams import Seam, seam_of, widened
 from stages.exemplars.symmetry.sites import Docker, beside
 from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from stages.exemplars.symmetry.terminals import Cuts, Terminal
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
 __all__ = ["Production", "productions", "seams_of"]
-
-OUTSIDE, INSIDE, CUT = 0, 1, 2
-"""Where a triangle lies: outside a docker, in it, or on both sides of its seam."""
 
 SETS = 10
 """Independent sets of sites that are sampled for a docker (symmetry §3.4.2)."""
@@ -46,7 +43,7 @@ class Production:
 
     site: int
     frame: FloatArray
-    terminal: Soup
+    terminal: Terminal
     places: tuple[Place, ...]
 
 
@@ -68,7 +65,7 @@ def productions(
     whole = Docker(np.arange(len(grid), dtype=np.int32), np.empty(0, np.int32), 1.0, START, np.eye(4))
     every = [*dockers, whole]
     inside, apart = _relations(grid, every)
-    cuts = _Cuts(grid, every, seams)
+    cuts = Cuts(grid, every, seams)
     found: list[tuple[Production, IntArray]] = []
     original: dict[int, Derivation] = {}
     # smallest first: what gives a docker back is made of what gives those in it back
@@ -144,52 +141,12 @@ def _rest(grid: SurfaceGrid, every: Sequence[Docker], node: int, chosen: tuple[i
     return np.flatnonzero(left).astype(np.int32)
 
 
-class _Cuts:
-    """Dockers cut out of the triangles of a surface. Where each triangle lies is found out once for a docker; those
-    that a seam cuts alone are cut anew for each docker and what is chosen in it."""
-
-    def __init__(self, grid: SurfaceGrid, every: Sequence[Docker], seams: dict[int, Seam]) -> None:
-        self._grid, self._every, self._seams = grid, every, seams
-        self._sides: dict[int, ByteArray] = {}
-
-    def between(self, node: int, chosen: Sequence[int]) -> Soup:
-        """The triangles of docker `node` that are in none of those chosen."""
-        inside, sides = self._side(node), [self._side(each) for each in chosen]
-        left = (inside != OUTSIDE) & np.all([each != INSIDE for each in sides], axis=0)
-        cut = left & ((inside == CUT) | np.any([each == CUT for each in sides], axis=0))
-        grid = self._grid
-        soup = self._cut_out(Soup(grid.corners[cut], grid.faces[cut]), node)[0]
-        for each in chosen:
-            soup = self._cut_out(soup, each)[1]
-        left &= ~cut
-        return joined(Soup(grid.corners[left], grid.faces[left]), soup)
-
-    def _side(self, place: int) -> ByteArray:
-        """Of each triangle whether it lies in a docker, uint8 (f,): INSIDE, OUTSIDE or CUT."""
-        if place not in self._sides:
-            count = len(self._grid.corners)
-            soup = Soup(self._grid.corners, np.arange(count, dtype=np.int32))
-            within, beyond = (np.bincount(each.faces, minlength=count) for each in self._cut_out(soup, place))
-            found = np.full(count, CUT, dtype=np.uint8)
-            found[(within == 1) & (beyond == 0)] = INSIDE
-            found[(within == 0) & (beyond == 1)] = OUTSIDE
-            self._sides[place] = found
-        return self._sides[place]
-
-    def _cut_out(self, soup: Soup, place: int) -> tuple[Soup, Soup]:
-        """What of a soup is in a docker, and what is not."""
-        docker = self._every[place]
-        if docker.site == START:
-            return soup, soup.select(np.empty(0, dtype=np.int64))
-        return cut_out(soup, self._grid, docker.cells, docker.frame, self._seams[docker.site])
-
-
-def _faithful(grid: SurfaceGrid, soup: Soup, cells: IntArray) -> bool:
+def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: IntArray) -> bool:
     """Whether triangles that were cut out are those of some cells, but for the border: a seam that moved here may part
     something else where sheets lie in one cell."""
     wanted = float(grid.area[cells].sum())
     border = float(grid.area[beside(grid, cells)].sum())
-    return abs(soup.area - wanted) <= BORDERS * border + SAME_AREA * wanted
+    return abs(terminal.area - wanted) <= BORDERS * border + SAME_AREA * wanted
 
 
 def _equal(
