@@ -12,7 +12,7 @@ from stages.exemplars.symmetry.cells import BITS, neighbours_of, pack
 from stages.exemplars.symmetry.clip import fragments
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["SurfaceGrid", "surface_grid", "with_area"]
+__all__ = ["CELLS_A_RADIUS", "SurfaceGrid", "surface_grid", "with_area"]
 
 CELLS_A_RADIUS = 4
 """Cells have a quarter of the radius of similarity (symmetry §4)."""
