@@ -65,12 +65,14 @@ def _in(at: float, count: int, period: float, margin: float) -> bool:
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
     """A box as triangles (12, 3, 3)."""
-    return blocks(*([a, b] for a, b in zip(low, high, strict=True)), lambda *_: True)  # type: ignore[misc]
+    x, y, z = ([a, b] for a, b in zip(low, high, strict=True))
+    return blocks(x, y, z, lambda *_: True)
 
 
 def moved(triangles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Triangles under a rigid motion (4, 4)."""
-    return triangles @ pose[:3, :3].T + pose[:3, 3]
+    turned: np.ndarray = triangles @ pose[:3, :3].T + pose[:3, 3]
+    return turned
 
 
 def screw(angle: float, rise: float) -> np.ndarray:
