@@ -6,7 +6,7 @@ python -m eval TABLE [OPTION...] FILE...                          prints one abo
 python -m eval all [--config YAML] [--out FOLDER] [OPTION...]     makes every table that can be made, and the report
 
 A table is kept as `OUT/<dataset>-eval/<table>.md`, `.csv` and `.tex`, its sheets of pictures beside it as `.png`, the
-report as `OUT/<dataset>-eval/report.html`.
+report as `OUT/<dataset>-eval/report.html`. Of a table about files its sheets alone are kept, in `OUT/eval`.
 """
 
 from __future__ import annotations
@@ -95,7 +95,10 @@ def _print_of_files(name: str, asked: argparse.Namespace) -> int:
     of_files = find_tables()[name].of_files
     if of_files is None:
         raise ConfigError(f"{name} is a table about datasets, not about files; leave out {asked.files[0]}")
-    print(_markdown(of_files(asked.files, asked)), end="")
+    answer = of_files(asked.files, asked)
+    print(_markdown(answer), end="")
+    for sheet in answer.sheets:
+        print(f"\n{sheet.title}: {write_file(asked.out / 'eval' / f'{name}_{sheet.name}.png', sheet.picture)}")
     return 0
 
 

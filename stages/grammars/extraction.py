@@ -18,6 +18,7 @@ from stages.exemplars.symmetry.productions import productions, seams_of
 from stages.exemplars.symmetry.seams import Seam
 from stages.exemplars.symmetry.sites import Docker, dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid, with_area
+from stages.exemplars.symmetry.welding import welded
 from stages.grammars.grammar import GridRule, Rule, ShapeGrammar, site_name
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
@@ -122,7 +123,7 @@ def extract(
     for each in found:
         called = f"{site_name(each.site)}{counted[each.site]}"
         counted[each.site] += 1
-        rules.append(Rule(called, each.site, each.frame, kept(called, each.terminal), each.places))
+        rules.append(Rule(called, each.site, each.frame, kept(called, each.terminal.soup()), each.places))
     grid_rules = []
     for number, one in enumerate(grids):
         pieces = [(kept(f"G{number}-{'-'.join(map(str, where))}", soup), where) for where, soup in one.pieces]
@@ -146,10 +147,7 @@ def extract(
 
 def _part(name: str, soup: Soup, colors: ByteArray, tolerance: float) -> tuple[FloatArray, PartMesh]:
     """Where the middle of a soup's box is, and its mesh around it, corners at one place one vertex."""
-    points = soup.corners.reshape(-1, 3)
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    rounded = np.round(points / tolerance) if tolerance else points
-    _, first, place = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-    faces = place.reshape(-1, 3).astype(np.int32)
+    faces, vertices = welded(soup.corners, tolerance)
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return middle, PartMesh(name, points[first] - middle, faces[real], colors[soup.faces[real]])
+    return middle, PartMesh(name, vertices - middle, faces[real], colors[soup.faces[real]])

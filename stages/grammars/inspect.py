@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.places import write_file
-from pipeline.randomness import decision_rng
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ReadLimits
 from stages.exemplars.symmetry.parts import about_size
 from stages.grammars.description import describe_grammar
 from stages.grammars.extraction import Extraction, extract, mesh_of
-from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.picture import grammar_sheet, shapes_sheet
 from stages.grammars.settings import GrammarConfig
-from stages.grammars.variety import METHODS, Variety
+from stages.grammars.variety import METHODS, some_shapes
 
 __all__ = ["has_grammar", "written_grammar"]
 
@@ -73,7 +70,7 @@ def written_grammar(
     text = json.dumps(describe_grammar(found), indent=1, ensure_ascii=False, allow_nan=False)
     yield "grammar as JSON", write_file(folder / f"{name}-grammar.json", f"{text}\n".encode())
     yield "docking sites", write_file(folder / f"{name}-grammar.png", grammar_sheet(found))
-    drawn = _drawn(found.grammar, config)
+    drawn = some_shapes(found.grammar, config, SHOWN)
     counts = {method: len(each) for method, each in drawn.items()}
     yield "shapes", _prospect(counts)
     if not any(counts.values()):
@@ -93,12 +90,6 @@ def written_grammar(
         resized=asked[METHODS[1]],
     )
     yield "grammar config", write_file(folder / f"{name}-grammar.yaml", written.encode())
-
-
-def _drawn(grammar: ShapeGrammar, config: GrammarConfig) -> dict[str, list[str]]:
-    """At most SHOWN shapes by each method, as texts."""
-    variety = Variety(grammar, config, partial(decision_rng, 0, "inspect"), lambda _: None)
-    return {method: [each.text for each in variety.shapes(method, SHOWN)] for method in METHODS}
 
 
 def _prospect(counts: dict[str, int]) -> str:

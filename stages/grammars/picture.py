@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup, carve
+from stages.exemplars.symmetry.welding import welded
 from stages.grammars.derivation import Piece, Resized, exemplar_shape, pieces_of, shape_of_text
 from stages.grammars.editing import Option, edited, options_of
 from stages.grammars.extraction import Extraction
@@ -21,7 +23,7 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
-__all__ = ["grammar_sheet", "shapes_sheet"]
+__all__ = ["dockers_row", "grammar_sheet", "shapes_row", "shapes_sheet"]
 
 CELL = 200
 COLUMNS = 4
@@ -55,10 +57,27 @@ def grammar_sheet(found: Extraction) -> bytes:
 
 def shapes_sheet(grammar: ShapeGrammar, texts: Sequence[str]) -> bytes:
     """A PNG: the exemplar, and the shapes of some derivations."""
-    cells = [Cell(_pictured(exemplar_shape(grammar)), "the model")]
-    cells += [Cell(_pictured(shape_of_text(grammar, each)), each) for each in texts]
+    cells = [Cell(_pictured(exemplar_shape(grammar)), "the model"), *shapes_row(grammar, texts)]
     rows = [cells[place : place + COLUMNS] for place in range(0, len(cells), COLUMNS)]
     return picture_png(contact_sheet([Section("Shapes of the grammar", rows)], grammar.name, CELL))
+
+
+def shapes_row(grammar: ShapeGrammar, texts: Sequence[str]) -> list[Cell]:
+    """The shapes of some derivations, each with its text."""
+    return [Cell(_pictured(shape_of_text(grammar, each)), each) for each in texts]
+
+
+def dockers_row(found: Extraction, most: int) -> list[Cell]:
+    """The exemplar with its sites, and, of at most so many classes of sites, those at which most dock, the smallest
+    docker."""
+    classes = Counter(each.site for each in found.dockers)
+    cells = [_cell(found, _sites(found), f"{len(found.dockers)} docking sites of {len(classes)} classes")]
+    for site, count in sorted(classes.items(), key=lambda each: (-each[1], each[0]))[:most]:
+        docker = next(each for each in found.dockers if each.site == site)
+        inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
+        caption = f"{site_name(site)}, one of {count}: {docker.area:.1%}"
+        cells.append(_cell(found, [(outside, STAYS), (inside, GOES)], caption))
+    return cells
 
 
 def _whole(found: Extraction) -> Soup:
@@ -137,5 +156,5 @@ def _pictured(shape: Shape) -> ByteArray:
 
 def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:
     colors: ByteArray = np.tile(np.array(color, np.uint8), (len(corners), 1))
-    vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    return PartMesh("part", vertices, place.reshape(-1, 3).astype(np.int32), colors)
+    places, vertices = welded(corners, 0.0)
+    return PartMesh("part", vertices, places, colors)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from pipeline.randomness import decision_rng
 from stages.exemplars.symmetry.derivations import Derivation
 from stages.grammars.collisions import Collisions
 from stages.grammars.derivation import Resized, derivation_text, pieces_of, surface_digest
@@ -15,7 +17,7 @@ from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.likeness import Known, Sight, difference
 from stages.grammars.settings import GrammarConfig
 
-__all__ = ["METHODS", "Drawn", "Variety", "few", "wanted"]
+__all__ = ["METHODS", "Drawn", "Variety", "few", "some_shapes", "wanted"]
 
 METHODS = ("random rules", "resized grid")
 """How shapes are made of a grammar."""
@@ -118,6 +120,12 @@ class Variety:
             )
         except Collided:
             return None
+
+
+def some_shapes(grammar: ShapeGrammar, config: GrammarConfig, most: int) -> dict[str, list[str]]:
+    """At most so many shapes by each of METHODS, as texts: a glimpse of what a dataset would have."""
+    variety = Variety(grammar, config, partial(decision_rng, 0, "inspect"), lambda _: None)
+    return {method: [each.text for each in variety.shapes(method, most)] for method in METHODS}
 
 
 def wanted(config: GrammarConfig) -> dict[str, int]:

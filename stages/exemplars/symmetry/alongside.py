@@ -11,6 +11,7 @@ import numpy as np
 from stages.exemplars.components import connected_faces
 from stages.exemplars.symmetry.carve import Soup, joined
 from stages.exemplars.symmetry.surface import SurfaceGrid
+from stages.exemplars.symmetry.welding import welded
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle
 
@@ -54,7 +55,8 @@ def chunks_along(copy: Soup, row: Row, rest: Soup, grid: SurfaceGrid) -> tuple[l
     """What of `rest` runs along a row, cut across it: a soup for each copy, where that copy stands, and what is left.
 
     `copy` is the one at place 0. Connected triangles count that are longer than some steps of the row and, seen along
-    it, lie no farther than the radius from the box of its copies.
+    it, lie no farther than the radius from the box of its copies; what lies in the box of such, torn off by the cuts
+    between copies, goes with it.
     """
     frame = np.linalg.qr(np.column_stack([row.way, np.eye(3)]))[0]
     frame[:, 0] = row.way
@@ -69,7 +71,10 @@ def chunks_along(copy: Soup, row: Row, rest: Soup, grid: SurfaceGrid) -> tuple[l
     np.maximum.at(high, component, corners.max(axis=1))
     beside = (low[:, 1:] > own[..., 1:].min(axis=(0, 1)) - grid.radius).all(axis=1)
     beside &= (high[:, 1:] < own[..., 1:].max(axis=(0, 1)) + grid.radius).all(axis=1)
-    chosen: BoolArray = np.asarray(beside & (high[:, 0] - low[:, 0] > SPANS * row.step))[component]
+    along = np.flatnonzero(beside & (high[:, 0] - low[:, 0] > SPANS * row.step))
+    held = (low[:, None] > low[along] - grid.tolerance) & (high[:, None] < high[along] + grid.tolerance)
+    inside = np.asarray(held.all(axis=2))
+    chosen: BoolArray = np.asarray(inside.any(axis=1))[component]
     left, runner = rest.select(~chosen), rest.select(chosen)
     chunks = []
     for place in row.places.tolist():
@@ -112,6 +117,5 @@ def _components(soup: Soup, tolerance: float) -> IntArray:
     """The connected component of each triangle, int32 (t,); corners closer than about `tolerance` are one."""
     if not len(soup):
         return np.empty(0, dtype=np.int32)
-    corners = soup.corners.reshape(-1, 3)
-    _, first, place = np.unique(np.round(corners / tolerance), axis=0, return_index=True, return_inverse=True)
-    return connected_faces(corners[first], place.reshape(-1, 3).astype(np.int32), np.zeros(len(soup), dtype=np.int64))
+    places, vertices = welded(soup.corners, tolerance)
+    return connected_faces(vertices, places, np.zeros(len(soup), dtype=np.int64))

@@ -6,22 +6,27 @@ import numba
 import numpy as np
 
 from stages.exemplars.symmetry.cells import cell_index, cell_of, grown
+from stages.exemplars.symmetry.welding import sides_by_edge, welded
+from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["SAME_ANGLE", "boundary_lines"]
+__all__ = ["SAME_ANGLE", "boundary_lines", "sides_that_go_on"]
 
 SAME_ANGLE = 5e-3
 """Radians up to which directions are one."""
 ACROSS = 2e-3
 """So far beyond a side of a triangle, as a share of a cell, its plane must go on for the side to be no boundary."""
+BROAD = 10 * ACROSS
+"""A triangle is no sliver if it is higher than this share of a cell."""
 GAP = 0.05
 """Pieces of a side that are bare for less, as a share of a cell, are none: in a sharp corner its line lies beyond the
 other side too."""
 
 
 @numba.njit(cache=True)
-def boundary_lines(corners, normals, origin, size, keys, starts, owner, tolerance):
+def boundary_lines(corners, normals, origin, size, keys, starts, owner, tolerance, goes_on):
     """Cell, point, direction and length of each piece of a boundary, cut by the cells, lines that are one once.
 
+    goes_on: bool (f, 3), sides beyond which the surface is known to go on (`sides_that_go_on`); they are not looked at.
     Where a side is covered is found out to the point: what is covered in part must be a boundary of one length in
     whatever way cells cut it.
     """
@@ -37,6 +42,8 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
     spans, inward = np.empty((np.diff(starts).max(), 2)), _inward(corners, normals)
     for face in range(len(corners)):
         for k in range(3):
+            if goes_on[face, k]:
+                continue
             start, way = corners[face, k], corners[face, (k + 1) % 3] - corners[face, k]
             length = np.sqrt((way * way).sum())
             if length <= tolerance:
@@ -78,6 +85,30 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
                     total += 1
     order = np.argsort(cell[:total], kind="mergesort")
     return _merged(cell[order], points[order], directions[order], lengths[order], tolerance)
+
+
+def sides_that_go_on(corners: FloatArray, normals: FloatArray, size: float) -> BoolArray:
+    """Which sides of triangles (f, 3, 3) with these normals they share with one other triangle, which lies in their
+    plane and is no sliver, bool (f, 3): the inner sides of a flat face that is subdivided."""
+    places, _ = welded(corners, 0.0)
+    sides = sides_by_edge(places)
+    pair = sides.first[sides.count == 2]
+    one, other = sides.side[pair], sides.side[pair + 1]
+    # a side that both triangles go the same way lies between two that fold back, or lie one upon the other
+    fits = places.reshape(-1)[one] != places.reshape(-1)[other]
+    fits &= np.linalg.norm(normals[one // 3] - normals[other // 3], axis=1) < SAME_ANGLE
+    found = np.zeros(places.size, dtype=bool)
+    for side, across in ((one[fits], other[fits]), (other[fits], one[fits])):
+        found[side] = _heights(corners, across) > BROAD * size
+    return found.reshape(-1, 3)
+
+
+def _heights(corners: FloatArray, sides: np.ndarray) -> FloatArray:
+    """How far from each of `sides`, int64 (s,), the third corner of its triangle is, float64 (s,)."""
+    face, k = sides // 3, sides % 3
+    start, end, top = (corners[face, (k + turn) % 3] for turn in range(3))
+    found: FloatArray = np.linalg.norm(np.cross(end - start, top - start), axis=1) / np.linalg.norm(end - start, axis=1)
+    return found
 
 
 @numba.njit(cache=True)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import numba
 import numpy as np
 
 from stages.exemplars.symmetry.cells import cell_keys
 from stages.exemplars.symmetry.clip import cut_triangles, fragments
+from stages.exemplars.symmetry.places import among
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
@@ -36,7 +39,7 @@ class Soup:
         found: FloatArray = np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1) / 2
         return found
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Area of all triangles."""
         return float(self.areas.sum())
@@ -47,31 +50,56 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
 
     Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border.
     """
-    local = transform_points(invert(pose), soup.corners.reshape(-1, 3)).reshape(-1, 3, 3)
-    box = grid.origin + grid.size * np.array([grid.cells[cells].min(axis=0), grid.cells[cells].max(axis=0) + 1])
-    near = ((local.max(axis=1) > box[0]) & (local.min(axis=1) < box[1])).all(axis=1)
-    asked = np.flatnonzero(near)
-    where, owner, _ = fragments(local[asked], grid.origin, grid.size)
-    inside = np.isin(cell_keys(where), grid.keys[cells])
+    box = np.array([grid.cells[cells].min(axis=0), grid.cells[cells].max(axis=0) + 1])
+    bounds, box = grid.origin + grid.size * box, box - [[0], [1]]
+    back = invert(pose)
+    asked = _reaching(soup.corners, back, *bounds)
+    local = transform_points(back, soup.corners[asked].reshape(-1, 3)).reshape(-1, 3, 3)
+    where, owner, _ = fragments(local, grid.origin, grid.size, box)
+    inside = among(grid.keys[cells], cell_keys(where))
     held, total = np.bincount(owner[inside], minlength=len(asked)), np.bincount(owner, minlength=len(asked))
-    whole, crossing = asked[(held == total) & (held > 0)], (held > 0) & (held < total)
+    whole = (held == total) & ((local >= bounds[0]) & (local <= bounds[1])).all(axis=(1, 2)) & (held > 0)
+    crossing = (held > 0) & ~whole
     within = np.zeros(len(soup), dtype=bool)
-    within[whole] = True
+    within[asked[whole]] = True
     cut = asked[crossing]
     mine = crossing[owner]
     corners, side, of = cut_triangles(
-        local[cut],
+        local[crossing],
         grid.origin,
         grid.size,
         where[mine],
         np.searchsorted(np.flatnonzero(crossing), owner[mine]),
         inside[mine],
+        box,
     )
     corners = transform_points(pose, corners.reshape(-1, 3)).reshape(-1, 3, 3)
     untouched = ~within
     untouched[cut] = False
     pieces = Soup(corners, soup.faces[cut][of])
     return joined(soup.select(within), pieces.select(side)), joined(soup.select(untouched), pieces.select(~side))
+
+
+@numba.njit(cache=True)
+def _reaching(corners, pose, low, high):
+    """The places of triangles (f, 3, 3) whose boxes, moved by `pose` (4, 4), overlap a box."""
+    found, total = np.empty(len(corners), dtype=np.int64), 0
+    for face in range(len(corners)):
+        overlaps = True
+        for d in range(3):
+            least, most = np.inf, -np.inf
+            for k in range(3):
+                at = pose[d, 3]
+                for e in range(3):
+                    at += pose[d, e] * corners[face, k, e]
+                least, most = min(least, at), max(most, at)
+            if most <= low[d] or least >= high[d]:
+                overlaps = False
+                break
+        if overlaps:
+            found[total] = face
+            total += 1
+    return found[:total].copy()
 
 
 def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:

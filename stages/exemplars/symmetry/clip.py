@@ -14,6 +14,8 @@ MOST_CORNERS = 12
 """A triangle cut by six planes has at most nine corners."""
 SPECK = 1e-9
 """Fragments below this share of a cell's face are rounding."""
+EVERYWHERE = np.array([[-(2**62)] * 3, [2**62] * 3])
+"""A box that holds all cells."""
 
 
 @numba.njit(cache=True)
@@ -66,7 +68,7 @@ def _reach(polygon, count, axis, origin, size):
 
 
 @numba.njit(cache=True)
-def _all_fragments(corners, origin, size):
+def _all_fragments(corners, origin, size, low_cell, high_cell):
     cells = np.empty((4 * len(corners) + 16, 3), dtype=np.int64)
     faces = np.empty(4 * len(corners) + 16, dtype=np.int64)
     middles = np.empty((4 * len(corners) + 16, 4))
@@ -76,19 +78,19 @@ def _all_fragments(corners, origin, size):
     for face in range(len(corners)):
         whole[:3] = corners[face]
         first_i, last_i = _reach(whole, 3, 0, origin, size)
-        for i in range(first_i, last_i + 1):
+        for i in range(max(first_i, low_cell[0]), min(last_i, high_cell[0]) + 1):
             low = origin[0] + i * size
             in_x = _slab(whole, 3, 0, low, low + size, spare, of_x)
             if in_x < 3:
                 continue
             first_j, last_j = _reach(of_x, in_x, 1, origin, size)
-            for j in range(first_j, last_j + 1):
+            for j in range(max(first_j, low_cell[1]), min(last_j, high_cell[1]) + 1):
                 low = origin[1] + j * size
                 in_y = _slab(of_x, in_x, 1, low, low + size, spare, of_y)
                 if in_y < 3:
                     continue
                 first_k, last_k = _reach(of_y, in_y, 2, origin, size)
-                for k in range(first_k, last_k + 1):
+                for k in range(max(first_k, low_cell[2]), min(last_k, high_cell[2]) + 1):
                     low = origin[2] + k * size
                     in_z = _slab(of_y, in_y, 2, low, low + size, spare, of_z)
                     area = _area(of_z, in_z) if in_z > 2 else 0.0
@@ -105,13 +107,18 @@ def _all_fragments(corners, origin, size):
     return cells[:total], faces[:total], middles[:total]
 
 
-def fragments(corners: FloatArray, origin: FloatArray, size: float) -> tuple[np.ndarray, np.ndarray, FloatArray]:
-    """The pieces into which cells cut triangles `corners` (f, 3, 3), in the triangles' order.
+def fragments(
+    corners: FloatArray, origin: FloatArray, size: float, box: np.ndarray = EVERYWHERE
+) -> tuple[np.ndarray, np.ndarray, FloatArray]:
+    """The pieces into which cells cut triangles `corners` (f, 3, 3), in the triangles' order; of cells from `box[0]` to
+    `box[1]`, int64 (2, 3), alone.
 
     Cell of each piece, int64 (m, 3); its triangle, int64 (m,); a point inside it and its area, float64 (m, 4). Cell
     (i, j, k) lies between `origin + size * (i, j, k)` and the same of (i + 1, j + 1, k + 1).
     """
-    found: tuple[np.ndarray, np.ndarray, FloatArray] = _all_fragments(np.ascontiguousarray(corners), origin, size)
+    found: tuple[np.ndarray, np.ndarray, FloatArray] = _all_fragments(
+        np.ascontiguousarray(corners), origin, size, box[0], box[1]
+    )
     return found
 
 
@@ -130,9 +137,12 @@ def _emit(polygon, count, size, side, face, triangles, sides, faces, total):
 
 
 @numba.njit(cache=True)
-def _sides_along(cells, inside, begin, end, axis, i, j, first, last, found):
-    """For each cell layer along an axis whether its fragments lie outside (0), inside (1), on both sides (2) or are
-    none (-1); with `i` and `j` of fragments in that layer (and row) alone."""
+def _sides_along(
+    cells, inside, begin, end, axis, i, j, first, last, found, polygon, count, origin, size, box, spare, out
+):
+    """For each cell layer of a polygon along an axis whether its fragments lie outside (0), inside (1), on both sides
+    (2) or are none (-1); with `i` and `j` of fragments in that layer (and row) alone. Beyond the box there is no
+    fragment, and all is outside."""
     found[: last - first + 1] = -1
     for place in range(begin, end):
         if (axis > 0 and cells[place, 0] != i) or (axis > 1 and cells[place, 1] != j):
@@ -142,6 +152,21 @@ def _sides_along(cells, inside, begin, end, axis, i, j, first, last, found):
             continue
         side = 1 if inside[place] else 0
         found[layer] = side if found[layer] in (-1, side) else 2
+    for layer in range(last - first + 1):
+        if not box[0, axis] <= first + layer <= box[1, axis]:
+            found[layer] = 0
+    for other in range(axis + 1, 3):
+        low, high = _reach(polygon, count, other, origin, size)
+        if low >= box[0, other] and high <= box[1, other]:
+            continue
+        for layer in range(last - first + 1):
+            if found[layer] == 1:
+                start = origin[axis] + (first + layer) * size
+                held = _slab(polygon, count, axis, start, start + size, spare, out)
+                if held > 2:
+                    low, high = _reach(out, held, other, origin, size)
+                    if low < box[0, other] or high > box[1, other]:
+                        found[layer] = 2
 
 
 @numba.njit(cache=True)
@@ -159,7 +184,7 @@ def _run(found, start, count):
 
 
 @numba.njit(cache=True)
-def _all_cuts(corners, origin, size, cells, owner_starts, inside):
+def _all_cuts(corners, origin, size, cells, owner_starts, inside, box):
     triangles = np.empty((4 * len(corners) + 16, 3, 3))
     sides, faces = np.empty(len(triangles), dtype=np.int64), np.empty(len(triangles), dtype=np.int64)
     total = 0
@@ -170,7 +195,9 @@ def _all_cuts(corners, origin, size, cells, owner_starts, inside):
         begin, end = owner_starts[face], owner_starts[face + 1]
         first_i, last_i = _reach(whole, 3, 0, origin, size)
         along_x = np.empty(last_i - first_i + 1, dtype=np.int64)
-        _sides_along(cells, inside, begin, end, 0, 0, 0, first_i, last_i, along_x)
+        _sides_along(
+            cells, inside, begin, end, 0, 0, 0, first_i, last_i, along_x, whole, 3, origin, size, box, spare, of_x
+        )
         start_x = 0
         while start_x < len(along_x):
             end_x, side = _run(along_x, start_x, len(along_x))
@@ -185,7 +212,9 @@ def _all_cuts(corners, origin, size, cells, owner_starts, inside):
                 continue
             first_j, last_j = _reach(of_x, in_x, 1, origin, size)
             along_y = np.empty(last_j - first_j + 1, dtype=np.int64)
-            _sides_along(cells, inside, begin, end, 1, i, 0, first_j, last_j, along_y)
+            _sides_along(
+                cells, inside, begin, end, 1, i, 0, first_j, last_j, along_y, of_x, in_x, origin, size, box, spare, of_y
+            )
             start_y = 0
             while start_y < len(along_y):
                 end_y, side = _run(along_y, start_y, len(along_y))
@@ -200,7 +229,10 @@ def _all_cuts(corners, origin, size, cells, owner_starts, inside):
                     continue
                 first_k, last_k = _reach(of_y, in_y, 2, origin, size)
                 along_z = np.empty(last_k - first_k + 1, dtype=np.int64)
-                _sides_along(cells, inside, begin, end, 2, i, j, first_k, last_k, along_z)
+                _sides_along(
+                    cells, inside, begin, end, 2, i, j, first_k, last_k, along_z,
+                    of_y, in_y, origin, size, box, spare, of_z,
+                )  # fmt: skip
                 start_z = 0
                 while start_z < len(along_z):
                     end_z, side = _run(along_z, start_z, len(along_z))
@@ -212,14 +244,20 @@ def _all_cuts(corners, origin, size, cells, owner_starts, inside):
 
 
 def cut_triangles(
-    corners: FloatArray, origin: FloatArray, size: float, cells: np.ndarray, faces: np.ndarray, inside: BoolArray
+    corners: FloatArray,
+    origin: FloatArray,
+    size: float,
+    cells: np.ndarray,
+    faces: np.ndarray,
+    inside: BoolArray,
+    box: np.ndarray,
 ) -> tuple[FloatArray, BoolArray, IntArray]:
     """Triangles cut where cells that are inside meet cells that are not, and nowhere else.
 
-    corners: float64 (f, 3, 3), each with fragments on both sides; cells int64 (m, 3) and faces int64 (m,) of their
-    `fragments`, of which bool (m,) `inside` says the side. Returns triangles float64 (t, 3, 3), their side and the
-    triangle that each is of, int32 (t,).
+    corners: float64 (f, 3, 3), each with something on both sides; cells int64 (m, 3) and faces int64 (m,) of their
+    `fragments` in `box` int64 (2, 3), of which bool (m,) `inside` says the side; beyond the box all is outside. Returns
+    triangles float64 (t, 3, 3), their side and the triangle that each is of, int32 (t,).
     """
     starts = np.searchsorted(faces, np.arange(len(corners) + 1))
-    triangles, sides, owners = _all_cuts(np.ascontiguousarray(corners), origin, size, cells, starts, inside)
+    triangles, sides, owners = _all_cuts(np.ascontiguousarray(corners), origin, size, cells, starts, inside, box)
     return triangles, sides == 1, owners.astype(np.int32)

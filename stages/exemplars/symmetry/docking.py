@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from stages.exemplars.symmetry.cells import cell_index, cell_of
-from stages.exemplars.symmetry.places import items_in
+from stages.exemplars.symmetry.places import among, items_in
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
@@ -114,7 +114,7 @@ def _members(region: np.ndarray, count: int) -> list[np.ndarray]:
 
 def operation_kind(primary: IntArray, secondary: IntArray) -> OperationKind:
     """What it is to put the docker of cells `primary` where that of cells `secondary` is, int32 (n,) each."""
-    shared = len(np.intersect1d(primary, secondary, assume_unique=True))
+    shared = int(among(primary, secondary).sum())
     if len(secondary) < len(primary) and shared >= (1 - SAME_SET) * len(secondary):
         return "insert"
     if len(primary) < len(secondary) and shared >= (1 - SAME_SET) * len(primary):

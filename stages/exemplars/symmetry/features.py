@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray
+from stages.exemplars.symmetry.welding import sides_by_edge, welded
+from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["CornerFrames", "corner_frames", "creases", "welded"]
+__all__ = ["CornerFrames", "corner_frames", "creases"]
 
 CREASE = 0.4
 """Radians between the normals at an edge from which on it is a feature line."""
@@ -72,29 +73,16 @@ def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
     return CornerFrames(frames[chosen], kinds[chosen], np.column_stack([lengths[first], lengths[second]])[chosen])
 
 
-def welded(corners: FloatArray, tolerance: float) -> tuple[np.ndarray, FloatArray]:
-    """The vertex of each corner of each triangle, int64 (f, 3), and the vertices, float64 (v, 3)."""
-    points = corners.reshape(-1, 3)
-    _, first, place = np.unique(np.round(points / tolerance), axis=0, return_index=True, return_inverse=True)
-    return place.reshape(-1, 3), points[first]
-
-
-def creases(places: np.ndarray, normals: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
+def creases(places: IntArray, normals: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
     """Edges at which the surface turns or ends, int64 (e, 2), how far it turns, in radians, -1 where it ends or more
     than two triangles meet, and the sum of the normals there, float64 (e, 3)."""
-    sides = np.concatenate([places[:, [k, (k + 1) % 3]] for k in range(3)])
-    face = np.tile(np.arange(len(places)), 3)
-    low, high = sides.min(axis=1), sides.max(axis=1)
-    order = np.lexsort((face, high, low))
-    order = order[low[order] != high[order]]
-    low, high, face = low[order], high[order], face[order]
-    first = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])][: len(low)])
-    count = np.diff(np.r_[first, len(low)])
-    one, two = face[first], face[first + count - 1]
+    sides = sides_by_edge(places)
+    first, count = sides.first, sides.count
+    one, two = sides.side[first] // 3, sides.side[first + count - 1] // 3
     turn = np.arccos(np.clip((normals[one] * normals[two]).sum(axis=1), -1.0, 1.0))
     turn[count != 2] = -1.0
     crease = (turn > CREASE) | (count != 2)
-    edges = np.column_stack([low[first], high[first]])
+    edges = np.column_stack([sides.low[first], sides.high[first]])
     return edges[crease], turn[crease], (normals[one] + normals[two])[crease]
 
 

@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup
+from stages.exemplars.symmetry.places import among
 from stages.exemplars.symmetry.seams import Seam, cut_out, stands, widened
 from stages.exemplars.symmetry.sites import Docker
 from stages.exemplars.symmetry.surface import SurfaceGrid
@@ -93,7 +94,8 @@ def rows_of(grid: SurfaceGrid, dockers: Sequence[Docker], seams: dict[int, Seam]
     kept: list[int] = []
     for new in order:
         if all(
-            grid.area[np.intersect1d(cells[new], cells[old])].sum() < SAME * min(areas[new], areas[old]) for old in kept
+            grid.area[cells[new][among(cells[old], cells[new])]].sum() < SAME * min(areas[new], areas[old])
+            for old in kept
         ):
             kept.append(new)
     return [found[each] for each in kept]
@@ -159,7 +161,9 @@ def _next(ways: Sequence[tuple[int, FloatArray]], motion: FloatArray, middle: Fl
 
 def _cells(dockers: Sequence[Docker], row: Row) -> IntArray:
     """The cells between the first docker of a row and its last."""
-    return np.setdiff1d(dockers[row.dockers[0]].cells, dockers[row.dockers[-1]].cells)
+    held = dockers[row.dockers[0]].cells
+    found: IntArray = held[~among(dockers[row.dockers[-1]].cells, held)]
+    return found
 
 
 def _labels(grid: SurfaceGrid, dockers: Sequence[Docker], row: Row) -> IntArray:
@@ -175,7 +179,8 @@ def _tile(
 ) -> bool:
     """Whether two rows make a 2-grid: their cells overlap, their motions commute, and each motion takes what the other
     row parts to what it parts in the same way, borders of cells too."""
-    shared = np.intersect1d(_cells(dockers, rows[one]), _cells(dockers, rows[other]))
+    shared = _cells(dockers, rows[one])
+    shared = shared[among(_cells(dockers, rows[other]), shared)]
     if not len(shared):
         return False
     points = grid.origin + (grid.cells[shared] + 0.5) * grid.size

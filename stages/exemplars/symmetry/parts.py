@@ -12,6 +12,7 @@ from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.pieces import RADIUS, Piece, repeated_pieces
 from stages.exemplars.symmetry.slabs import slab_pieces
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, with_area
+from stages.exemplars.symmetry.welding import welded
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
@@ -95,6 +96,5 @@ def _in_the_world(scene: Scene) -> tuple[FloatArray, IntArray]:
 
 def _surface(name: str, piece: Piece, colors: ByteArray) -> Surface:
     """The surface of a piece, corners at one position one vertex."""
-    corners = piece.triangles.corners.reshape(-1, 3)
-    vertices, place = np.unique(corners, axis=0, return_inverse=True)
-    return Surface(name, vertices, place.reshape(-1, 3).astype(np.int32), colors[piece.triangles.faces])
+    places, vertices = welded(piece.triangles.corners, 0.0)
+    return Surface(name, vertices, places, colors[piece.triangles.faces])

@@ -10,9 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from stages.exemplars.symmetry.boundary import SAME_ANGLE
-from stages.exemplars.symmetry.features import creases, welded
+from stages.exemplars.symmetry.features import creases
 from stages.exemplars.symmetry.sections import Section, alike, section
 from stages.exemplars.symmetry.surface import with_area
+from stages.exemplars.symmetry.welding import welded
 from stages.shape.arrays import BoolArray, FloatArray
 
 __all__ = ["NEAR", "Cuts", "parallel_cuts"]

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.derivations import START, Derivation, Place
 from stages.exemplars.symmetry.matching import matched_items
 from stages.exemplars.symmetry.places import items_in
-from stages.exemplars.symmetry.seams import Seam, cut_out, seam_of, widened
+from stages.exemplars.symmetry.seams import Seam, seam_of, widened
 from stages.exemplars.symmetry.sites import Docker, beside
 from stages.exemplars.symmetry.surface import SurfaceGrid
+from stages.exemplars.symmetry.terminals import Cuts, Terminal
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
@@ -43,7 +43,7 @@ class Production:
 
     site: int
     frame: FloatArray
-    terminal: Soup
+    terminal: Terminal
     places: tuple[Place, ...]
 
 
@@ -65,7 +65,7 @@ def productions(
     whole = Docker(np.arange(len(grid), dtype=np.int32), np.empty(0, np.int32), 1.0, START, np.eye(4))
     every = [*dockers, whole]
     inside, apart = _relations(grid, every)
-    whole_soup = Soup(grid.corners, grid.faces)
+    cuts = Cuts(grid, every, seams)
     found: list[tuple[Production, IntArray]] = []
     original: dict[int, Derivation] = {}
     # smallest first: what gives a docker back is made of what gives those in it back
@@ -74,7 +74,7 @@ def productions(
             if not all(each in original for each in chosen):
                 continue
             cells = _rest(grid, every, node, chosen)
-            terminal = _cut(grid, whole_soup, [every[node], *(every[each] for each in chosen)], seams)
+            terminal = cuts.between(node, chosen)
             if not len(terminal) or not _faithful(grid, terminal, cells):
                 continue
             places = tuple(Place(every[each].site, every[each].frame, original[each]) for each in chosen)
@@ -141,21 +141,12 @@ def _rest(grid: SurfaceGrid, every: Sequence[Docker], node: int, chosen: tuple[i
     return np.flatnonzero(left).astype(np.int32)
 
 
-def _cut(grid: SurfaceGrid, whole: Soup, dockers: Sequence[Docker], seams: dict[int, Seam]) -> Soup:
-    """The triangles of the first docker that are in none of the others."""
-    first, *others = dockers
-    soup = whole if first.site == START else cut_out(whole, grid, first.cells, first.frame, seams[first.site])[0]
-    for each in others:
-        soup = cut_out(soup, grid, each.cells, each.frame, seams[each.site])[1]
-    return soup
-
-
-def _faithful(grid: SurfaceGrid, soup: Soup, cells: IntArray) -> bool:
+def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: IntArray) -> bool:
     """Whether triangles that were cut out are those of some cells, but for the border: a seam that moved here may part
     something else where sheets lie in one cell."""
     wanted = float(grid.area[cells].sum())
     border = float(grid.area[beside(grid, cells)].sum())
-    return abs(soup.area - wanted) <= BORDERS * border + SAME_AREA * wanted
+    return abs(terminal.area - wanted) <= BORDERS * border + SAME_AREA * wanted
 
 
 def _equal(

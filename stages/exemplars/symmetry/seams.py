@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup, carve, joined
-from stages.exemplars.symmetry.cells import cell_keys
+from stages.exemplars.symmetry.cells import cell_index, cell_of
 from stages.exemplars.symmetry.matching import cells_within, matched_items
 from stages.exemplars.symmetry.places import among, items_in, items_moved_into
 from stages.exemplars.symmetry.surface import SurfaceGrid
@@ -35,7 +35,7 @@ class Seam:
 def seam_of(grid: SurfaceGrid, border: IntArray, cells: IntArray) -> Seam:
     """The seam between a docker's cells and the cells around it."""
     band = cells_within(grid, border, BAND)
-    return Seam(band, np.intersect1d(band, cells).astype(np.int32))
+    return Seam(band, band[among(cells, band)])
 
 
 def widened(grid: SurfaceGrid, cells: IntArray, steps: int) -> BoolArray:
@@ -44,6 +44,17 @@ def widened(grid: SurfaceGrid, cells: IntArray, steps: int) -> BoolArray:
     chosen[cells] = True
     _widen(chosen, np.asarray(cells, dtype=np.int64), grid.neighbours, steps)
     return chosen
+
+
+@numba.njit(cache=True)
+def _middle_among(corners, origin, size, keys):
+    """Of which triangles (f, 3, 3) the middle lies in a cell with one of these keys, bool (f,)."""
+    found = np.zeros(len(corners), dtype=np.bool_)
+    cell = np.empty(3, dtype=np.int64)
+    for face in range(len(corners)):
+        cell_of((corners[face, 0] + corners[face, 1] + corners[face, 2]) / 3, origin, size, cell)
+        found[face] = cell_index(keys, cell[0], cell[1], cell[2]) >= 0
+    return found
 
 
 @numba.njit(cache=True)
@@ -81,6 +92,5 @@ def cut_out(soup: Soup, grid: SurfaceGrid, cells: IntArray, frame: FloatArray, s
     """
     along, away = carve(soup, grid, seam.band, frame)
     inside, outside = carve(along, grid, seam.inner, frame)
-    where = np.floor((away.corners.mean(axis=1) - grid.origin) / grid.size).astype(np.int64)
-    within = among(grid.keys[cells], cell_keys(where))
+    within = _middle_among(away.corners, grid.origin, grid.size, grid.keys[cells])
     return joined(inside, away.select(within)), joined(outside, away.select(~within))

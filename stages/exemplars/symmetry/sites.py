@@ -13,7 +13,7 @@ import numpy as np
 from stages.exemplars.symmetry.docking import docking_sites, slippable_motions
 from stages.exemplars.symmetry.matching import cells_within, eroded_twice, mutual, symmetric_cells
 from stages.exemplars.symmetry.seams import stands, widened
-from stages.exemplars.symmetry.surface import SurfaceGrid
+from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, rotation_angle, transform_points
 
@@ -115,8 +115,9 @@ class _Site:
 
     @cached_property
     def rim(self) -> FloatArray:
-        """Middles of the docker's cells beside the site, float64 (m, 3)."""
-        near = widened(self._grid, self.docker.border, 1)[self.docker.cells]
+        """Middles of the docker's cells within the radius of the site, float64 (m, 3): those right beside it would lie
+        near those on its other side."""
+        near = widened(self._grid, self.docker.border, CELLS_A_RADIUS)[self.docker.cells]
         return _centres(self._grid, self.docker.cells[near])
 
     @cached_property

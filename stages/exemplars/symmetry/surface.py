@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from stages.exemplars.symmetry.boundary import SAME_ANGLE, boundary_lines
+from stages.exemplars.symmetry.boundary import SAME_ANGLE, boundary_lines, sides_that_go_on
 from stages.exemplars.symmetry.cells import BITS, neighbours_of, pack
 from stages.exemplars.symmetry.clip import fragments
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["SurfaceGrid", "surface_grid", "with_area"]
+__all__ = ["CELLS_A_RADIUS", "SurfaceGrid", "surface_grid", "with_area"]
 
 CELLS_A_RADIUS = 4
 """Cells have a quarter of the radius of similarity (symmetry §4)."""
@@ -84,7 +84,8 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     starts = np.append(first, len(packed))
     tolerance = SAME_PLACE * size
     planes = _planes(starts, owner, middles, normals, tolerance)
-    lines = boundary_lines(corners, normals, origin, size, keys, starts, owner, tolerance)
+    goes_on = sides_that_go_on(corners, normals, size)
+    lines = boundary_lines(corners, normals, origin, size, keys, starts, owner, tolerance, goes_on)
     item_cell, points, directions, is_line = _joined(planes, lines)
     return SurfaceGrid(
         corners=corners,

@@ -57,8 +57,8 @@ class Moves:
 
     motions: float64 (k, 4, 4), bring each piece into the base; inside: bool (k, n + m), the parts of the base that
     leave and those of the giver that come; images: int16 (k, m), the part of the base that each part of the giver
-    coincides with, or -1; work: how many parts were laid upon others; is_whole: whether these are all, or what came first
-    until a limit was met.
+    coincides with, or -1; work: how many parts were laid upon others; is_whole: whether these are all, or what came
+    first until a limit was met.
     """
 
     motions: FloatArray

@@ -65,12 +65,14 @@ def _in(at: float, count: int, period: float, margin: float) -> bool:
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
     """A box as triangles (12, 3, 3)."""
-    return blocks(*([a, b] for a, b in zip(low, high, strict=True)), lambda *_: True)  # type: ignore[misc]
+    x, y, z = ([a, b] for a, b in zip(low, high, strict=True))
+    return blocks(x, y, z, lambda *_: True)
 
 
 def moved(triangles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Triangles under a rigid motion (4, 4)."""
-    return triangles @ pose[:3, :3].T + pose[:3, 3]
+    turned: np.ndarray = triangles @ pose[:3, :3].T + pose[:3, 3]
+    return turned
 
 
 def screw(angle: float, rise: float) -> np.ndarray:
@@ -87,3 +89,24 @@ def spiral_stair(steps: int, angle: float = 0.5, rise: float = 0.35) -> np.ndarr
         parts.append(moved(step, pose))
         pose = screw(angle, rise) @ pose
     return np.concatenate(parts)
+
+
+def uneven_wall() -> np.ndarray:
+    """A wall of four by three windows, of which those of the third bay stand higher: storeys repeat in each bay, bays
+    beside others alone."""
+    x = [0.0, *(0.6 + k + o for k in range(4) for o in (0.25, 0.75)), 5.2]
+    z = sorted({0.0, 6.4, *(2 * k + o for k in range(3) for o in (0.5, 0.8, 1.5, 1.8))})
+
+    def solid(across: float, _: float, up: float) -> bool:
+        raised = 0.3 if _in(across - 2.6, 1, 1, 0.0) else 0.0
+        return not (_in(across - 0.6, 4, 1, 0.25) and _in(up - raised, 3, 2, 0.5))
+
+    return blocks(x, [0.0, 0.3], z, solid)
+
+
+def prongs_and_bridge() -> np.ndarray:
+    """A plate with two prongs, and nine beside them two prongs with a bar between them."""
+    return blocks(
+        [0, 1, 2, 5, 6, 7, 9, 10, 11, 14, 15, 16], [0, 1], [0, 1, 3, 4],
+        lambda x, _, z: z < 1 or (x in (1.5, 5.5)) or (x in (10.5, 14.5)) or (z > 3 and 10 < x < 15),
+    )  # fmt: skip

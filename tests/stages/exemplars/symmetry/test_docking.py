@@ -14,7 +14,7 @@ from stages.exemplars.symmetry.productions import seams_of
 from stages.exemplars.symmetry.seams import cut_out
 from stages.exemplars.symmetry.sites import dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
-from tests.stages.exemplars.symmetry.planted import blocks, box, moved, screw, spiral_stair, wall
+from tests.stages.exemplars.symmetry.planted import blocks, box, moved, prongs_and_bridge, screw, spiral_stair, wall
 
 SHARE = 0.03
 
@@ -168,6 +168,19 @@ class TestDockingSites:
             assert area(shape) == pytest.approx(area(triangles) + more, rel=1e-9)
             assert r_similarity(triangles, shape, grid.radius, 60, np.random.default_rng(0)).share == 1.0
 
+    def test_dockers_on_two_sides_of_a_bar_have_sites_of_two_classes(self) -> None:
+        """Where the bar is the same on both sides of a site, the left end of it lies near the right end of another."""
+        grid = surface_grid(prongs_and_bridge(), 0.02)
+        across = grid.origin[0] + grid.size * (grid.cells[:, 0] + 0.5)
+        sides: dict[int, set[bool]] = {}
+        for each in dockers_of(grid, np.array([shift(9, 0, 0), shift(15, 0, 0), shift(4, 0, 0)])):
+            if np.ptp(across[each.border]) < 2 * grid.size:
+                rightward = bool(across[each.cells].mean() > across[each.border].mean())
+                sides.setdefault(each.site, set()).add(rightward)
+        assert {True} in sides.values()
+        assert {False} in sides.values()
+        assert {True, False} not in sides.values()
+
     def test_a_straight_prism_slips_one_way_and_a_plane_three(self) -> None:
         grid = surface_grid(box((0, 0, 0), (6, 1, 1)), 0.03)
         x, z = (grid.origin[d] + grid.size * (grid.cells[:, d] + 0.5) for d in (0, 2))
@@ -175,14 +188,6 @@ class TestDockingSites:
         top = around[z[around] > 1 - grid.size]
         inner = top[np.abs(grid.cells[top, 1] - np.median(grid.cells[top, 1])) < 5]
         assert (slippable_motions(grid, around), slippable_motions(grid, inner)) == (1, 3)
-
-
-def prongs_and_bridge() -> np.ndarray:
-    """A plate with two prongs, and nine beside them two prongs with a bar between them."""
-    return blocks(
-        [0, 1, 2, 5, 6, 7, 9, 10, 11, 14, 15, 16], [0, 1], [0, 1, 3, 4],
-        lambda x, _, z: z < 1 or (x in (1.5, 5.5)) or (x in (10.5, 14.5)) or (z > 3 and 10 < x < 15),
-    )  # fmt: skip
 
 
 def area(triangles: np.ndarray) -> float:

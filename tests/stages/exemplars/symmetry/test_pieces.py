@@ -83,7 +83,7 @@ class TestBridge:
 
     @pytest.mark.parametrize(
         ("taper", "said"),
-        [(0.0, ()), (0.004, ("what runs along a row is alike at all its copies now; it differed by 13%",))],
+        [(0.0, ()), (0.004, ("what runs along a row is alike at all its copies now; it differed by 14%",))],
     )
     def test_what_runs_along_a_row_unevenly_is_told(self, taper: float, said: tuple[str, ...]) -> None:
         """The far end of a cable is thicker by less than a cell."""

@@ -1,0 +1,46 @@
+"""`python -m eval radii a.glb`: what does the radius of similarity do to a grammar? (symmetry figure 10 j)"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from eval.evaluation import Answer, Evaluation, Need
+from eval.subject import Subject
+from pipeline.errors import ConfigError
+
+__all__ = ["TABLE"]
+
+RADII = (0.008, 0.016, 0.032, 0.064)
+FILE = "a model as a file: python -m eval radii a.glb"
+
+
+def _options(parser: ArgumentParser) -> None:
+    parser.add_argument("--radii", nargs="+", type=float, default=RADII, help="of similarity, in longest sides")
+
+
+def _answer(subject: Subject, asked: Namespace) -> Answer:
+    raise ConfigError(f"this table takes {FILE}")
+
+
+def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
+    from eval.radii import extractions, radii_sheet, radii_table
+
+    for path in paths:
+        if not path.is_file():
+            raise ConfigError(f"there is no file {path}")
+    found = {path: extractions(path, sorted(asked.radii)) for path in paths}
+    return Answer(
+        [radii_table(each) for each in found.values()], sheets=[radii_sheet(path, each) for path, each in found.items()]
+    )
+
+
+TABLE = Evaluation(
+    question="What does the radius of similarity do to the grammar of a mesh?",
+    needs=(Need("a model file", lambda subject: f"it takes {FILE}"),),  # a minute or two: no part of `all`
+    seconds=lambda subject: 120.0,
+    answer=_answer,
+    of_files=_of_files,
+    options=_options,
+)

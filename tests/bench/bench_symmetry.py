@@ -1,0 +1,100 @@
+"""How the time from a mesh to its grammar grows with its triangles: subdivided facades, merged kits and models
+(symmetry §5)."""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from stages.exemplars.read import read_model
+from stages.exemplars.symmetry.welding import welded
+from stages.grammars.extraction import Mesh, extract, mesh_of
+from stages.shape.arrays import FloatArray
+from tests.bench.measure import Measure
+from tests.stages.exemplars.symmetry.planted import wall
+
+RADIUS = 0.016
+LEAST = 250_000
+"""Triangles from which on a model is large enough."""
+STEPS = 6
+SHIPPED = Path("datasets/exemplars/castle")
+REAL = Path("../shared/exemplars")
+
+
+def bench() -> Iterator[Measure]:
+    """Triangles a CPU second to a grammar, one core, in a process of its own; the note has what was found, CPU seconds
+    of the steps, and peak memory; that of the facade seconds by size as well."""
+    seconds = {}
+    for steps in range(STEPS):
+        found = _alone(partial(_facade, steps))
+        seconds[found[0]] = found[1]
+    yield _measure("facade of 20 windows", found, "; ".join(f"{n:,}: {each:.3g} s" for n, each in seconds.items()))
+    for path in (*sorted(SHIPPED.glob("*.glb"))[:1], *sorted(REAL.glob("u0[16]*/model.*"))):
+        yield _measure(f"{path.parent.name}, subdivided", _alone(partial(_subdivided, path)))
+
+
+def split(corners: FloatArray) -> FloatArray:
+    """Triangles (f, 3, 3), each in four (4 f, 3, 3)."""
+    middles = (corners + np.roll(corners, -1, axis=1)) / 2
+    tips = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+    return np.concatenate([*tips, middles])
+
+
+def _facade(steps: int) -> tuple[Mesh, str]:
+    triangles = wall(5, 4)
+    for _ in range(steps):
+        triangles = split(triangles)
+    return _grey(triangles), "z"
+
+
+def _subdivided(path: Path) -> tuple[Mesh, str]:
+    model = read_model(path, "components")
+    triangles = mesh_of(model).corners
+    while len(triangles) < LEAST:
+        triangles = split(triangles)
+    return _grey(triangles), model.up or "y"
+
+
+def _grey(triangles: FloatArray) -> Mesh:
+    faces, vertices = welded(triangles, 0.0)
+    return Mesh(vertices, faces, np.full((len(faces), 3), 160, np.uint8))
+
+
+Found = tuple[int, float, str]
+
+
+def _alone(made: Callable[[], tuple[Mesh, str]]) -> Found:
+    """Triangles, CPU seconds and a note of the grammar of a mesh, made and searched in a process of its own."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(_grammar, (made,))
+
+
+def _grammar(made: Callable[[], tuple[Mesh, str]]) -> Found:
+    small = _grey(wall(2))
+    extract(small, "warm", 0.05, "z", np.random.default_rng(0))
+    source, up = made()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.process_time()
+    found = extract(source, "bench", RADIUS, "z" if up == "z" else "y", np.random.default_rng(0))
+    spent = time.process_time() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    parts = ", ".join(f"{name} {each:.1f}" for name, each in found.seconds.items())
+    note = (
+        f"{len(source.faces):,} triangles in {spent:.1f} s ({parts}); {len(found.grid):,} cells, {found.motions} "
+        f"motions, {len(found.dockers)} dockers, {len(found.grammar.rules)} rules, {len(found.grammar.grids)} grids; "
+        f"peak {peak / 1024:.0f} MiB, {before / 1024:.0f} before"
+    )
+    return len(source.faces), spent, note
+
+
+def _measure(name: str, found: Found, more: str = "") -> Measure:
+    triangles, seconds, note = found
+    return Measure(
+        f"grammar of a mesh, {name}", "triangles", triangles / seconds, note="; ".join(filter(None, [note, more]))
+    )

@@ -1,0 +1,57 @@
+"""Show 1 of a grammar: of surfaces whose symmetries are known every shape is everywhere like the surface somewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eval.similarity import r_similarity, triangles_of
+from stages.grammars.collisions import Collisions
+from stages.grammars.derivation import derivation_text, pieces_of, shape_of_text, surface_digest
+from stages.grammars.drawing import Collided, random_counts, random_derivation
+from stages.grammars.extraction import Mesh, extract
+from stages.grammars.grammar import ShapeGrammar
+from stages.shape.arrays import FloatArray
+from tests.stages.exemplars.symmetry.planted import mesh, prongs_and_bridge, spiral_stair, uneven_wall, wall
+
+MOST = 8
+"""So many shapes of a grammar are looked at."""
+
+
+def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
+    """Different shapes by random rules and by grids in turn, as triangles (t, 3, 3)."""
+    collisions = Collisions(grammar)
+    texts: dict[str, str] = {}
+    for seed in range(2 * MOST):
+        try:
+            drawn = random_derivation(grammar, collisions, 5, np.random.default_rng(seed))
+            texts.setdefault(surface_digest(grammar, pieces_of(grammar, drawn)), derivation_text(grammar, drawn))
+        except Collided:
+            pass
+        counts = random_counts(grammar, 7, np.random.default_rng(seed))
+        if not collisions.whole(counts):
+            texts.setdefault(surface_digest(grammar, pieces_of(grammar, counts)), derivation_text(grammar, counts))
+    return [triangles_of(shape_of_text(grammar, each)) for each in list(texts.values())[:MOST]]
+
+
+@pytest.mark.parametrize(
+    ("triangles", "radius", "classes", "rows"),
+    [
+        (wall(4), 0.03, 1, {1}),
+        (wall(4, 3), 0.03, 3, {2}),
+        (uneven_wall(), 0.03, 16, {2}),
+        (prongs_and_bridge(), 0.02, 10, {1}),
+        (spiral_stair(5), 0.03, 3, {1}),
+    ],
+    ids=["wall", "2-grid", "uneven wall", "interlocked dockers", "spiral stair"],
+)
+def test_every_shape_is_r_similar(triangles: FloatArray, radius: float, classes: int, rows: set[int]) -> None:
+    vertices, faces = mesh(triangles)
+    grey = np.full((len(faces), 3), 160, np.uint8)
+    found = extract(Mesh(vertices, faces, grey), "planted", radius, "z", np.random.default_rng(0))
+    assert len({each.site for each in found.dockers}) == classes
+    assert {len(each.counts) for each in found.grammar.grids} == rows
+    shapes = shapes_of(found.grammar)
+    assert len(shapes) >= MOST - 1
+    for shape in shapes:
+        assert r_similarity(triangles, shape, found.grammar.radius, 60, np.random.default_rng(0)).share == 1.0
