@@ -16,6 +16,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import moved_by
 from stages.variations.constraint import made_mend, made_test, unknown_in
 from stages.variations.resizing import heights_of, spans_of
+from tests.stages.variations.substructures.test_replacing import replaced
 from tests.stages.variations.toy import Placed, box, kit_of, pose
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -203,3 +204,43 @@ def moved_leg(assembly: Assembly, part: int, factor: float) -> Assembly:
     motions = np.tile(np.eye(4), (len(assembly), 1, 1))
     motions[part, 1, 1] = factor
     return moved_by(assembly, motions)
+
+
+SUPPORT: dict[str, dict[str, tuple[str, ...]]] = {"support": {}}
+TOWERS = {
+    "deck": box(1.0, 1.0, 1.0),
+    "bridge": box(1.0, 0.2, 0.6),
+    "plinth": box(1.0, 0.8, 1.0),
+    "kerb": box(1.0, 0.5, 1.0),
+    "roof": box(0.8, 0.4, 0.8),
+    "tank": box(0.6, 0.6, 0.6),
+}
+
+
+def towers(foot: str, *tops: str) -> list[Placed]:
+    """Decks in a row, each on a foot and with something on top, joined by bridges; decks are level."""
+    parts = list[Placed]()
+    for place, top in enumerate(tops):
+        low, high = TOWERS[foot].extents[1] / 2, TOWERS[top].extents[1] / 2
+        parts += [("deck", pose(2 * place, 0, 0)), (foot, pose(2 * place, -0.5 - low, 0))]
+        parts.append((top, pose(2 * place, 0.5 + high, 0)))
+        parts += [("bridge", pose(2 * place - 1, 0, 0))] if place else []
+    return parts
+
+
+def test_of_towers_on_feet_of_two_heights_those_that_mix_them_are_refused_or_get_taller_feet() -> None:
+    kit = kit_of(
+        TOWERS, [towers("plinth", "roof", "tank", "roof"), towers("kerb", "tank", "roof")], grammar="count_and_pairs"
+    )
+    _, found = replaced(kit, 400, stretch={"most": 2.0})
+    unmet, mend, less = made_test(kit, SUPPORT), made_mend(kit, SUPPORT, 2.0, ()), made_mend(kit, SUPPORT, 1.5, ())
+    lifted = [each.assembly for each in found if unmet(each.assembly) == "lifted off the ground"]
+    assert 0 < len(lifted) < len(found)
+    kerb = kit.type_names().index("kerb")
+    mended = [made for made in map(mend, lifted) if made is not None]
+    assert mended
+    assert not any(map(less, lifted))
+    for shape in mended:
+        spans, feet = spans_of(kit, shape), np.isin(shape.types, [kerb, kit.type_names().index("plinth")])
+        assert np.ptp(spans[feet, 0]) < kit.contact_tolerance
+        assert np.ptp(spans[shape.types == kerb], axis=1).max() == pytest.approx(0.8, abs=kit.contact_tolerance)
