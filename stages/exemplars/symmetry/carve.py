@@ -32,7 +32,7 @@ class Soup:
         """The triangles that are `chosen`, bool (t,) or indices."""
         return Soup(self.corners[chosen], self.faces[chosen])
 
-    @property
+    @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, float64 (t,)."""
         ways = self.corners[:, 1:] - self.corners[:, :1]
@@ -54,6 +54,8 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
     bounds, box = grid.origin + grid.size * box, box - [[0], [1]]
     back = invert(pose)
     asked = _reaching(soup.corners, back, *bounds)
+    if not len(asked):
+        return soup.select(asked), soup
     local = transform_points(back, soup.corners[asked].reshape(-1, 3)).reshape(-1, 3, 3)
     where, owner, _ = fragments(local, grid.origin, grid.size, box)
     inside = among(grid.keys[cells], cell_keys(where))
@@ -122,6 +124,6 @@ def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
     return [soup.select(piece == each) for each in order]
 
 
-def joined(one: Soup, other: Soup) -> Soup:
-    """The triangles of two soups."""
-    return Soup(np.concatenate([one.corners, other.corners]), np.concatenate([one.faces, other.faces]))
+def joined(*soups: Soup) -> Soup:
+    """The triangles of some soups, one after another."""
+    return Soup(np.concatenate([each.corners for each in soups]), np.concatenate([each.faces for each in soups]))
