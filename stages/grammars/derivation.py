@@ -149,7 +149,7 @@ def shape_of_text(grammar: ShapeGrammar, text: str) -> Shape:
     pieces = pieces_of(grammar, read_derivation(grammar, text))
     types = np.array([each.mesh for each in pieces], dtype=np.int16)
     poses = np.array([each.pose for each in pieces])
-    return Shape(grammar.meshes, Assembly(types, poses, np.empty((0, 2), np.int32)), grammar.up, grammar.labels)
+    return Shape(tuple(grammar.meshes), Assembly(types, poses, np.empty((0, 2), np.int32)), grammar.up, grammar.labels)
 
 
 def exemplar_shape(grammar: ShapeGrammar) -> Shape:

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model
-from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.grids import Row, crossing, cut_grid, rows_of
 from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.productions import productions, seams_of
 from stages.exemplars.symmetry.seams import Seam
 from stages.exemplars.symmetry.sites import Docker, dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid, with_area
+from stages.exemplars.symmetry.terminals import Terminal, alone
 from stages.exemplars.symmetry.welding import welded
 from stages.grammars.grammar import GridRule, Rule, ShapeGrammar, site_name
+from stages.grammars.meshes import TerminalMeshes, part_around_middle
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
-from stages.shape.kit import PartMesh
 
 __all__ = ["Extraction", "Mesh", "extract", "mesh_of"]
 
@@ -108,46 +108,35 @@ def extract(
         cut_grid(grid, dockers, [rows[each] for each in chosen], seams) for chosen in crossing(grid, dockers, rows)
     ]
     passed("grids")
-    found = productions(grid, dockers, seams, rng)
+    found, pieces = productions(grid, dockers, seams, rng)
     passed("productions")
-    meshes: list[PartMesh] = []
-    middles: list[FloatArray] = []
+    terminals: list[tuple[str, Terminal]] = []
 
-    def kept(name: str, soup: Soup) -> int:
-        middle, part = _part(name, soup, mesh.colors[grid.faces], WELDED * grid.size)
-        meshes.append(part)
-        middles.append(middle)
-        return len(meshes) - 1
+    def kept(name: str, terminal: Terminal) -> int:
+        terminals.append((name, terminal))
+        return len(terminals) - 1
 
     rules, counted = [], dict.fromkeys([each.site for each in found], 0)
     for each in found:
         called = f"{site_name(each.site)}{counted[each.site]}"
         counted[each.site] += 1
-        rules.append(Rule(called, each.site, each.frame, kept(called, each.terminal.soup()), each.places))
+        rules.append(Rule(called, each.site, each.frame, kept(called, each.terminal), each.places))
     grid_rules = []
     for number, one in enumerate(grids):
-        pieces = [(kept(f"G{number}-{'-'.join(map(str, where))}", soup), where) for where, soup in one.pieces]
-        grid_rules.append(GridRule(f"G{number}", one.motions, one.counts, one.sites, one.frames, tuple(pieces)))
-    whole = _part(
-        "exemplar", Soup(grid.corners, np.arange(len(grid.corners), dtype=np.int32)), mesh.colors[grid.faces], 0
-    )
+        cut = [(kept(f"G{number}-{'-'.join(map(str, where))}", alone(soup)), where) for where, soup in one.pieces]
+        grid_rules.append(GridRule(f"G{number}", one.motions, one.counts, one.sites, one.frames, tuple(cut)))
+    colors = mesh.colors[grid.faces]
+    meshes = TerminalMeshes(grid.corners, pieces, colors, terminals, WELDED * grid.size)
+    middle, whole = part_around_middle("exemplar", *welded(grid.corners, 0.0), colors)
     grammar = ShapeGrammar(
         name=name,
         up=up,
         radius=grid.radius,
-        meshes=tuple(meshes),
-        middles=np.array(middles).reshape(-1, 3),
+        meshes=meshes,
+        middles=meshes.middles(),
         rules=tuple(rules),
         grids=tuple(grid_rules),
         seams={site: grid.origin + (grid.cells[each.band] + 0.5) * grid.size for site, each in seams.items()},
-        exemplar=PartMesh("exemplar", whole[1].vertices + whole[0], whole[1].faces, whole[1].face_colors),
+        exemplar=replace(whole, vertices=whole.vertices + middle),
     )
     return Extraction(grammar, mesh, grid, len(motions), dockers, seams, rows, seconds)
-
-
-def _part(name: str, soup: Soup, colors: ByteArray, tolerance: float) -> tuple[FloatArray, PartMesh]:
-    """Where the middle of a soup's box is, and its mesh around it, corners at one place one vertex."""
-    faces, vertices = welded(soup.corners, tolerance)
-    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return middle, PartMesh(name, vertices - middle, faces[real], colors[soup.faces[real]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ def write_grammar(described: Mapping[str, Any], grammar: ShapeGrammar, text: Any
     """Write a grammar to two binary streams: what `describe_grammar` says of it to `text`, the tar to `arrays`."""
     text.write(json.dumps(described, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n")
     with ShardWriter(arrays) as writer:
-        for number, each in enumerate((*grammar.meshes, grammar.exemplar)):
+        for number, each in enumerate(chain(grammar.meshes, (grammar.exemplar,))):
             members = {
                 "vertices.npy": array_bytes(each.vertices),
                 "faces.npy": array_bytes(each.faces),

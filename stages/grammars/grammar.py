@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -60,7 +60,7 @@ class ShapeGrammar:
     name: str
     up: Literal["y", "z"]
     radius: float
-    meshes: tuple[PartMesh, ...]
+    meshes: Sequence[PartMesh]
     middles: FloatArray
     rules: tuple[Rule, ...]
     grids: tuple[GridRule, ...]

@@ -17,6 +17,11 @@ from stages.shape.geometry.pose import invert, transform_points
 
 __all__ = ["Soup", "carve", "connected_soups", "joined"]
 
+BLOCK = 4
+"""Triangles are looked at that come near blocks of so many cells along each axis in which there is something to cut."""
+NEAR = 1e-3
+"""How near to a block, as a share of its width."""
+
 
 @dataclass(frozen=True)
 class Soup:
@@ -32,7 +37,7 @@ class Soup:
         """The triangles that are `chosen`, bool (t,) or indices."""
         return Soup(self.corners[chosen], self.faces[chosen])
 
-    @property
+    @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, float64 (t,)."""
         ways = self.corners[:, 1:] - self.corners[:, :1]
@@ -50,10 +55,15 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
 
     Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border.
     """
-    box = np.array([grid.cells[cells].min(axis=0), grid.cells[cells].max(axis=0) + 1])
-    bounds, box = grid.origin + grid.size * box, box - [[0], [1]]
+    chosen = grid.cells[cells]
+    box = np.array([chosen.min(axis=0), chosen.max(axis=0)])
+    bounds = grid.origin + grid.size * np.array([box[0], box[1] + 1])
+    blocks = np.zeros((box[1] - box[0]) // BLOCK + 1, dtype=bool)
+    blocks[tuple(((chosen - box[0]) // BLOCK).T)] = True
     back = invert(pose)
-    asked = _reaching(soup.corners, back, *bounds)
+    asked = _reaching(soup.corners, back, bounds[0], BLOCK * grid.size, blocks)
+    if not len(asked):
+        return soup.select(asked), soup
     local = transform_points(back, soup.corners[asked].reshape(-1, 3)).reshape(-1, 3, 3)
     where, owner, _ = fragments(local, grid.origin, grid.size, box)
     inside = among(grid.keys[cells], cell_keys(where))
@@ -81,11 +91,12 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
 
 
 @numba.njit(cache=True)
-def _reaching(corners, pose, low, high):
-    """The places of triangles (f, 3, 3) whose boxes, moved by `pose` (4, 4), overlap a box."""
+def _reaching(corners, pose, low, size, blocks):
+    """The places of triangles (f, 3, 3) whose boxes, moved by `pose` (4, 4), come near one of `blocks`, bool (i, j, k),
+    `size` wide each from `low` (3,) on."""
     found, total = np.empty(len(corners), dtype=np.int64), 0
+    first, last = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for face in range(len(corners)):
-        overlaps = True
         for d in range(3):
             least, most = np.inf, -np.inf
             for k in range(3):
@@ -93,13 +104,24 @@ def _reaching(corners, pose, low, high):
                 for e in range(3):
                     at += pose[d, e] * corners[face, k, e]
                 least, most = min(least, at), max(most, at)
-            if most <= low[d] or least >= high[d]:
-                overlaps = False
-                break
-        if overlaps:
+            # blocks that a triangle only touches count too: rounding must not decide
+            first[d] = max(int(np.floor((least - low[d]) / size - NEAR)), 0)
+            last[d] = min(int(np.floor((most - low[d]) / size + NEAR)), blocks.shape[d] - 1)
+        if _any(blocks, first, last):
             found[total] = face
             total += 1
     return found[:total].copy()
+
+
+@numba.njit(cache=True)
+def _any(blocks, first, last):
+    """Whether there is one of `blocks`, bool (i, j, k), from `first` to `last`."""
+    for i in range(first[0], last[0] + 1):
+        for j in range(first[1], last[1] + 1):
+            for k in range(first[2], last[2] + 1):
+                if blocks[i, j, k]:
+                    return True
+    return False
 
 
 def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
@@ -122,6 +144,6 @@ def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
     return [soup.select(piece == each) for each in order]
 
 
-def joined(one: Soup, other: Soup) -> Soup:
-    """The triangles of two soups."""
-    return Soup(np.concatenate([one.corners, other.corners]), np.concatenate([one.faces, other.faces]))
+def joined(*soups: Soup) -> Soup:
+    """The triangles of some soups, one after another."""
+    return Soup(np.concatenate([each.corners for each in soups]), np.concatenate([each.faces for each in soups]))

@@ -49,8 +49,8 @@ class Grid:
     """Rows that cross, and the pieces that they cut the exemplar into, up to 3^k of them.
 
     motions: float64 (k, 4, 4), which commute; counts: of the exemplar; sites: of each row the class of its sites, and
-    frames float64 (k, 4, 4) where the first of them stands. pieces: for each row 0, 1 or 2 as in ENDS, and the
-    triangles, as the exemplar has them first along all rows.
+    frames float64 (k, 4, 4) where the first of them stands. pieces: for each row 0, 1 or 2 as in ENDS, and pieces of
+    the surface's triangles, as the exemplar has them first along all rows.
     """
 
     motions: FloatArray
@@ -120,7 +120,9 @@ def crossing(grid: SurfaceGrid, dockers: Sequence[Docker], rows: Sequence[Row]) 
 
 def cut_grid(grid: SurfaceGrid, dockers: Sequence[Docker], rows: Sequence[Row], seams: dict[int, Seam]) -> Grid:
     """The pieces of a grid of rows that cross: what all of them cut the exemplar into, a cell of each row once."""
-    pieces: list[tuple[tuple[int, ...], Soup]] = [((), Soup(grid.corners, grid.faces))]
+    pieces: list[tuple[tuple[int, ...], Soup]] = [
+        ((), Soup(grid.corners, np.arange(len(grid.corners), dtype=np.int32)))
+    ]
     for row in rows:
         held = [dockers[row.dockers[place]].cells for place in (0, 1, -1)]
         frames = _frames(dockers[row.dockers[0]].frame, row.motion, len(row.dockers))

@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from stages.exemplars.symmetry.cells import cell_keys
 from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["among", "items_in", "items_moved_into", "keys_at"]
+__all__ = ["Chosen", "among", "items_in", "items_moved_into", "keys_at"]
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """Which of many things are chosen, a bit each, uint8 (bytes,); how many there are, and how many of them are."""
+
+    bits: ByteArray
+    count: int
+    chosen: int
+
+    @classmethod
+    def of(cls, chosen: BoolArray) -> Chosen:
+        """Those that are `chosen`, bool (n,)."""
+        return cls(np.packbits(chosen), len(chosen), int(chosen.sum()))
+
+    def __len__(self) -> int:
+        return self.chosen
+
+    @property
+    def places(self) -> IntArray:
+        """Where they are, int32 ascending."""
+        return np.flatnonzero(np.unpackbits(self.bits, count=self.count)).astype(np.int32)
 
 
 def items_in(grid: SurfaceGrid, cells: np.ndarray) -> np.ndarray:

@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.derivations import START, Derivation, Place
 from stages.exemplars.symmetry.matching import matched_items
-from stages.exemplars.symmetry.places import items_in
+from stages.exemplars.symmetry.places import Chosen, items_in
 from stages.exemplars.symmetry.seams import Seam, seam_of, widened
 from stages.exemplars.symmetry.sites import Docker, beside
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.exemplars.symmetry.terminals import Cuts, Terminal
-from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 
 __all__ = ["Production", "productions", "seams_of"]
@@ -55,8 +56,8 @@ def seams_of(grid: SurfaceGrid, dockers: Sequence[Docker]) -> dict[int, Seam]:
 
 def productions(
     grid: SurfaceGrid, dockers: Sequence[Docker], seams: dict[int, Seam], rng: np.random.Generator
-) -> list[Production]:
-    """The productions of an exemplar, those of START first.
+) -> tuple[list[Production], Soup]:
+    """The productions of an exemplar, those of START first, and all pieces that their terminals may have.
 
     Dockers that lie in a docker are its children; of those that overlap some are chosen, in at most SETS ways, each a
     production of its own. Of a child that overlaps what is chosen its own children are tried, one level. Productions
@@ -66,19 +67,19 @@ def productions(
     every = [*dockers, whole]
     inside, apart = _relations(grid, every)
     cuts = Cuts(grid, every, seams)
-    found: list[tuple[Production, IntArray]] = []
+    found: list[tuple[Production, Chosen]] = []
     original: dict[int, Derivation] = {}
     # smallest first: what gives a docker back is made of what gives those in it back
     for node in np.argsort([each.area for each in every], kind="stable").tolist():
         for chosen in _independent(node, inside, apart, rng):
             if not all(each in original for each in chosen):
                 continue
-            cells = _rest(grid, every, node, chosen)
+            left = _rest(grid, every, node, chosen)
             terminal = cuts.between(node, chosen)
-            if not len(terminal) or not _faithful(grid, terminal, cells):
+            if not len(terminal) or not _faithful(grid, terminal, np.flatnonzero(left)):
                 continue
             places = tuple(Place(every[each].site, every[each].frame, original[each]) for each in chosen)
-            made = Production(every[node].site, every[node].frame, terminal, places), cells
+            made = Production(every[node].site, every[node].frame, terminal, places), Chosen.of(left)
             known, order = len(found), tuple(range(len(places)))
             for number, each in enumerate(found):
                 same = _equal(grid, each, made, seams)
@@ -89,7 +90,7 @@ def productions(
                 found.append(made)
             # places of one production lie elsewhere in the exemplar, with other things in them
             original.setdefault(node, Derivation(known, tuple(places[each].original for each in order)))
-    return _by_site([each for each, _ in found])
+    return _by_site([each for each, _ in found]), cuts.pieces()
 
 
 def _relations(grid: SurfaceGrid, every: Sequence[Docker]) -> tuple[BoolArray, BoolArray]:
@@ -132,16 +133,16 @@ def _direct(node: int, inside: BoolArray) -> np.ndarray:
     return found
 
 
-def _rest(grid: SurfaceGrid, every: Sequence[Docker], node: int, chosen: tuple[int, ...]) -> IntArray:
-    """The cells of a docker that are in none of those chosen in it."""
+def _rest(grid: SurfaceGrid, every: Sequence[Docker], node: int, chosen: tuple[int, ...]) -> BoolArray:
+    """Which cells are of a docker and in none of those chosen in it, bool (n,)."""
     left = np.zeros(len(grid), dtype=bool)
     left[every[node].cells] = True
     for each in chosen:
         left[every[each].cells] = False
-    return np.flatnonzero(left).astype(np.int32)
+    return left
 
 
-def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: IntArray) -> bool:
+def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: np.ndarray) -> bool:
     """Whether triangles that were cut out are those of some cells, but for the border: a seam that moved here may part
     something else where sheets lie in one cell."""
     wanted = float(grid.area[cells].sum())
@@ -150,7 +151,7 @@ def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: IntArray) -> bool:
 
 
 def _equal(
-    grid: SurfaceGrid, one: tuple[Production, IntArray], other: tuple[Production, IntArray], seams: dict[int, Seam]
+    grid: SurfaceGrid, one: tuple[Production, Chosen], other: tuple[Production, Chosen], seams: dict[int, Seam]
 ) -> tuple[int, ...] | None:
     """Whether two productions, each with its cells, are equal in their sites, their places, and what is left: for each
     place of the first which of the second it is, None where they are not."""
@@ -176,7 +177,7 @@ def _equal(
         order.append(same[0])
     alike = all(
         bool(matched_items(grid, way, items_in(grid, held)).mean() > ALIKE)
-        for way, held in ((motion, cells), (invert(motion), others))
+        for way, held in ((motion, cells.places), (invert(motion), others.places))
     )
     return tuple(order) if alike else None
 

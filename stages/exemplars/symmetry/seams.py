@@ -38,7 +38,7 @@ def seam_of(grid: SurfaceGrid, border: IntArray, cells: IntArray) -> Seam:
     return Seam(band, band[among(cells, band)])
 
 
-def widened(grid: SurfaceGrid, cells: IntArray, steps: int) -> BoolArray:
+def widened(grid: SurfaceGrid, cells: np.ndarray, steps: int) -> BoolArray:
     """Which cells of the grid are at most so many steps from `cells`, bool (n,)."""
     chosen = np.zeros(len(grid), dtype=bool)
     chosen[cells] = True

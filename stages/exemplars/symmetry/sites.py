@@ -73,7 +73,7 @@ def dockers_of(grid: SurfaceGrid, motions: FloatArray) -> list[Docker]:
     return _identified(grid, found, np.stack([each for one in motions for each in (one, invert(one))]), kept)
 
 
-def beside(grid: SurfaceGrid, cells: IntArray) -> IntArray:
+def beside(grid: SurfaceGrid, cells: np.ndarray) -> IntArray:
     """The cells around `cells`, int32, ascending."""
     around = widened(grid, cells, 1)
     around[cells] = False

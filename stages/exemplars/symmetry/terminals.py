@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
 
 import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup, joined
 from stages.exemplars.symmetry.derivations import START
+from stages.exemplars.symmetry.places import Chosen
 from stages.exemplars.symmetry.seams import Seam, cut_out
 from stages.exemplars.symmetry.sites import Docker
 from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.shape.arrays import BoolArray, ByteArray, IntArray
+from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
 
-__all__ = ["Cuts", "Terminal"]
+__all__ = ["Cuts", "Terminal", "alone"]
 
 OUTSIDE, INSIDE, CUT = 0, 1, 2
 """Where a triangle lies: outside a docker, in it, or on both sides of its seam."""
@@ -23,37 +23,43 @@ OUTSIDE, INSIDE, CUT = 0, 1, 2
 
 @dataclass(frozen=True)
 class Terminal:
-    """Triangles of a surface, and pieces of them that seams have cut: of many terminals that have much in common none
-    holds what is whole.
+    """Triangles of a surface and pieces of them that seams have cut. Of many terminals that have much in common none
+    holds what it shares with others.
 
-    surface: all triangles; whole: places of those that are whole, int32; cut: the pieces.
+    whole: of a surface's triangles those that are whole; cut: pieces that no other terminal has; pieces: places among
+    all that one seam cuts, int32; area: of all together.
     """
 
-    surface: Soup
-    whole: IntArray
+    whole: Chosen
     cut: Soup
+    pieces: IntArray
+    area: float
 
     def __len__(self) -> int:
-        return len(self.whole) + len(self.cut)
+        return len(self.whole) + len(self.cut) + len(self.pieces)
 
-    @cached_property
-    def area(self) -> float:
-        """Area of all triangles."""
-        return self.surface.select(self.whole).area + self.cut.area
 
-    def soup(self) -> Soup:
-        """All of its triangles."""
-        return joined(self.surface.select(self.whole), self.cut)
+def alone(soup: Soup) -> Terminal:
+    """Triangles that have nothing in common with others."""
+    nothing = np.empty(0, dtype=np.int32)
+    return Terminal(Chosen.of(nothing.astype(bool)), soup, nothing, soup.area)
 
 
 @dataclass(frozen=True)
 class _Side:
     """Where each triangle of a surface lies, uint8 (f,): OUTSIDE of a docker, INSIDE or CUT; and of those that are cut
-    the pieces within it and beyond."""
+    the pieces within it and beyond, which are `first` and following among the pieces of all dockers."""
 
     of: ByteArray
     within: Soup
     beyond: Soup
+    first: int
+
+    def pieces(self, within: bool, chosen: BoolArray) -> tuple[IntArray, FloatArray]:
+        """The pieces on one side of chosen triangles, bool (f,): their places and areas."""
+        soup, first = (self.within, self.first) if within else (self.beyond, self.first + len(self.within))
+        places = np.flatnonzero(chosen[soup.faces])
+        return (first + places).astype(np.int32), soup.areas[places]
 
 
 class Cuts:
@@ -64,6 +70,12 @@ class Cuts:
         self._grid, self._every, self._seams = grid, every, seams
         self._whole = Soup(grid.corners, grid.faces)
         self._known: dict[int, _Side] = {}
+        self._count = 0
+
+    def pieces(self) -> Soup:
+        """The pieces of all triangles that seams have cut, one at a time."""
+        every = [soup for each in self._known.values() for soup in (each.within, each.beyond)]
+        return joined(*every, Soup(np.empty((0, 3, 3)), np.empty(0, dtype=np.int32)))
 
     def between(self, node: int, chosen: Sequence[int]) -> Terminal:
         """The triangles of docker `node` that are in none of those chosen."""
@@ -74,15 +86,15 @@ class Cuts:
             left &= each.of != INSIDE
             seams += each.of == CUT
         once = left & (seams == 1)
-        pieces = [first.within.select(once[first.within.faces])]
-        pieces += [each.beyond.select(once[each.beyond.faces]) for each in others]
+        pieces = [first.pieces(True, once), *(each.pieces(False, once) for each in others)]
         places = np.flatnonzero(left & (seams > 1)).astype(np.int32)
-        soup = self._cut_out(Soup(self._grid.corners[places], places), node)[0]
+        cut = self._cut_out(Soup(self._whole.corners[places], places), node)[0]
         for number in chosen:
-            soup = self._cut_out(soup, number)[1]
-        cut = reduce(joined, pieces, soup)
-        whole = np.flatnonzero(left & (seams == 0)).astype(np.int32)
-        return Terminal(self._whole, whole, Soup(cut.corners, self._whole.faces[cut.faces]))
+            cut = self._cut_out(cut, number)[1]
+        whole = left & (seams == 0)
+        area = float(self._whole.areas[whole].sum())
+        area += float(np.concatenate([cut.areas, *(areas for _, areas in pieces)]).sum())
+        return Terminal(Chosen.of(whole), cut, np.concatenate([found for found, _ in pieces]), area)
 
     def _side(self, place: int) -> _Side:
         if place not in self._known:
@@ -93,7 +105,8 @@ class Cuts:
             of[(ins == 1) & (outs == 0)] = INSIDE
             of[(ins == 0) & (outs == 1)] = OUTSIDE
             within, beyond = (each.select(of[each.faces] == CUT) for each in (within, beyond))
-            self._known[place] = _Side(of, within, beyond)
+            self._known[place] = _Side(of, within, beyond, self._count)
+            self._count += len(within) + len(beyond)
         return self._known[place]
 
     def _cut_out(self, soup: Soup, place: int) -> tuple[Soup, Soup]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["Sides", "sides_by_edge", "welded"]
+__all__ = ["Sides", "WeldedSurface", "sides_by_edge", "welded"]
 
 MIX = -7046029254386353131
 """An odd number whose bits are about half ones: what is multiplied by it differs in its high bits (golden ratio)."""
@@ -22,12 +22,38 @@ def welded(corners: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]
     By hashing: as long as vertices are few a corner, five times as fast as sorting all of them.
     """
     points = corners.reshape(-1, 3)
-    rounded = np.round(points / tolerance) + 0.0 if tolerance else points + 0.0
+    rounded = _rounded(points, tolerance)
     place, first = _numbered(np.ascontiguousarray(rounded).view(np.int64))
     order = np.lexsort(rounded[first].T[::-1])
     number = np.empty(len(order), dtype=np.int32)
     number[order] = np.arange(len(order), dtype=np.int32)
     return number[place].reshape(-1, 3), points[first[order]]
+
+
+def _rounded(points: FloatArray, tolerance: float) -> FloatArray:
+    """Points (n, 3) on a lattice of `tolerance`, where they are equal if they are one vertex."""
+    rounded: FloatArray = np.round(points / tolerance) + 0.0 if tolerance else points + 0.0
+    return rounded
+
+
+class WeldedSurface:
+    """Triangles (f, 3, 3) that are welded once, for many meshes of some of them each and of little else."""
+
+    def __init__(self, corners: FloatArray, tolerance: float) -> None:
+        self._points = corners.reshape(-1, 3)
+        self._tolerance = tolerance
+        self._places, vertices = welded(corners, tolerance)
+        self._rows = _rounded(vertices, tolerance)
+
+    def around(self, first: IntArray, others: FloatArray, last: IntArray) -> tuple[IntArray, FloatArray]:
+        """What `welded` makes of triangles at places `first` (n,), then `others` (m, 3, 3), then those at `last`."""
+        places, vertices = welded(others, self._tolerance)
+        rows = _rounded(vertices, self._tolerance)
+        faces, source = _merged(self._places, self._rows, first, places, rows, last)
+        own = source >= 0
+        found = np.empty((len(source), 3))
+        found[own], found[~own] = self._points[source[own]], vertices[-1 - source[~own]]
+        return faces, found
 
 
 @dataclass(frozen=True)
@@ -81,3 +107,59 @@ def _numbered(rows):
             total += 1
         place[n] = table[slot]
     return place, first[:total].copy()
+
+
+@numba.njit(cache=True)
+def _merged(places, rows, first, others, other_rows, last):
+    """The vertices of triangles `first` out of `places` (f, 3), of `others` (m, 3), and of `last` out of `places`, in
+    the order of both their ascending rows (v, 3) and (w, 3), equal ones once: int32 (n, 3), and where each vertex comes
+    first: at which corner of the surface or, of the others, -1 less its place there."""
+    corner, early = np.full(len(rows), -1, dtype=np.int64), np.zeros(len(rows), dtype=np.bool_)
+    for chosen, is_early in ((first, True), (last, False)):
+        for triangle in chosen:
+            for k in range(3):
+                vertex = places[triangle, k]
+                if corner[vertex] < 0:
+                    corner[vertex], early[vertex] = 3 * triangle + k, is_early
+    number, other_number = np.empty(len(rows), dtype=np.int32), np.empty(len(other_rows), dtype=np.int32)
+    source = np.empty(len(rows) + len(other_rows), dtype=np.int64)
+    total, other = 0, 0
+    for vertex in range(len(rows)):
+        if corner[vertex] < 0:
+            continue
+        while other < len(other_rows) and _before(other_rows[other], rows[vertex]):
+            other_number[other], source[total] = total, -1 - other
+            total, other = total + 1, other + 1
+        number[vertex], source[total] = total, corner[vertex]
+        if other < len(other_rows) and not _before(rows[vertex], other_rows[other]):
+            other_number[other] = total
+            if not early[vertex]:
+                source[total] = -1 - other
+            other += 1
+        total += 1
+    for rest in range(other, len(other_rows)):
+        other_number[rest], source[total] = total, -1 - rest
+        total += 1
+    faces, n = np.empty((len(first) + len(others) + len(last), 3), dtype=np.int32), 0
+    for triangle in first:
+        for k in range(3):
+            faces[n, k] = number[places[triangle, k]]
+        n += 1
+    for triangle in range(len(others)):
+        for k in range(3):
+            faces[n, k] = other_number[others[triangle, k]]
+        n += 1
+    for triangle in last:
+        for k in range(3):
+            faces[n, k] = number[places[triangle, k]]
+        n += 1
+    return faces, source[:total].copy()
+
+
+@numba.njit(cache=True)
+def _before(one, other):
+    """Whether a point comes before another in lexicographic order."""
+    for d in range(3):
+        if one[d] != other[d]:
+            return one[d] < other[d]
+    return False

@@ -9,13 +9,27 @@ from eval.similarity import r_similarity, triangles_of
 from stages.grammars.collisions import Collisions
 from stages.grammars.derivation import derivation_text, pieces_of, shape_of_text, surface_digest
 from stages.grammars.drawing import Collided, random_counts, random_derivation
-from stages.grammars.extraction import Mesh, extract
+from stages.grammars.extraction import Extraction, Mesh, extract
 from stages.grammars.grammar import ShapeGrammar
 from stages.shape.arrays import FloatArray
-from tests.stages.exemplars.symmetry.planted import mesh, prongs_and_bridge, spiral_stair, uneven_wall, wall
+from tests.stages.exemplars.symmetry.planted import (
+    blind_corners,
+    mesh,
+    prongs_and_bridge,
+    spiral_stair,
+    uneven_wall,
+    wall,
+)
 
 MOST = 8
 """So many shapes of a grammar are looked at."""
+
+
+def extraction(triangles: FloatArray, radius: float) -> Extraction:
+    """The grammar of triangles (f, 3, 3) in grey."""
+    vertices, faces = mesh(triangles)
+    grey = np.full((len(faces), 3), 160, np.uint8)
+    return extract(Mesh(vertices, faces, grey), "planted", radius, "z", np.random.default_rng(0))
 
 
 def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
@@ -42,16 +56,29 @@ def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
         (uneven_wall(), 0.03, 16, {2}),
         (prongs_and_bridge(), 0.02, 10, {1}),
         (spiral_stair(5), 0.03, 3, {1}),
+        (blind_corners(), 0.045, 4, {1}),
     ],
-    ids=["wall", "2-grid", "uneven wall", "interlocked dockers", "spiral stair"],
+    ids=["wall", "2-grid", "uneven wall", "interlocked dockers", "spiral stair", "rows that do not tile"],
 )
 def test_every_shape_is_r_similar(triangles: FloatArray, radius: float, classes: int, rows: set[int]) -> None:
-    vertices, faces = mesh(triangles)
-    grey = np.full((len(faces), 3), 160, np.uint8)
-    found = extract(Mesh(vertices, faces, grey), "planted", radius, "z", np.random.default_rng(0))
+    found = extraction(triangles, radius)
     assert len({each.site for each in found.dockers}) == classes
     assert {len(each.counts) for each in found.grammar.grids} == rows
     shapes = shapes_of(found.grammar)
     assert len(shapes) >= MOST - 1
     for shape in shapes:
         assert r_similarity(triangles, shape, found.grammar.radius, 60, np.random.default_rng(0)).share == 1.0
+
+
+def test_rows_that_cross_otherwise_from_cell_to_cell_make_no_2_grid() -> None:
+    """Symmetry figure 7b: bays and storeys are rows that overlap, by motions that commute."""
+    found = extraction(blind_corners(), 0.045)
+    cells: dict[tuple[float, ...], list[set[int]]] = {}
+    for row in found.rows:
+        first, last = (found.dockers[row.dockers[end]].cells for end in (0, -1))
+        along = tuple(np.abs(row.motion[:3, 3]).round(6).tolist())
+        cells.setdefault(along, []).append(set(first.tolist()) - set(last.tolist()))
+    assert set(cells) == {(1, 0, 0), (0, 0, 1)}
+    assert all(bays & storeys for bays in cells[1, 0, 0] for storeys in cells[0, 0, 1])
+    assert len(found.grammar.grids) == len(found.rows) == 4
+    assert all(len(each.counts) == 1 for each in found.grammar.grids)

@@ -104,6 +104,18 @@ def uneven_wall() -> np.ndarray:
     return blocks(x, [0.0, 0.3], z, solid)
 
 
+def blind_corners() -> np.ndarray:
+    """A wall of four by four windows without those in its corners. Bays and storeys can be put in, at sites that go
+    around the corners: where one of bays crosses one of storeys, it does not in the next bay (symmetry figure 7b)."""
+    ticks = [0.0, *(k + o for k in range(4) for o in (0.2, 0.8)), 4.0]
+
+    def solid(across: float, _: float, up: float) -> bool:
+        corner = int(across) in (0, 3) and int(up) in (0, 3)
+        return corner or not (_in(across, 4, 1, 0.2) and _in(up, 4, 1, 0.2))
+
+    return blocks(ticks, [0.0, 0.3], ticks, solid)
+
+
 def prongs_and_bridge() -> np.ndarray:
     """A plate with two prongs, and nine beside them two prongs with a bar between them."""
     return blocks(
