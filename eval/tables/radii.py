@@ -26,10 +26,14 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 
 def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
     from eval.radii import extractions, radii_sheet, radii_table
+    from stages.grammars.settings import LARGEST_RADIUS, LEAST_RADIUS
 
     for path in paths:
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")
+    for radius in asked.radii:
+        if not LEAST_RADIUS <= radius <= LARGEST_RADIUS:
+            raise ConfigError(f"--radii: {radius:g} is not from {LEAST_RADIUS:g} to {LARGEST_RADIUS:g} longest sides")
     found = {path: extractions(path, sorted(asked.radii)) for path in paths}
     return Answer(
         [radii_table(each) for each in found.values()], sheets=[radii_sheet(path, each) for path, each in found.items()]

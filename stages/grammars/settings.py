@@ -9,7 +9,10 @@ from pydantic import Field, field_validator, model_validator
 from pipeline.config import ExistingFile, StrictModel
 from stages.shape.collection.origin import Credit
 
-__all__ = ["GrammarConfig", "GrammarSplitConfig", "GrammarsConfig"]
+__all__ = ["LARGEST_RADIUS", "LEAST_RADIUS", "GrammarConfig", "GrammarSplitConfig", "GrammarsConfig"]
+
+LEAST_RADIUS, LARGEST_RADIUS = 0.004, 0.1
+"""Of similarity, as shares of the longest side."""
 
 
 class GrammarConfig(StrictModel):
@@ -27,8 +30,8 @@ class GrammarConfig(StrictModel):
     credit: Credit = Field(default_factory=Credit, exclude=True, description="Whose the model is.")
     radius: float = Field(
         0.016,
-        ge=0.004,
-        le=0.1,
+        ge=LEAST_RADIUS,
+        le=LARGEST_RADIUS,
         description="Radius of similarity, as a share of the longest side of the model's box: every neighbourhood of "
         "this size in a shape is one of the model's. Smaller finds more sites, and takes longer.",
     )

@@ -26,3 +26,12 @@ def test_a_row_and_a_row_of_pictures_for_each_radius(tmp_path: Path, capsys: pyt
 def test_a_file_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["radii", str(tmp_path / "none.glb")]) == 2
     assert "none.glb" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("radius", ["0", "-0.01", "1.6", "nan"])
+def test_a_radius_that_no_config_may_have_is_refused_before_any_work(
+    radius: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "wall.obj").write_text("never read")
+    assert main(["radii", str(tmp_path / "wall.obj"), "--radii", "0.03", radius]) == 2
+    assert "0.004 to 0.1" in capsys.readouterr().err
