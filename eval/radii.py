@@ -25,10 +25,10 @@ SHAPES = 2
 CELL = 200
 
 
-def extractions(path: Path, radii: Sequence[float]) -> dict[float, Extraction]:
-    """The grammar of the model in a file, all of it one mesh, for each radius, as a share of the longest side."""
+def extractions(path: Path, radii: Sequence[float], up: Literal["y", "z"]) -> dict[float, Extraction]:
+    """The grammar of the model in a file, all of it one mesh whose axis `up` points up, for each radius, as a share of
+    the longest side."""
     model = read_model(path, "components")
-    up: Literal["y", "z"] = "z" if model.up == "z" else "y"
     name = path.parent.name if path.stem == "model" else path.stem
     mesh = mesh_of(model)
     return {each: extract(mesh, name, each, up, decision_rng(0, "radii", name)) for each in radii}

@@ -34,7 +34,7 @@ def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
     for radius in asked.radii:
         if not LEAST_RADIUS <= radius <= LARGEST_RADIUS:
             raise ConfigError(f"--radii: {radius:g} is not from {LEAST_RADIUS:g} to {LARGEST_RADIUS:g} longest sides")
-    found = {path: extractions(path, sorted(asked.radii)) for path in paths}
+    found = {path: extractions(path, sorted(asked.radii), asked.up) for path in paths}
     return Answer(
         [radii_table(each) for each in found.values()], sheets=[radii_sheet(path, each) for path, each in found.items()]
     )

@@ -21,6 +21,12 @@ def test_a_row_and_a_row_of_pictures_for_each_radius(tmp_path: Path, capsys: pyt
     assert [each[0].strip() for each in rows] == ["3.0%", "6.0%"]
     assert int(rows[0][1].replace(",", "")) > 3 * int(rows[1][1].replace(",", ""))
     assert (tmp_path / "eval" / "radii_wall.png").read_bytes().startswith(b"\x89PNG")
+    assert int(rows[1][3]) > 0
+    # lying on its back it has fewer motions that keep upright what is up, and so fewer sites
+    command = ["radii", str(tmp_path / "wall.obj"), "--radii", "0.06", "--up", "z", "--out", str(tmp_path)]
+    assert main(command) == 0
+    lying = [line.split("|")[1:-1] for line in capsys.readouterr().out.splitlines() if line.startswith("| 6.0%")]
+    assert lying[0][3:6] != rows[1][3:6]
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
