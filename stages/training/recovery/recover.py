@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from stages.training.checkpoint import CheckpointError, weights_of_kind
 from stages.training.recovery.fitting import Fit, Up, best_fit, first_look
 from stages.training.recovery.reading import Input, checked_cloud, ink_of
 from stages.training.recovery.refinement import Guess, Refined, refine
+from stages.training.recovery.strays import strays_of
 from stages.training.recovery.trained import KIND, TrainedRecovery, load_recovery
 
 __all__ = ["SHIPPED", "Models", "Recovered", "find_models", "recover", "recover_input"]
@@ -96,7 +97,8 @@ def recover(
     program: which; empty: the likeliest of those that come with Shapemill and those that `models` know. budget: shapes
     that are made for it at most, besides those that up and program are found with.
 
-    Equal arguments have equal answers. Raises InputError for what is neither a cloud nor a drawing, ConfigError for a
+    Points that stand alone beside the shape are left out, and a warning says how many. Equal arguments have equal
+    answers. Raises InputError for what is neither a cloud nor a drawing, ConfigError for a
     program that is not there.
     """
     if np.asarray(source).dtype == np.uint8:
@@ -111,6 +113,7 @@ def recover_input(
 ) -> Recovered:
     """`recover` of what `read_inputs` has read. turned: whether the front of a cloud may look along any axis, and not
     only along the program's."""
+    given, strays = _without_strays(given)
     kind = "points" if given.ink is None else "sketch"
     names = [program] if program else sorted({*program_names(), *(name for name, known in models if known == kind)})
     looks = [first_look(find_program(name), models.get((name, kind)), given, up, turned, seed) for name in names]
@@ -119,7 +122,15 @@ def recover_input(
         glances = [refine(each.program, each.guess, each.target, GLANCE, rng).distance for each in looks]
         looks = [looks[int(np.argmin(glances))]]
     fit = best_fit(looks[0], given, up, turned, budget, seed)
-    return _told(fit, kind, guessed_program=not program)
+    return _told(fit, kind, strays, guessed_program=not program)
+
+
+def _without_strays(given: Input) -> tuple[Input, int]:
+    """A cloud without the points that lie beside it, and how many these are."""
+    if given.points is None:
+        return given, 0
+    strays = strays_of(given.points)
+    return replace(given, points=given.points[~strays]), int(strays.sum())
 
 
 def find_models(*folders: Path) -> tuple[dict[tuple[str, str], TrainedRecovery], list[str]]:
@@ -157,7 +168,7 @@ def _models_in(folder: Path, wrong: list[str]) -> dict[tuple[str, str], TrainedR
     return found
 
 
-def _told(fit: Fit, kind: str, guessed_program: bool) -> Recovered:
+def _told(fit: Fit, kind: str, strays: int, guessed_program: bool) -> Recovered:
     """A fit, and what speaks against it."""
     look, refined, program = fit.look, fit.refined, fit.look.program
     warnings = []
@@ -165,6 +176,8 @@ def _told(fit: Fit, kind: str, guessed_program: bool) -> Recovered:
         warnings.append(f"no program was named: {program.name} fits best")
     if look.model is None:
         warnings.append(f"there is no trained model of {program.name} for {kind}: searched from its base shape alone")
+    if strays:
+        warnings.append(f"{strays:,} points of the cloud stand alone, beside the shape, and were left out")
     if fit.missing > 0.0:
         warnings.append(
             f"the cloud is partial: beyond its edge lies {fit.missing:.0%} of the shape that was found, of which the "
