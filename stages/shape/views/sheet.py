@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ __all__ = ["Cell", "Section", "contact_sheet", "picture_png"]
 TITLE_INK = (32, 30, 34)
 CAPTION_INK = (122, 116, 112)
 RULE = (226, 221, 213)
+NOTE_ROOM = 180
+"""Pixels beside a title, of a cell of 320, that a note has at least."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Section:
 
 def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int = 320) -> ByteArray:
     """The sheet, uint8 (h, w, 3). Pictures are scaled to `cell_width` pixels (times the section's span, and the gaps
-    between); rows of unequal length stay ragged.
+    between); rows of unequal length stay ragged. Where titles are longer than rows, the sheet is as wide as they are.
 
     Margins and letters grow with `cell_width`. Raises ValueError where there is no picture at all.
     """
@@ -52,7 +55,7 @@ def contact_sheet(sections: Sequence[Section], title: str = "", cell_width: int 
     margin, gap = round(40 * unit), round(16 * unit)
     fonts = {"title": _font(round(30 * unit), True), "head": _font(round(19 * unit), True)}
     fonts |= {"caption": _font(round(13.5 * unit), False), "note": _font(round(14 * unit), False)}
-    width = 2 * margin + columns * cell_width + (columns - 1) * gap
+    width = 2 * margin + max(columns * cell_width + (columns - 1) * gap, _longest(sections, title, fonts, unit))
     widths = [section.span * (cell_width + gap) - gap for section in sections]
     heights = _row_heights(sections, widths, unit)
     notes = [_note_lines(each, fonts, width - 2 * margin, unit) for each in sections]
@@ -122,6 +125,14 @@ def _scaled(picture: ByteArray, width: int) -> Any:
         light = np.asarray(image)[..., None] / 255.0
         image = Image.fromarray(np.rint(light * np.array(PAPER)).astype(np.uint8))
     return image
+
+
+def _longest(sections: Sequence[Section], title: str, fonts: Mapping[str, Any], unit: float) -> int:
+    """Pixels that titles take, and some of each note beside them."""
+    lengths: list[float] = [fonts["title"].getlength(title)]
+    lengths += [fonts["head"].getlength(each.title) for each in sections]
+    lengths += [_after(each, fonts, unit) + NOTE_ROOM * unit for each in sections if each.title and each.note]
+    return ceil(max(lengths))
 
 
 def _after(section: Section, fonts: Mapping[str, Any], unit: float) -> float:
