@@ -109,8 +109,8 @@ def cloud_target(points: FloatArray, rng: np.random.Generator) -> CloudTarget:
 
 @dataclass(frozen=True)
 class DrawingTarget:
-    """The lines of a drawing: `pixels` float64 (n, 2), and `tree`, a search tree of them. Shapes are drawn as stage
-    `sketches` does by `config`, from `view`.
+    """The lines of a drawing: `ink` bool (SIDE, SIDE), and `far` float64 (SIDE, SIDE), how far each pixel is from them,
+    squared, in sides. Shapes are drawn as stage `sketches` does by `config`, from `view`.
 
     step: by how many degrees the camera is moved when the target is aligned again; zero before it is aligned at all.
     """
@@ -119,8 +119,8 @@ class DrawingTarget:
     config: SketchesConfig
     view: SketchView
     step: float
-    pixels: FloatArray
-    tree: Any
+    ink: BoolArray
+    far: FloatArray
 
     @property
     def camera(self) -> Camera:
@@ -128,12 +128,8 @@ class DrawingTarget:
         return jittered_camera(self.view, np.random.default_rng(0))
 
     def compared(self, parts: Sequence[Part]) -> tuple[float, DrawingTarget]:
-        from scipy.spatial import cKDTree
-
-        lines = _pixels(drawn(self.program, tuple(parts), self.view, self.config, np.random.default_rng(0)))
-        there, _ = self.tree.query(lines)
-        back, _ = cKDTree(lines).query(self.pixels)
-        return float((there**2).mean() + (back**2).mean()), self
+        lines = drawn(self.program, tuple(parts), self.view, self.config, np.random.default_rng(0))
+        return float(self.far[lines].mean() + _far(lines)[self.ink].mean()), self
 
     def floor(self, parts: Sequence[Part], rng: np.random.Generator) -> float:
         return 0.0
@@ -155,12 +151,9 @@ class DrawingTarget:
 
 def drawing_target(program: Program, config: SketchesConfig, ink: BoolArray) -> DrawingTarget:
     """The target of fitted ink (SIDE, SIDE). It is not aligned yet."""
-    from scipy.spatial import cKDTree
-
     # a line is looked for, not every pixel of it
     quick = config.model_copy(update={"supersample": 1, "size": SIDE})
-    pixels = _pixels(ink)
-    return DrawingTarget(program, quick, _steady(config.views[0]), 0.0, pixels, cKDTree(pixels))
+    return DrawingTarget(program, quick, _steady(config.views[0]), 0.0, ink, _far(ink))
 
 
 def _around(program: Program) -> Iterator[SketchView]:
@@ -174,8 +167,12 @@ def _moved(view: SketchView, azimuth: float, elevation: float) -> SketchView:
     return view.model_copy(update={"azimuth": view.azimuth + azimuth, "elevation": found})
 
 
-def _pixels(ink: BoolArray) -> FloatArray:
-    return np.argwhere(ink) / SIDE
+def _far(ink: BoolArray) -> FloatArray:
+    """How far each pixel of a square is from its ink, squared, in sides."""
+    from scipy.ndimage import distance_transform_edt
+
+    far: FloatArray = (distance_transform_edt(~ink) / SIDE) ** 2
+    return far
 
 
 def _steady(view: SketchView) -> SketchView:
