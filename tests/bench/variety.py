@@ -64,8 +64,8 @@ HEADER = (
 @dataclass
 class Finds:
     """What searches have found. keys: graph and histogram of each variant; features: float32 (10,) of each; curve:
-    numbers of variants after each quarter of the time; megabytes: the most memory that a process held; different: the
-    most different of them."""
+    numbers of variants after each quarter of the time; megabytes: the most memory that a process held; kept: the
+    first of them, where they are shown; different: the most different of those; rejects: why other tries gave none."""
 
     tries: int = 0
     keys: list[tuple[int, int]] = field(default_factory=list)
@@ -74,6 +74,8 @@ class Finds:
     crossings: Counter[str] = field(default_factory=Counter)
     megabytes: float = 0.0
     different: list[Assembly] = field(default_factory=list)
+    kept: list[Assembly] = field(default_factory=list)
+    rejects: Counter[str] = field(default_factory=Counter)
 
 
 def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig]:
@@ -104,7 +106,8 @@ def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int, shown: bo
             finds.features += [each.features for each in found]
             variants += found[: KEPT - len(variants)] if shown else []
         finds.curve.append(len(finds.keys))
-    finds.crossings = line.crossings
+    finds.crossings, finds.rejects = line.crossings, line.rejects
+    finds.kept = [each.assembly for each in variants]
     lists = (type_counts(kit, [each.assembly.types for each in of]) for of in (variants, kit.exemplars))
     finds.different = [variants[place].assembly for place in farthest_first(*lists, min(SHOWN, len(variants))).tolist()]
     finds.megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -26,9 +26,8 @@ def is_alike(graph, d, e):
 
 
 @numba.njit(cache=True)
-def pass_over(graph, over, most):
-    """Each dummy edge that the symmetry in hand can be continued by, as `lay_over` takes them, int64 (k, 4), k at most
-    `most`."""
+def pass_over(graph, over):
+    """Each dummy edge that the symmetry in hand can be continued by, as `go_on` takes them, int64 (k, 4)."""
     found = np.empty((64, 4), dtype=np.int64)
     count = 0
     for k in range(over.counts[DEFECTS]):
@@ -36,10 +35,9 @@ def pass_over(graph, over, most):
         v, w = graph.tails[d], graph.tails[e]
         first, second = graph.starts[v + 1] - graph.starts[v], graph.starts[w + 1] - graph.starts[w]
         for place in range(1, max(first, second)):
-            if count < most:
-                found = grown(found, count + 1)
-                found[count] = (d, e, 0 if first > second else 1, place)
-                count += 1
+            found = grown(found, count + 1)
+            found[count] = (d, e, 0 if first > second else 1, place)
+            count += 1
     contour, other = np.empty(len(graph.tails), dtype=np.int64), np.empty(len(graph.tails), dtype=np.int64)
     for row in range(over.counts[ROWS]):
         x, y = over.rows[row]
@@ -52,10 +50,9 @@ def pass_over(graph, over, most):
                 for j in range(0 if i > 0 else 1, nearest):
                     if is_alike(graph, contour[i], other[j]):
                         nearest = j
-                        if count < most:
-                            found = grown(found, count + 1)
-                            found[count] = (contour[i], other[j], -1, 0)
-                            count += 1
+                        found = grown(found, count + 1)
+                        found[count] = (contour[i], other[j], -1, 0)
+                        count += 1
                         break
     return found[:count]
 

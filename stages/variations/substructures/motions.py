@@ -57,13 +57,16 @@ class Moves:
 
     motions: float64 (k, 4, 4), bring each piece into the base; inside: bool (k, n + m), the parts of the base that
     leave and those of the giver that come; images: int16 (k, m), the part of the base that each part of the giver
-    coincides with, or -1; work: how many parts were laid upon others; is_whole: whether these are all, or what came
+    coincides with, or -1; meetings: how often they are met from all pairs of equal parts and their symmetries, each of
+    which would have to be tried if equivalent replacements were not factored out; work: how many parts were laid upon
+    others; is_whole: whether these are all, or what came
     first until a limit was met.
     """
 
     motions: FloatArray
     inside: np.ndarray
     images: np.ndarray
+    meetings: int
     work: int
     is_whole: bool
 
@@ -99,10 +102,12 @@ def find_moves(kit: Kit, up: int, base: tuple[Assembly, OrderedGraph], giver: tu
         base[1], giver[1], _placed(kit, base[0]), _placed(kit, giver[0]), np.ascontiguousarray(symmetries[:, :3, :3]),
         np.ascontiguousarray(symmetries[:, :3, 3]), starts, up, kit.pose_tolerance, base[0] is giver[0],
     )  # fmt: skip
-    turns, shifts, inside, images, work, is_whole = found
+    turns, shifts, inside, images, meetings, work, is_whole = found
     motions = np.tile(np.eye(4), (len(turns), 1, 1))
     motions[:, :3, :3], motions[:, :3, 3] = turns, shifts
-    return Moves(np.array([invert(each) for each in motions]).reshape(-1, 4, 4), inside, images, work, is_whole)
+    return Moves(
+        np.array([invert(each) for each in motions]).reshape(-1, 4, 4), inside, images, meetings, work, is_whole
+    )
 
 
 def _placed(kit: Kit, assembly: Assembly) -> _Placed:
@@ -119,17 +124,19 @@ def _placed(kit: Kit, assembly: Assembly) -> _Placed:
 
 @numba.njit(cache=True)
 def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same):
-    """Turns and shifts that lay the base upon the giver, what leaves and comes, images, the work, whether it is all."""
+    """Turns and shifts that lay the base upon the giver, what leaves and comes, images, meetings, work, whether it is
+    all."""
     n, m = len(a.types), len(b.types)
     most = 0
     for kind in range(len(starts) - 1):
         most = max(most, starts[kind + 1] - starts[kind])
     visited = np.zeros((n, m, most), dtype=np.bool_)
-    listed, count, work, is_whole = np.zeros(1 << 10, dtype=np.uint64), 0, 0, True
+    listed, count, work, meetings = np.zeros(1 << 10, dtype=np.uint64), 0, 0, 0
+    is_whole = True
     out_turns, out_shifts = np.empty((64, 9)), np.empty((64, 3))
     inside, images = np.empty((64, n + m), dtype=np.bool_), np.empty((64, m), dtype=np.int16)
     image, back, queue = np.full(n, -1), np.full(m, -1), np.empty(n, dtype=np.int64)
-    leader = np.empty(n + m, dtype=np.int64)
+    leader, line = np.empty(n + m, dtype=np.int64), np.empty(n + m, dtype=np.int64)
     keys = np.empty(n + m, dtype=np.uint64)
     comes, met = np.empty(n + m, dtype=np.bool_), np.empty(n + m, dtype=np.bool_)
     for v in range(n):
@@ -146,16 +153,17 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same):
                     continue
                 if same and v == w and np.abs(turn - np.eye(3)).max() < SAME_TURN:
                     continue
-                matched = _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited)
+                matched, ways = _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited)
                 work += len(here.types)
                 is_whole = work < MOST_WORK
                 if matched == 0:
                     continue
-                regions = _regions(a, b, here, there, turn, shift, image, back, queue, matched, leader)
-                if regions > 1:
+                _join_across(a, b, here, there, turn, shift, image, back, queue, matched, leader)
+                if not _is_one(a, b, image, queue, matched, leader, line):
                     keys[:], comes[:], met[:] = 0, False, False
                     for node in range(n + m):
                         if leader[node] >= 0:
+                            leader[node] = _root(leader, node)
                             keys[leader[node]] += mix(np.uint64(node + 7))
                             comes[leader[node]] |= node >= n
                     for k in range(matched):
@@ -164,6 +172,7 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same):
                     for root in range(n + m):
                         if leader[root] != root or not comes[root] or not met[root]:
                             continue
+                        meetings += ways
                         key = keys[root] | np.uint64(1)
                         if holds(listed, key):
                             continue
@@ -186,6 +195,7 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same):
         out_shifts[:count],
         inside[:count],
         images[:count],
+        meetings,
         work,
         is_whole,
     )
@@ -193,68 +203,114 @@ def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same):
 
 @numba.njit(cache=True)
 def _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited):
-    """Lay part upon part and tick off what lays them so; how many coincide."""
-    count = 0
+    """Lay part upon part and tick off what lays them so; how many coincide, and how many ways were ticked off."""
+    count, ways = 0, 0
     for x in range(len(here.types)):
-        place, kind = turn @ here.centroids[x] + shift, here.types[x]
+        (px, py, pz), kind = _moved(turn, shift, here.centroids[x]), here.types[x]
         low, end = there.firsts[kind], there.firsts[kind + 1]
         high = end
         while low < high:
             middle = (low + high) // 2
-            if there.centroids[there.order[middle], 0] < place[0] - tolerance:
+            if there.centroids[there.order[middle], 0] < px - tolerance:
                 low = middle + 1
             else:
                 high = middle
-        while low < end and there.centroids[there.order[low], 0] <= place[0] + tolerance:
+        while low < end and there.centroids[there.order[low], 0] <= px + tolerance:
             y = there.order[low]
             low += 1
-            if back[y] >= 0 or np.abs(place - there.centroids[y]).max() > tolerance:
+            if (
+                back[y] >= 0
+                or abs(py - there.centroids[y, 1]) > tolerance
+                or abs(pz - there.centroids[y, 2]) > tolerance
+            ):
                 continue
             rest = there.rotations[y].T @ turn @ here.rotations[x]
             for h in range(starts[kind], starts[kind + 1]):
                 if np.abs(rest - turns[h]).max() < SAME_TURN:
                     visited[x, y, h - starts[kind]] = True
                     image[x], back[y] = y, x
+                    ways += 1
             if image[x] >= 0:
                 queue[count] = x
                 count += 1
                 break
-    return count
+    return count, ways
 
 
 @numba.njit(cache=True)
-def _regions(a, b, here, there, turn, shift, image, back, queue, matched, leader):
-    """Find what hangs together of what does not coincide, in either shape or across a part that coincides, where two of
-    its neighbours take one place; the leader of each node, those of the giver counted on, -1 of matched ones, and how
-    many regions there are."""
+def _moved(turn, shift, place):
+    """The coordinates of a place that is turned and shifted."""
+    return (
+        turn[0, 0] * place[0] + turn[0, 1] * place[1] + turn[0, 2] * place[2] + shift[0],
+        turn[1, 0] * place[0] + turn[1, 1] * place[1] + turn[1, 2] * place[2] + shift[1],
+        turn[2, 0] * place[0] + turn[2, 1] * place[1] + turn[2, 2] * place[2] + shift[2],
+    )
+
+
+@numba.njit(cache=True)
+def _join_across(a, b, here, there, turn, shift, image, back, queue, matched, leader):
+    """Make each node a region of its own, those of the giver counted on, -1 of matched ones; and join those across a
+    part that coincides, where two of its neighbours take one place."""
     n, m = len(a.types), len(b.types)
     for node in range(n + m):
         is_matched = image[node] >= 0 if node < n else back[node - n] >= 0
         leader[node] = -1 if is_matched else node
-    for d in range(len(a.tails)):
-        _join(leader, a.tails[d], a.tails[a.twins[d]])
-    for d in range(len(b.tails)):
-        _join(leader, n + b.tails[d], n + b.tails[b.twins[d]])
     for k in range(matched):
         x, y = queue[k], image[queue[k]]
         for d in range(a.starts[x], a.starts[x + 1]):
             near = a.tails[a.twins[d]]
             if leader[near] < 0:
                 continue
-            place = turn @ here.centroids[near] + shift
+            px, py, pz = _moved(turn, shift, here.centroids[near])
             for e in range(b.starts[y], b.starts[y + 1]):
                 other = b.tails[b.twins[e]]
                 if leader[n + other] < 0:
                     continue
-                gap = place - there.centroids[other]
-                if (gap * gap).sum() < max(here.radii[near], there.radii[other]) ** 2:
+                gx, gy, gz = (
+                    px - there.centroids[other, 0],
+                    py - there.centroids[other, 1],
+                    pz - there.centroids[other, 2],
+                )
+                if gx * gx + gy * gy + gz * gz < max(here.radii[near], there.radii[other]) ** 2:
                     _join(leader, near, n + other)
-    regions = 0
-    for node in range(n + m):
-        if leader[node] >= 0:
-            leader[node] = _root(leader, node)
-            regions += leader[node] == node
-    return regions
+
+
+@numba.njit(cache=True)
+def _is_one(a, b, image, queue, matched, leader, line):
+    """Whether all that does not coincide is one region; else `leader` says what is: what hangs together in either shape
+    is joined.
+
+    It is looked at breadth-first from next to what coincides, and no farther than until one is seen, which is soon.
+    `line` int64 (n + m,) is room for what waits.
+    """
+    n, count, regions = len(a.types), 0, 0
+    is_met = np.zeros(len(leader), dtype=np.bool_)
+    for k in range(matched):
+        for graph, node, offset in ((a, queue[k], 0), (b, image[queue[k]], n)):
+            for d in range(graph.starts[node], graph.starts[node + 1]):
+                near = offset + graph.tails[graph.twins[d]]
+                if leader[near] >= 0 and not is_met[near]:
+                    is_met[near] = True
+                    line[count] = near
+                    regions += _root(leader, near) == near
+                    count += 1
+    head = 0
+    while regions > 1 and head < count:
+        node = line[head]
+        head += 1
+        graph, offset = (a, 0) if node < n else (b, n)
+        for d in range(graph.starts[node - offset], graph.starts[node - offset + 1]):
+            near = offset + graph.tails[graph.twins[d]]
+            if leader[near] < 0:
+                continue
+            if not is_met[near]:
+                is_met[near] = True
+                line[count] = near
+                count += 1
+            else:
+                regions -= _root(leader, node) != _root(leader, near)
+            _join(leader, node, near)
+    return regions <= 1
 
 
 @numba.njit(cache=True)

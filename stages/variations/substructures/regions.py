@@ -79,6 +79,8 @@ def _find_rows(graph, by_docking, over):
                 if y >= 0:
                     over.row_of[y] = count
                 count += 1
+        if graph.starts[w + 1] - graph.starts[w] <= graph.starts[v + 1] - graph.starts[v]:
+            continue
         for y in range(graph.starts[w], graph.starts[w + 1]):
             if partner[y] < 0:
                 rows[count, 0] = -1

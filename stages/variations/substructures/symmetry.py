@@ -23,6 +23,7 @@ __all__ = [
     "WORK",
     "Overlay",
     "agree",
+    "go_on",
     "lay_over",
     "lift",
     "overlay",
@@ -101,10 +102,10 @@ def agree(graph, d, e, by_docking):
 
 
 @numba.njit(cache=True)
-def _match(graph, d, e, dummies, over):
+def _match(graph, d, e, side, place, over):
     """Lay the tail of dart e upon that of d, dart upon dart in their order; whether that could be done.
 
-    A row (d, e, side, place) of `dummies` says that, arriving there, one dart is passed over.
+    Of `side` 0 of the first, of 1 of the second, which has one dart more, the one at `place` from there is passed over.
     """
     v, w = graph.tails[d], graph.tails[e]
     if graph.types[v] != graph.types[w]:
@@ -114,17 +115,12 @@ def _match(graph, d, e, dummies, over):
         return False
     start, end, start_there, end_there = graph.starts[v], graph.starts[v + 1], graph.starts[w], graph.starts[w + 1]
     first, second = end - start, end_there - start_there
-    side, place = -1, -1
-    if first != second:
-        for k in range(len(dummies)):
-            if dummies[k, 0] == d and dummies[k, 1] == e:
-                side, place = dummies[k, 2], dummies[k, 3]
-        if side < 0:
-            if abs(first - second) == 1 and over.counts[DEFECTS] < MOST_DEFECTS:
-                over.defects[over.counts[DEFECTS], 0] = d
-                over.defects[over.counts[DEFECTS], 1] = e
-                over.counts[DEFECTS] += 1
-            return False
+    if first != second and side < 0:
+        if abs(first - second) == 1 and over.counts[DEFECTS] < MOST_DEFECTS:
+            over.defects[over.counts[DEFECTS], 0] = d
+            over.defects[over.counts[DEFECTS], 1] = e
+            over.counts[DEFECTS] += 1
+        return False
     over.image[v] = w
     over.image[w] = v
     over.queue[over.counts[MATCHED]] = v
@@ -145,54 +141,63 @@ def _match(graph, d, e, dummies, over):
 
 @numba.njit(cache=True)
 def lay_over(graph, d, e, by_docking, dummies, over):
-    """The greatest partial symmetry of two graphs side by side that lays dart e of the second upon dart d of the first;
-    a hash of it, 0 where it has no part at all.
+    """The greatest partial symmetry of two graphs side by side that lays dart e of the second upon dart d of the first,
+    gone on with over each of `dummies` int64 (q, 4) in turn, as `go_on` takes them; a sum of hashes that tells it, 0
+    where it has no part at all, or a dummy edge leads nowhere.
 
-    dummies int64 (q, 4): dummy edges of the dual (§4.4), which pass over what does not agree. Either (d, e, 0 or 1,
-    place), where the order of docking sites has one more in the first or in the second, or (x, y, -1, 0), darts beyond
-    an unmatched region, from which the symmetry goes on; it has no part at all where it cannot. `over` is as `lift`
-    leaves it. Breadth-first, so that where a way round leads elsewhere the nearer match stands.
+    `over` is as `lift` leaves it. Breadth-first, so that where a way round leads elsewhere the nearer match stands.
     """
     over.counts[CONFLICTS] = over.counts[DEFECTS] = over.counts[MATCHED] = 0
-    if not _match(graph, d, e, dummies, over):
-        return np.uint64(0)
-    _spread(graph, 0, by_docking, dummies, over)
-    total = np.uint64(0)
+    total = _extend(graph, d, e, -1, 0, by_docking, over)
     for k in range(len(dummies)):
-        if dummies[k, 2] >= 0:
-            total += pair_hash(dummies[k, 0], dummies[k, 3])
-            continue
-        begin = over.counts[MATCHED]
-        if not _match(graph, dummies[k, 0], dummies[k, 1], dummies, over):
+        more = go_on(graph, dummies[k], by_docking, over)
+        if more == 0:
             return np.uint64(0)
-        _spread(graph, begin, by_docking, dummies, over)
-    for k in range(over.counts[MATCHED]):
-        x = graph.starts[over.queue[k]]
-        total += pair_hash(x, over.partner[x])
-    return mix(total) | np.uint64(1)
+        total += more
+    return total
 
 
 @numba.njit(cache=True)
-def _spread(graph, head, by_docking, dummies, over):
-    """Go on from the matched nodes, from place `head` of the queue on, to all that they lead to."""
+def go_on(graph, dummy, by_docking, over):
+    """Go on with the symmetry in hand over one dummy edge of the dual (§4.4), which passes over what does not agree;
+    what its sum of hashes grows by, or 0 where that cannot be done.
+
+    dummy int64 (4,): either (d, e, 0 or 1, place), where the order of docking sites has one more in the first or in the
+    second, or (x, y, -1, 0), darts beyond an unmatched region, from which the symmetry goes on.
+    """
+    more = _extend(graph, dummy[0], dummy[1], dummy[2], dummy[3], by_docking, over)
+    return more + pair_hash(dummy[0], dummy[3]) if more != 0 and dummy[2] >= 0 else more
+
+
+@numba.njit(cache=True)
+def _extend(graph, d, e, side, place, by_docking, over):
+    """Match the tails of two darts, and all that they lead to; a sum of hashes of the pairs, 0 of none."""
+    begin, total = over.counts[MATCHED], np.uint64(0)
+    if not _match(graph, d, e, side, place, over):
+        return total
+    head = begin
     while head < over.counts[MATCHED]:
         v = over.queue[head]
         head += 1
+        x = graph.starts[v]
+        total += pair_hash(x, over.partner[x])
         for x in range(graph.starts[v], graph.starts[v + 1]):
             y = over.partner[x]
             if y < 0 or not agree(graph, x, y, by_docking):
                 continue
             back, ahead = graph.twins[x], graph.twins[y]
             if over.partner[back] != ahead:
-                _match(graph, back, ahead, dummies, over)
+                _match(graph, back, ahead, -1, 0, over)
+    return total
 
 
 @numba.njit(cache=True)
-def lift(graph, over):
-    """Take up what was laid out, so that the next symmetry can be."""
-    for k in range(over.counts[MATCHED]):
+def lift(graph, over, left):
+    """Take up what was laid out but the first `left` pairs of parts, so that the next symmetry can be."""
+    for k in range(left, over.counts[MATCHED]):
         v = over.queue[k]
         for node in (v, over.image[v]):
             over.image[node] = -1
             for x in range(graph.starts[node], graph.starts[node + 1]):
                 over.partner[x] = -1
+    over.counts[MATCHED] = left

@@ -8,6 +8,7 @@ matched is a replacement.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 import networkx as nx
@@ -26,9 +27,9 @@ Replaced = tuple[frozenset[int], frozenset[int], Pairs]
 """The parts of the base that leave, those of the giver that come, and the pairs that coincide at their border."""
 
 
-def replacements(kit: Kit, base: Assembly, giver: Assembly, *, upright: bool) -> set[Replaced]:
-    """All replacements of a piece of the base by one of the giver, which may be the same."""
-    found = set[Replaced]()
+def replacements(kit: Kit, base: Assembly, giver: Assembly, *, upright: bool) -> Counter[Replaced]:
+    """All replacements of a piece of the base by one of the giver, which may be the same; how often each is met."""
+    found = Counter[Replaced]()
     for motion in _motions(kit, base, giver):
         if upright and motion[1, 1] < UPRIGHT:
             continue

@@ -110,7 +110,9 @@ def check_against_all_motions(kit: Kit) -> int:
                 ]
                 assert moves.is_whole
                 assert len(found) == len(set(found))
-                assert set(found) == replacements(kit, base, giver, upright=up == 1)
+                wanted = replacements(kit, base, giver, upright=up == 1)
+                assert set(found) == set(wanted)
+                assert moves.meetings == wanted.total()
                 count += len(found)
     return count
 

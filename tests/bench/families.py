@@ -1,0 +1,196 @@
+"""Replaceable substructures of families of real models beside exchange, in the same CPU time (substructures §6).
+
+python -m tests.bench.families [--seconds 8] [--sheets DIR] [FAMILY...]
+
+Models are read from ../shared, where they lie beside the project; ten chairs are made by the program. Prints two
+Markdown tables: what can be replaced between the exemplars, and what searches find of it. CPU seconds of one process.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from itertools import combinations_with_replacement, product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from pipeline.places import write_file
+from stages.choices.sheet import forecast_sheet
+from stages.exemplars.build import build_kit, read_kit
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.programs.files import named_values, shape_glb
+from stages.programs.program import find_program
+from stages.shape.kit import Kit
+from stages.shape.shape import kit_shape
+from stages.variations.constraint import made_test
+from stages.variations.features import AXES, MIXED
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import SearchConfig, StretchConfig
+from stages.variations.substructures.motions import find_moves
+from stages.variations.substructures.operations import find_operations
+from stages.variations.substructures.sites import docking_graph
+from tests.bench.furniture import FURNITURE, MEANINGS, side_by_side
+from tests.bench.variety import Finds, configured, explore
+
+REAL = Path("../shared/exemplars")
+Family = tuple[Kit, SearchConfig]
+
+LISTED = (
+    "| family | parts | moves | normalised | by order | normalised | with dummy edges |\n"
+    "|---|---:|---:|---:|---:|---:|---:|"
+)
+FOUND = (
+    "| family | search | tries | known | too few or many parts | not embedded | clash | grammar | other | shapes "
+    "| stand | graphs | histograms | mixed | copied |\n"
+    "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+)
+REASONS = {
+    "known": ("duplicate",),
+    "size": ("too few parts", "too many parts"),
+    "not embedded": ("no embedding", "nothing but a gap to close", "at other angles", "not matched", "missing", "took"),
+    "clash": ("clash",),
+    "grammar": ("grammar",),
+}
+"""Words of the search's reasons for a reject, by column."""
+
+STOOD = 300
+"""So many shapes are asked whether all of their parts stand on something that stood so in the exemplars."""
+
+
+def _real(*folders: str, grammar: str = "multiset", up: str = "y") -> Family:
+    paths = tuple(ShapeFile(path=REAL / each / "model.glb") for each in folders)
+    chosen = {**STRICTEST, "grammar": grammar, "up": up}
+    return read_kit(KitConfig(name="family", shapes=paths).decide(chosen)), SearchConfig(duplicates="graph")
+
+
+def _dungeon() -> Family:
+    return _real("a12_dungeon_room_large", "a13_dungeon_junction", "a15_dungeon_full", grammar="count_and_pairs")
+
+
+def _vault() -> Family:
+    return _real("a26_crossvault", grammar="count_and_pairs", up="z")
+
+
+def _furniture() -> Family:
+    """As coarse as meanings may be: what is stretched by four at most and stands about as it stood."""
+    paths = [REAL / each / "model.glb" for each in FURNITURE]
+    config = KitConfig(
+        name="furniture", shapes=tuple(ShapeFile(path=path) for path in paths), types="meaning", meanings=MEANINGS
+    )
+    chosen = {
+        **STRICTEST,
+        "up": "z",
+        "grammar": "count_and_types",
+        "contact.tolerance": 0.02,
+        "disconnected": "largest",
+    }
+    kit, _ = build_kit(config.decide(chosen), side_by_side([read_model(path) for path in paths]))
+    return kit, SearchConfig(duplicates="graph", smallest=0.5, stretch=StretchConfig(most=4.0))
+
+
+def _chairs() -> Family:
+    program = find_program("chair")
+    with TemporaryDirectory() as folder:
+        paths = [
+            write_file(Path(folder) / f"{seed}.glb", shape_glb(program, named_values(program, str(seed))))
+            for seed in range(1, 11)
+        ]
+        config = KitConfig(name="chairs", shapes=tuple(ShapeFile(path=path) for path in paths), types="meaning")
+        kit = read_kit(config.decide({**STRICTEST, "contact.tolerance": 0.01}))
+    return kit, SearchConfig(duplicates="graph")
+
+
+FAMILIES: dict[str, Callable[[], Family]] = {
+    "dungeon": _dungeon,
+    "castle": lambda: configured("castle"),
+    "bridge": lambda: configured("bridge"),
+    "temple": lambda: configured("temple"),
+    "ring": lambda: configured("ring-segments"),
+    "crossvault": _vault,
+    "space base": lambda: configured("default/space-base"),
+    "space base hall": lambda: configured("spacebase-hall"),
+    "furniture": _furniture,
+    "chairs": _chairs,
+}
+
+
+def main() -> None:
+    """List what can be replaced in every family, search it both ways, and print the tables."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.families", description="Replacements of real models.")
+    parser.add_argument("families", nargs="*", help=f"families; all of {', '.join(FAMILIES)} if none is named")
+    parser.add_argument("--seconds", type=float, default=8.0, help="CPU seconds of each search")
+    parser.add_argument("--sheets", type=Path, metavar="DIR", help="draw the most different finds of each search there")
+    asked = parser.parse_args()
+    unknown = set(asked.families) - set(FAMILIES)
+    if unknown:
+        parser.error(f"there is no family {', '.join(sorted(unknown))}; families are {', '.join(FAMILIES)}")
+    rows: list[str] = []
+    print(LISTED, flush=True)
+    for name in asked.families or FAMILIES:
+        kit, config = FAMILIES[name]()
+        print(_listed(name, kit, config), flush=True)
+        for method in ("substructures", "exchange"):
+            way = config.model_copy(update={"method": method})
+            finds = explore(kit, way, asked.seconds, 0, shown=True)
+            rows.append(_found(name, method, kit, finds))
+            if asked.sheets and finds.different:
+                shapes = [kit_shape(kit, each) for each in finds.different]
+                path = asked.sheets / f"{name.replace(' ', '-')}-{method}.png"
+                write_file(path, forecast_sheet(kit, shapes, "Most different finds", name, method))
+    print("\n".join(["", FOUND, *rows]))
+
+
+def _listed(name: str, kit: Kit, config: SearchConfig) -> str:
+    """What can be replaced between the exemplars, each with itself too."""
+    up, dockings = {"y": 1, "z": 2}[kit.up] if config.upright else -1, ContactAnswers(kit).dockings
+    sides = [
+        (each, docking_graph(kit, each, dockings.label_edges(each.types, each.poses, each.edges)))
+        for each in (exemplar.assembly for exemplar in kit.exemplars)
+    ]
+    moves = [] if kit.by_meaning else [find_moves(kit, up, *pair) for pair in product(sides, repeat=2)]
+    operations = [
+        find_operations(a, b, config.dummies, by_docking=not kit.by_meaning)
+        for (_, a), (_, b) in combinations_with_replacement(sides, 2)
+    ]
+    plain = sum(each.plain for each in operations)
+    cut = "" if all(each.is_whole for each in operations) else " and more"
+    return (
+        f"| {name} | {' + '.join(str(len(each)) for each, _ in sides)} | {sum(map(len, moves)):,} | "
+        f"{_share(sum(map(len, moves)), sum(each.meetings for each in moves))} | {plain:,} | "
+        f"{_share(plain, sum(each.meetings for each in operations))} | {sum(map(len, operations)) - plain:,}{cut} |"
+    )
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part / whole:.1%}" if whole else "-"
+
+
+def _found(name: str, how: str, kit: Kit, finds: Finds) -> str:
+    """What a search has found, and how its other tries ended."""
+    counts = dict.fromkeys(REASONS, 0)
+    other = 0
+    for reason, count in finds.rejects.items():
+        column = next((each for each, words in REASONS.items() if any(word in reason for word in words)), None)
+        if column is None:
+            other += count
+        else:
+            counts[column] += count
+    unmet = made_test(kit, {"support": {}})
+    stand = np.mean([unmet(each) is None for each in finds.kept[:STOOD]]) if finds.kept else 0.0
+    features = np.array(finds.features).reshape(-1, len(AXES))
+    mixed = np.mean(features[:, AXES.index("mixture")] >= MIXED) if len(features) else 0.0
+    copied = np.median(features[:, AXES.index("copied")]) if len(features) else 0.0
+    found, tried = len(finds.keys), sum(finds.rejects.values()) + len(finds.keys)
+    cells = [f"{count:,}" for count in (tried, *counts.values(), other, found)]
+    graphs, histograms = ({key[place] for key in finds.keys} for place in (0, 1))
+    return (
+        f"| {name} | {how} | {' | '.join(cells)} | {stand:.0%} | {len(graphs):,} | {len(histograms):,} | {mixed:.0%} | "
+        f"{copied:.0%} |"
+    )
+
+
+if __name__ == "__main__":
+    main()
