@@ -37,6 +37,8 @@ def main(arguments: list[str]) -> int:
     """Do what the arguments ask for; 0, or 2 with a message where that cannot be, or 1 where a table of all failed."""
     # Solvers of small systems on a busy machine: threads that wait for each other take a hundred times as long.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Small networks there: threads that wait without sleeping take up to fifteen times the processor's time.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     tables = find_tables()
     asked = _parser(tables).parse_args(arguments)
     try:

@@ -25,7 +25,7 @@ from stages.training.program_lm.trained import load_program_lm
 from stages.training.program_vae.lines import node_lines
 from stages.training.program_vae.trained import load_program_vae
 
-__all__ = ["PROGRAM_KINDS", "category_programs", "program_models", "read_by_all", "told_without"]
+__all__ = ["PROGRAM_KINDS", "category_programs", "program_models", "program_shards", "read_by_all", "told_without"]
 
 PROGRAM_KINDS = ("program_vae", "program_lm")
 """The kinds that write whole programs; the others write cuboids."""
@@ -50,8 +50,13 @@ def told_without(trained: Trained[Any]) -> str:
 
 def category_programs(subject: Subject, category: str, split: str) -> list[Program]:
     """The programs of a category in a split of the dataset."""
-    shards = sorted(subject.places.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
+    shards = program_shards(subject, split)
     return [parse(each.text) for shard in shards for each in read_samples(shard) if each.kit == category]
+
+
+def program_shards(subject: Subject, split: str) -> list[Path]:
+    """The files of all programs in a split of the dataset."""
+    return sorted(subject.places.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
 
 
 def read_by_all(subject: Subject, category: str, split: str, most: int, rng: np.random.Generator) -> list[Program]:

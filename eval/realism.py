@@ -38,10 +38,11 @@ class Realism:
     fd: Cell
 
 
-def realism(samples: FloatArray, real: FloatArray, seed: int) -> Realism:
-    """Of clouds (n, k, 3) beside as many real ones (n, k, 3), k best POINTS; the judge sees every fourth."""
-    features = [each for each in map(features_of, (samples, real)) if each is not None]
-    distance = frechet_distance(*features) if len(features) == 2 else ""
+def realism(samples: FloatArray, real: FloatArray, features: FloatArray | None, seed: int) -> Realism:
+    """Of clouds (n, k, 3) beside as many real ones (n, k, 3) with these `features_of`, k best POINTS; the judge sees
+    every fourth."""
+    own = None if features is None else features_of(samples)
+    distance = "" if own is None or features is None else frechet_distance(own, features)
     return Realism(fooled(samples[:, ::4], real[:, ::4], seed), distance)
 
 

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING
 
 from eval.evaluation import Answer, Evaluation, Strip
 from eval.needs import CURVE_PROGRAM
+from eval.parts import Part, in_parts
 from eval.subject import Subject
+from stages.training.checkpoint import weights_of_kind
+
+if TYPE_CHECKING:
+    from stages.training.recovery.trained import TrainedRecovery
 
 __all__ = ["TABLE"]
 
@@ -16,7 +24,19 @@ LOOKED_AT = 8
 """Shapes whose parameters are changed one by one, to see how much each error is."""
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+    """One for each program and kind of input."""
+    from eval.recovery import usable_models
+    from stages.programs.program import program_module
+    from stages.training.recovery.recover import SHIPPED
+
+    reads = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(SHIPPED, "recovery")]
+    for (program, kind), model in sorted(usable_models(subject.models, asked.programs).items()):
+        make = partial(_of_model, model, asked, subject.config.seed)
+        yield Part(f"{program}, {kind}", reads, make, (program_module(program),))
+
+
+def _of_model(model: TrainedRecovery, asked: Namespace, seed: int) -> Answer:
     from eval.recovery import (
         Found,
         accuracy_chart,
@@ -27,41 +47,37 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         parameters_table,
         recovery_table,
         tried,
-        usable_models,
     )
     from pipeline.randomness import decision_rng
     from stages.shape.views.sheet import picture_png
     from stages.training.recovery.files import recovery_picture
 
-    models = usable_models(subject.models, asked.programs)
     rows: list[Found] = []
-    floors, strips, shares, seed = {}, [], {}, subject.config.seed
-    for (program, kind), model in sorted(models.items()):
-        ways = methods(model, asked.budget, seed)
-        for name, shapes, inputs in held_out(model, asked.shapes, decision_rng(seed, "recovery", program)):
-            of_input = f"{model.program.name}, {name}"
-            found = {}
-            for way, method in ways.items():
-                # searching from the base shape is as long for drawings of any angle
-                if way == "base shape, refined" and "novel" in name:
-                    continue
-                many = asked.refined if way.endswith("refined") else asked.shapes
-                found[way] = tried(f"{of_input}: {way}", model.program, method, shapes[:many], inputs[:many])
-            rows += found.values()
-            guessed, refined = found["network"], found["network, refined"]
-            shares[of_input] = guessed, alike(guessed, shapes[:LOOKED_AT])
-            chart = accuracy_chart([guessed, refined], shares[of_input][1])
-            strips.append(Strip(f"Parameters that are right, {of_input}", [("", chart)]))
-            best = [*refined.results, *guessed.results[len(refined.results) :]]
-            captions = [
-                f"{each.name}, {'refined' if at < asked.refined else 'network'}" for at, each in enumerate(inputs)
-            ]
-            pictures = [
-                (caption, picture_png(recovery_picture(given, result)))
-                for caption, given, result in zip(captions[:SHOWN], inputs, best, strict=False)
-            ]
-            strips.append(Strip(f"Input and result, {of_input}", pictures))
-        floors[f"{model.program.name}, {kind}: true shape"] = float(floor(model.program, shapes).mean())
+    strips, shares = [], {}
+    ways = methods(model, asked.budget, seed)
+    rng = decision_rng(seed, "recovery", model.header["program"])
+    for name, shapes, inputs in held_out(model, asked.shapes, rng):
+        of_input = f"{model.program.name}, {name}"
+        found = {}
+        for way, method in ways.items():
+            # searching from the base shape is as long for drawings of any angle
+            if way == "base shape, refined" and "novel" in name:
+                continue
+            many = asked.refined if way.endswith("refined") else asked.shapes
+            found[way] = tried(f"{of_input}: {way}", model.program, method, shapes[:many], inputs[:many])
+        rows += found.values()
+        guessed, refined = found["network"], found["network, refined"]
+        shares[of_input] = guessed, alike(guessed, shapes[:LOOKED_AT])
+        chart = accuracy_chart([guessed, refined], shares[of_input][1])
+        strips.append(Strip(f"Parameters that are right, {of_input}", [("", chart)]))
+        best = [*refined.results, *guessed.results[len(refined.results) :]]
+        captions = [f"{each.name}, {'refined' if at < asked.refined else 'network'}" for at, each in enumerate(inputs)]
+        pictures = [
+            (caption, picture_png(recovery_picture(given, result)))
+            for caption, given, result in zip(captions[:SHOWN], inputs, best, strict=False)
+        ]
+        strips.append(Strip(f"Input and result, {of_input}", pictures))
+    floors = {f"{model.program.name}, {model.entry.input}: true shape": float(floor(model.program, shapes).mean())}
     return Answer([recovery_table(rows, floors, asked.budget), parameters_table(shares)], strips=strips)
 
 
@@ -76,6 +92,6 @@ TABLE = Evaluation(
     question="How near do shapes come that are recovered from clouds and drawings, and which parameters are right?",
     needs=(CURVE_PROGRAM,),
     seconds=lambda subject: 750.0,
-    answer=_answer,
+    answer=in_parts(_parts, _options),
     options=_options,
 )

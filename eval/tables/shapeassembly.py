@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache, partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from eval.evaluation import Answer, Curve, Evaluation, Strip
 from eval.models import Trained, training_curve
 from eval.needs import PROGRAM_WRITERS, PROGRAMS
+from eval.parts import Part, in_parts
 from eval.subject import Subject
 from stages.shapeassembly.settings import NUCLEUS
 from stages.training.checkpoint import weights_of_kind
@@ -17,6 +20,8 @@ from stages.training.checkpoint import weights_of_kind
 if TYPE_CHECKING:
     import numpy as np
 
+    from eval.program_reference import Reference
+    from eval.table import Table
     from stages.shapeassembly.extraction.hierarchy import Box
     from stages.shapeassembly.program import Program
 
@@ -26,73 +31,92 @@ SHOWN = 16
 SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part_graph_vae": 120.0}
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.program_models import category_programs, program_models, told_without
-    from eval.program_tables import editability_table, quality_table, smoothness_table, variability_table
-    from eval.programs import boxes_of_programs, clouds_of, novelty, physics_of, smoothness, variability
-    from eval.realism import POINTS, realism
+def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+    """One for each model, and one for the shapes of val of each category; what a category's share is read once."""
+    from eval.program_models import program_models, program_shards
+    from eval.program_reference import read_reference
+    from stages.training.recovery.recover import SHIPPED
+
+    reads = [*program_shards(subject, "train"), *program_shards(subject, "val")]
+    reads += weights_of_kind(SHIPPED, "recovery")  # one of them is the network whose features are compared
+    reference = lru_cache(1)(partial(read_reference, subject, judged=asked.judged))
+    for category, models in groupby(program_models(subject, asked.nucleus), key=lambda each: each.kit):
+        for each in models:
+            folder = subject.models / each.folder
+            of_model = partial(_of_model, subject, asked, each, reference)
+            yield Part(each.folder, [folder / "weights.safetensors", folder / "curves.csv", *reads], of_model)
+        yield Part(f"{category}, val", reads, partial(_of_val, subject, asked, category, reference))
+
+
+def _of_model(
+    subject: Subject, asked: Namespace, trained: Trained[Any], reference: Callable[[str], Reference]
+) -> Answer:
+    from eval.program_models import told_without
+    from eval.program_tables import quality_table, smoothness_table
+    from eval.programs import smoothness
     from pipeline.randomness import decision_rng
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
     from stages.training.program_vae.trained import TrainedProgramVae
 
-    quality, seen, told, varied, novel, rejected, smooth, curves, strips = {}, {}, {}, {}, {}, {}, {}, {}, []
-    silent: dict[str, str] = {}
-    category = ""
-    for each in program_models(subject, asked.nucleus):
-        if each.kit != category:  # thousands of programs: one category at a time
-            category = each.kit
-            train, val = (category_programs(subject, category, split) for split in ("train", "val"))
-            learnt = boxes_of_programs(train)
-            clouds = {"train": clouds_of(learnt), "val": clouds_of(boxes_of_programs(val))}
-        rng = decision_rng(subject.config.seed, "shapeassembly", each.folder)
-        without = told_without(each)
-        curves[each.folder] = training_curve(subject.models / each.folder, "val_loss")
-        try:
-            rows = list(_written(each, asked, rng))
-        except ValueError as error:
-            silent[each.folder] = str(error)
-            continue
-        real = Written(f"{each.kit}, val", boxes_of_programs(val[: asked.samples]), val[: asked.samples])
-        for row in (*rows, real):
-            if row.name not in quality:
-                count = len(row.samples)
-                quality[row.name] = physics_of(row.samples)
-                if judged := min(count, len(learnt), asked.judged):
-                    shown = clouds_of(row.samples[:judged], POINTS), clouds_of(learnt[:judged], POINTS)
-                    seen[row.name] = realism(*shown, subject.config.seed)
-                varied[row.name] = variability(row.samples, clouds["train"], None if row is real else clouds["val"])
-                if row.begun:
-                    rejected[row.name] = 100 * (1 - count / row.begun)
-                if row.programs:
-                    told[row.name] = row.programs
-                    # What is told in another way is new whatever it is.
-                    if row is real or without == "nothing":
-                        novel[row.name] = novelty(row.programs, train)
-                if row is not real:
-                    strips.append(Strip(f"Samples of {row.name}", _pictures(row.samples[:SHOWN])))
-        if isinstance(each.model, TrainedProgramVae | TrainedPartGraphVae) and without == "nothing":
-            smooth[each.folder] = smoothness(each.model, asked.sequences, asked.steps, rng)
-    return Answer(
-        [
-            quality_table(quality, seen, rejected, silent),
-            editability_table(told),
-            variability_table(varied, novel),
-            smoothness_table(smooth),
-        ],
-        [Curve("How well shapes that were not learnt are written", "steps of training", "loss", curves)],
-        strips,
-    )
+    rng = decision_rng(subject.config.seed, "shapeassembly", trained.folder)
+    learning = {trained.folder: training_curve(subject.models / trained.folder, "val_loss")}
+    curve = Curve("How well shapes that were not learnt are written", "steps of training", "loss", learning)
+    try:
+        rows = list(_written(trained, asked, rng))
+    except ValueError as error:
+        return Answer([quality_table({}, {}, {}, {trained.folder: str(error)})], [curve])
+    # What is told in another way is new whatever it is.
+    whole = told_without(trained) == "nothing"
+    tables = _tables(rows, reference(trained.kit), subject.config.seed, novel=whole)
+    if isinstance(trained.model, TrainedProgramVae | TrainedPartGraphVae) and whole:
+        tables.append(smoothness_table({trained.folder: smoothness(trained.model, asked.sequences, asked.steps, rng)}))
+    strips = [Strip(f"Samples of {row.name}", _pictures(row.samples[:SHOWN])) for row in rows]
+    return Answer(tables, [curve], strips)
+
+
+def _of_val(subject: Subject, asked: Namespace, category: str, reference: Callable[[str], Reference]) -> Answer:
+    from eval.programs import boxes_of_programs
+
+    programs = reference(category).val[: asked.samples]
+    row = Written(f"{category}, val", boxes_of_programs(programs), programs, of_val=True)
+    return Answer(_tables([row], reference(category), subject.config.seed, novel=True))
+
+
+def _tables(rows: Sequence[Written], reference: Reference, seed: int, *, novel: bool) -> list[Table]:
+    """The tables of shapes; novel: whether structures that train has not are counted."""
+    from eval.program_tables import editability_table, quality_table, variability_table
+    from eval.programs import clouds_of, novelty, physics_of, variability
+    from eval.realism import POINTS, Realism, realism
+
+    seen: dict[str, Realism] = {}
+    for row in rows:
+        if judged := min(len(row.samples), len(reference.shown)):
+            clouds, features = clouds_of(row.samples[:judged], POINTS), reference.features
+            real = reference.shown[:judged], None if features is None else features[:judged]
+            seen[row.name] = realism(clouds, *real, seed)
+    varied = {
+        row.name: variability(row.samples, reference.learnt, None if row.of_val else reference.unseen) for row in rows
+    }
+    told = {row.name: row.programs for row in rows if row.programs}
+    rejected = {row.name: 100 * (1 - len(row.samples) / row.begun) for row in rows if row.begun}
+    new = {name: novelty(programs, reference.train) for name, programs in told.items()} if novel else {}
+    return [
+        quality_table({row.name: physics_of(row.samples) for row in rows}, seen, rejected, {}),
+        editability_table(told),
+        variability_table(varied, new),
+    ]
 
 
 @dataclass(frozen=True)
 class Written:
     """What a row of the tables is about: the cuboids of each shape, and the programs that made them, if any. begun: how
-    many were begun, or 0 where none is given up."""
+    many were begun, or 0 where none is given up; of_val: whether they are the shapes of val themselves."""
 
     name: str
     samples: Sequence[Sequence[Box]]
     programs: Sequence[Program] = ()
     begun: int = 0
+    of_val: bool = False
 
 
 def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> Iterator[Written]:
@@ -139,6 +163,6 @@ TABLE = Evaluation(
     question="Do shapes stand whose programs or cuboids a model writes, how much do they vary, can programs be edited?",
     needs=(PROGRAM_WRITERS, PROGRAMS),
     seconds=lambda subject: sum(each * len(weights_of_kind(subject.models, kind)) for kind, each in SECONDS.items()),
-    answer=_answer,
+    answer=in_parts(_parts, _options),
     options=_options,
 )
