@@ -42,7 +42,7 @@ def grammar_sheet(found: Extraction) -> bytes:
     dockers = len(found.dockers)
     classes = len({each.site for each in found.dockers})
     exemplar = [
-        _cell(found, [(whole, STAYS)], f"{len(found.mesh.faces):,} triangles"),
+        _cell(found, [(whole, STAYS)], f"{len(grammar.exemplar.faces):,} {grammar.made_of}"),
         _cell(found, _sites(found), f"{dockers} docking sites of {classes} classes"),
     ]
     sections = [Section("Exemplar", [exemplar], f"{len(grammar.rules)} rules, {len(grammar.grids)} grids", 2)]

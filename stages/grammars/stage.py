@@ -84,7 +84,7 @@ def run_extraction(task: Task) -> Outcome:
     return Outcome(
         samples=0,
         summary={
-            "triangles": len(found.mesh.faces),
+            "made_of": f"{len(found.grammar.exemplar.faces):,} {found.grammar.made_of}",
             "motions": found.motions,
             "sites": len({each.site for each in found.dockers}),
             "dockers": len(found.dockers),
@@ -178,7 +178,7 @@ def report(plan: Plan) -> Sequence[str]:
         if seen is not None:
             grids = ", ".join(" x ".join(map(str, each)) for each in seen["grids"]) or "none"
             lines.append(
-                f"{name}: {seen['triangles']:,} triangles, {seen['motions']} motions, {seen['dockers']} dockers at "
+                f"{name}: {seen['made_of']}, {seen['motions']} motions, {seen['dockers']} dockers at "
                 f"{seen['sites']} classes of sites, {seen['rules']} rules; grids: {grids}"
             )
     drawing = drawing_name(plan.config.name)

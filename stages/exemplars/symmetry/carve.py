@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.exemplars.symmetry.cells import cell_keys
 from stages.exemplars.symmetry.clip import cut_triangles, fragments
-from stages.exemplars.symmetry.places import among
+from stages.exemplars.symmetry.places import among, keys_at
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
@@ -53,8 +53,12 @@ class Soup:
 def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> tuple[Soup, Soup]:
     """What of `soup` lies in the cells of `grid` with places `cells`, moved by `pose` (4, 4), and what does not.
 
-    Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border.
+    Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border; splats
+    are not cut, and are where their middles are.
     """
+    if grid.splats:
+        inside = among(grid.keys[cells], keys_at(grid, invert(pose), soup.corners.mean(axis=1)))
+        return soup.select(inside), soup.select(~inside)
     chosen = grid.cells[cells]
     box = np.array([chosen.min(axis=0), chosen.max(axis=0)])
     bounds = grid.origin + grid.size * np.array([box[0], box[1] + 1])

@@ -19,6 +19,8 @@ SAME_SET = 0.02
 """Share of a docker by which another may reach beyond it and count as inside: borders of cells do not move with it."""
 SLIPPERY = 1e-4
 """Least eigenvalue, as a share of the largest, of a motion that does not slip."""
+SLANTED = 0.06
+"""By this share of the radians up to which planes are one they may be slanted by noise."""
 AROUND = 2
 """Borders of two regions that are equal under a motion are at most so many cells apart, once moved."""
 
@@ -103,7 +105,7 @@ def slippable_motions(grid: SurfaceGrid, cells: IntArray) -> int:
     points = points / max(float(np.linalg.norm(points, axis=1).mean()), 1e-300)
     rows = np.column_stack([np.cross(points, normals), normals])
     values = np.linalg.eigvalsh(rows.T @ rows)
-    return int((values < SLIPPERY * values[-1]).sum())
+    return int((values < max(SLIPPERY, (SLANTED * grid.same_angle) ** 2) * values[-1]).sum())
 
 
 def _members(region: np.ndarray, count: int) -> list[np.ndarray]:

@@ -77,10 +77,11 @@ def _widen(chosen, cells, neighbours, steps):
 
 def stands(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> bool:
     """Whether the surface has at a pose (4, 4) what lies in ascending cells, and nothing beside."""
-    if matched_items(grid, pose, items_in(grid, cells)).mean() < STANDS:
+    least = STANDS * grid.agreement
+    if matched_items(grid, pose, items_in(grid, cells)).mean() < least:
         return False
     there = items_moved_into(grid, cells, pose)
-    return bool(matched_items(grid, invert(pose), there).mean() >= STANDS)
+    return bool(matched_items(grid, invert(pose), there).mean() >= least)
 
 
 def cut_out(soup: Soup, grid: SurfaceGrid, cells: IntArray, frame: FloatArray, seam: Seam) -> tuple[Soup, Soup]:
