@@ -8,11 +8,11 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.symmetry.cells import BITS, neighbours_of, pack
-from stages.exemplars.symmetry.patches import neighbourhoods, planar_patches
+from stages.exemplars.symmetry.patches import glance, neighbourhoods, planar_patches
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SHIFT, SurfaceGrid
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["Cloud", "ScannedGrid", "cloud_grid"]
+__all__ = ["Cloud", "ScannedGrid", "cloud_grid", "radius_for"]
 
 FEWEST_POINTS = 500
 LEAST_SPREAD = 1e-6
@@ -124,6 +124,17 @@ def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
         splats=True,
     )
     return ScannedGrid(grid, patch[begin], patches.middles, patches.normals, around.noise)
+
+
+def radius_for(cloud: Cloud, least: float) -> float:
+    """The radius of similarity that suits a cloud, at least `least`, as a share of the longest side: with it cells hold
+    twice the points that they must, and noise is half as much as it may be. Raises ConfigError as `cloud_grid` does for
+    points that are no surface."""
+    _check(cloud.points)
+    noise, reach, count = glance(cloud.points)
+    size = max((2 * A_CELL * np.pi / count) ** 0.5 * reach, 2 * noise / MOST_NOISE)
+    low, high = np.quantile(cloud.points, [0.001, 0.999], axis=0)
+    return max(least, float(np.ceil(1000 * CELLS_A_RADIUS * size / (high - low).max()) / 1000))
 
 
 def _check(points: FloatArray) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["LEAST_NEIGHBOURS", "Neighbourhoods", "Patches", "neighbourhoods", "planar_patches"]
+__all__ = ["LEAST_NEIGHBOURS", "Neighbourhoods", "Patches", "glance", "neighbourhoods", "planar_patches"]
 
 LEAST_NEIGHBOURS, MOST_NEIGHBOURS = 12, 32
 """Points around a point that say how the surface lies there, itself among them."""
@@ -83,9 +83,21 @@ def neighbourhoods(points: FloatArray) -> Neighbourhoods:
     from scipy.spatial import KDTree
 
     tree = KDTree(points, balanced_tree=False, compact_nodes=False)
-    glance = _around(tree, points, points[:: max(1, len(points) // GLANCE)], LEAST_NEIGHBOURS)
-    wanted = LEAST_NEIGHBOURS * (SMOOTH * glance.noise / max(float(np.median(glance.reach)), 1e-300)) ** 2
+    noise, reach, count = _glance(tree, points)
+    wanted = count * (SMOOTH * noise / max(reach, 1e-300)) ** 2
     return _around(tree, points, points, int(np.clip(wanted, LEAST_NEIGHBOURS, MOST_NEIGHBOURS)))
+
+
+def glance(points: FloatArray) -> tuple[float, float, int]:
+    """The noise of points (n, 3), and how far neighbourhoods of so many points reach, medians of some of them."""
+    from scipy.spatial import KDTree
+
+    return _glance(KDTree(points, balanced_tree=False, compact_nodes=False), points)
+
+
+def _glance(tree: Any, points: FloatArray) -> tuple[float, float, int]:
+    found = _around(tree, points, points[:: max(1, len(points) // GLANCE)], LEAST_NEIGHBOURS)
+    return found.noise, float(np.median(found.reach)), LEAST_NEIGHBOURS
 
 
 def _around(tree: Any, points: FloatArray, asked: FloatArray, count: int) -> Neighbourhoods:
