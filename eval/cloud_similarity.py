@@ -1,5 +1,5 @@
-"""Is a point cloud r-similar to another (symmetry §3.1)? An answer from the points alone: nothing here is shared with the
-search for symmetries, or knows how a cloud was made."""
+"""Is a point cloud r-similar to another (symmetry §3.1)? An answer from the points alone: nothing here is shared with
+the search for symmetries, or knows how a cloud was made."""
 
 from __future__ import annotations
 
@@ -28,21 +28,30 @@ INNER = 0.8
 
 
 def cloud_similarity(
-    exemplar: FloatArray, shape: FloatArray, radius: float, near: float, up: int, probes: int, rng: np.random.Generator
+    exemplar: FloatArray,
+    shape: FloatArray,
+    radius: float,
+    near: float,
+    up: int,
+    probes: int,
+    rng: np.random.Generator,
+    only: BoolArray | None = None,
 ) -> FloatArray:
-    """How much of the neighbourhood of each of `probes` random points of a shape (n, 3) some motion matches with an exemplar
-    (m, 3), float64 (probes,); from MATCHED on it is the exemplar's.
+    """How much of the neighbourhood of each of `probes` random points of a shape (n, 3), of those of `only`, bool (n,),
+    some motion matches with an exemplar (m, 3), float64 (probes,); from MATCHED on it is one of the exemplar's.
 
-    Points match within a distance of `near`, that at which an exemplar that is sampled twice matches itself. Motions are
-    shifts with turns about the axis `up`. Neighbourhoods are balls: what lies within the radius across a thin wall counts.
+    Points match within a distance of `near`, that at which an exemplar that is sampled twice matches itself. Motions
+    are shifts with turns about the axis `up`. Neighbourhoods are balls: what lies across a thin wall counts, too.
     """
     from scipy.spatial import KDTree
 
     tree, other = KDTree(exemplar), KDTree(shape)
     anchors = exemplar[_thinned(exemplar, radius / ANCHORS)]
-    known = np.array([_numbers(exemplar[each] - at, radius, up) for at, each in zip(anchors, tree.query_ball_point(anchors, radius), strict=True)])  # fmt: skip
+    inside = tree.query_ball_point(anchors, radius)
+    known = np.array([_numbers(exemplar[each] - at, radius, up) for at, each in zip(anchors, inside, strict=True)])
     found = np.zeros(probes)
-    for place, probe in enumerate(shape[rng.choice(len(shape), probes, replace=False)]):
+    asked = np.arange(len(shape)) if only is None else np.flatnonzero(only)
+    for place, probe in enumerate(shape[rng.choice(asked, probes, replace=False)]):
         around = shape[other.query_ball_point(probe, radius)] - probe
         alike = np.abs(known - _numbers(around, radius, up)).sum(axis=1)
         hopes = anchors[np.argsort(alike, kind="stable")[:HOPES]]
@@ -88,7 +97,7 @@ def _turns(up: int) -> list[FloatArray]:
 
 
 def _share(tree: Any, exemplar: FloatArray, around: FloatArray, at: FloatArray, radius: float, near: float) -> float:
-    """The share of a neighbourhood, and of what lies there, that match once it has been moved onto the nearest points."""
+    """The share of a neighbourhood, and of what lies there, that match once it is moved onto the nearest points."""
     from scipy.spatial import KDTree
 
     middle = at.copy()

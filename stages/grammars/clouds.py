@@ -2,8 +2,8 @@
 
 python -m stages.grammars.clouds GRAMMAR.json TEXT... [--out FOLDER]
 
-GRAMMAR.json is what stage `grammars` has written, with its .tar beside it; TEXT a derivation, as samples of a dataset have
-it: 'S1(B0)' or 'G0[5]'.
+GRAMMAR.json is what stage `grammars` has written, with its .tar beside it; TEXT a derivation, as samples of a dataset
+have it: 'S1(B0)' or 'G0[5]'.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ from stages.shape.arrays import ByteArray, FloatArray, IntArray
 __all__ = ["Cloud", "ScannedGrid", "cloud_grid", "radius_for"]
 
 FEWEST_POINTS = 500
+FARTHEST = 1e30
+"""Numbers beyond this are as good as infinite: their squares leave the range of floats."""
 LEAST_SPREAD = 1e-6
 """Of the points of a line or a dot the second widest spread is below this share of the widest."""
 A_CELL = 2.0
@@ -71,6 +73,8 @@ def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
     points = cloud.points
     _check(points)
     around = neighbourhoods(points)
+    if not np.median(around.reach) > 0:
+        raise ConfigError("most points are at the place of another; take those out that are there more than once")
     held = points[~around.lonely]
     size = share * float(np.ptp(held, axis=0).max()) / CELLS_A_RADIUS
     if around.noise > MOST_NOISE * size:
@@ -141,7 +145,7 @@ def _check(points: FloatArray) -> None:
     """Raises ConfigError for points (n, 3) that are no surface."""
     if len(points) < FEWEST_POINTS:
         raise ConfigError(f"{len(points):,} points are no scan of a surface; it takes at least {FEWEST_POINTS:,}")
-    wrong = int((~np.isfinite(points)).any(axis=1).sum())
+    wrong = int((~(np.abs(points) <= FARTHEST)).any(axis=1).sum())
     if wrong:
         raise ConfigError(f"{wrong:,} of {len(points):,} points are not finite (NaN or infinity); take them out")
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False, full_matrices=False)

@@ -80,7 +80,12 @@ def docking_sites(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_b
         cells = np.unique(border[np.concatenate([of_border[each] for each in own]), 0]).astype(np.int32)
         sites.append(
             DockingSite(
-                motion, primary, secondary, cells, operation_kind(primary, secondary), slippable_motions(grid, cells)
+                motion,
+                primary,
+                secondary,
+                cells,
+                operation_kind(primary, secondary, grid.slack),
+                slippable_motions(grid, cells),
             )
         )
     return sites
@@ -114,12 +119,13 @@ def _members(region: np.ndarray, count: int) -> list[np.ndarray]:
     return np.split(order, np.searchsorted(region[order], np.arange(count + 1)))[1:-1]
 
 
-def operation_kind(primary: IntArray, secondary: IntArray) -> OperationKind:
-    """What it is to put the docker of cells `primary` where that of cells `secondary` is, int32 (n,) each."""
+def operation_kind(primary: IntArray, secondary: IntArray, slack: float) -> OperationKind:
+    """What it is to put the docker of cells `primary` where that of cells `secondary` is, int32 (n,) each. slack: share
+    that may lie elsewhere for noise."""
     shared = int(among(primary, secondary).sum())
-    if len(secondary) < len(primary) and shared >= (1 - SAME_SET) * len(secondary):
+    if len(secondary) < len(primary) and shared >= (1 - SAME_SET - slack) * len(secondary):
         return "insert"
-    if len(primary) < len(secondary) and shared >= (1 - SAME_SET) * len(primary):
+    if len(primary) < len(secondary) and shared >= (1 - SAME_SET - slack) * len(primary):
         return "delete"
     return "replace"
 

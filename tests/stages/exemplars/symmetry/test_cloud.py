@@ -110,6 +110,15 @@ def test_what_a_hole_as_large_as_a_window_leaves_is_not_symmetric() -> None:
     assert not kept[onto].any()
 
 
+def test_a_plane_and_a_ball_are_like_themselves_everywhere() -> None:
+    """Nothing in them can be exchanged: they have no corners."""
+    flat = np.random.default_rng(0).random((9000, 3)) * (1.0, 0.0, 1.0)
+    ball = np.random.default_rng(0).normal(size=(9000, 3))
+    for points in (flat, ball / np.linalg.norm(ball, axis=1)[:, None]):
+        found = cloud_grid(Cloud(points, np.zeros((len(points), 3), np.uint8)), 0.1)
+        assert len(candidate_motions(found.grid, 24, None, ridge_frames(found))) == 0
+
+
 class TestRefused:
     @pytest.mark.parametrize(
         ("points", "why"),
@@ -118,9 +127,10 @@ class TestRefused:
             (np.random.default_rng(0).random((40, 3)), "40 points are no scan"),
             (np.linspace(0, 1, 900)[:, None] * [1.0, 2.0, 3.0], "lie on one line"),
             (np.ones((900, 3)), "lie on one line"),
+            (np.random.default_rng(0).random((20, 3)).repeat(50, axis=0), "at the place of another"),
             (np.r_[np.random.default_rng(0).random((900, 3)), [[np.nan, 0, 0]]], "1 of 901 points are not finite"),
         ],
-        ids=["none", "few", "line", "one place", "nan"],
+        ids=["none", "few", "line", "one place", "few places", "nan"],
     )
     def test_what_is_no_surface(self, points: FloatArray, why: str) -> None:
         with pytest.raises(ConfigError, match=why):
