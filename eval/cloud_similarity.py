@@ -74,7 +74,8 @@ def _numbers(around: FloatArray, radius: float, up: int) -> FloatArray:
     flat = np.delete(around, up, axis=1) / radius
     along = around[:, up] / radius
     spread = np.linalg.eigvalsh(flat.T @ flat / len(flat))
-    return np.r_[spread, along.mean(), along.std(), np.linalg.norm(flat.mean(axis=0))]
+    found: FloatArray = np.r_[spread, along.mean(), along.std(), np.linalg.norm(flat.mean(axis=0))]
+    return found
 
 
 def _ranked(tree: Any, around: FloatArray, anchors: FloatArray, up: int) -> list[tuple[FloatArray, FloatArray]]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.symmetry.cells import BITS, neighbours_of, pack
-from stages.exemplars.symmetry.patches import glance, neighbourhoods, planar_patches
+from stages.exemplars.symmetry.neighbourhoods import glance, neighbourhoods
+from stages.exemplars.symmetry.patches import planar_patches
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SHIFT, SurfaceGrid
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 

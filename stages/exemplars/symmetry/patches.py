@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
 
+from stages.exemplars.symmetry.neighbourhoods import Neighbourhoods, contacts
+from stages.exemplars.symmetry.outward import outward
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["LEAST_NEIGHBOURS", "Neighbourhoods", "Patches", "glance", "neighbourhoods", "planar_patches"]
+__all__ = ["Patches", "planar_patches"]
 
-LEAST_NEIGHBOURS, MOST_NEIGHBOURS = 12, 32
-"""Points around a point that say how the surface lies there, itself among them."""
-SMOOTH = 5.0
-"""Neighbourhoods reach so many standard deviations of the noise, as far as their numbers of points allow."""
-ALONE = 4.0
-"""A point is an outlier if its neighbours reach so many times as far as is usual."""
-GLANCE = 2000
-"""At so many points the noise is estimated before all of them are looked at."""
-BLOCK = 100_000
-"""So many neighbourhoods are looked at at once."""
 TILT = 0.4
 """Radians that normals of neighbourhoods may differ from that of a patch: they are those of few points, with noise."""
 SPREAD = 3.0
@@ -36,27 +27,6 @@ FLAT = 0.1
 """Radians between patches that meet and are one."""
 ROUNDS = 3
 """So often points beside another patch go to where they fit best."""
-ALIKE = 0.7
-"""Cosine of the angle of two patches from which on what meets at them is no crease."""
-
-
-@dataclass(frozen=True)
-class Neighbourhoods:
-    """What is around each of n points: `near`, the k nearest, itself first, int32 (n, k); `reach`, how far they
-    are, float64 (n,); `normals` of the planes through them, float64 (n, 3), of either sign; `rough`, how far from it
-    they are, a standard deviation, float64 (n,); `lonely`, bool (n,), outliers. noise: of the whole cloud, the median
-    of `rough`."""
-
-    near: IntArray
-    reach: FloatArray
-    normals: FloatArray
-    rough: FloatArray
-    lonely: BoolArray
-
-    @property
-    def noise(self) -> float:
-        """A standard deviation, in the units of the points."""
-        return float(np.median(self.rough[~self.lonely]))
 
 
 @dataclass(frozen=True)
@@ -76,44 +46,6 @@ class Patches:
         off = ((points[held] - self.middles[self.of[held]]) * normals).sum(axis=1)
         found[held] -= off[:, None] * normals
         return found
-
-
-def neighbourhoods(points: FloatArray) -> Neighbourhoods:
-    """The neighbourhoods of at least MOST_NEIGHBOURS points (n, 3), of as many points as their noise asks for."""
-    from scipy.spatial import KDTree
-
-    tree = KDTree(points, balanced_tree=False, compact_nodes=False)
-    noise, reach, count = _glance(tree, points)
-    wanted = count * (SMOOTH * noise / max(reach, 1e-300)) ** 2
-    return _around(tree, points, points, int(np.clip(wanted, LEAST_NEIGHBOURS, MOST_NEIGHBOURS)))
-
-
-def glance(points: FloatArray) -> tuple[float, float, int]:
-    """The noise of points (n, 3), and how far neighbourhoods of so many points reach, medians of some of them."""
-    from scipy.spatial import KDTree
-
-    return _glance(KDTree(points, balanced_tree=False, compact_nodes=False), points)
-
-
-def _glance(tree: Any, points: FloatArray) -> tuple[float, float, int]:
-    found = _around(tree, points, points[:: max(1, len(points) // GLANCE)], LEAST_NEIGHBOURS)
-    return found.noise, float(np.median(found.reach)), LEAST_NEIGHBOURS
-
-
-def _around(tree: Any, points: FloatArray, asked: FloatArray, count: int) -> Neighbourhoods:
-    """The neighbourhoods, of `count` out of points (n, 3), around those `asked`, (m, 3)."""
-    near = np.empty((len(asked), count), dtype=np.int32)
-    reach, rough, normals = np.empty(len(asked)), np.empty(len(asked)), np.empty((len(asked), 3))
-    for begin in range(0, len(asked), BLOCK):
-        block = slice(begin, begin + BLOCK)
-        away, near[block] = tree.query(asked[block], k=count)
-        reach[block] = away[:, -1]
-        around = points[near[block]]
-        around -= around.mean(axis=1, keepdims=True)
-        values, ways = np.linalg.eigh(around.transpose(0, 2, 1) @ around)
-        # a plane takes three degrees of freedom
-        rough[block], normals[block] = np.sqrt(np.maximum(values[:, 0], 0) / (count - 3)), ways[:, :, 0]
-    return Neighbourhoods(near, reach, normals, rough, reach > ALONE * np.median(reach))
 
 
 def planar_patches(points: FloatArray, around: Neighbourhoods, least: float, given: FloatArray | None) -> Patches:
@@ -136,7 +68,7 @@ def planar_patches(points: FloatArray, around: Neighbourhoods, least: float, giv
         of[noise[of]] = -1
         of = _numbered(_settled(points, around.near, of, middles, normals, most, around.lonely))
     middles, normals, _ = _fitted(points, of)
-    return Patches(of, middles, normals * _outward(points, around.near, of, middles, normals, given)[:, None])
+    return Patches(of, middles, normals * outward(points, around.near, of, middles, normals, given)[:, None])
 
 
 @numba.njit(cache=True)
@@ -214,14 +146,6 @@ def _fitted(points: FloatArray, of: IntArray) -> tuple[FloatArray, FloatArray, F
     return middles, ways[:, :, 0], np.sqrt(np.maximum(values[:, 1], 0))
 
 
-def _contacts(near: IntArray, of: IntArray) -> tuple[IntArray, IntArray]:
-    """Pairs of neighbouring points of different patches, int32 (c,) each."""
-    one = np.repeat(np.arange(len(near), dtype=np.int32), near.shape[1] - 1)
-    other = near[:, 1:].reshape(-1)
-    chosen = (of[one] >= 0) & (of[other] >= 0) & (of[one] != of[other])
-    return one[chosen], other[chosen]
-
-
 def _merged(
     points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, most: float
 ) -> IntArray:
@@ -229,7 +153,7 @@ def _merged(
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    one, other = _contacts(near, of)
+    one, other = contacts(near, of)
     pairs, place = np.unique(np.column_stack([of[one], of[other]]), axis=0, return_inverse=True)
     first, second = pairs.T
     off = np.abs(((points[one] - middles[of[other]]) * normals[of[other]]).sum(axis=1))
@@ -247,7 +171,7 @@ def _explained(
     points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, most: float
 ) -> BoolArray:
     """Which patches lie in the planes of larger ones that they meet, bool (m,): such as noise makes along creases."""
-    one, other = _contacts(near, of)
+    one, other = contacts(near, of)
     pairs = np.unique(np.column_stack([of[one], of[other]]), axis=0)
     order = np.argsort(of, kind="stable")
     members = np.split(order, np.searchsorted(of[order], np.arange(len(middles) + 1)))[1:-1]
@@ -281,54 +205,3 @@ def _settled(points, near, of, middles, normals, most, lonely):
                 best, patch = abs(off), each
         found[n] = patch
     return found
-
-
-def _outward(
-    points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, given: FloatArray | None
-) -> FloatArray:
-    """1 or -1 for each patch, by which its normal is outward, float64 (m,)."""
-    held = of >= 0
-    if given is not None:
-        along = (given[held] * normals[of[held]]).sum(axis=1)
-        return np.where(np.bincount(of[held], along, len(normals)) < 0, -1.0, 1.0)
-    component, signs = _agreeing(points, near, of, middles, normals)
-    apart = points[held] - points[held].mean(axis=0)
-    away = np.bincount(of[held], (apart * (normals * signs[:, None])[of[held]]).sum(axis=1), len(normals))
-    found: FloatArray = signs * np.where(np.bincount(component, away)[component] < 0, -1.0, 1.0)
-    return found
-
-
-def _agreeing(
-    points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray
-) -> tuple[IntArray, FloatArray]:
-    """The component of each patch among those that meet, int32 (m,), and signs by which their normals agree, float64
-    (m,): at a crease both look away from each other's patch, or both to it."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
-
-    one, other = _contacts(near, of)
-    flip = of[one] > of[other]
-    one, other = np.where(flip, other, one), np.where(flip, one, other)
-    pairs, place, count = np.unique(
-        np.column_stack([of[one], of[other]]), axis=0, return_inverse=True, return_counts=True
-    )
-    first, second = pairs.T
-    cosine = (normals[first] * normals[second]).sum(axis=1)
-    # each patch lies on one side of the other's plane beside the crease, wherever it goes from there
-    off = ((points[one] - middles[of[other]]) * normals[of[other]]).sum(axis=1)
-    off_other = ((points[other] - middles[of[one]]) * normals[of[one]]).sum(axis=1)
-    across = [np.bincount(place.reshape(-1), each, len(pairs)) for each in (off, off_other)]
-    agree = np.where(np.abs(cosine) > ALIKE, cosine, across[0] * across[1]) > 0
-    total = len(normals)
-    tree = minimum_spanning_tree(coo_array((1.0 / count, (first, second)), shape=(total, total)))
-    both = (tree + tree.T).tocsr()
-    sense = coo_array((np.where(agree, 1.0, -1.0), (first, second)), shape=(total, total))
-    sense = (sense + sense.T).tocsr()
-    number, component = connected_components(both, directed=False)
-    signs = np.ones(total)
-    for each in range(number):
-        root = int(np.flatnonzero(component == each)[0])
-        order, before = breadth_first_order(both, root, directed=False)
-        for patch in order[1:].tolist():
-            signs[patch] = signs[before[patch]] * sense[before[patch], patch]
-    return component, signs

@@ -11,7 +11,8 @@ from pipeline.errors import ConfigError
 from stages.exemplars.symmetry.cloud import Cloud, ScannedGrid, cloud_grid
 from stages.exemplars.symmetry.matching import eroded, symmetric_cells
 from stages.exemplars.symmetry.motions import candidate_motions
-from stages.exemplars.symmetry.patches import neighbourhoods, planar_patches
+from stages.exemplars.symmetry.neighbourhoods import neighbourhoods
+from stages.exemplars.symmetry.patches import planar_patches
 from stages.exemplars.symmetry.ridges import ridge_frames
 from stages.exemplars.symmetry.sites import dockers_of
 from stages.exemplars.symmetry.surface import surface_grid
