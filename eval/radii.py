@@ -9,9 +9,9 @@ from typing import Literal
 from eval.evaluation import Sheet
 from eval.table import Cell, Table
 from pipeline.randomness import decision_rng
-from stages.exemplars.read import read_model
-from stages.grammars.extraction import Extraction, extract, mesh_of
+from stages.grammars.extraction import Extraction, extract
 from stages.grammars.picture import dockers_row, shapes_row
+from stages.grammars.reading import read_surface
 from stages.grammars.settings import GrammarConfig
 from stages.grammars.variety import some_shapes
 from stages.shape.views.sheet import Section, contact_sheet, picture_png
@@ -26,12 +26,11 @@ CELL = 200
 
 
 def extractions(path: Path, radii: Sequence[float], up: Literal["y", "z"]) -> dict[float, Extraction]:
-    """The grammar of the model in a file, all of it one mesh whose axis `up` points up, for each radius, as a share of
-    the longest side."""
-    model = read_model(path, "components")
+    """The grammar of the mesh or cloud in a file, whose axis `up` points up, for each radius, as a share of the longest
+    side."""
     name = path.parent.name if path.stem == "model" else path.stem
-    mesh = mesh_of(model)
-    return {each: extract(mesh, name, each, up, decision_rng(0, "radii", name)) for each in radii}
+    surface, _ = read_surface(path)
+    return {each: extract(surface, name, each, up, decision_rng(0, "radii", name)) for each in radii}
 
 
 def radii_table(found: dict[float, Extraction]) -> Table:

@@ -26,6 +26,7 @@ from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.grammars.inspect import has_grammar, written_grammar
+from stages.grammars.reading import is_cloud
 from stages.shape.kit import ContactKind, Strictness
 from stages.variations.settings import CHOSEN_INSTEAD_STABLE
 
@@ -42,6 +43,9 @@ def main(arguments: list[str]) -> int:
     try:
         paths = [path for text in asked.models for path in _paths(text)]
         limits = _limits(asked)
+        if len(paths) == 1 and is_cloud(paths[0], limits):
+            _show_cloud(asked, paths[0], limits)
+            return 0
         models = [read_model(path, asked.parts, limits) for path in paths]
         config = _config(asked, paths)
         found = look_at(config, models, asked.tries, limits)
@@ -68,6 +72,17 @@ def main(arguments: list[str]) -> int:
         print(error, file=sys.stderr)
         return 2
     return 0
+
+
+def _show_cloud(asked: argparse.Namespace, path: Path, limits: ReadLimits) -> None:
+    """Print what there is in a point cloud: no parts, but perhaps a grammar."""
+    found = written_grammar(asked.out or FOLDER, dataset_name([path]), path, asked.up or "y", limits)
+    if asked.json:
+        print(json.dumps({title: str(said) for title, said in found}, ensure_ascii=False))
+        return
+    print(f"{path}: a point cloud, which has no parts; of what is alike in it a grammar can be made")
+    for title, said in found:
+        print(f"{title:<18} {said}", flush=True)
 
 
 def _written(folder: Path, paths: Sequence[Path], found: Prospect) -> Iterator[tuple[str, Path]]:
@@ -138,7 +153,12 @@ def _parser() -> argparse.ArgumentParser:
         description="Show what Shapemill sees in one model, or in several models of one kit: parts, part types, "
         "contacts, grammar, what may go wrong, and what will come of it; and write a config for it.",
     )
-    parser.add_argument("models", nargs="+", metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF or DAE")
+    parser.add_argument(
+        "models",
+        nargs="+",
+        metavar="MODEL",
+        help="GLB, glTF, OBJ, PLY, STL, OFF or DAE; or one point cloud, PLY or XYZ",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     parser.add_argument("--parts", choices=get_args(Segmentation), default="auto", help="what makes a part")
     parser.add_argument("--types", choices=["congruence", "labels", "meaning"], help="what makes a part type")

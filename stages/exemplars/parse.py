@@ -183,7 +183,10 @@ def _solid_placements(path: Path, scene: Scene) -> Scene:
             placements.append(placement)
     if not placements:
         reasons = f" ({'; '.join(warnings)})" if warnings else ""
-        raise ConfigError(f"{path}: holds no triangles{reasons}; export it as a triangle mesh")
+        raise ConfigError(
+            f"{path}: holds no triangles{reasons}; export it as a triangle mesh, or, if it is a point cloud, "
+            "which has no parts, make a grammar of it: grammars.models"
+        )
     used = sorted({each.surface for each in placements})
     return Scene(
         kind=scene.kind,

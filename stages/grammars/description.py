@@ -24,7 +24,7 @@ def describe_grammar(found: Extraction) -> dict[str, Any]:
     terminals = [
         {
             "name": each.name,
-            "triangles": len(each.faces),
+            grammar.made_of: len(each.faces),
             "size": [round(float(side), 6) for side in np.ptp(each.bounds, axis=0)],
             "middle": middle.tolist(),
         }
@@ -34,7 +34,8 @@ def describe_grammar(found: Extraction) -> dict[str, Any]:
         "grammar": grammar.name,
         "up": grammar.up,
         "radius": grammar.radius,
-        "triangles": len(found.mesh.faces),
+        "made_of": grammar.made_of,
+        grammar.made_of: len(grammar.exemplar.faces),
         "area": whole,
         "motions": found.motions,
         "dockers": len(found.dockers),

@@ -48,7 +48,7 @@ def options_of(found: Extraction) -> dict[int, list[Option]]:
         for other, each in enumerate(dockers):
             if each.site == docker.site and kinds[other] not in seen:
                 seen.add(kinds[other])
-                kind = operation_kind(each.cells, docker.cells)
+                kind = operation_kind(each.cells, docker.cells, found.grid.slack)
                 motion = docker.frame @ invert(each.frame)
                 options.setdefault(place, []).append(Option(place, other, kind, motion))
     return options

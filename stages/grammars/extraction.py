@@ -1,4 +1,4 @@
-"""From a mesh to its grammar: motions, docking sites, dockers, productions and grids (symmetry §3, §4)."""
+"""From a mesh or a cloud to its grammar: motions, docking sites, dockers, productions and grids (symmetry §3, §4)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model
+from stages.exemplars.symmetry.cloud import Cloud, cloud_grid
+from stages.exemplars.symmetry.features import CornerFrames, corner_frames
 from stages.exemplars.symmetry.grids import Row, crossing, cut_grid, rows_of
 from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.productions import productions, seams_of
+from stages.exemplars.symmetry.ridges import ridge_frames
 from stages.exemplars.symmetry.seams import Seam
 from stages.exemplars.symmetry.sites import Docker, dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid, with_area
@@ -51,11 +54,10 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class Extraction:
-    """A grammar, and what it was made of. motions: how many; seconds: CPU seconds of surface, motions, dockers,
-    grids and productions, by name."""
+    """A grammar, and what it was made of, in the cells of a grid. motions: how many; seconds: CPU seconds of surface,
+    motions, dockers, grids and productions, by name."""
 
     grammar: ShapeGrammar
-    mesh: Mesh
     grid: SurfaceGrid
     motions: int
     dockers: Sequence[Docker]
@@ -77,17 +79,20 @@ def mesh_of(model: Model) -> Mesh:
 
 
 def extract(
-    mesh: Mesh, name: str, radius: float, up: Literal["y", "z"], rng: np.random.Generator, upright: bool = True
+    surface: Mesh | Cloud,
+    name: str,
+    radius: float,
+    up: Literal["y", "z"],
+    rng: np.random.Generator,
+    upright: bool = True,
 ) -> Extraction:
-    """The grammar of a mesh for a radius of similarity, as a share of the longest side of its box.
+    """The grammar of a surface for a radius of similarity, as a share of the longest side of its box. That of a cloud
+    is made of splats, a triangle for each point, which are never cut.
 
     upright: whether only motions are looked for that keep what points up: a front that is like itself upside down
     would get its door under the roof. Triangles without area are left out. Raises ConfigError for a mesh without any
-    other.
+    other, and for a cloud of which no grid can be made.
     """
-    corners = mesh.corners
-    if not with_area(corners).any():
-        raise ConfigError(f"{name}: no triangle has any area; export the model again, with its surfaces")
     seconds: dict[str, float] = {}
     clock = time.process_time()
 
@@ -95,10 +100,10 @@ def extract(
         nonlocal clock
         seconds[what], clock = time.process_time() - clock, time.process_time()
 
-    grid = surface_grid(corners, radius)
+    grid, frames = _gridded(surface, name, radius)
     passed("surface")
     axis = np.eye(3)[{"y": 1, "z": 2}[up]] if upright else None
-    motions = candidate_motions(grid, min(MOTIONS, max(1, WORK // len(grid))), axis)
+    motions = candidate_motions(grid, min(MOTIONS, max(1, WORK // len(grid))), axis, frames)
     passed("motions")
     dockers = dockers_of(grid, motions)
     seams = seams_of(grid, dockers)
@@ -125,7 +130,7 @@ def extract(
     for number, one in enumerate(grids):
         cut = [(kept(f"G{number}-{'-'.join(map(str, where))}", alone(soup)), where) for where, soup in one.pieces]
         grid_rules.append(GridRule(f"G{number}", one.motions, one.counts, one.sites, one.frames, tuple(cut)))
-    colors = mesh.colors[grid.faces]
+    colors = surface.colors[grid.faces]
     meshes = TerminalMeshes(grid.corners, pieces, colors, terminals, WELDED * grid.size)
     middle, whole = part_around_middle("exemplar", *welded(grid.corners, 0.0), colors)
     grammar = ShapeGrammar(
@@ -138,5 +143,21 @@ def extract(
         grids=tuple(grid_rules),
         seams={site: grid.origin + (grid.cells[each.band] + 0.5) * grid.size for site, each in seams.items()},
         exemplar=replace(whole, vertices=whole.vertices + middle),
+        splats=grid.splats,
     )
-    return Extraction(grammar, mesh, grid, len(motions), dockers, seams, rows, seconds)
+    return Extraction(grammar, grid, len(motions), dockers, seams, rows, seconds)
+
+
+def _gridded(surface: Mesh | Cloud, name: str, radius: float) -> tuple[SurfaceGrid, CornerFrames]:
+    """The grid of a surface, and the frames in its corners."""
+    if isinstance(surface, Cloud):
+        try:
+            scan = cloud_grid(surface, radius)
+        except ConfigError as error:
+            raise ConfigError(f"{name}: {error}") from None
+        return scan.grid, ridge_frames(scan)
+    corners = surface.corners
+    if not with_area(corners).any():
+        raise ConfigError(f"{name}: no triangle has any area; export the model again, with its surfaces")
+    grid = surface_grid(corners, radius)
+    return grid, corner_frames(grid.corners, grid.tolerance)

@@ -59,6 +59,7 @@ def load_grammar(text: Path, arrays: Path) -> ShapeGrammar:
         grids=tuple(map(_grid, said["grids"])),
         seams=seams,
         exemplar=meshes[-1],
+        splats=said["made_of"] == "points",
     )
 
 

@@ -55,6 +55,7 @@ class ShapeGrammar:
     radius: of similarity, in units of the exemplar; meshes: terminals of the rules, then pieces of the grids, each
     around the middle of its box, which stands at `middles` float64 (m, 3) in the exemplar. rules: those of the start
     symbol first. seams: for each class of sites points on the first of them, float64 (k, 3). exemplar: the whole.
+    splats: whether the exemplar is a point cloud, and triangles stand for its points, one each.
     """
 
     name: str
@@ -66,6 +67,12 @@ class ShapeGrammar:
     grids: tuple[GridRule, ...]
     seams: Mapping[int, FloatArray]
     exemplar: PartMesh
+    splats: bool = False
+
+    @property
+    def made_of(self) -> str:
+        """What surfaces are made of."""
+        return "points" if self.splats else "triangles"
 
     @cached_property
     def labels(self) -> tuple[str, ...]:

@@ -8,21 +8,26 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.errors import ConfigError
 from pipeline.places import write_file
 from stages.exemplars.model import Model
-from stages.exemplars.read import read_model
 from stages.exemplars.settings import ReadLimits
+from stages.exemplars.symmetry.cloud import Cloud, radius_for
 from stages.exemplars.symmetry.parts import about_size
+from stages.grammars.clouds import written_clouds
 from stages.grammars.description import describe_grammar
 from stages.grammars.extraction import Extraction, extract, mesh_of
 from stages.grammars.picture import grammar_sheet, shapes_sheet
-from stages.grammars.settings import GrammarConfig
+from stages.grammars.reading import read_surface
+from stages.grammars.settings import LARGEST_RADIUS, GrammarConfig
 from stages.grammars.variety import METHODS, some_shapes
 
 __all__ = ["has_grammar", "written_grammar"]
 
 SHOWN = 12
 """So many shapes by each method are drawn to see what will come."""
+CLOUDS = 4
+"""About so many of them are written as clouds, if the model is one."""
 FEWEST = 8
 """With fewer shapes there is no config: a split has as many shards."""
 LARGEST = 400_000
@@ -58,11 +63,20 @@ def has_grammar(model: Model, asked: str) -> bool:
 def written_grammar(
     folder: Path, name: str, path: Path, up: str, limits: ReadLimits
 ) -> Iterator[tuple[str, Path | str]]:
-    """Write the grammar of a model as JSON and as a picture, some shapes of it, and a config; what each is, and where,
-    and what there is in the grammar in a sentence. No config where few shapes differ from the model to the eye."""
+    """Write the grammar of a mesh or cloud as JSON and as a picture, some shapes of it, and a config; what each is, and
+    where, and what there is in the grammar in a sentence. No config where few shapes differ from the model to the
+    eye."""
+    surface, _ = read_surface(path, limits)
     config = GrammarConfig(name=name, model=path.resolve(), up="z" if up == "z" else "y")
-    mesh = mesh_of(read_model(path, "components", limits))
-    found = extract(mesh, name, config.radius, "z" if up == "z" else "y", np.random.default_rng(0))
+    if isinstance(surface, Cloud):
+        radius = radius_for(surface, config.radius)
+        if radius > LARGEST_RADIUS:
+            raise ConfigError(
+                f"{path}: too thin or too noisy: it takes a radius of {radius:.0%} of its longest side, at most "
+                f"{LARGEST_RADIUS:.0%} make sense; scan more densely, or take the noise out"
+            )
+        config = config.model_copy(update={"radius": radius})
+    found = extract(surface, name, config.radius, "z" if up == "z" else "y", np.random.default_rng(0))
     said = _sentence(found)
     yield "grammar", said
     if len(found.grammar.rules) < 2 and not found.grammar.grids:
@@ -77,6 +91,8 @@ def written_grammar(
         return
     shapes = [each for listed in drawn.values() for each in listed]
     yield "some shapes", write_file(folder / f"{name}-grammar-shapes.png", shapes_sheet(found.grammar, shapes))
+    if found.grammar.splats:
+        yield from written_clouds(folder, f"{name}-grammar", found.grammar, shapes[:: max(1, len(shapes) // CLOUDS)])
     if len(shapes) < FEWEST:
         return
     asked = {method: 100 if count == SHOWN else count for method, count in counts.items()}

@@ -19,7 +19,7 @@ from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 from stages.shape.views.camera import Camera
 from stages.shape.views.palette import label_colors
-from stages.shape.views.portrait import portrait
+from stages.shape.views.portrait import points_portrait, portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
@@ -31,6 +31,8 @@ CAMERA = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.06)
 STAYS, COMES, GOES = (196, 192, 186), (204, 72, 58), (232, 186, 64)
 SITES = 5
 """So many classes of sites are shown, those at which most can dock."""
+POINTS = 100_000
+"""So many points of a cloud are drawn at most."""
 OPTIONS = 3
 """So many editing options of one site, those that change most."""
 
@@ -42,7 +44,7 @@ def grammar_sheet(found: Extraction) -> bytes:
     dockers = len(found.dockers)
     classes = len({each.site for each in found.dockers})
     exemplar = [
-        _cell(found, [(whole, STAYS)], f"{len(found.mesh.faces):,} triangles"),
+        _cell(found, [(whole, STAYS)], f"{len(grammar.exemplar.faces):,} {grammar.made_of}"),
         _cell(found, _sites(found), f"{dockers} docking sites of {classes} classes"),
     ]
     sections = [Section("Exemplar", [exemplar], f"{len(grammar.rules)} rules, {len(grammar.grids)} grids", 2)]
@@ -57,14 +59,14 @@ def grammar_sheet(found: Extraction) -> bytes:
 
 def shapes_sheet(grammar: ShapeGrammar, texts: Sequence[str]) -> bytes:
     """A PNG: the exemplar, and the shapes of some derivations."""
-    cells = [Cell(_pictured(exemplar_shape(grammar)), "the model"), *shapes_row(grammar, texts)]
+    cells = [Cell(_pictured(exemplar_shape(grammar), grammar.splats), "the model"), *shapes_row(grammar, texts)]
     rows = [cells[place : place + COLUMNS] for place in range(0, len(cells), COLUMNS)]
     return picture_png(contact_sheet([Section("Shapes of the grammar", rows)], grammar.name, CELL))
 
 
 def shapes_row(grammar: ShapeGrammar, texts: Sequence[str]) -> list[Cell]:
     """The shapes of some derivations, each with its text."""
-    return [Cell(_pictured(shape_of_text(grammar, each)), each) for each in texts]
+    return [Cell(_pictured(shape_of_text(grammar, each), grammar.splats), each) for each in texts]
 
 
 def dockers_row(found: Extraction, most: int) -> list[Cell]:
@@ -147,11 +149,19 @@ def _cell(found: Extraction, parts: Sequence[tuple[Soup, tuple[int, int, int]]],
     meshes = tuple(_mesh(each.corners, color) for each, color in filled)
     types = np.arange(len(meshes), dtype=np.int16)
     assembly = Assembly(types, np.tile(np.eye(4), (len(meshes), 1, 1)), np.empty((0, 2), np.int32))
-    return Cell(_pictured(Shape(meshes, assembly, found.grammar.up, ("part",))), caption)
+    return Cell(_pictured(Shape(meshes, assembly, found.grammar.up, ("part",)), found.grammar.splats), caption)
 
 
-def _pictured(shape: Shape) -> ByteArray:
-    return portrait(scene_of(shape), CAMERA, (CELL, CELL))
+def _pictured(shape: Shape, splats: bool) -> ByteArray:
+    """A portrait of a shape, or of the points that its splats stand for, of evenly many of them."""
+    if not splats:
+        return portrait(scene_of(shape), CAMERA, (CELL, CELL))
+    placed = [(shape.meshes[kind], pose) for kind, pose in zip(shape.assembly.types, shape.assembly.poses, strict=True)]
+    step = 1 + sum(len(mesh.faces) for mesh, _ in placed) // POINTS
+    points = [transform_points(pose, mesh.vertices[mesh.faces[::step]].mean(axis=1)) for mesh, pose in placed]
+    paint: ByteArray = np.concatenate([mesh.face_colors[::step] for mesh, _ in placed])
+    every = np.concatenate(points)
+    return points_portrait(every, np.arange(len(every), dtype=np.int32), CAMERA, (CELL, CELL), shape.up, paint)
 
 
 def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:

@@ -16,7 +16,7 @@ LEAST_RADIUS, LARGEST_RADIUS = 0.004, 0.1
 
 
 class GrammarConfig(StrictModel):
-    """One mesh, and how many shapes of its grammar are made."""
+    """One mesh or cloud, and how many shapes of its grammar are made."""
 
     name: str = Field(
         pattern=r"^[a-z0-9][a-z0-9-]*$",
@@ -24,7 +24,8 @@ class GrammarConfig(StrictModel):
         description="Name of the grammar; starts the keys of its samples.",
     )
     model: ExistingFile = Field(
-        description="Model file (GLB, glTF, OBJ, PLY, STL, OFF, DAE), from the run's folder; all of it is one mesh."
+        description="Model file (GLB, glTF, OBJ, PLY, STL, OFF, DAE), from the run's folder, all of it one mesh; or a "
+        "point cloud (PLY without faces; XYZ, XYZN, XYZRGB as text), with or without normals."
     )
     # excluded from what the stage's fingerprint sees: a mended licence makes the card anew and no shape
     credit: Credit = Field(default_factory=Credit, exclude=True, description="Whose the model is.")

@@ -1,4 +1,4 @@
-"""Stage `grammars`: meshes in one piece in; random and resized shapes of their grammars out, as the shards
+"""Stage `grammars`: meshes in one piece and clouds in; random and resized shapes of their grammars out, as the shards
 `<dataset>-<split>-<index>.tar`.
 
 Its first shards extract a grammar each: `<name>.json`, `<name>.tar`, `<name>.png`. Then one draws the shapes of all of
@@ -59,18 +59,19 @@ def run_shard(task: Task) -> Outcome:
 
 
 def run_extraction(task: Task) -> Outcome:
-    """Read a mesh, find its grammar, write it. Raises ShardFailed for a mesh in which nothing can be exchanged."""
-    from stages.exemplars.read import read_model
+    """Read a mesh or a cloud, find its grammar, write it. Raises ShardFailed for one in which nothing can be
+    exchanged."""
     from stages.grammars.description import describe_grammar
-    from stages.grammars.extraction import extract, mesh_of
+    from stages.grammars.extraction import extract
     from stages.grammars.files import write_grammar
     from stages.grammars.picture import grammar_sheet
+    from stages.grammars.reading import read_surface
 
     names = grammar_shards(task.config)
     config = task.config.section(GrammarsConfig).models[names.index(task.shard.name)]
-    model = read_model(config.model, "components")
-    up = config.up if config.up != "auto" else model.up or "y"
-    found = extract(mesh_of(model), config.name, config.radius, up, task.rng("sets"), config.upright)
+    surface, said = read_surface(config.model)
+    up = config.up if config.up != "auto" else said or "y"
+    found = extract(surface, config.name, config.radius, up, task.rng("sets"), config.upright)
     if len(found.grammar.rules) < 2 and not found.grammar.grids:
         raise ShardFailed(
             f"{config.model}: nothing in it can be exchanged, for {found.motions} motions leave no docking site; set "
@@ -84,7 +85,7 @@ def run_extraction(task: Task) -> Outcome:
     return Outcome(
         samples=0,
         summary={
-            "triangles": len(found.mesh.faces),
+            "made_of": f"{len(found.grammar.exemplar.faces):,} {found.grammar.made_of}",
             "motions": found.motions,
             "sites": len({each.site for each in found.dockers}),
             "dockers": len(found.dockers),
@@ -178,7 +179,7 @@ def report(plan: Plan) -> Sequence[str]:
         if seen is not None:
             grids = ", ".join(" x ".join(map(str, each)) for each in seen["grids"]) or "none"
             lines.append(
-                f"{name}: {seen['triangles']:,} triangles, {seen['motions']} motions, {seen['dockers']} dockers at "
+                f"{name}: {seen['made_of']}, {seen['motions']} motions, {seen['dockers']} dockers at "
                 f"{seen['sites']} classes of sites, {seen['rules']} rules; grids: {grids}"
             )
     drawing = drawing_name(plan.config.name)

@@ -18,7 +18,7 @@ from stages.exemplars.formats.polygons import triangulate
 from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface
 from stages.shape.arrays import ByteArray, FloatArray
 
-__all__ = ["read_ply"]
+__all__ = ["read_ply", "read_ply_points"]
 
 _TYPES = {
     "char": "i1",
@@ -98,6 +98,24 @@ def read_ply(path: Path, enclosure: Enclosure) -> Scene:
         face_colors = _textured(texture, enclosure, vertex, face, lengths, triangles, faces, face_colors, warnings)
     surface = Surface(path.stem, vertices, faces, face_colors, paint=paint)
     return Scene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),), tuple(warnings))
+
+
+def read_ply_points(path: Path, enclosure: Enclosure) -> tuple[FloatArray, FloatArray | None, ByteArray | None] | None:
+    """Points (n, 3), normals (n, 3) and colours uint8 (n, 3) sRGB of a `.ply` file without faces, a point cloud; None
+    for one with faces. Raises ConfigError for a file that is cut off or malformed."""
+    content = path.read_bytes()
+    try:
+        elements, order, _, start = _header(content, enclosure)
+        if any(each.name == "face" and each.count for each in elements):
+            return None
+        vertex = (_ascii if order == "" else _binary)(content[start:], elements, order, enclosure).get("vertex", {})
+        points = _rows("vertex", vertex, ("x", "y", "z")).astype(np.float64)
+        ways = ("nx", "ny", "nz")
+        normals = _rows("vertex", vertex, ways).astype(np.float64) if vertex.keys() >= set(ways) else None
+        return points, normals, _colors("vertex", vertex)
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        reason = error if isinstance(error, Malformed) else f"{enclosure.at} {SENSELESS}"
+        raise ConfigError(f"{path}: not a whole PLY file ({reason}); copy or export it again") from None
 
 
 def _header(content: bytes, enclosure: Enclosure) -> tuple[list[_Element], str, str | None, int]:

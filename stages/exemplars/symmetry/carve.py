@@ -8,14 +8,14 @@ from functools import cached_property
 import numba
 import numpy as np
 
-from stages.exemplars.symmetry.cells import cell_keys
+from stages.exemplars.symmetry.cells import cell_index, cell_keys, cell_of
 from stages.exemplars.symmetry.clip import cut_triangles, fragments
 from stages.exemplars.symmetry.places import among
 from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Soup", "carve", "connected_soups", "joined"]
+__all__ = ["Soup", "carve", "connected_soups", "joined", "middles_in"]
 
 BLOCK = 4
 """Triangles are looked at that come near blocks of so many cells along each axis in which there is something to cut."""
@@ -53,8 +53,12 @@ class Soup:
 def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> tuple[Soup, Soup]:
     """What of `soup` lies in the cells of `grid` with places `cells`, moved by `pose` (4, 4), and what does not.
 
-    Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border.
+    Triangles are cut where they leave the cells, and nowhere else, so that both sides of a seam have one border; splats
+    are not cut, and are where their middles are.
     """
+    if grid.splats:
+        inside = middles_in(soup, grid, cells, pose)
+        return soup.select(inside), soup.select(~inside)
     chosen = grid.cells[cells]
     box = np.array([chosen.min(axis=0), chosen.max(axis=0)])
     bounds = grid.origin + grid.size * np.array([box[0], box[1] + 1])
@@ -122,6 +126,35 @@ def _any(blocks, first, last):
                 if blocks[i, j, k]:
                     return True
     return False
+
+
+def middles_in(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> BoolArray:
+    """Of which triangles of a soup the middle lies in ascending cells with places `cells`, moved by `pose` (4, 4), bool
+    (t,)."""
+    chosen = grid.cells[cells]
+    low, high = (chosen.min(axis=0), chosen.max(axis=0)) if len(chosen) else (np.zeros(3, int), np.full(3, -1))
+    found: BoolArray = _middles_in(soup.corners, invert(pose), grid.origin, grid.size, grid.keys[cells], low, high)
+    return found
+
+
+@numba.njit(cache=True)
+def _middles_in(corners, pose, origin, size, keys, low, high):
+    """Of which triangles (f, 3, 3) the middle, moved by `pose` (4, 4), lies in a cell from `low` to `high` (3,) with one
+    of these keys, bool (f,)."""
+    found = np.zeros(len(corners), dtype=np.bool_)
+    at, cell = np.empty(3), np.empty(3, dtype=np.int64)
+    for face in range(len(corners)):
+        for d in range(3):
+            at[d] = pose[d, 3]
+            for e in range(3):
+                at[d] += pose[d, e] * (corners[face, 0, e] + corners[face, 1, e] + corners[face, 2, e]) / 3
+        cell_of(at, origin, size, cell)
+        near = True
+        for d in range(3):
+            near &= low[d] <= cell[d] <= high[d]
+        if near:
+            found[face] = cell_index(keys, cell[0], cell[1], cell[2]) >= 0
+    return found
 
 
 def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:

@@ -19,6 +19,8 @@ SAME_SET = 0.02
 """Share of a docker by which another may reach beyond it and count as inside: borders of cells do not move with it."""
 SLIPPERY = 1e-4
 """Least eigenvalue, as a share of the largest, of a motion that does not slip."""
+SLANTED = 0.06
+"""By this share of the radians up to which planes are one they may be slanted by noise."""
 AROUND = 2
 """Borders of two regions that are equal under a motion are at most so many cells apart, once moved."""
 
@@ -78,7 +80,12 @@ def docking_sites(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_b
         cells = np.unique(border[np.concatenate([of_border[each] for each in own]), 0]).astype(np.int32)
         sites.append(
             DockingSite(
-                motion, primary, secondary, cells, operation_kind(primary, secondary), slippable_motions(grid, cells)
+                motion,
+                primary,
+                secondary,
+                cells,
+                operation_kind(primary, secondary, grid.slack),
+                slippable_motions(grid, cells),
             )
         )
     return sites
@@ -103,7 +110,7 @@ def slippable_motions(grid: SurfaceGrid, cells: IntArray) -> int:
     points = points / max(float(np.linalg.norm(points, axis=1).mean()), 1e-300)
     rows = np.column_stack([np.cross(points, normals), normals])
     values = np.linalg.eigvalsh(rows.T @ rows)
-    return int((values < SLIPPERY * values[-1]).sum())
+    return int((values < max(SLIPPERY, (SLANTED * grid.same_angle) ** 2) * values[-1]).sum())
 
 
 def _members(region: np.ndarray, count: int) -> list[np.ndarray]:
@@ -112,12 +119,13 @@ def _members(region: np.ndarray, count: int) -> list[np.ndarray]:
     return np.split(order, np.searchsorted(region[order], np.arange(count + 1)))[1:-1]
 
 
-def operation_kind(primary: IntArray, secondary: IntArray) -> OperationKind:
-    """What it is to put the docker of cells `primary` where that of cells `secondary` is, int32 (n,) each."""
+def operation_kind(primary: IntArray, secondary: IntArray, slack: float) -> OperationKind:
+    """What it is to put the docker of cells `primary` where that of cells `secondary` is, int32 (n,) each. slack: share
+    that may lie elsewhere for noise."""
     shared = int(among(primary, secondary).sum())
-    if len(secondary) < len(primary) and shared >= (1 - SAME_SET) * len(secondary):
+    if len(secondary) < len(primary) and shared >= (1 - SAME_SET - slack) * len(secondary):
         return "insert"
-    if len(primary) < len(secondary) and shared >= (1 - SAME_SET) * len(primary):
+    if len(primary) < len(secondary) and shared >= (1 - SAME_SET - slack) * len(primary):
         return "delete"
     return "replace"
 

@@ -9,7 +9,7 @@ import numpy as np
 from stages.exemplars.symmetry.welding import sides_by_edge, welded
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["CornerFrames", "corner_frames", "creases"]
+__all__ = ["CREASE", "CornerFrames", "corner_frames", "creases", "frames_of_lines"]
 
 CREASE = 0.4
 """Radians between the normals at an edge from which on it is a feature line."""
@@ -50,15 +50,31 @@ def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
     ends, turns, outwards, ways, lengths = ends[real], turns[real], outwards[real], ways[real], lengths[real]
     ways = ways / lengths[:, None]
     order = np.lexsort((ends[:, 1], ends[:, 0]))
-    first, second = _pairs(ends[order, 0])
-    first, second = order[first], order[second]
+    return frames_of_lines(
+        ends[order, 0], vertices[ends[order, 0]], ways[order], lengths[order], turns[order], outwards[order], 2
+    )
+
+
+def frames_of_lines(
+    corner: np.ndarray,
+    at: FloatArray,
+    ways: FloatArray,
+    lengths: FloatArray,
+    turns: FloatArray,
+    outwards: FloatArray,
+    decimals: int,
+) -> CornerFrames:
+    """The frames of feature lines that begin in corners. Of each line: the number of its corner, int (m,), ascending;
+    where that is, and the way that the line goes, float64 (m, 3) each; its length and the turn of the surface there,
+    float64 (m,) each; and the sum of the normals beside it, float64 (m, 3). Kinds are compared to so many decimals."""
+    first, second = _pairs(corner)
     across = ways[second] - (ways[first] * ways[second]).sum(axis=1)[:, None] * ways[first]
     sine = np.linalg.norm(across, axis=1)
     bent = sine > STRAIGHT
     first, second, across = first[bent], second[bent], across[bent] / sine[bent, None]
     frames = np.zeros((len(first), 4, 4))
     frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = ways[first], across, np.cross(ways[first], across)
-    frames[:, :3, 3], frames[:, 3, 3] = vertices[ends[first, 0]], 1.0
+    frames[:, :3, 3], frames[:, 3, 3] = at[first], 1.0
     outward = outwards[first] + outwards[second]
     kinds = np.column_stack(
         [
@@ -68,8 +84,8 @@ def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
             (outward * frames[:, :3, 2]).sum(axis=1),
         ]
     )
-    kinds = np.round(kinds, 2) + 0.0
-    chosen = _first_of_corner(ends[first, 0], kinds)
+    kinds = np.round(kinds, decimals) + 0.0
+    chosen = _first_of_corner(corner[first], kinds)
     return CornerFrames(frames[chosen], kinds[chosen], np.column_stack([lengths[first], lengths[second]])[chosen])
 
 

@@ -205,7 +205,7 @@ def _keeps(grid: SurfaceGrid, dockers: Sequence[Docker], row: Row, own: IntArray
         asked[dockers[docker].border] = True
     points = grid.origin + (grid.cells[asked & clear] + 0.5) * grid.size
     there = _nearest_labels(grid, transform_points(row.motion, points), other)
-    return bool((there == other[asked & clear]).mean() >= TILED)
+    return bool((there == other[asked & clear]).mean() >= TILED - grid.slack)
 
 
 def _nearest_labels(grid: SurfaceGrid, points: FloatArray, labels: IntArray) -> IntArray:

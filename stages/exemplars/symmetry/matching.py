@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.exemplars.symmetry.boundary import SAME_ANGLE
 from stages.exemplars.symmetry.cells import cell_index, cell_of
 from stages.exemplars.symmetry.places import keys_at
 from stages.exemplars.symmetry.surface import SurfaceGrid
@@ -23,22 +22,52 @@ __all__ = [
 ]
 
 TINY = 1e-9
+HOLE = 50
+"""Cells of a scan that may be missing in one place: about those within the radius of a point."""
+ISOLATED = 16
+"""Cells of a scan in one place that are taken for noise where they differ."""
 
 
 def symmetric_cells(grid: SurfaceGrid, motion: FloatArray) -> tuple[BoolArray, BoolArray]:
     """The cells that a rigid motion (4, 4) maps onto the surface, and those that its inverse does, bool (n,) each.
 
     A cell is symmetric if each plane and each boundary line in it has its equal where the motion takes it, and nothing
-    else lies there.
+    else lies there. Of a scan, where not all items need to agree, small regions that are not symmetric are taken for
+    noise and holes.
     """
     back = invert(motion)
-    forth_found, back_found = matched_items(grid, motion), matched_items(grid, back)
-    forth, backward = np.ones(len(grid), dtype=bool), np.ones(len(grid), dtype=bool)
-    forth[grid.item_cell[~forth_found]] = False
-    backward[grid.item_cell[~back_found]] = False
-    _mark(forth, grid.points[~back_found], back, grid.origin, grid.size, grid.keys, grid.tolerance)
-    _mark(backward, grid.points[~forth_found], motion, grid.origin, grid.size, grid.keys, grid.tolerance)
-    return forth, backward
+    lost, lost_back = (np.flatnonzero(~matched_items(grid, each)) for each in (motion, back))
+    forth, backward = (_without(grid, lost, lost_back, back), _without(grid, lost_back, lost, motion))
+    if grid.agreement == 1:
+        return forth, backward
+    differ = lost[_anything_at(grid, motion, lost)]
+    differ_back = lost_back[_anything_at(grid, back, lost_back)]
+    return (
+        _without_specks(grid, forth, ~_without(grid, differ, differ_back, back)),
+        _without_specks(grid, backward, ~_without(grid, differ_back, differ, motion)),
+    )
+
+
+def _without(grid: SurfaceGrid, lost: np.ndarray, lost_back: np.ndarray, back: FloatArray) -> BoolArray:
+    """All cells but those of items `lost` under a motion, and those to which its inverse `back` (4, 4) takes items that
+    are lost under it, bool (n,)."""
+    found = np.ones(len(grid), dtype=bool)
+    found[grid.item_cell[lost]] = False
+    _mark(found, grid.points[lost_back], back, grid.origin, grid.size, grid.keys, grid.tolerance)
+    return found
+
+
+def _anything_at(grid: SurfaceGrid, motion: FloatArray, items: np.ndarray) -> BoolArray:
+    """Whether a motion takes each of some items to an occupied cell or beside one, bool (i,)."""
+    found: BoolArray = _near_cells(grid.points[items], motion, grid.origin, grid.size, grid.keys)
+    return found
+
+
+def _without_specks(grid: SurfaceGrid, symmetric: BoolArray, differs: BoolArray) -> BoolArray:
+    """The symmetric cells, and regions of others that are small: at most HOLE cells, of which at most ISOLATED differ,
+    while of the rest nothing is known. The paper removes isolated voxels of scans (symmetry §4.1)."""
+    found: BoolArray = _filled(symmetric, differs, grid.neighbours, HOLE, ISOLATED)
+    return found
 
 
 def r_symmetric_cells(grid: SurfaceGrid, motion: FloatArray) -> tuple[BoolArray, BoolArray]:
@@ -48,13 +77,13 @@ def r_symmetric_cells(grid: SurfaceGrid, motion: FloatArray) -> tuple[BoolArray,
 
 
 def matched_items(grid: SurfaceGrid, motion: FloatArray, items: np.ndarray | None = None) -> BoolArray:
-    """For each item of the grid (or of those with indices `items`) whether it lies on its equal once moved."""
+    """For each item of the grid (or of those with indices `items`) whether it is weak or, moved, lies on its equal."""
     asked = np.arange(len(grid.points)) if items is None else items
     found: BoolArray = _matched(
         asked, motion, grid.origin, grid.size, grid.keys, grid.starts, grid.points, grid.directions, grid.is_line,
-        grid.tolerance,
+        grid.tolerance, grid.same_angle,
     )  # fmt: skip
-    return found
+    return found if grid.weak is None else found | grid.weak[asked]
 
 
 def eroded(grid: SurfaceGrid, symmetric: BoolArray) -> BoolArray:
@@ -98,7 +127,7 @@ def cells_within(grid: SurfaceGrid, cells: IntArray, most: float) -> IntArray:
 
 
 @numba.njit(cache=True)
-def _matched(asked, motion, origin, size, keys, starts, points, directions, is_line, tolerance):
+def _matched(asked, motion, origin, size, keys, starts, points, directions, is_line, tolerance, same_angle):
     found = np.zeros(len(asked), dtype=np.bool_)
     at, along = np.empty(3), np.empty(3)
     low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
@@ -128,7 +157,7 @@ def _matched(asked, motion, origin, size, keys, starts, points, directions, is_l
                         c0 = along[1] * w - along[2] * v
                         c1 = along[2] * u - along[0] * w
                         c2 = along[0] * v - along[1] * u
-                        if c0 * c0 + c1 * c1 + c2 * c2 > SAME_ANGLE**2:
+                        if c0 * c0 + c1 * c1 + c2 * c2 > same_angle**2:
                             continue
                         if is_line[item]:
                             c0, c1, c2 = d1 * w - d2 * v, d2 * u - d0 * w, d0 * v - d1 * u
@@ -140,6 +169,50 @@ def _matched(asked, motion, origin, size, keys, starts, points, directions, is_l
                         ):
                             found[place] = True
                             break
+    return found
+
+
+@numba.njit(cache=True)
+def _near_cells(points, motion, origin, size, keys):
+    """Whether a motion takes each point (n, 3) to an occupied cell or beside one."""
+    found = np.zeros(len(points), dtype=np.bool_)
+    at, cell = np.empty(3), np.empty(3, dtype=np.int64)
+    for place in range(len(points)):
+        for d in range(3):
+            at[d] = motion[d, 3]
+            for e in range(3):
+                at[d] += motion[d, e] * points[place, e]
+        cell_of(at, origin, size, cell)
+        for x in range(-1, 2):
+            for y in range(-1, 2):
+                for z in range(-1, 2):
+                    if not found[place] and cell_index(keys, cell[0] + x, cell[1] + y, cell[2] + z) >= 0:
+                        found[place] = True
+    return found
+
+
+@numba.njit(cache=True)
+def _filled(symmetric, differs, neighbours, most, most_differ):
+    """The symmetric cells with regions of at most so many others, at most so many of which differ."""
+    found, seen = symmetric.copy(), symmetric.copy()
+    region = np.empty(len(symmetric), dtype=np.int64)
+    for first in range(len(symmetric)):
+        if seen[first]:
+            continue
+        seen[first], region[0] = True, first
+        head, tail, count = 0, 1, 0
+        while head < tail:
+            n = region[head]
+            head += 1
+            count += differs[n]
+            for place in range(26):
+                other = neighbours[n, place]
+                if other >= 0 and not seen[other]:
+                    seen[other] = True
+                    region[tail] = other
+                    tail += 1
+        if tail <= most and count <= most_differ:
+            found[region[:tail]] = True
     return found
 
 

@@ -28,15 +28,18 @@ PLAIN = 1e-4
 """Radians below which a motion does not turn."""
 
 
-def candidate_motions(grid: SurfaceGrid, most: int, axis: FloatArray | None = None) -> FloatArray:
+def candidate_motions(
+    grid: SurfaceGrid, most: int, axis: FloatArray | None = None, frames: CornerFrames | None = None
+) -> FloatArray:
     """At most `most` rigid motions (m, 4, 4) that carry parts of the surface onto it, that of the largest part first.
 
     Of a motion and its inverse one stands for both; the identity is none. Frames in corners of feature lines that agree
     in kind, and in the lengths of their edges where many do, are aligned; alignments are hashed into clusters, and
     those of many votes tried on a sample of the surface: thousands are pruned before the whole surface is looked at.
-    axis: a direction, float64 (3,), that all of them keep; None for any.
+    axis: a direction, float64 (3,), that all of them keep; None for any. frames: in corners of feature lines; without,
+    those of the grid's triangles.
     """
-    found = corner_frames(grid.corners, grid.tolerance)
+    found = corner_frames(grid.corners, grid.tolerance) if frames is None else frames
     middle = grid.corners.reshape(-1, 3).mean(axis=0)
     centred = found.frames.copy()
     centred[:, :3, 3] -= middle
@@ -119,9 +122,12 @@ def _agreed(cluster: FloatArray) -> FloatArray:
 
 def _sample(grid: SurfaceGrid) -> np.ndarray:
     """Items of the surface: of its boundary lines, of which planes of plain walls say nothing, as far as there are any,
-    evenly through the grid."""
-    lines = np.flatnonzero(grid.is_line)
-    chosen = lines if len(lines) else np.arange(len(grid.points))
+    else of cells in which planes meet, evenly through the grid."""
+    chosen = np.flatnonzero(grid.is_line)
+    if not len(chosen):
+        chosen = np.flatnonzero(np.diff(grid.starts)[grid.item_cell] > 1)
+    if not len(chosen):
+        chosen = np.arange(len(grid.points))
     return chosen[np.linspace(0, len(chosen) - 1, min(SAMPLE, len(chosen))).astype(np.int64)]
 
 

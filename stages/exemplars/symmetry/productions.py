@@ -147,7 +147,7 @@ def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: np.ndarray) -> bool:
     something else where sheets lie in one cell."""
     wanted = float(grid.area[cells].sum())
     border = float(grid.area[beside(grid, cells)].sum())
-    return abs(terminal.area - wanted) <= BORDERS * border + SAME_AREA * wanted
+    return abs(terminal.area - wanted) <= BORDERS * border + (SAME_AREA + grid.slack) * wanted
 
 
 def _equal(
@@ -158,7 +158,7 @@ def _equal(
     (first, cells), (second, others) = one, other
     if first.site != second.site or len(first.places) != len(second.places):
         return None
-    if abs(first.terminal.area - second.terminal.area) > SAME_AREA * first.terminal.area:
+    if abs(first.terminal.area - second.terminal.area) > (SAME_AREA + grid.slack) * first.terminal.area:
         return None
     motion = second.frame @ invert(first.frame)
     order: list[int] = []
@@ -176,7 +176,7 @@ def _equal(
             return None
         order.append(same[0])
     alike = all(
-        bool(matched_items(grid, way, items_in(grid, held)).mean() > ALIKE)
+        bool(matched_items(grid, way, items_in(grid, held)).mean() > ALIKE * grid.agreement)
         for way, held in ((motion, cells.places), (invert(motion), others.places))
     )
     return tuple(order) if alike else None

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from stages.exemplars.symmetry.carve import Soup, carve, joined
-from stages.exemplars.symmetry.cells import cell_index, cell_of
+from stages.exemplars.symmetry.carve import Soup, carve, joined, middles_in
 from stages.exemplars.symmetry.matching import cells_within, matched_items
 from stages.exemplars.symmetry.places import among, items_in, items_moved_into
 from stages.exemplars.symmetry.surface import SurfaceGrid
@@ -47,17 +46,6 @@ def widened(grid: SurfaceGrid, cells: np.ndarray, steps: int) -> BoolArray:
 
 
 @numba.njit(cache=True)
-def _middle_among(corners, origin, size, keys):
-    """Of which triangles (f, 3, 3) the middle lies in a cell with one of these keys, bool (f,)."""
-    found = np.zeros(len(corners), dtype=np.bool_)
-    cell = np.empty(3, dtype=np.int64)
-    for face in range(len(corners)):
-        cell_of((corners[face, 0] + corners[face, 1] + corners[face, 2]) / 3, origin, size, cell)
-        found[face] = cell_index(keys, cell[0], cell[1], cell[2]) >= 0
-    return found
-
-
-@numba.njit(cache=True)
 def _widen(chosen, cells, neighbours, steps):
     """Set the cells at most so many steps from `cells`."""
     queue = np.empty(len(chosen), dtype=np.int64)
@@ -77,10 +65,11 @@ def _widen(chosen, cells, neighbours, steps):
 
 def stands(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> bool:
     """Whether the surface has at a pose (4, 4) what lies in ascending cells, and nothing beside."""
-    if matched_items(grid, pose, items_in(grid, cells)).mean() < STANDS:
+    least = STANDS * grid.agreement
+    if matched_items(grid, pose, items_in(grid, cells)).mean() < least:
         return False
     there = items_moved_into(grid, cells, pose)
-    return bool(matched_items(grid, invert(pose), there).mean() >= STANDS)
+    return bool(matched_items(grid, invert(pose), there).mean() >= least)
 
 
 def cut_out(soup: Soup, grid: SurfaceGrid, cells: IntArray, frame: FloatArray, seam: Seam) -> tuple[Soup, Soup]:
@@ -92,5 +81,5 @@ def cut_out(soup: Soup, grid: SurfaceGrid, cells: IntArray, frame: FloatArray, s
     """
     along, away = carve(soup, grid, seam.band, frame)
     inside, outside = carve(along, grid, seam.inner, frame)
-    within = _middle_among(away.corners, grid.origin, grid.size, grid.keys[cells])
+    within = middles_in(away, grid, cells, np.eye(4))
     return joined(inside, away.select(within)), joined(outside, away.select(~within))

@@ -136,12 +136,13 @@ class _Site:
         for end, there in ((here.min(axis=0), other.around.min(axis=0)), (here.max(axis=0), other.around.max(axis=0))):
             if (np.abs(end - there) > most).any():
                 return False
-        if not np.isfinite(other.tree.query(here, distance_upper_bound=most)[0]).all():
+        if np.isfinite(other.tree.query(here, distance_upper_bound=most)[0]).mean() < self._grid.agreement:
             return False
-        if not np.isfinite(KDTree(here).query(other.around, distance_upper_bound=most)[0]).all():
+        if np.isfinite(KDTree(here).query(other.around, distance_upper_bound=most)[0]).mean() < self._grid.agreement:
             return False
         moved = transform_points(motion, self.rim)
-        return bool(np.isfinite(other.rim_tree.query(moved, distance_upper_bound=most)[0]).mean() > WITHIN)
+        within = WITHIN * self._grid.agreement
+        return bool(np.isfinite(other.rim_tree.query(moved, distance_upper_bound=most)[0]).mean() > within)
 
 
 def _centres(grid: SurfaceGrid, cells: IntArray) -> FloatArray:
@@ -157,7 +158,7 @@ def _identified(grid: SurfaceGrid, sites: list[_Site], motions: FloatArray, kept
     middles = np.array([each.middle for each in sites]).reshape(-1, 3)
     for motion, symmetric in zip(motions, kept, strict=True):
         for one, docker in enumerate(found):
-            if not symmetric[docker.border].all():
+            if symmetric[docker.border].mean() < grid.agreement:
                 continue
             away = np.linalg.norm(middles - transform_points(motion, middles[one]), axis=1)
             for other in np.flatnonzero(away <= 2 * APART * grid.size).tolist():

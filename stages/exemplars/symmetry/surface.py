@@ -12,7 +12,7 @@ from stages.exemplars.symmetry.cells import BITS, neighbours_of, pack
 from stages.exemplars.symmetry.clip import fragments
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["CELLS_A_RADIUS", "SurfaceGrid", "surface_grid", "with_area"]
+__all__ = ["CELLS_A_RADIUS", "SHIFT", "SurfaceGrid", "surface_grid", "with_area"]
 
 CELLS_A_RADIUS = 4
 """Cells have a quarter of the radius of similarity (symmetry §4)."""
@@ -33,7 +33,10 @@ class SurfaceGrid:
     area: float64 (n,). Items are planes (`is_line` False, `directions` outward normals) and boundary lines
     (`directions` along them, either way): item_cell int32 (i,) ascending, points float64 (i, 3) on the surface,
     directions float64 (i, 3), is_line bool (i,); starts int64 (n + 1,) of each cell's items.
-    radius: of similarity; size: of a cell.
+    radius: of similarity; size: of a cell. tolerance, same_angle: distance and radians up to which planes and lines are
+    one; agreement: share of items that must agree where a surface is the same, 1 for exact ones. weak: bool (i,),
+    items that may be missing where a surface is the same, if there are any. splats: whether
+    triangles stand for points, one each, so that none is ever cut.
     """
 
     corners: FloatArray
@@ -50,14 +53,19 @@ class SurfaceGrid:
     directions: FloatArray
     is_line: np.ndarray
     starts: np.ndarray
+    tolerance: float
+    same_angle: float = SAME_ANGLE
+    agreement: float = 1.0
+    weak: BoolArray | None = None
+    splats: bool = False
 
     def __len__(self) -> int:
         return len(self.keys)
 
     @property
-    def tolerance(self) -> float:
-        """Distance up to which planes and lines are one."""
-        return SAME_PLACE * self.size
+    def slack(self) -> float:
+        """By so much shares of surfaces may differ that are the same: 0 for exact ones."""
+        return (1 - self.agreement) / 5
 
 
 def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
@@ -102,6 +110,7 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
         directions=directions,
         is_line=is_line,
         starts=np.searchsorted(item_cell, np.arange(len(keys) + 1)),
+        tolerance=tolerance,
     )
 
 

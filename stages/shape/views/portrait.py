@@ -70,11 +70,17 @@ def portrait(
 
 
 def points_portrait(
-    points: FloatArray, labels: IntArray, camera: Camera, size: tuple[int, int], up: Literal["y", "z"]
+    points: FloatArray,
+    labels: IntArray,
+    camera: Camera,
+    size: tuple[int, int],
+    up: Literal["y", "z"],
+    paint: ByteArray | None = None,
 ) -> ByteArray:
     """Points (n, 3) as small shaded balls coloured by `labels` (n,), uint8 (height, width, 3) for (width, height).
 
-    The more points, the smaller the balls. Raises ValueError where there are no points.
+    paint: uint8 (k, 3) sRGB, the colour of each label; without, labels have colours that differ well. The more points,
+    the smaller the balls. Raises ValueError where there are no points.
     """
     width, height = size[0] * SUPERSAMPLE, size[1] * SUPERSAMPLE
     view = camera.look(points, up, width / height)
@@ -88,9 +94,8 @@ def points_portrait(
     lit = np.clip(normal[shown] @ np.array([-0.5, 0.68, 0.54]), 0.0, None)
     sky = (0.5 + 0.5 * above)[:, None] * SKY + (0.5 - 0.5 * above)[:, None] * GROUND
     open_sky = openness(depth, normal, view, 0.10 * view.radius)[shown][:, None]
-    used, which = np.unique(labels, return_inverse=True)
-    colors = label_colors(int(used.max()) + 1)[used]
-    albedo = srgb_to_linear(colors)[which[owner[shown]]]
+    colors = label_colors(int(labels.max()) + 1) if paint is None else paint
+    albedo = srgb_to_linear(colors)[labels[owner[shown]]]
     picture[shown] = albedo * (lit[:, None] * KEY * 0.9 + 1.15 * sky) * (0.25 + 0.75 * open_sky)
     return linear_to_srgb(_reduced(picture))
 
