@@ -139,7 +139,7 @@ def middles_in(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray)
 
 @numba.njit(cache=True)
 def _middles_in(corners, pose, origin, size, keys, low, high):
-    """Of which triangles (f, 3, 3) the middle, moved by `pose` (4, 4), lies in a cell from `low` to `high` (3,) with one
+    """Of which triangles (f, 3, 3) the middle, moved by `pose` (4, 4), is in a cell from `low` to `high` (3,) with one
     of these keys, bool (f,)."""
     found = np.zeros(len(corners), dtype=np.bool_)
     at, cell = np.empty(3), np.empty(3, dtype=np.int64)
