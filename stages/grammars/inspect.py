@@ -33,8 +33,11 @@ FEWEST = 8
 LARGEST = 400_000
 """Cells and triangles up to which a grammar is looked for unasked: with more it takes minutes."""
 
+READY = "ready for `make dataset CONFIG=` this file"
+READY_CLOUD = """of a point cloud. `python -m pipeline run grammars --config` this file makes its
+# shapes, and `python -m stages.grammars.clouds` writes them as PLY; what comes after it looks at surfaces"""
 CONFIG = """\
-# Written by `make inspect`; ready for `make dataset CONFIG=` this file. Every key is in configs/README.md.
+# Written by `make inspect`; {ready}. Every key is in configs/README.md.
 # {said}.
 name: {name}-grammar
 seed: 1
@@ -97,6 +100,7 @@ def written_grammar(
         return
     asked = {method: 100 if count == SHOWN else count for method, count in counts.items()}
     written = CONFIG.format(
+        ready=READY_CLOUD if found.grammar.splats else READY,
         said=said,
         name=config.name,
         model=json.dumps(str(path)),
