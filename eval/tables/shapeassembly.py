@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import groupby
@@ -61,13 +61,12 @@ def _of_model(
     rng = decision_rng(subject.config.seed, "shapeassembly", trained.folder)
     learning = {trained.folder: training_curve(subject.models / trained.folder, "val_loss")}
     curve = Curve("How well shapes that were not learnt are written", "steps of training", "loss", learning)
-    try:
-        rows = list(_written(trained, asked, rng))
-    except ValueError as error:
-        return Answer([quality_table({}, {}, {}, {trained.folder: str(error)})], [curve])
+    rows, silent = _written(trained, asked, rng)
+    if not rows:
+        return Answer([quality_table({}, {}, {}, silent)], [curve])
     # What is told in another way is new whatever it is.
     whole = told_without(trained) == "nothing"
-    tables = _tables(rows, reference(trained.kit), subject.config.seed, novel=whole)
+    tables = _tables(rows, reference(trained.kit), subject.config.seed, silent, novel=whole)
     if isinstance(trained.model, TrainedProgramVae | TrainedPartGraphVae) and whole:
         tables.append(smoothness_table({trained.folder: smoothness(trained.model, asked.sequences, asked.steps, rng)}))
     strips = [Strip(f"Samples of {row.name}", _pictures(row.samples[:SHOWN])) for row in rows]
@@ -79,11 +78,14 @@ def _of_val(subject: Subject, asked: Namespace, category: str, reference: Callab
 
     programs = reference(category).val[: asked.samples]
     row = Written(f"{category}, val", boxes_of_programs(programs), programs, of_val=True)
-    return Answer(_tables([row], reference(category), subject.config.seed, novel=True))
+    return Answer(_tables([row], reference(category), subject.config.seed, {}, novel=True))
 
 
-def _tables(rows: Sequence[Written], reference: Reference, seed: int, *, novel: bool) -> list[Table]:
-    """The tables of shapes; novel: whether structures that train has not are counted."""
+def _tables(
+    rows: Sequence[Written], reference: Reference, seed: int, silent: Mapping[str, str], *, novel: bool
+) -> list[Table]:
+    """The tables of shapes; silent: which models write nothing, and why; novel: whether structures that train has not
+    are counted."""
     from eval.program_tables import editability_table, quality_table, variability_table
     from eval.programs import clouds_of, novelty, physics_of, variability
     from eval.realism import POINTS, Realism, realism
@@ -101,7 +103,7 @@ def _tables(rows: Sequence[Written], reference: Reference, seed: int, *, novel: 
     rejected = {row.name: 100 * (1 - len(row.samples) / row.begun) for row in rows if row.begun}
     new = {name: novelty(programs, reference.train) for name, programs in told.items()} if novel else {}
     return [
-        quality_table({row.name: physics_of(row.samples) for row in rows}, seen, rejected, {}),
+        quality_table({row.name: physics_of(row.samples) for row in rows}, seen, rejected, silent),
         editability_table(told),
         variability_table(varied, new),
     ]
@@ -119,23 +121,35 @@ class Written:
     of_val: bool = False
 
 
-def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> Iterator[Written]:
-    """What a model writes; and, of one of whole programs, what it writes where nothing is rejected. Raises ValueError
-    for a model that writes next to nothing."""
+def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> tuple[list[Written], dict[str, str]]:
+    """What a model writes; and, of one of whole programs, what it writes where nothing is rejected. Beside it why one
+    that writes next to nothing is silent, by name."""
     from eval.program_models import PROGRAM_KINDS, told_without
     from eval.programs import boxes_of_programs, unrejected
     from stages.training.program_vae.trained import TrainedProgramVae
 
-    found, begun = trained.model.sample(asked.samples, rng, asked.temperature)
-    if trained.model.header["kind"] not in PROGRAM_KINDS:
-        yield Written(trained.folder, found, begun=begun)
-        return
+    rows: list[Written] = []
+    silent: dict[str, str] = {}
     without = told_without(trained)
-    name = trained.folder if without == "nothing" else f"{trained.folder}, without {without}"
-    yield Written(name, boxes_of_programs(found), found, begun)
+    try:
+        found, begun = trained.model.sample(asked.samples, rng, asked.temperature)
+    except ValueError as error:
+        silent[trained.folder] = str(error)
+    else:
+        if trained.model.header["kind"] in PROGRAM_KINDS:
+            name = trained.folder if without == "nothing" else f"{trained.folder}, without {without}"
+            rows.append(Written(name, boxes_of_programs(found), found, begun))
+        else:
+            rows.append(Written(trained.folder, found, begun=begun))
     if isinstance(trained.model, TrainedProgramVae) and without == "nothing":
-        programs = unrejected(trained.model, asked.samples, rng, asked.temperature)
-        yield Written(f"{trained.folder}, no reject", boxes_of_programs(programs), programs)
+        name = f"{trained.folder}, no reject"
+        try:
+            programs = unrejected(trained.model, asked.samples, rng, asked.temperature)
+        except ValueError as error:
+            silent[name] = str(error)
+        else:
+            rows.append(Written(name, boxes_of_programs(programs), programs))
+    return rows, silent
 
 
 def _pictures(samples: Sequence[Sequence[Box]]) -> list[tuple[str, bytes]]:

@@ -13,7 +13,7 @@ from eval.evaluation import Sheet
 from eval.models import Trained
 from eval.nearest import nearest, nearest_and_which, nearest_programs
 from eval.part_surfaces import curve_parts, surface_of, surfaces_sheet, trained_surfaces
-from eval.program_figures import beside_sheet, edits_sheet, journey_sheet, neighbours, neighbours_table
+from eval.program_figures import WIDTH, beside_sheet, edits_sheet, journey_sheet, neighbours, neighbours_table
 from eval.programs import boxes_of_programs, clouds_of
 from stages.shapeassembly import execute_all, parse
 from stages.shapeassembly.extraction.boxes import box_corners
@@ -60,7 +60,7 @@ def test_figure_7_tells_a_copy_from_a_new_structure() -> None:
 def test_figures_8_and_9_have_a_picture_for_each_sample() -> None:
     edits = edits_sheet("vae-box-0", "box", PROGRAMS, np.random.default_rng(0))
     beside = beside_sheet("box", {"one": boxes_of_programs(PROGRAMS), "other": boxes_of_programs(PROGRAMS[:1])})
-    assert _size(edits)[0] == _size(beside)[0]
+    assert min(_size(edits)[0], _size(beside)[0]) > 2 * WIDTH
     assert _size(edits)[1] < _size(beside)[1], "captions stand below"
 
 
