@@ -5,9 +5,6 @@ top and bottom alone; a cuboid is attached to another once, to the bounding box 
 bounding box is never moved, has no sub-program, and bears others as what is grounded does; only grounded cuboids are
 attached to or copied; cuboids are declared first, then attached, then copied; and no cuboid reaches further out of the
 bounding box than by a tenth of its size. What is not grounded in the end is left out.
-
-Beyond the paper, where lines may be refused no cuboid comes apart from what it is attached to: an aligned one is not
-stretched, and half of the chairs that fell had a leg or a back too short to reach both of its ends.
 """
 
 from __future__ import annotations
@@ -18,7 +15,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.attached import coming_apart
 from stages.shapeassembly.checks import SIDE, reaching_out
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.interpreter import execute
@@ -152,10 +148,10 @@ class Draft:
         self.below.append(below)
         self.written += 1
 
-    def add(self, choice: Choice, numbers: Numbers, *, attached: bool) -> bool:
-        """Writes a line, if it keeps the rules, and with `attached` nothing comes apart; whether it does."""
+    def add(self, choice: Choice, numbers: Numbers) -> bool:
+        """Writes a line, if it keeps the rules; whether it does."""
         found = self.line(choice, numbers)
-        if found is None or not self.fits(found[0], choice[1], attached=attached):
+        if found is None or not self.fits(found[0], choice[1]):
             return False
         self.put(choice, *found)
         return True
@@ -198,13 +194,11 @@ class Draft:
         self.lines.append(line)
         self.written += 1
 
-    def fits(self, line: Written, moved: int, *, attached: bool = False) -> bool:
-        """Whether what is grounded with the line stays within the bounding box, and with `attached` where it is
-        attached."""
+    def fits(self, line: Written, moved: int) -> bool:
+        """Whether what is grounded with the line stays within the bounding box."""
         drafted = replace(self, lines=[*self.lines, line], _grounded={*self._grounded, moved})
-        block = drafted.block("Program_0", {})
         try:
-            return not (reaching_out(block) or (attached and coming_apart(block)))
+            return not reaching_out(drafted.block("Program_0", {}))
         except ProgramError:
             return False
 

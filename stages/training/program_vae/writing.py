@@ -57,8 +57,8 @@ def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[
     """A program for each point, float32 (n, latent), its numbers to three decimals.
 
     None where a line broke a rule and no other could be found, and for a program that is beyond the limits of
-    execution; without `reject` an assembly ends before such a line, as for interpolation, and cuboids may come apart
-    from what they are attached to. None is a program without a cuboid, too.
+    execution; without `reject` an assembly ends before such a line, as for interpolation. None is a program without a
+    cuboid, too.
     """
     device = next(module.parameters()).device
     codes = torch.from_numpy(points).to(device)
@@ -69,7 +69,7 @@ def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[
     for depth in range(MOST_DEPTH):
         if not level:
             break
-        _write_level(module, level, reject)
+        _write_level(module, level)
         failed |= {node.shape for node in level if node.failed}
         below: list[_Node] = []
         for node in level:
@@ -85,21 +85,21 @@ def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[
     ]
 
 
-def _write_level(module: ProgramVae, level: Sequence[_Node], attached: bool) -> None:
-    """Writes the assemblies of a level to their ends. attached: as in `Draft.add`."""
+def _write_level(module: ProgramVae, level: Sequence[_Node]) -> None:
+    """Writes the assemblies of a level to their ends."""
     states = module.start(torch.stack([node.code for node in level]))
     open_ = list(range(len(level)))
     while open_:
         nodes = [level[each] for each in open_]
         shown = torch.stack([node.last for node in nodes]).to(states.device)[:, None]
         written, states = module.write(shown, states)
-        ended = _write_lines(module, nodes, written[:, 0], attached)
+        ended = _write_lines(module, nodes, written[:, 0])
         going = [place for place, over in enumerate(ended) if not over]
         open_ = [open_[place] for place in going]
         states = states[:, going]
 
 
-def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor, attached: bool) -> list[bool]:
+def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor) -> list[bool]:
     """One line more of each assembly; whether each has ended."""
     boxes = states.new_tensor([node.draft.box for node in nodes])
     heads = module.lines
@@ -129,7 +129,7 @@ def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor, att
                 ended[row] = True
             elif choice[0] == CUBOID:
                 _declare(module, node, states[row], sizes[row], bool(aligned[row] > 0))
-            elif node.draft.add(choice, of_place[place], attached=attached):
+            elif node.draft.add(choice, of_place[place]):
                 node.last = _line_of(node.draft, choice)
             else:
                 pending.append(row)
