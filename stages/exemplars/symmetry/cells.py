@@ -7,7 +7,7 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray
 
-__all__ = ["BITS", "cell_index", "cell_keys", "cell_of", "grown", "neighbours_of", "pack"]
+__all__ = ["BITS", "cell_index", "cell_keys", "cell_of", "grown", "neighbours_of", "pack", "unpack"]
 
 BITS = 21
 """Bits of a key that say where a cell lies along an axis."""
@@ -17,6 +17,12 @@ def pack(cells: np.ndarray) -> np.ndarray:
     """Cells int64 (n, 3), none negative, as one number each, int64 (n,), in lexicographic order."""
     packed: np.ndarray = (cells[:, 0] << 2 * BITS) | (cells[:, 1] << BITS) | cells[:, 2]
     return packed
+
+
+def unpack(keys: np.ndarray) -> np.ndarray:
+    """The cells int64 (n, 3) of packed keys int64 (n,)."""
+    lowest = (1 << BITS) - 1
+    return np.column_stack([keys >> 2 * BITS, keys >> BITS & lowest, keys & lowest])
 
 
 def cell_keys(cells: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.symmetry.cells import BITS, neighbours_of, pack
+from stages.exemplars.symmetry.cells import neighbours_of, pack, unpack
 from stages.exemplars.symmetry.neighbourhoods import glance, neighbourhoods
 from stages.exemplars.symmetry.patches import planar_patches
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SHIFT, SurfaceGrid
@@ -103,7 +103,7 @@ def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
             f"radius to at least {share * (A_CELL / dense) ** 0.5:.3f}, or scan more densely"
         )
     keys, first = np.unique(packed, return_index=True)
-    cells = np.column_stack([keys >> 2 * BITS, keys >> BITS & (1 << BITS) - 1, keys & (1 << BITS) - 1])
+    cells = unpack(keys)
     begin = np.flatnonzero(np.r_[True, (packed[1:] != packed[:-1]) | (patch[1:] != patch[:-1])])
     count = np.diff(np.r_[begin, len(faces)])
     item_cell = np.searchsorted(keys, packed[begin]).astype(np.int32)

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stages.exemplars.symmetry.boundary import SAME_ANGLE, boundary_lines, sides_that_go_on
-from stages.exemplars.symmetry.cells import BITS, neighbours_of, pack
+from stages.exemplars.symmetry.cells import neighbours_of, pack, unpack
 from stages.exemplars.symmetry.clip import fragments
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
@@ -86,7 +86,7 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     order = np.argsort(packed, kind="stable")
     packed, owner, middles = packed[order], owner[order], middles[order]
     keys, first = np.unique(packed, return_index=True)
-    cells = np.column_stack([keys >> 2 * BITS, keys >> BITS & (1 << BITS) - 1, keys & (1 << BITS) - 1])
+    cells = unpack(keys)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     starts = np.append(first, len(packed))
