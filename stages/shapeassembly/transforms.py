@@ -3,18 +3,17 @@ the ablations of Table 2)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shapeassembly.attached import both_ends
 from stages.shapeassembly.flat import copy_name
 from stages.shapeassembly.interpreter import parts_of
 from stages.shapeassembly.program import (
     AXES,
     BBOX,
-    FACES,
     Attach,
     Block,
     Cuboid,
@@ -110,7 +109,7 @@ def _expanded(block: Block, program: Program) -> _Tree:
         if isinstance(line, Attach):
             joints.append(line)
         elif isinstance(line, Squeeze):
-            joints += _both_ends(line)
+            joints += both_ends(line)
         elif isinstance(line, Reflect | Translate):
             made = parts_of(replace(block, lines=block.lines[:number]))
             boxes = {BBOX: _upright(block.bbox), **dict(zip(*made, strict=True))}
@@ -126,20 +125,6 @@ def _expanded(block: Block, program: Program) -> _Tree:
                     mirror = isinstance(line, Reflect)
                     below[name] = original.mirrored(AXES.index(line.axis)) if mirror else original
     return _Tree(block.bbox, tuple(cuboids.values()), tuple(joints), below)
-
-
-def _both_ends(line: Squeeze) -> Iterator[Attach]:
-    """The two attachments that a squeeze is: an opposite face of a cuboid, the same face of the bounding box."""
-    face = FACES.index(line.face)
-    for own, target in ((face, line.first), (face ^ 1, line.second)):
-        there = own if target == BBOX else own ^ 1
-        yield Attach(line.moved, target, _on_face(own, 0.5, 0.5), _on_face(there, line.u, line.v))
-
-
-def _on_face(face: int, u: float, v: float) -> Point:
-    place = [u, v]
-    place.insert(face // 2, 1.0 - face % 2)
-    return (place[0], place[1], place[2])
 
 
 def _copied(joint: Attach, line: Reflect | Translate, copy: int, name: str, boxes: dict[str, FloatArray]) -> Attach:

@@ -185,7 +185,7 @@ class Text:
         )
         found = self._draft.line(choice, numbers)
         assert found is not None, "a word that is not allowed was taken"
-        if fit and not self._draft.fits(found[0], choice[1]):
+        if fit and not self._draft.with_line(found[0], choice[1]).fits():
             return False
         self._draft.put(choice, *found)
         return True

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 
 import numpy as np
 import torch
@@ -16,6 +17,7 @@ from stages.shapeassembly.program import AXES, FACES, Attach, Program, Reflect, 
 from stages.training.program_vae.draft import MOST_DEPTH, Choice, Draft, Numbers
 from stages.training.program_vae.lines import (
     ALIGNED,
+    ATTACH,
     AXIS,
     COPIES,
     COPIES_UNIT,
@@ -25,6 +27,7 @@ from stages.training.program_vae.lines import (
     INDICES,
     POINTS,
     SLOTS,
+    SQUEEZE,
     START,
     STOP,
     UV,
@@ -107,17 +110,17 @@ def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor) -> 
     commands = torch.eye(7, device=states.device).repeat(len(nodes), 1)
     every = heads.indices(states.repeat_interleave(7, dim=0), commands).view(len(nodes), 7, 3, SLOTS).cpu().numpy()
     sizes, aligned = (each.cpu().numpy() for each in heads.cuboid(states, boxes))
-    choices = [node.draft.choices(logits[row], every[row], TRIES) for row, node in enumerate(nodes)]
+    tries = [_tries(node.draft.choices(logits[row], every[row], TRIES)) for row, node in enumerate(nodes)]
     ended = [False] * len(nodes)
     pending = list(range(len(nodes)))
     tried = 0
     while pending:
-        rows = [row for row in pending if tried < len(choices[row])]
+        rows = [row for row in pending if tried < len(tries[row])]
         for row in set(pending) - set(rows):
             # Nothing that may follow keeps the rules.
             nodes[row].failed = True
             ended[row] = True
-        chosen = [choices[row][tried] for row in rows]
+        chosen = [tries[row][tried][0] for row in rows]
         named = [place for place, choice in enumerate(chosen) if choice[0] not in (STOP, CUBOID)]
         at = [rows[place] for place in named]
         numbers = _numbers(module, [nodes[row] for row in at], states[at], [chosen[place] for place in named])
@@ -129,12 +132,23 @@ def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor) -> 
                 ended[row] = True
             elif choice[0] == CUBOID:
                 _declare(module, node, states[row], sizes[row], bool(aligned[row] > 0))
-            elif node.draft.add(choice, of_place[place]):
+            elif node.draft.add(choice, of_place[place], reaching=tries[row][tried][1]):
                 node.last = _line_of(node.draft, choice)
             else:
                 pending.append(row)
         tried += 1
     return ended
+
+
+def _tries(choices: Sequence[Choice]) -> list[tuple[Choice, bool]]:
+    """The lines in the order in which they are tried, and whether a cuboid must reach where one attaches it: first with
+    this, then without, before another command is."""
+    found: list[tuple[Choice, bool]] = []
+    for command, alike in groupby(choices, key=lambda choice: choice[0]):
+        lines = list(alike)
+        found += [(each, True) for each in lines] if command in (ATTACH, SQUEEZE) else []
+        found += [(each, False) for each in lines]
+    return found
 
 
 def _declare(module: ProgramVae, node: _Node, state: Tensor, sizes: FloatArray, aligned: bool) -> None:
