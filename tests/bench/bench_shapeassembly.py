@@ -24,7 +24,8 @@ AUTHORS, STATED = "their authors', as stated", 78.0
 EACH = 1000
 
 
-def _texts() -> dict[str, list[str]]:
+def category_texts() -> dict[str, list[str]]:
+    """The texts of the published programs of each category, at most EACH, or of those that we ship."""
     if not SHARED.is_file():
         return {"shipped": [text for _, text in program_texts(ROOT / "datasets" / "exemplars" / "programs")]}
     categories = ("chair", "table", "storage")
@@ -41,7 +42,7 @@ def _differentiate(programs: list[Program]) -> int:
 def bench() -> Iterator[Measure]:
     """Programs a second and core: read, executed one by one and together, differentiated."""
     torch.set_num_threads(1)
-    for category, texts in _texts().items():
+    for category, texts in category_texts().items():
         programs = [parse(text) for text in texts]
         few = programs[:50]
         for name, work, peer in [

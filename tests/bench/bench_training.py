@@ -1,13 +1,16 @@
-"""Strings that a VAE learns from a second and core, beside one trained as in MOSES.
+"""Strings and programs that a VAE learns from a second and core, beside one trained as in MOSES, and beside one program
+at a time as in shapeassembly §6.2.
 
-The peer has the same sizes and sees the same strings. As in MOSES it draws its batches at random, whatever the lengths,
-sorts each by length, reads it as a packed sequence and writes it as a packed sequence, without a mask.
+The peer of strings has the same sizes and sees the same strings. As in MOSES it draws its batches at random, whatever
+the lengths, sorts each by length, reads it as a packed sequence and writes it as a packed sequence, without a mask. The
+peer of programs is our own model with batches of one: its assemblies of a level are still batched.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import count
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import count, cycle, islice
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +22,17 @@ from torch.nn.utils.rnn import pack_sequence, pad_packed_sequence
 
 from stages.exemplars.build import read_kit
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.shapeassembly import parse
+from stages.shapeassembly.errors import ProgramError
 from stages.strings.acceptor import follow
 from stages.strings.kit_strings import KitStrings
 from stages.strings.rules import make_rules
 from stages.training.loop import LARGEST_GRADIENT, same_arithmetic
+from stages.training.program_vae.batches import Programs
+from stages.training.program_vae.lines import node_lines
+from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.program_vae.training import ProgramVaeLearner
+from stages.training.program_vae.training import new_model as new_program_vae
 from stages.training.string_vae.batches import Strings
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.training import StringVaeLearner, new_model
@@ -30,6 +40,7 @@ from stages.training.string_vae.vocabulary import END, Vocabulary
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
+from tests.bench.bench_shapeassembly import category_texts
 from tests.bench.measure import Measure, rate
 
 SHAPES = 60
@@ -53,6 +64,23 @@ def bench() -> Iterator[Measure]:
         learner = StringVaeLearner(new_model(arm, vocabulary, most, 0), {}, arm, vocabulary, True, strings, strings)
         ours = rate(our_steps(learner), 4.0, 2)
         yield Measure(f"string VAE learns, {name}", "strings", ours, "as in MOSES", peer, note)
+    yield _programs_measure()
+
+
+def _programs_measure() -> Measure:
+    """Forward, backward and a step of Adam on the programs of a category; what is not learnt from left out."""
+    learnt = []
+    for text in next(iter(category_texts().values())):
+        with suppress(ProgramError):
+            learnt.append(node_lines(parse(text)))
+    rates = {}
+    for batch in (64, 1):
+        entry = ProgramVaeEntry(name="bench", kind="program_vae", batch=batch)
+        programs = Programs.of(list(islice(cycle(learnt), max(len(learnt), batch))))
+        learner = ProgramVaeLearner(new_program_vae(entry, 0), {}, entry, programs, programs)
+        rates[batch] = rate(_steps(learner, lambda levels: len(levels[0].lines)), 4.0, 2)
+    note = "batches of 64, levels of one batched in both"
+    return Measure("program VAE learns", "programs", rates[64], "one program at a time", rates[1], note)
 
 
 def castle_strings() -> tuple[Strings, Vocabulary, int]:
@@ -80,6 +108,11 @@ def castle_strings() -> tuple[Strings, Vocabulary, int]:
 
 def our_steps(learner: StringVaeLearner) -> Any:
     """A function that trains one step and says how many strings it saw."""
+    return _steps(learner, lambda batch: len(batch.codes))
+
+
+def _steps(learner: Any, seen: Callable[[Any], int]) -> Any:
+    """A function that trains one step and says how much of a batch it saw."""
     optimizer = torch.optim.Adam(learner.module.parameters())
     stream, noise, steps = learner.batches(np.random.default_rng(0)), torch.Generator().manual_seed(0), count()
 
@@ -88,7 +121,7 @@ def our_steps(learner: StringVaeLearner) -> Any:
         with torch.autocast("cpu", torch.bfloat16, enabled=learner.entry.precision == "bfloat16"):
             loss = learner.losses(batch, next(steps), noise)["loss"]
         _descend(learner.module, optimizer, loss)
-        return len(batch.codes)
+        return seen(batch)
 
     return step
 
