@@ -10,7 +10,7 @@ import numpy as np
 from stages.shapeassembly.program import Program
 from stages.shapeassembly.structure import token_distance, tokens
 
-__all__ = ["nearest", "nearest_and_which", "nearest_programs"]
+__all__ = ["nearest", "nearest_and_which", "nearest_programs", "paired"]
 
 CELLS = 24
 """Cells along each axis of the grid that bounds of distances are looked up in."""
@@ -153,6 +153,17 @@ def _at_least(field, cells, way, grid):
 def nearest(clouds, others, itself):
     """The distances alone of `nearest_and_which`."""
     return nearest_and_which(clouds, others, itself)[0]
+
+
+@numba.njit(cache=True)
+def paired(clouds, others):
+    """The Chamfer distance of each cloud (n, k, 3) to the other (n, k, 3) at its place, float64 (n,)."""
+    ours, theirs = _by_axes(clouds), _by_axes(others)
+    squares, found = np.empty(max(clouds.shape[1], others.shape[1]), np.float32), np.empty(len(clouds))
+    for n in range(len(clouds)):
+        there = _one_way(ours[n], theirs[n], squares, np.inf)
+        found[n] = (there + _one_way(theirs[n], ours[n], squares, np.inf)) / 2
+    return found
 
 
 def nearest_programs(programs: Sequence[Program], others: Sequence[Program]) -> list[tuple[int, int]]:

@@ -10,7 +10,7 @@ from statistics import fmean
 
 import numpy as np
 
-from eval.nearest import nearest
+from eval.nearest import nearest, paired
 from eval.physical import judge_all, stays_up
 from eval.shapes import box_shape
 from eval.table import Cell
@@ -141,10 +141,9 @@ def smoothness(
         programs, samples = _decoded(model, first + shares * (last - first))
         none += steps - len(samples)
         clouds = clouds_of(samples) if samples else np.empty((0, POINTS, 3))
-        for place in range(1, len(samples)):
-            corners = np.concatenate([box_corners(box) for box in samples[place - 1]])
-            diagonal = float(np.linalg.norm(np.ptp(corners, axis=0)))
-            geometry.append(nearest(clouds[place : place + 1], clouds[place - 1 : place], False)[0] / diagonal)
+        for before, distance in zip(samples, paired(clouds[:-1], clouds[1:]).tolist(), strict=False):
+            corners = np.concatenate([box_corners(box) for box in before])
+            geometry.append(distance / float(np.linalg.norm(np.ptp(corners, axis=0))))
         structure += [program_distance(one, other) for one, other in pairwise(programs)]
     share = 100 * none / (sequences * steps)
     return fmean(geometry) if geometry else "", fmean(structure) if structure else "", share

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from eval.nearest import nearest
+from eval.nearest import nearest, paired
 from eval.program_tables import editability_table, quality_table, smoothness_table, variability_table
 from eval.programs import (
     POINTS,
@@ -44,9 +44,10 @@ def test_nearest_is_the_nearest_by_trees() -> None:
         return float(cKDTree(one).query(other)[0].mean() + cKDTree(other).query(one)[0].mean()) / 2
 
     table = np.array([[chamfer(one, other) for other in others] for one in clouds])
-    np.testing.assert_allclose(nearest(clouds, others, False), table.min(axis=1))
+    np.testing.assert_allclose(nearest(clouds, others, False), table.min(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(paired(clouds, others[:6]), np.diag(table), rtol=1e-6)
     own = np.array([[chamfer(one, other) for other in clouds] for one in clouds]) + np.diag([1e9] * 6)
-    np.testing.assert_allclose(nearest(clouds, clouds, True), own.min(axis=1))
+    np.testing.assert_allclose(nearest(clouds, clouds, True), own.min(axis=1), rtol=1e-6)
 
 
 def test_physics_counts_what_is_rooted_and_what_of_it_stays_up() -> None:
