@@ -5,9 +5,6 @@ top and bottom alone; a cuboid is attached to another once, to the bounding box 
 bounding box is never moved, has no sub-program, and bears others as what is grounded does; only grounded cuboids are
 attached to or copied; cuboids are declared first, then attached, then copied; and no cuboid reaches further out of the
 bounding box than by a tenth of its size. What is not grounded in the end is left out.
-
-Beyond the paper, an aligned cuboid that would not reach all that it is attached to gets the size with which it does: it
-is not stretched where it is attached, and most chairs that fell had a leg or a back that was a little too short.
 """
 
 from __future__ import annotations
@@ -18,7 +15,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.attached import ends_of
 from stages.shapeassembly.checks import SIDE, reaching_out
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.interpreter import execute
@@ -53,13 +49,6 @@ MOST_COPIES = 40
 
 UNLIKELY = 4.6
 """Commands a hundred times less likely than the likeliest that may follow are no way out, in nats."""
-
-APART = 0.01
-"""How far a cuboid may stand from where it is attached, as a share of the diagonal of the bounding box: half of what
-connects parts (shapeassembly App. E)."""
-
-OPPOSITE = 0.5
-"""How far apart, as a share of a cuboid's size, two of its points are that say how large it should be."""
 
 _PHASES = {CUBOID: 0, ATTACH: 1, SQUEEZE: 1, TRANSLATE: 2, REFLECT: 2}
 
@@ -159,24 +148,6 @@ class Draft:
         self.below.append(below)
         self.written += 1
 
-    def add(self, choice: Choice, numbers: Numbers, *, reaching: bool = False) -> bool:
-        """Writes a line, if it keeps the rules; whether it does. An aligned cuboid that would not reach where it is
-        attached gets the size with which it does, if that keeps the rules too; with `reaching` a line is not written
-        after which a cuboid still does not."""
-        found = self.line(choice, numbers)
-        if found is None:
-            return False
-        line, moved = found[0], choice[1]
-        drafts = [self.with_line(line, moved)]
-        if isinstance(line, Attach | Squeeze):
-            drafts = [each for each in (drafts[0].resized(moved), *drafts) if each is not None]
-        for each in drafts:
-            if each.fits() and not (reaching and each.gap(moved) > APART):
-                self.sizes = each.sizes
-                self.put(choice, *found)
-                return True
-        return False
-
     def line(self, choice: Choice, numbers: Numbers) -> tuple[Written, list[Joint]] | None:
         """The line, its numbers to three decimals, with its joints; None where it breaks a rule that can be told$
         without executing it."""
@@ -226,37 +197,6 @@ class Draft:
         except ProgramError:
             return False
 
-    def gap(self, moved: int) -> float:
-        """How far the cuboid of a slot stands from where it is attached, at most, as a share of the diagonal of the
-        bounding box; infinite where the assembly cannot be executed."""
-        ends = self._ends(moved)
-        return np.inf if ends is None else _gap(ends[1], ends[2], self.box)
-
-    def resized(self, moved: int) -> Draft | None:
-        """With the sizes of an aligned cuboid by which it comes nearer to all that it is attached to; None where its
-        own serve, or none are better."""
-        ends = self._ends(moved) if self.aligned[moved - 1] else None
-        if ends is None or _gap(ends[1], ends[2], self.box) <= APART:
-            return None
-        own, stands, wanted = ends
-        sizes = list(self.sizes[moved - 1])
-        for axis in range(3):
-            low, high = own[:, axis].argmin(), own[:, axis].argmax()
-            if own[high, axis] - own[low, axis] >= OPPOSITE:
-                size = (wanted[high, axis] - wanted[low, axis]) / (own[high, axis] - own[low, axis])
-                sizes[axis] = round(float(size), 3)
-        if any(not SMALLEST <= size <= most for size, most in zip(sizes, self.box, strict=True)):
-            return None
-        drafted = replace(self, sizes=[*self.sizes[: moved - 1], (sizes[0], sizes[1], sizes[2]), *self.sizes[moved:]])
-        return drafted if drafted.gap(moved) < _gap(stands, wanted, self.box) else None
-
-    def _ends(self, moved: int) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-        """Where the cuboid of a slot is attached (`ends_of`); None where the assembly cannot be executed."""
-        try:
-            return ends_of(self.block("Program_0", {}), f"cube{self.grounded.index(moved)}")
-        except ProgramError:
-            return None
-
     def block(self, name: str, names: dict[int, str]) -> Block:
         """The assembly, what is not grounded left out; `names` of expanded cuboids by slot."""
         kept = [slot for slot in range(1, len(self.sizes) + 1) if slot in self._grounded]
@@ -303,11 +243,6 @@ def joints_of(choice: Choice, way: int) -> list[Joint]:
         first, second = others
         return [_joint(moved, first, FACES[way] == "top"), _joint(moved, second, FACES[way] == "bot")]
     return [(moved, -1 if command == REFLECT else -2, way)]
-
-
-def _gap(stands: FloatArray, wanted: FloatArray, box: Point) -> float:
-    """The largest distance of points (n, 3) from others, as a share of the diagonal of a bounding box."""
-    return float(np.linalg.norm(stands - wanted, axis=1).max(initial=0.0) / np.linalg.norm(box))
 
 
 def _joint(moved: int, target: int, top: bool) -> Joint:

@@ -34,6 +34,7 @@ from stages.training.program_vae.lines import (
     WIDTH,
 )
 from stages.training.program_vae.model import ProgramVae
+from stages.training.program_vae.reaching import add_line
 from stages.training.standing import Points
 
 __all__ = ["write_programs"]
@@ -132,7 +133,7 @@ def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor) -> 
                 ended[row] = True
             elif choice[0] == CUBOID:
                 _declare(module, node, states[row], sizes[row], bool(aligned[row] > 0))
-            elif node.draft.add(choice, of_place[place], reaching=tries[row][tried][1]):
+            elif add_line(node.draft, choice, of_place[place], reaching=tries[row][tried][1]):
                 node.last = _line_of(node.draft, choice)
             else:
                 pending.append(row)

@@ -11,9 +11,10 @@ from stages.shapeassembly.checks import reaching_out, violations
 from stages.shapeassembly.program import BBOX
 from stages.shapeassembly.structure import signature
 from stages.training.program_vae.batches import Programs, batch_of
-from stages.training.program_vae.draft import APART, Draft, Numbers
+from stages.training.program_vae.draft import Draft, Numbers
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, STOP, TRANSLATE, node_lines
 from stages.training.program_vae.model import ProgramVae
+from stages.training.program_vae.reaching import add_line
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.program_vae.training import ProgramVaeLearner, new_model, reconstruction
@@ -106,12 +107,12 @@ def test_lines_follow_in_the_order_of_the_grammar_and_only_grounded_cuboids_bear
     assert made.sizes[0] == (0.2, 0.4, 1.0)
     assert allowed(made) == {CUBOID, ATTACH, SQUEEZE}
     assert choices(made, ATTACH) == {(1, 0), (2, 0)}
-    assert made.add((ATTACH, 1, 0), NUMBERS)
+    assert add_line(made, (ATTACH, 1, 0), NUMBERS, reaching=True)
     assert allowed(made) == {STOP, ATTACH, SQUEEZE, TRANSLATE, REFLECT}
     assert choices(made, ATTACH) == {(1, 0), (2, 0), (2, 1)}
     assert choices(made, REFLECT) == {(1,)}
-    assert not made.add((ATTACH, 1, 0), NUMBERS), "it is attached to the bottom already"
-    assert made.add((REFLECT, 1), NUMBERS)
+    assert not add_line(made, (ATTACH, 1, 0), NUMBERS, reaching=True), "it is attached to the bottom already"
+    assert add_line(made, (REFLECT, 1), NUMBERS, reaching=True)
     assert allowed(made) == {STOP, TRANSLATE, REFLECT}
     block = made.block("P", {})
     assert [each.name for each in block.cuboids] == ["cube0"], "the other is not grounded"
@@ -124,34 +125,5 @@ def test_lines_follow_in_the_order_of_the_grammar_and_only_grounded_cuboids_bear
 def test_the_box_is_attached_to_at_its_ends_and_not_left_by_more_than_a_tenth(goal: list[float], kept: bool) -> None:
     made = draft()
     numbers = Numbers(np.array([0.5, 0.0, 0.5, *goal]), 0, np.zeros(2), 0, 1, 0.0)
-    assert made.add((ATTACH, 1, 0), numbers) == kept
+    assert add_line(made, (ATTACH, 1, 0), numbers, reaching=False) == kept
     assert (BBOX in str(made.block("P", {}).lines)) == kept
-
-
-SQUEEZE_LEG = Numbers(np.zeros(6), 2, np.array([0.2, 0.5]), 0, 1, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("height", "aligned", "written"), [(0.96, True, 1.0), (0.96, False, 0.96), (0.995, True, 0.995), (0.5, True, 1.0)]
-)
-def test_an_aligned_cuboid_that_is_too_short_gets_the_size_with_which_it_reaches(
-    height: float, aligned: bool, written: float
-) -> None:
-    """What is not aligned is stretched where it is attached; a hundredth of the diagonal is no gap."""
-    made = Draft((1.0, 1.0, 1.0))
-    made.declare(np.array([0.1, height, 0.1]), aligned, None)
-    assert made.add((SQUEEZE, 1, 0, 0), SQUEEZE_LEG, reaching=True)
-    assert made.sizes == [(0.1, written, 0.1)]
-    assert made.gap(1) <= APART
-
-
-def test_a_line_that_leaves_a_gap_is_written_only_if_it_may() -> None:
-    """Two attachments side by side, at the middle of the cuboid both: no size brings them together."""
-    made = draft()
-    assert made.add((ATTACH, 1, 0), NUMBERS)
-    beside = Numbers(np.array([0.5, 1.0, 0.5, 0.8, 1.0, 0.5]), 2, np.zeros(2), 0, 1, 0.0)
-    assert not made.add((ATTACH, 1, 0), beside, reaching=True)
-    assert made.lines[1:] == []
-    assert made.add((ATTACH, 1, 0), beside)
-    assert made.gap(1) > APART
-    assert made.sizes[0] == (0.2, 1.0, 1.0), "it reaches the top, and not the side"

@@ -1,0 +1,40 @@
+"""Cuboids that are written reach what they are attached to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.training.program_vae.draft import Draft, Numbers
+from stages.training.program_vae.lines import ATTACH, SQUEEZE
+from stages.training.program_vae.reaching import APART, add_line, gap
+
+BOTTOM = Numbers(np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5]), 2, np.array([0.5, 0.5]), 0, 2, 0.5)
+LEG = Numbers(np.zeros(6), 2, np.array([0.2, 0.5]), 0, 1, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("height", "aligned", "written"), [(0.96, True, 1.0), (0.96, False, 0.96), (0.995, True, 0.995), (0.5, True, 1.0)]
+)
+def test_an_aligned_cuboid_that_is_too_short_gets_the_size_with_which_it_reaches(
+    height: float, aligned: bool, written: float
+) -> None:
+    """What is not aligned is stretched where it is attached; a hundredth of the diagonal is no gap."""
+    made = Draft((1.0, 1.0, 1.0))
+    made.declare(np.array([0.1, height, 0.1]), aligned, None)
+    assert add_line(made, (SQUEEZE, 1, 0, 0), LEG, reaching=True)
+    assert made.sizes == [(0.1, written, 0.1)]
+    assert gap(made, 1) <= APART
+
+
+def test_a_line_that_leaves_a_gap_is_written_only_if_it_may() -> None:
+    """Two attachments side by side, at the middle of the cuboid both: no size brings them together."""
+    made = Draft((1.0, 1.0, 1.0))
+    made.declare(np.array([0.2, 0.4, 1.0]), True, None)
+    assert add_line(made, (ATTACH, 1, 0), BOTTOM, reaching=False)
+    beside = Numbers(np.array([0.5, 1.0, 0.5, 0.8, 1.0, 0.5]), 2, np.zeros(2), 0, 1, 0.0)
+    assert not add_line(made, (ATTACH, 1, 0), beside, reaching=True)
+    assert made.lines[1:] == []
+    assert add_line(made, (ATTACH, 1, 0), beside, reaching=False)
+    assert gap(made, 1) > APART
+    assert made.sizes[0] == (0.2, 1.0, 1.0), "it reaches the top, and not the side"
