@@ -70,7 +70,7 @@ REPLACED_REASONS = {
     Outcome.NOTHING_ATTACHED: "replaced: nothing but a gap to close",
     Outcome.KNOWN: DUPLICATE,
     Outcome.ASKEW: "bent: boundaries stand at other angles",
-    **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
+    **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE, Outcome.GRAMMAR)},
 }
 
 SUBASSEMBLY = "nothing but a piece of an exemplar"
