@@ -47,9 +47,10 @@ MOST_OPEN = 16
 """Pairs of shapes whose lists are kept, so that a pair that is drawn again goes on where it was left."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
-ORDERED = 0.25
+ORDERED, BENT = 0.25, 0.75
 """The most of the work that is given to operations by the order of docking sites where motions are known too: they
-find what moves the parts that stay apart, and take long to list."""
+find what moves the parts that stay apart, and take long to list; and where pieces may be bent or stretched, for only
+these are."""
 WITHIN = 0.25
 """How often a shape is laid upon itself whatever else was drawn: recursive rules are within one shape."""
 BLENDED = 0.5
@@ -85,9 +86,10 @@ class Pair:
 
 
 class Replacer:
-    """Replaces pieces within limits of size, as a config says. Matched by pose, edges match by their dockings, which
-    keeps rigid what is laid upon each other; else, and where types go by meaning or pieces may be stretched, by the
-    types at their ends alone.
+    """Replaces pieces within limits of size, as a config says. Matched by pose, shapes are laid upon each other first, by
+    motions, also where pieces may be stretched: no shape that is laid so is stretched, and what comes of it fits as it
+    is. In what comes after, edges match by their dockings, which keeps rigid what is laid upon each other; else, and
+    where types go by meaning or pieces may be stretched, by the types at their ends alone.
 
     After a try that is OK, `base` is what the piece was put into: the shape that was chosen, or what all times but the
     last of a recursive rule have made of it; `times` is how often the operation was carried out; `stretches`
@@ -110,7 +112,9 @@ class Replacer:
         kit = answers.kit
         self._rigid = rigid_types(kit, config.stretch.rigid)
         self._by_meaning = kit.by_meaning
-        self._by_docking = config.matching == "pose" and not self._by_meaning and self.most == 1
+        self._moves = config.matching == "pose" and not self._by_meaning
+        self._by_docking = self._moves and self.most == 1
+        self._share = BENT if self.blends or self.most > 1 else ORDERED
         self.lists: Counter[str] = Counter()
         self.known: set[int] = set()
         self._open: dict[tuple[int, int], Pair] = {}
@@ -133,7 +137,7 @@ class Replacer:
         by `connect`."""
         outcome, work = self._turn(rng, choice, ws)
         self._work += work
-        if self._pair is not None and self._pair.operations is not None and self._by_docking:
+        if self._pair is not None and self._pair.operations is not None:
             self._ordered += work
         return outcome, work
 
@@ -344,7 +348,7 @@ class Replacer:
         if key in self._open:
             pair = replace(self._open.pop(key), choice=choice)
         else:
-            graph_of = contact_graph if self._by_docking else docking_graph
+            graph_of = contact_graph if self._moves else docking_graph
             base = _side(self.answers.kit, choice.b, graph_of)
             giver = base if choice.a is choice.b else _side(self.answers.kit, choice.a, graph_of)
             pair = Pair(choice, (base, giver), [])
@@ -359,13 +363,13 @@ class Replacer:
         """A pair of which nothing is left with more that can be replaced, if there is more, in random order; and what
         that cost: moves, in lists that are longer each time until one is whole, then operations."""
         kit, (base, giver) = self.answers.kit, pair.sides
-        if self._by_docking and (pair.moves is None or not pair.moves.is_whole) and pair.reach < MOST_WORK:
+        if self._moves and (pair.moves is None or not pair.moves.is_whole) and pair.reach < MOST_WORK:
             reach = min(DEEPER * pair.reach, MOST_WORK)
             moves = find_moves(kit, self.tables.up, (base.assembly, base.graph), (giver.assembly, giver.graph), reach)
             return replace(pair, moves=moves, reach=reach, left=moves.order(rng)), self._listing(moves)
-        if pair.operations is not None or (self._by_docking and self._ordered > ORDERED * self._work):
+        if pair.operations is not None or (self._moves and self._ordered > self._share * self._work):
             return pair, 0.0
-        if self._by_docking:
+        if self._moves:
             base = _side(kit, pair.base, docking_graph)
             giver = base if pair.giver is pair.base else _side(kit, pair.giver, docking_graph)
         operations = find_operations(base.graph, giver.graph, self.dummies, self._by_docking)
