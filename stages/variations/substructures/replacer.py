@@ -86,10 +86,10 @@ class Pair:
 
 
 class Replacer:
-    """Replaces pieces within limits of size, as a config says. Matched by pose, shapes are laid upon each other first, by
-    motions, also where pieces may be stretched: no shape that is laid so is stretched, and what comes of it fits as it
-    is. In what comes after, edges match by their dockings, which keeps rigid what is laid upon each other; else, and
-    where types go by meaning or pieces may be stretched, by the types at their ends alone.
+    """Replaces pieces within limits of size, as a config says. Matched by pose, shapes are laid upon each other by
+    motions first, also where pieces may be stretched: parents never are, and what comes of a motion fits as it is. In
+    what comes after, edges match by their dockings, which keeps rigid what is laid upon each other; else, and where
+    types go by meaning or pieces may be stretched, by the types at their ends alone.
 
     After a try that is OK, `base` is what the piece was put into: the shape that was chosen, or what all times but the
     last of a recursive rule have made of it; `times` is how often the operation was carried out; `stretches`
