@@ -37,7 +37,7 @@ from stages.variations.substructures.stretching import stretch_onto
 
 __all__ = ["Replacer"]
 
-FIRST_WORK, DEEPER = 1 << 18, 16
+FIRST_WORK, DEEPER = 1 << 19, 16
 """Parts that are laid upon others when two shapes are first drawn, at most; and how many times as many when they are
 drawn again and nothing is left: motions under which most coincides come first."""
 DRAWS = 48
@@ -47,7 +47,7 @@ MOST_OPEN = 16
 """Pairs of shapes whose lists are kept, so that a pair that is drawn again goes on where it was left."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
-ORDERED, BENT = 0.25, 0.75
+ORDERED, BENT = 0.1, 0.75
 """The most of the work that is given to operations by the order of docking sites where motions are known too: they
 find what moves the parts that stay apart, and take long to list; and where pieces may be bent or stretched, for only
 these are."""
