@@ -73,7 +73,7 @@ def what_was_left(lists: Mapping[str, int]) -> str:
         return ""
     return (
         f"{short:,} of {short + whole:,} lists of replacements ended at their limit, and what came last is missing; "
-        "fewer `variations.search.dummies` leave less out"
+        "a longer search goes on with them, and fewer `variations.search.dummies` leave less out"
     )
 
 

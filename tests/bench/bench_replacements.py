@@ -15,7 +15,8 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
 from stages.shape.kit import Assembly, Kit
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.substructures.motions import Moves, find_moves
+from stages.variations.substructures.motions import find_moves
+from stages.variations.substructures.moves import Moves
 from stages.variations.substructures.operations import Operations, find_operations
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.sites import docking_graph

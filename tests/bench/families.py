@@ -9,7 +9,7 @@ Markdown tables: what can be replaced between the exemplars, and what searches f
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import combinations_with_replacement, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,18 +17,21 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from pipeline.places import write_file
-from stages.choices.sheet import forecast_sheet
+from stages.choices.probe import type_counts
+from stages.choices.sheet import SHOWN, forecast_sheet
 from stages.exemplars.build import build_kit, read_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.programs.files import named_values, shape_glb
 from stages.programs.program import find_program
-from stages.shape.kit import Kit
+from stages.shape.kit import Assembly, Kit
+from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
 from stages.variations.constraint import made_test
 from stages.variations.features import AXES, MIXED
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.settings import SearchConfig, StretchConfig
+from stages.variations.selection import farthest_first
+from stages.variations.settings import SearchConfig, StretchConfig, VariantRequirements
 from stages.variations.substructures.motions import find_moves
 from stages.variations.substructures.operations import find_operations
 from stages.variations.substructures.sites import docking_graph
@@ -43,9 +46,9 @@ LISTED = (
     "|---|---:|---:|---:|---:|---:|---:|"
 )
 FOUND = (
-    "| family | search | tries | known | too few or many parts | not embedded | clash | grammar | other | shapes "
-    "| stand | graphs | histograms | mixed | copied |\n"
-    "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+    "| family | search | tries | known | too few or many parts | not embedded | clash | grammar | in the air | other "
+    "| shapes | held up | stand | graphs | histograms | mixed | copied |\n"
+    "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 )
 REASONS = {
     "known": ("duplicate",),
@@ -53,11 +56,13 @@ REASONS = {
     "not embedded": ("no embedding", "nothing but a gap to close", "at other angles", "not matched", "missing", "took"),
     "clash": ("clash",),
     "grammar": ("grammar",),
+    "in the air": ("lifted", "not held"),
 }
 """Words of the search's reasons for a reject, by column."""
 
 STOOD = 300
-"""So many shapes are asked whether all of their parts stand on something that stood so in the exemplars."""
+"""So many shapes are asked whether all of their parts stand on something that stood so in the exemplars, and whether
+they stand themselves."""
 
 
 def _real(*folders: str, grammar: str = "multiset", up: str = "y") -> Family:
@@ -135,12 +140,28 @@ def main() -> None:
         for method in ("substructures", "exchange"):
             way = config.model_copy(update={"method": method})
             finds = explore(kit, way, asked.seconds, 0, shown=True)
-            rows.append(_found(name, method, kit, finds))
-            if asked.sheets and finds.different:
-                shapes = [kit_shape(kit, each) for each in finds.different]
+            standing = _standing(kit, finds.kept[:STOOD])
+            rows.append(_found(name, method, kit, finds, len(standing)))
+            if asked.sheets and standing:
+                lists = (type_counts(kit, [each.types for each in of]) for of in (standing, _exemplars(kit)))
+                chosen = farthest_first(*lists, min(SHOWN, len(standing))).tolist()
+                shapes = [kit_shape(kit, standing[place]) for place in chosen]
                 path = asked.sheets / f"{name.replace(' ', '-')}-{method}.png"
                 write_file(path, forecast_sheet(kit, shapes, "Most different finds", name, method))
     print("\n".join(["", FOUND, *rows]))
+
+
+def _exemplars(kit: Kit) -> list[Assembly]:
+    return [each.assembly for each in kit.exemplars]
+
+
+def _standing(kit: Kit, found: Sequence[Assembly]) -> list[Assembly]:
+    """Those that stand and bear small pushes, where the exemplars do: what `variations.require.stable` keeps by itself
+    of a kit that leaves it open; of other kits all."""
+    physical = VariantRequirements().physical(stable=True)
+    if any(unmet(physical, kit_shape(kit, each)) for each in _exemplars(kit)):
+        return list(found)
+    return [each for each in found if unmet(physical, kit_shape(kit, each)) is None]
 
 
 def _listed(name: str, kit: Kit, config: SearchConfig) -> str:
@@ -148,9 +169,9 @@ def _listed(name: str, kit: Kit, config: SearchConfig) -> str:
     up, dockings = {"y": 1, "z": 2}[kit.up] if config.upright else -1, ContactAnswers(kit).dockings
     sides = [
         (each, docking_graph(kit, each, dockings.label_edges(each.types, each.poses, each.edges)))
-        for each in (exemplar.assembly for exemplar in kit.exemplars)
+        for each in _exemplars(kit)
     ]
-    moves = [] if kit.by_meaning else [find_moves(kit, up, *pair) for pair in product(sides, repeat=2)]
+    moves = [] if kit.by_meaning else [find_moves(kit, up, base, giver) for base, giver in product(sides, repeat=2)]
     operations = [
         find_operations(a, b, config.dummies, by_docking=not kit.by_meaning)
         for (_, a), (_, b) in combinations_with_replacement(sides, 2)
@@ -168,8 +189,8 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.1%}" if whole else "-"
 
 
-def _found(name: str, how: str, kit: Kit, finds: Finds) -> str:
-    """What a search has found, and how its other tries ended."""
+def _found(name: str, how: str, kit: Kit, finds: Finds, standing: int) -> str:
+    """What a search has found, so many of the first STOOD `standing`, and how its other tries ended."""
     counts = dict.fromkeys(REASONS, 0)
     other = 0
     for reason, count in finds.rejects.items():
@@ -178,18 +199,16 @@ def _found(name: str, how: str, kit: Kit, finds: Finds) -> str:
             other += count
         else:
             counts[column] += count
-    unmet = made_test(kit, {"support": {}})
-    stand = np.mean([unmet(each) is None for each in finds.kept[:STOOD]]) if finds.kept else 0.0
+    fault, asked = made_test(kit, {"support": {}}), finds.kept[:STOOD]
+    held = np.mean([fault(each) is None for each in asked]) if asked else 0.0
     features = np.array(finds.features).reshape(-1, len(AXES))
     mixed = np.mean(features[:, AXES.index("mixture")] >= MIXED) if len(features) else 0.0
     copied = np.median(features[:, AXES.index("copied")]) if len(features) else 0.0
     found, tried = len(finds.keys), sum(finds.rejects.values()) + len(finds.keys)
     cells = [f"{count:,}" for count in (tried, *counts.values(), other, found)]
     graphs, histograms = ({key[place] for key in finds.keys} for place in (0, 1))
-    return (
-        f"| {name} | {how} | {' | '.join(cells)} | {stand:.0%} | {len(graphs):,} | {len(histograms):,} | {mixed:.0%} | "
-        f"{copied:.0%} |"
-    )
+    cells += [f"{held:.0%}", f"{standing / max(len(asked), 1):.0%}", f"{len(graphs):,}", f"{len(histograms):,}"]
+    return f"| {name} | {how} | {' | '.join(cells)} | {mixed:.0%} | {copied:.0%} |"
 
 
 if __name__ == "__main__":

@@ -42,6 +42,7 @@ from stages.variations.search.steering import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.settings import SearchConfig
 from stages.variations.stretched import contact_fault
 from stages.variations.substitution.ground import GroundTest
+from stages.variations.substitution.held import HoldTest
 from stages.variations.substitution.substitute import substitute
 from stages.variations.substructures.replacer import Replacer
 
@@ -70,12 +71,13 @@ REPLACED_REASONS = {
     Outcome.NOTHING_ATTACHED: "replaced: nothing but a gap to close",
     Outcome.KNOWN: DUPLICATE,
     Outcome.ASKEW: "bent: boundaries stand at other angles",
-    **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE)},
+    **{each: f"replaced: {REASONS[each]}" for each in (Outcome.TOO_SMALL, Outcome.TOO_LARGE, Outcome.GRAMMAR)},
 }
 
 SUBASSEMBLY = "nothing but a piece of an exemplar"
 APART = "falls apart"
 LIFTED = "lifted off the ground"
+LOOSE = "not held at a side where it always was"
 NEW = "new variant"
 
 KNOWN_GAIN = 0.2
@@ -138,6 +140,7 @@ class Search:
         by_meaning = kit.by_meaning
         self.steering = Steering(config, by_meaning)
         self._ground = GroundTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
+        self._holds = HoldTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
         self._features = FeatureTest(kit)
         self._copies = copies or CopyTest(kit, answers.dockings)
         self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
@@ -391,6 +394,8 @@ class Search:
         placed = self._poses() if self._stretches is None else self._assembly().placements
         if self._ground is not None and self._ground.is_lifted(types, placed):
             return LIFTED
+        if self._holds is not None and self._holds.is_loose(self._assembly()):
+            return LOOSE
         fault = None if self._stretches is None else contact_fault(self.kit, self._assembly())
         if fault is not None:
             return f"stretched: {fault}"

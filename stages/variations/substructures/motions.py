@@ -9,29 +9,28 @@ type are. What does not coincide falls into regions, and each can be replaced: n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numba
 import numpy as np
 
-from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.variations.kernels.layout import UPRIGHT
 from stages.variations.kernels.lookup import mix
-from stages.variations.substitution.substitute import Docked
 from stages.variations.substructures.keys import grown, holds, with_key
+from stages.variations.substructures.moves import Moves
 from stages.variations.substructures.ordered import OrderedGraph
-from stages.variations.substructures.result_key import ODD_TYPE, refined
 from stages.variations.substructures.symmetry import pair_hash
 
-__all__ = ["MOST_MOVES", "Moves", "find_moves", "moved_key"]
+__all__ = ["MOST_MOVES", "MOST_WORK", "find_moves"]
 
 MOST_MOVES = 1 << 13
 """Replacements along motions that are listed between two shapes at most: what bounds memory."""
 MOST_WORK = 1 << 24
 """Parts that are laid upon others at most, between two shapes: a second or two."""
+GOLDEN = 0.6180339887
+"""Multiples of it lie spread out between whole numbers."""
 SAME_TURN = 1e-3
 """Entries of rotations that differ by less are equal."""
 
@@ -51,62 +50,36 @@ class _Placed(NamedTuple):
     firsts: np.ndarray
 
 
-@dataclass(frozen=True)
-class Moves:
-    """Replacements of a piece of a base by one of a giver along rigid motions.
-
-    motions: float64 (k, 4, 4), bring each piece into the base; inside: bool (k, n + m), the parts of the base that
-    leave and those of the giver that come; images: int16 (k, m), the part of the base that each part of the giver
-    coincides with, or -1; meetings: how often they are met from all pairs of equal parts and their symmetries, each of
-    which would have to be tried if equivalent replacements were not factored out; work: how many parts were laid upon
-    others; is_whole: whether these are all, or what came
-    first until a limit was met.
-    """
-
-    motions: FloatArray
-    inside: np.ndarray
-    images: np.ndarray
-    meetings: int
-    work: int
-    is_whole: bool
-
-    def __len__(self) -> int:
-        return len(self.motions)
-
-    def pieces(self, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """What one takes out of the base, bool (n,), and what comes of the giver, bool (m,)."""
-        parts = self.inside.shape[1] - self.images.shape[1]
-        return self.inside[number, :parts], self.inside[number, parts:]
-
-    def docked(self, number: int, giver: OrderedGraph, poses: FloatArray) -> Docked:
-        """The parts of the piece at its boundary, each with the part of the base that it docks to, and its own of the
-        giver's `poses` (m, 4, 4)."""
-        image, (_, piece) = self.images[number], self.pieces(number)
-        inner, outer = giver.tails, giver.tails[giver.twins]
-        across = piece[inner] & (image[outer] >= 0)
-        return [
-            (part, int(image[other]), poses[part])
-            for part, other in zip(inner[across].tolist(), outer[across].tolist(), strict=True)
-        ]
-
-
-def find_moves(kit: Kit, up: int, base: tuple[Assembly, OrderedGraph], giver: tuple[Assembly, OrderedGraph]) -> Moves:
+def find_moves(
+    kit: Kit,
+    up: int,
+    base: tuple[Assembly, OrderedGraph],
+    giver: tuple[Assembly, OrderedGraph],
+    most_work: int = MOST_WORK,
+) -> Moves:
     """All replacements of a piece of the base by one of the giver, which may be the same, that are a region of what two
     greatest pieces that coincide leave over, where they leave several: of one the result is the giver.
 
-    up: the axis that motions keep upright, or -1.
+    up: the axis that motions keep upright, or -1; most_work: parts that are laid upon others at most. Pairs of parts
+    are taken from all over both shapes, so that a list that is cut short has those motions by which most coincides.
     """
     symmetries = np.concatenate([each.symmetries for each in kit.types])
     starts = np.cumsum([0, *(len(each.symmetries) for each in kit.types)])
     found = _enumerate(
         base[1], giver[1], _placed(kit, base[0]), _placed(kit, giver[0]), np.ascontiguousarray(symmetries[:, :3, :3]),
-        np.ascontiguousarray(symmetries[:, :3, 3]), starts, up, kit.pose_tolerance, base[0] is giver[0],
+        np.ascontiguousarray(symmetries[:, :3, 3]), starts, up, kit.pose_tolerance, base[0] is giver[0], most_work,
     )  # fmt: skip
-    turns, shifts, inside, images, meetings, work, is_whole = found
+    turns, shifts, regions, images, listed, meetings, work, is_whole = found
     motions = np.tile(np.eye(4), (len(turns), 1, 1))
     motions[:, :3, :3], motions[:, :3, 3] = turns, shifts
     return Moves(
-        np.array([invert(each) for each in motions]).reshape(-1, 4, 4), inside, images, meetings, work, is_whole
+        np.array([invert(each) for each in motions]).reshape(-1, 4, 4),
+        regions,
+        images,
+        listed,
+        meetings,
+        work,
+        is_whole,
     )
 
 
@@ -123,82 +96,107 @@ def _placed(kit: Kit, assembly: Assembly) -> _Placed:
 
 
 @numba.njit(cache=True)
-def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same):
-    """Turns and shifts that lay the base upon the giver, what leaves and comes, images, meetings, work, whether it is
-    all."""
+def _enumerate(a, b, here, there, turns, shifts, starts, up, tolerance, same, most_work):
+    """Turns and shifts that lay the base upon the giver, their regions and images, what is listed of them, meetings,
+    work, whether it is all."""
     n, m = len(a.types), len(b.types)
     most = 0
     for kind in range(len(starts) - 1):
         most = max(most, starts[kind + 1] - starts[kind])
     visited = np.zeros((n, m, most), dtype=np.bool_)
-    listed, count, work, meetings = np.zeros(1 << 10, dtype=np.uint64), 0, 0, 0
+    known, count, laid, work, meetings = np.zeros(1 << 10, dtype=np.uint64), 0, 0, 0, 0
     is_whole = True
     out_turns, out_shifts = np.empty((64, 9)), np.empty((64, 3))
-    inside, images = np.empty((64, n + m), dtype=np.bool_), np.empty((64, m), dtype=np.int16)
+    regions, images = np.empty((64, n + m), dtype=np.int16), np.empty((64, m), dtype=np.int16)
+    listed = np.empty((64, 2), dtype=np.int32)
     image, back, queue = np.full(n, -1), np.full(m, -1), np.empty(n, dtype=np.int64)
     leader, line = np.empty(n + m, dtype=np.int64), np.empty(n + m, dtype=np.int64)
     keys = np.empty(n + m, dtype=np.uint64)
     comes, met = np.empty(n + m, dtype=np.bool_), np.empty(n + m, dtype=np.bool_)
-    for v in range(n):
-        for w in range(m):
-            if here.types[v] != there.types[w]:
+    for v, w in _spread(n, m):
+        if here.types[v] != there.types[w]:
+            continue
+        first, last = starts[here.types[v]], starts[here.types[v] + 1]
+        for g in range(first, last):
+            if visited[v, w, g - first] or not is_whole or (same and v == w and g == first):
                 continue
-            first, last = starts[here.types[v]], starts[here.types[v] + 1]
-            for g in range(first, last):
-                if visited[v, w, g - first] or not is_whole or (same and v == w and g == first):
-                    continue
-                turn = there.rotations[w] @ turns[g] @ here.rotations[v].T
-                shift = there.rotations[w] @ shifts[g] + there.translations[w] - turn @ here.translations[v]
-                if up >= 0 and turn[up, up] < UPRIGHT:
-                    continue
-                if same and v == w and np.abs(turn - np.eye(3)).max() < SAME_TURN:
-                    continue
-                matched, ways = _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited)
-                work += len(here.types)
-                is_whole = work < MOST_WORK
-                if matched == 0:
-                    continue
-                _join_across(a, b, here, there, turn, shift, image, back, queue, matched, leader)
-                if not _is_one(a, b, image, queue, matched, leader, line):
-                    keys[:], comes[:], met[:] = 0, False, False
-                    for node in range(n + m):
-                        if leader[node] >= 0:
-                            leader[node] = _root(leader, node)
-                            keys[leader[node]] += mix(np.uint64(node + 7))
-                            comes[leader[node]] |= node >= n
-                    for k in range(matched):
-                        _mark(a, queue[k], 0, image, leader, keys, met, pair_hash(queue[k], image[queue[k]]))
-                        _mark(b, image[queue[k]], n, back, leader, keys, met, pair_hash(image[queue[k]], queue[k]))
-                    for root in range(n + m):
-                        if leader[root] != root or not comes[root] or not met[root]:
-                            continue
-                        meetings += ways
-                        key = keys[root] | np.uint64(1)
-                        if holds(listed, key):
-                            continue
-                        if count == MOST_MOVES:
-                            is_whole = False
-                            break
-                        listed = with_key(listed, count, key)
-                        inside, images = grown(inside, count + 1), grown(images, count + 1)
-                        out_turns, out_shifts = grown(out_turns, count + 1), grown(out_shifts, count + 1)
-                        for node in range(n + m):
-                            inside[count, node] = leader[node] == root
-                        images[count] = back
-                        out_turns[count], out_shifts[count] = turn.copy().reshape(9), shift
-                        count += 1
+            turn = there.rotations[w] @ turns[g] @ here.rotations[v].T
+            shift = there.rotations[w] @ shifts[g] + there.translations[w] - turn @ here.translations[v]
+            if up >= 0 and turn[up, up] < UPRIGHT:
+                continue
+            if same and v == w and np.abs(turn - np.eye(3)).max() < SAME_TURN:
+                continue
+            matched, ways = _lay(here, there, turn, shift, turns, starts, tolerance, image, back, queue, visited)
+            work += len(here.types)
+            is_whole = work < most_work
+            if matched == 0:
+                continue
+            _join_across(a, b, here, there, turn, shift, image, back, queue, matched, leader)
+            if not _is_one(a, b, image, queue, matched, leader, line):
+                keys[:], comes[:], met[:] = 0, False, False
+                for node in range(n + m):
+                    if leader[node] >= 0:
+                        leader[node] = _root(leader, node)
+                        keys[leader[node]] += mix(np.uint64(node + 7))
+                        comes[leader[node]] |= node >= n
                 for k in range(matched):
-                    back[image[queue[k]]] = -1
-                    image[queue[k]] = -1
+                    _mark(a, queue[k], 0, image, leader, keys, met, pair_hash(queue[k], image[queue[k]]))
+                    _mark(b, image[queue[k]], n, back, leader, keys, met, pair_hash(image[queue[k]], queue[k]))
+                before = count
+                for root in range(n + m):
+                    if leader[root] != root or not comes[root] or not met[root]:
+                        continue
+                    meetings += ways
+                    key = keys[root] | np.uint64(1)
+                    if holds(known, key):
+                        continue
+                    if count == MOST_MOVES:
+                        is_whole = False
+                        break
+                    known = with_key(known, count, key)
+                    listed = grown(listed, count + 1)
+                    listed[count] = laid, root
+                    count += 1
+                if count > before:
+                    regions, images = grown(regions, laid + 1), grown(images, laid + 1)
+                    out_turns, out_shifts = grown(out_turns, laid + 1), grown(out_shifts, laid + 1)
+                    regions[laid], images[laid] = leader, back
+                    out_turns[laid], out_shifts[laid] = turn.copy().reshape(9), shift
+                    laid += 1
+            for k in range(matched):
+                back[image[queue[k]]] = -1
+                image[queue[k]] = -1
     return (
-        out_turns[:count].copy().reshape((count, 3, 3)),
-        out_shifts[:count],
-        inside[:count],
-        images[:count],
+        out_turns[:laid].copy().reshape((laid, 3, 3)),
+        out_shifts[:laid],
+        regions[:laid],
+        images[:laid],
+        listed[:count],
         meetings,
         work,
         is_whole,
     )
+
+
+@numba.njit(cache=True)
+def _spread(n, m):
+    """All pairs (v, w) of v < n and w < m, int64 (n * m, 2), each far from those before it."""
+    total = n * m
+    step = max(int(total * GOLDEN), 1)
+    while _divisor(step, total) > 1:
+        step += 1
+    pairs, place = np.empty((total, 2), dtype=np.int64), 0
+    for k in range(total):
+        pairs[k, 0], pairs[k, 1] = place // m, place % m
+        place = (place + step) % total
+    return pairs
+
+
+@numba.njit(cache=True)
+def _divisor(i, j):
+    while j > 0:
+        i, j = j, i % j
+    return i
 
 
 @numba.njit(cache=True)
@@ -338,35 +336,3 @@ def _mark(graph, node, offset, image, leader, keys, met, key):
             root = leader[offset + near]
             keys[root] += key
             met[root] = True
-
-
-@numba.njit(cache=True)
-def moved_key(base, giver, taken, piece, image):
-    """The key of the result, as `result_key` reckons it: parts of the giver that coincide with one of the base, as
-    `image` int16 (m,) says, bring their edges to the piece along."""
-    n = len(base.types)
-    place, count = np.full(n + len(giver.types), -1, dtype=np.int64), 0
-    for node in range(len(place)):
-        if not taken[node] if node < n else piece[node - n]:
-            place[node] = count
-            count += 1
-    most = len(base.tails) + 2 * len(giver.tails)
-    edges, labels = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.uint64)
-    colours, filled = np.empty(count, dtype=np.uint64), 0
-    for node in range(len(place)):
-        if place[node] >= 0:
-            kind = base.types[node] if node < n else giver.types[node - n]
-            colours[place[node]] = mix(np.uint64(kind) + ODD_TYPE)
-    for d in range(len(base.tails)):
-        i, j = place[base.tails[d]], place[base.tails[base.twins[d]]]
-        if i >= 0 and j >= 0:
-            edges[filled, 0], edges[filled, 1], labels[filled] = i, j, np.uint64(base.labels[d] - 1)
-            filled += 1
-    for d in range(len(giver.tails)):
-        tail, head = giver.tails[d], giver.tails[giver.twins[d]]
-        i = place[n + tail] if piece[tail] else place[image[tail]] if image[tail] >= 0 else -1
-        j = place[n + head] if piece[head] else place[image[head]] if image[head] >= 0 else -1
-        if i >= 0 and j >= 0 and (piece[tail] or piece[head]):
-            edges[filled, 0], edges[filled, 1], labels[filled] = i, j, np.uint64(giver.labels[d] - 1)
-            filled += 1
-    return refined(colours, edges[:filled], labels)

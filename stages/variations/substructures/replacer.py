@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.shape.arrays import FloatArray
+from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import split
@@ -23,18 +23,23 @@ from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import Exchanged
 from stages.variations.substitution.substitute import Docked, find_motion, put_together
 from stages.variations.substructures.blending import blend, is_oriented_alike
+from stages.variations.substructures.consistency import make_consistent
 from stages.variations.substructures.embedding import Side, embed, pieces
-from stages.variations.substructures.motions import Moves, find_moves, moved_key
+from stages.variations.substructures.motions import MOST_WORK, find_moves
+from stages.variations.substructures.moves import Moves
 from stages.variations.substructures.operations import Operations, find_operations
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.recursion import cut_again, cut_farther, growth_of
 from stages.variations.substructures.replacement import replace_piece
-from stages.variations.substructures.result_key import result_key
-from stages.variations.substructures.sites import docking_graph
+from stages.variations.substructures.result_key import moved_key, result_key
+from stages.variations.substructures.sites import contact_graph, docking_graph
 from stages.variations.substructures.stretching import stretch_onto
 
 __all__ = ["Replacer"]
 
+FIRST_WORK, DEEPER = 1 << 19, 16
+"""Parts that are laid upon others when two shapes are first drawn, at most; and how many times as many when they are
+drawn again and nothing is left: motions under which most coincides come first."""
 DRAWS = 48
 """Operations between two shapes that are carried out before it is another pair's turn, if listing them took no longer:
 else as many as take that long."""
@@ -42,6 +47,10 @@ MOST_OPEN = 16
 """Pairs of shapes whose lists are kept, so that a pair that is drawn again goes on where it was left."""
 EMBEDDING_WORK = 12.0
 """What embedding costs beside a try of the exchange that finds no match."""
+ORDERED, BENT = 0.1, 0.75
+"""The most of the work that is given to operations by the order of docking sites where motions are known too: they
+find what moves the parts that stay apart, and take long to list; and where pieces may be bent or stretched, for only
+these are."""
 WITHIN = 0.25
 """How often a shape is laid upon itself whatever else was drawn: recursive rules are within one shape."""
 BLENDED = 0.5
@@ -58,12 +67,13 @@ DARTS_A_TRY = 4000.0
 class Pair:
     """Two shapes, as they were chosen, what can be replaced between them, and what of it is left: numbers of moves, or,
     once operations are listed, which is when no move is left, of these, of one shape the second half of them the other
-    way round."""
+    way round; `reach`: how many parts were laid upon others at most where moves were listed."""
 
     choice: Choice
     sides: tuple[Side, Side]
-    left: Iterator[int]
+    left: list[int]
     moves: Moves | None = None
+    reach: int = FIRST_WORK // DEEPER
     operations: Operations | None = None
 
     @property
@@ -76,9 +86,10 @@ class Pair:
 
 
 class Replacer:
-    """Replaces pieces within limits of size, as a config says. Matched by pose, edges match by their dockings, which
-    keeps rigid what is laid upon each other; else, and where types go by meaning or pieces may be stretched, by the
-    types at their ends alone.
+    """Replaces pieces within limits of size, as a config says. Matched by pose, shapes are laid upon each other by
+    motions first, also where pieces may be stretched: parents never are, and what comes of a motion fits as it is. In
+    what comes after, edges match by their dockings, which keeps rigid what is laid upon each other; else, and where
+    types go by meaning or pieces may be stretched, by the types at their ends alone.
 
     After a try that is OK, `base` is what the piece was put into: the shape that was chosen, or what all times but the
     last of a recursive rule have made of it; `times` is how often the operation was carried out; `stretches`
@@ -101,11 +112,14 @@ class Replacer:
         kit = answers.kit
         self._rigid = rigid_types(kit, config.stretch.rigid)
         self._by_meaning = kit.by_meaning
-        self._by_docking = config.matching == "pose" and not self._by_meaning and self.most == 1
+        self._moves = config.matching == "pose" and not self._by_meaning
+        self._by_docking = self._moves and self.most == 1
+        self._share = BENT if self.blends or self.most > 1 else ORDERED
         self.lists: Counter[str] = Counter()
         self.known: set[int] = set()
         self._open: dict[tuple[int, int], Pair] = {}
         self._turns = 0
+        self._work = self._ordered = 0.0
         self._pair: Pair | None = None
         self._docked: Docked = []
         self._bent: np.ndarray | None = None
@@ -121,24 +135,34 @@ class Replacer:
         """Carry out one more operation of the pair in hand, or one between the two shapes that are chosen where nothing
         is left of it, in the workspace: the outcome and the work. After OK the contacts between the two are to be found
         by `connect`."""
+        outcome, work = self._turn(rng, choice, ws)
+        self._work += work
+        if self._pair is not None and self._pair.operations is not None:
+            self._ordered += work
+        return outcome, work
+
+    def _turn(self, rng: np.random.Generator, choice: Choice, ws: Workspace) -> tuple[int, float]:
         work = 1.0
-        number = next(self._pair.left, None) if self._pair is not None and self._turns > 0 else None
-        if self._pair is None or (number is None and (self._turns <= 0 or self._pair.operations is not None)):
+        if self._pair is None or self._turns <= 0 or not self._pair.left:
             self._pair, cost = self._opened(rng, choice)
             work += cost
-            number = next(self._pair.left, None)
-        if number is None and self._pair.operations is None:
-            self._pair, cost = self._listed(rng, self._pair)
-            work += cost
-            number = next(self._pair.left, None)
         pair = self._pair
-        if number is None:  # nothing can be replaced, or all has been
+        if not pair.left:  # nothing can be replaced, or all has been
             return Outcome.KNOWN if pair.operations or pair.moves else Outcome.NO_MATCH, work
+        number = pair.left.pop()
         if pair.operations is None:
-            outcome, cost = self._move(pair, number, ws)
-            return outcome, work + cost
-        count = len(pair.operations)
-        boundary = pair.operations.boundary(number % count)[:, :: 1 if number < count else -1]
+            outcome, cost = self._move(rng, pair, number, ws)
+        else:
+            outcome, cost = self._operate(rng, pair, pair.operations, number, ws)
+        return outcome, work + cost
+
+    def _operate(
+        self, rng: np.random.Generator, pair: Pair, operations: Operations, number: int, ws: Workspace
+    ) -> tuple[int, float]:
+        """Carry out an operation along a boundary of docking sites, in the workspace: the outcome and the work."""
+        work = 0.0
+        count = len(operations)
+        boundary = operations.boundary(number % count)[:, :: 1 if number < count else -1]
         self.base, side, self.times = pair.base, pair.sides[0], 1
         times = self._times(rng, pair, boundary)
         if times > 1:
@@ -182,25 +206,33 @@ class Replacer:
         put_together(self.tables, pair.giver, self.base, exchanged, motion, self._docked, ws)
         return Outcome.OK, work
 
-    def _move(self, pair: Pair, number: int, ws: Workspace) -> tuple[int, float]:
+    def _move(self, rng: np.random.Generator, pair: Pair, number: int, ws: Workspace) -> tuple[int, float]:
         """Carry out a replacement along a motion, in the workspace: the outcome and the work."""
-        moves = pair.moves
-        assert moves is not None, "numbers are of moves until operations are listed"
-        taken, piece = moves.pieces(number)
+        assert pair.moves is not None, "numbers are of moves until operations are listed"
         base, giver = (each.graph for each in pair.sides)
+        moves, types = pair.moves, [each.assembly.types for each in pair.sides]
+        motion, chosen = moves.draw(rng, number)
+        is_consistent = make_consistent(
+            rng, self.tables, base, giver, *types, moves.regions[motion], moves.images[motion], chosen
+        )
+        if not is_consistent:
+            return Outcome.GRAMMAR, 0.0
+        move = moves.along(motion, chosen)
+        if not move.piece.any() and not move.taken.any():
+            return Outcome.KNOWN, 0.0
         self.base, self.times = pair.base, 1
-        parts = int(piece.sum() + (~taken).sum())
+        parts = int(move.piece.sum() + (~move.taken).sum())
         if not self.smallest <= parts <= self.largest:
             return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, 0.0
-        key = int(moved_key(base, giver, taken, piece, moves.images[number]))
+        key = int(moved_key(base, giver, move.taken, move.piece, move.image))
         if key in self.known:
             return Outcome.KNOWN, 0.0
         self.known.add(key)
         self._turns -= 1
-        self._docked = moves.docked(number, giver, pair.giver.assembly.poses)
+        self._docked = move.docked(giver, pair.giver.assembly.poses)
         self._bent = self._cut = self.stretches = None
         put_together(
-            self.tables, pair.giver, self.base, Exchanged(taken, piece), moves.motions[number], self._docked, ws
+            self.tables, pair.giver, self.base, Exchanged(move.taken, move.piece), move.motion, self._docked, ws
         )
         return Outcome.OK, EMBEDDING_WORK
 
@@ -307,42 +339,42 @@ class Replacer:
         return all(ws.stamp[i, j] == ws.counts[TRY] for i, j in ends)
 
     def _opened(self, rng: np.random.Generator, choice: Choice) -> tuple[Pair, float]:
-        """Two shapes, or the first twice, with all moves between them in random order; what is left of them where the
-        pair was drawn before; and what that cost."""
+        """Two shapes, or the first twice, with some of what can be replaced between them in random order; what is left
+        of it where the pair was drawn before, or more of it where nothing is; and what that cost."""
         if rng.random() < WITHIN:
             choice = replace(choice, b=choice.a)
         key = id(choice.b), id(choice.a)  # of shapes that the pair itself keeps
-        self._turns = DRAWS
+        self._turns, work = DRAWS, 0.0
         if key in self._open:
-            known = self._open.pop(key)
-            self._open[key] = replace(known, choice=choice)
-            return self._open[key], 0.0
-        kit = self.answers.kit
-        base = _side(kit, choice.b)
-        giver = base if choice.a is choice.b else _side(kit, choice.a)
-        pair, work = Pair(choice, (base, giver), iter(())), 0.0
-        if self._by_docking:
-            moves = find_moves(kit, self.tables.up, (base.assembly, base.graph), (giver.assembly, giver.graph))
-            pair, work = (
-                replace(pair, moves=moves, left=iter(rng.permutation(len(moves)).tolist())),
-                self._listing(moves),
-            )
+            pair = replace(self._open.pop(key), choice=choice)
+        else:
+            graph_of = contact_graph if self._moves else docking_graph
+            base = _side(self.answers.kit, choice.b, graph_of)
+            giver = base if choice.a is choice.b else _side(self.answers.kit, choice.a, graph_of)
+            pair = Pair(choice, (base, giver), [])
+        if not pair.left:
+            pair, work = self._listed(rng, pair)
         self._open[key] = pair
         if len(self._open) > MOST_OPEN:
             del self._open[next(iter(self._open))]
         return pair, work
 
     def _listed(self, rng: np.random.Generator, pair: Pair) -> tuple[Pair, float]:
-        """A pair of which no move is left with all operations between its shapes, in random order; and what that
-        cost."""
-        base, giver = (each.graph for each in pair.sides)
-        operations = find_operations(base, giver, self.dummies, self._by_docking)
-        ways = len(operations) * (2 if base is giver else 1)
-        listed = replace(pair, operations=operations, left=iter(_order(rng, operations, ways)))
-        key = id(pair.base), id(pair.giver)
-        if key in self._open:
-            self._open[key] = listed
-        return listed, self._listing(operations)
+        """A pair of which nothing is left with more that can be replaced, if there is more, in random order; and what
+        that cost: moves, in lists that are longer each time until one is whole, then operations."""
+        kit, (base, giver) = self.answers.kit, pair.sides
+        if self._moves and (pair.moves is None or not pair.moves.is_whole) and pair.reach < MOST_WORK:
+            reach = min(DEEPER * pair.reach, MOST_WORK)
+            moves = find_moves(kit, self.tables.up, (base.assembly, base.graph), (giver.assembly, giver.graph), reach)
+            return replace(pair, moves=moves, reach=reach, left=moves.order(rng)), self._listing(moves)
+        if pair.operations is not None or (self._moves and self._ordered > self._share * self._work):
+            return pair, 0.0
+        if self._moves:
+            base = _side(kit, pair.base, docking_graph)
+            giver = base if pair.giver is pair.base else _side(kit, pair.giver, docking_graph)
+        operations = find_operations(base.graph, giver.graph, self.dummies, self._by_docking)
+        left = _order(rng, operations, len(operations) * (2 if base is giver else 1))
+        return replace(pair, sides=(base, giver), operations=operations, left=left), self._listing(operations)
 
     def _listing(self, found: Operations | Moves) -> float:
         """What a list cost; as much time is given to what it has."""
@@ -353,16 +385,17 @@ class Replacer:
 
 
 def _order(rng: np.random.Generator, operations: Operations, ways: int) -> list[int]:
-    """The numbers of a pair in random order, those without dummy edges, which are few, and the others by turns."""
+    """The numbers of a pair in random order, from the last on, those without dummy edges, which are few, and the others
+    by turns."""
     numbers = rng.permutation(ways)
     is_plain = numbers % max(len(operations), 1) < operations.plain
     rank = np.where(is_plain, 2 * np.cumsum(is_plain), 2 * np.cumsum(~is_plain) + 1)
-    order: list[int] = numbers[np.argsort(rank, kind="stable")].tolist()
+    order: list[int] = numbers[np.argsort(-rank, kind="stable")].tolist()
     return order
 
 
-def _side(kit: Kit, parent: Parent) -> Side:
-    return Side(parent.assembly, docking_graph(kit, parent.assembly, parent.labels))
+def _side(kit: Kit, parent: Parent, graph_of: Callable[[Kit, Assembly, IntArray], OrderedGraph]) -> Side:
+    return Side(parent.assembly, graph_of(kit, parent.assembly, parent.labels))
 
 
 def _docked(base: Side, giver: Side, boundary: np.ndarray, piece: np.ndarray) -> Docked:

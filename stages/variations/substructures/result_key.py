@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.variations.kernels.lookup import mix
 
-__all__ = ["ODD_TYPE", "refined", "result_key"]
+__all__ = ["moved_key", "result_key"]
 
 GOLDEN, ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
 ODD_TYPE = np.uint64(0x51ED270B)
@@ -67,6 +67,38 @@ def _beyond(base, giver, dart, place, source):
     if own >= 0:
         return own
     return place[base.tails[source[ahead]]] if source[ahead] >= 0 else np.int64(-1)
+
+
+@numba.njit(cache=True)
+def moved_key(base, giver, taken, piece, image):
+    """The same of what a move makes: parts of the giver that coincide with one of the base, as `image` int16 (m,) says,
+    bring their edges to the piece along."""
+    n = len(base.types)
+    place, count = np.full(n + len(giver.types), -1, dtype=np.int64), 0
+    for node in range(len(place)):
+        if not taken[node] if node < n else piece[node - n]:
+            place[node] = count
+            count += 1
+    most = len(base.tails) + 2 * len(giver.tails)
+    edges, labels = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.uint64)
+    colours, filled = np.empty(count, dtype=np.uint64), 0
+    for node in range(len(place)):
+        if place[node] >= 0:
+            kind = base.types[node] if node < n else giver.types[node - n]
+            colours[place[node]] = mix(np.uint64(kind) + ODD_TYPE)
+    for d in range(len(base.tails)):
+        i, j = place[base.tails[d]], place[base.tails[base.twins[d]]]
+        if i >= 0 and j >= 0:
+            edges[filled, 0], edges[filled, 1], labels[filled] = i, j, np.uint64(base.labels[d] - 1)
+            filled += 1
+    for d in range(len(giver.tails)):
+        tail, head = giver.tails[d], giver.tails[giver.twins[d]]
+        i = place[n + tail] if piece[tail] else place[image[tail]] if image[tail] >= 0 else -1
+        j = place[n + head] if piece[head] else place[image[head]] if image[head] >= 0 else -1
+        if i >= 0 and j >= 0 and (piece[tail] or piece[head]):
+            edges[filled, 0], edges[filled, 1], labels[filled] = i, j, np.uint64(giver.labels[d] - 1)
+            filled += 1
+    return refined(colours, edges[:filled], labels)
 
 
 @numba.njit(cache=True)

@@ -15,7 +15,7 @@ from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
 
-__all__ = ["cyclic_order", "docking_graph"]
+__all__ = ["contact_graph", "cyclic_order", "docking_graph"]
 
 SAME = 1e-3
 """Directions that differ by less (as a share of a radian, or of a spread) are the same."""
@@ -39,6 +39,21 @@ def docking_graph(kit: Kit, assembly: Assembly, labels: IntArray) -> OrderedGrap
         orders.append([near[place] for place in order])
     docked = [[label_of[part, other] for other in order] for part, order in enumerate(orders)]
     return ordered_graph(kit.label_of[assembly.types], orders, docked)
+
+
+def contact_graph(kit: Kit, assembly: Assembly, labels: IntArray) -> OrderedGraph:
+    """The same with the docking sites of each part in the order of its neighbours' numbers, for what asks for none."""
+    tails, heads = np.concatenate([assembly.edges, assembly.edges[:, ::-1]]).T.astype(np.int64)
+    order = np.lexsort((heads, tails))
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return OrderedGraph(
+        types=kit.label_of[assembly.types].astype(np.int64),
+        starts=np.searchsorted(tails[order], np.arange(len(assembly) + 1)),
+        tails=tails[order],
+        twins=place[(order + len(order) // 2) % max(len(order), 1)],
+        labels=labels.T.reshape(-1)[order].astype(np.int64) + 1,
+    )
 
 
 def cyclic_order(sites: FloatArray, axes: FloatArray) -> list[int]:

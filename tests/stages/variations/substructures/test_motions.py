@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
-from stages.shape.kit import Assembly, Kit
+from stages.shape.graphs.neighbourhoods import admits
+from stages.shape.kit import Assembly, Kit, Multiset
 from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.substructures.motions import Moves, find_moves, moved_key
+from stages.variations.kernels.tables import kit_tables
+from stages.variations.substructures.consistency import make_consistent
+from stages.variations.substructures.motions import find_moves
+from stages.variations.substructures.moves import Move, Moves
 from stages.variations.substructures.ordered import OrderedGraph
-from stages.variations.substructures.sites import docking_graph
+from stages.variations.substructures.result_key import moved_key
+from stages.variations.substructures.sites import contact_graph, docking_graph
 from tests.stages.variations.substructures.laid import Replaced, replacements
 from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
 
@@ -26,8 +33,7 @@ def placed(kit: Kit) -> list[tuple[Assembly, OrderedGraph]]:
 
 def sizes(moves: Moves) -> list[int]:
     """How many parts each result has."""
-    pieces = [moves.pieces(number) for number in range(len(moves))]
-    return sorted({int(piece.sum() + (~taken).sum()) for taken, piece in pieces})
+    return sorted({int(move.piece.sum() + (~move.taken).sum()) for move in (moves[at] for at in range(len(moves)))})
 
 
 def test_a_chain_laid_upon_itself_grows_and_shrinks_by_any_number_of_links() -> None:
@@ -44,13 +50,12 @@ def test_what_stays_and_what_comes_do_not_overlap_and_every_move_keeps_a_part_th
         for giver in placed(kit):
             moves = find_moves(kit, 1, base, giver)
             for number in range(len(moves)):
-                taken, piece = moves.pieces(number)
-                held = moves.images[number]
+                taken, piece, held, motion = moves[number]
                 assert piece.any()
                 assert (held >= 0).any()
                 assert not piece[held >= 0].any()
                 assert not taken[held[held >= 0]].any()
-                moved = moves.motions[number] @ giver[0].poses[held >= 0]
+                moved = motion @ giver[0].poses[held >= 0]
                 gaps = np.abs(moved[:, :3, 3] - base[0].poses[held[held >= 0], :3, 3]).max()
                 assert gaps < kit.pose_tolerance * 2
 
@@ -63,8 +68,8 @@ def test_the_key_of_a_move_that_brings_nothing_new_is_that_of_the_base() -> None
     none = np.zeros(len(own[0]), dtype=bool)
     whole = int(moved_key(own[1], own[1], none, none, np.full(len(own[0]), -1, dtype=np.int16)))
     for number in range(len(moves)):
-        taken, piece = moves.pieces(number)
-        key = int(moved_key(own[1], own[1], taken, piece, moves.images[number]))
+        taken, piece, image, _ = moves[number]
+        key = int(moved_key(own[1], own[1], taken, piece, image))
         assert (key == whole) == (piece.sum() == taken.sum())
 
 
@@ -84,12 +89,86 @@ def tiling(rng: np.random.Generator, tiles: int) -> list[Placed]:
     return parts
 
 
+def test_a_list_that_is_cut_short_has_the_motions_by_which_most_coincides() -> None:
+    kit = kit_of(CHAIN, [chain(12)])
+    (own,) = placed(kit)
+    whole, short = find_moves(kit, 1, own, own), find_moves(kit, 1, own, own, 12 * len(own[0]))
+    assert whole.is_whole
+    assert not short.is_whole
+    assert {row.tobytes() for row in short.images} <= {row.tobytes() for row in whole.images}
+    matched = [(moves.images >= 0).sum(axis=1).mean() for moves in (short, whole)]
+    assert matched[0] > matched[1]
+
+
+def test_several_regions_along_one_motion_change_places_at_once() -> None:
+    """What a composition makes is what its regions make one after the other."""
+    rng, several = np.random.default_rng(0), 0
+    kit = kit_of(TILES, [tiling(rng, tiles) for tiles in (9, 12)])
+    for base in placed(kit):
+        for giver in placed(kit):
+            moves = find_moves(kit, 1, base, giver)
+            numbers = [each for each in moves.order(rng) if each >= len(moves)]
+            for number in numbers:
+                motion, chosen = moves.draw(rng, number)
+                move, regions = moves.along(motion, chosen), moves.regions[motion]
+                alone = [
+                    moves.along(motion, np.arange(len(regions)) == region)
+                    for region in np.unique(regions[regions >= 0])
+                    if chosen[region]
+                ]
+                assert (move.taken == np.any([each.taken for each in alone], axis=0)).all()
+                assert (move.piece == np.any([each.piece for each in alone], axis=0)).all()
+                several += len(alone) > 1
+    assert several > 20
+
+
+def test_a_choice_of_regions_is_changed_until_the_grammar_admits_what_stands_around_every_part() -> None:
+    rng, changed = np.random.default_rng(0), 0
+    kit = kit_of(TILES, [tiling(rng, tiles) for tiles in (9, 12)])
+    tables = kit_tables(kit, True)
+    for base in placed(kit):
+        for giver in placed(kit):
+            moves = find_moves(kit, 1, base, giver)
+            types = base[0].types, giver[0].types
+            for motion, (regions, image) in enumerate(zip(moves.regions, moves.images, strict=True)):
+                chosen = rng.random(len(regions)) < 0.5
+                before = chosen.copy()
+                if not make_consistent(rng, tables, base[1], giver[1], *types, regions, image, chosen):
+                    continue
+                changed += (chosen != before).any()
+                move = moves.along(motion, chosen)
+                for part in image[image >= 0].tolist():
+                    assert admits(kit.grammar, int(kit.label_of[types[0][part]]), around(kit, base, giver, move, part))
+    assert changed > 5
+
+
+def around(
+    kit: Kit, base: tuple[Assembly, OrderedGraph], giver: tuple[Assembly, OrderedGraph], move: Move, part: int
+) -> Multiset:
+    """The labels beside a part of the base that coincides with one of the giver, once the move is made."""
+    own = int(np.flatnonzero(move.image == part)[0])
+    types = [base[0].types[each] for each in base[0].neighbours()[part] if not move.taken[each]]
+    types += [giver[0].types[each] for each in giver[0].neighbours()[own] if move.piece[each]]
+    return tuple(sorted(Counter(kit.label_of[types].tolist()).items()))
+
+
+def test_a_graph_without_an_order_of_sites_is_that_with_one_but_for_the_order() -> None:
+    kit = kit_of(ROAD, [ring(2, 3)])
+    dockings, whole = ContactAnswers(kit).dockings, kit.exemplars[0].assembly
+    labels = dockings.label_edges(whole.types, whole.poses, whole.edges)
+    plain, ordered = (graph_of(kit, whole, labels) for graph_of in (contact_graph, docking_graph))
+    assert (plain.types == ordered.types).all()
+    assert (plain.edges() == ordered.edges()).all()
+    assert (plain.docking_labels() == ordered.docking_labels()).all()
+    assert (plain.twins[plain.twins] == np.arange(len(plain.twins))).all()
+
+
 def listed(moves: Moves) -> list[Replaced]:
     """The moves in the oracle's words; pairs at the border alone."""
     found = []
     for number in range(len(moves)):
-        taken, piece = (frozenset(np.flatnonzero(each).tolist()) for each in moves.pieces(number))
-        images = moves.images[number]
+        taken, piece = (frozenset(np.flatnonzero(each).tolist()) for each in moves[number][:2])
+        images = moves[number].image
         found.append(
             (taken, piece, frozenset((int(images[part]), part) for part in np.flatnonzero(images >= 0).tolist()))
         )
