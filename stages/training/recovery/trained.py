@@ -19,8 +19,8 @@ from stages.sketches.settings import SketchesConfig
 from stages.training.checkpoint import CheckpointError, load_checkpoint
 from stages.training.recovery.answers import Answers
 from stages.training.recovery.clouds import frame_of, taken
+from stages.training.recovery.guess import Guess
 from stages.training.recovery.model import RecoveryNet
-from stages.training.recovery.refinement import Guess
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.training import described_parameters
 

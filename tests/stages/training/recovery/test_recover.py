@@ -21,9 +21,10 @@ from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.recovery.__main__ import main
 from stages.training.recovery.drawings import drawn
+from stages.training.recovery.guess import base_guess
 from stages.training.recovery.reading import Input, InputError, read_inputs
 from stages.training.recovery.recover import SHIPPED, find_models, recover, recover_input
-from stages.training.recovery.refinement import base_guess, refine
+from stages.training.recovery.refinement import refine
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TEST, TRAIN, VAL, random_shapes
 from stages.training.recovery.ship import slim_bytes
