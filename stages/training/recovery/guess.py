@@ -11,7 +11,7 @@ from stages.programs.program import Program
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Guess", "base_guess"]
+__all__ = ["Guess", "base_guess", "guess_of"]
 
 LEAST_CHANCE = 1e-4
 """No value is less likely to the network than this: it may be wrong."""
@@ -42,6 +42,22 @@ class Guess:
         _, visible = program.schema.settled(settled)
         shown = (each for each in program.parameters if each.name in visible)
         return sum(_surprise(each, self.probabilities[each.name], settled[each.name]) for each in shown)
+
+
+def guess_of(program: Program, chances: FloatArray) -> Guess:
+    """The guess of a network that gives the classes of each parameter `chances` (parameters, most classes). Of a
+    continuous parameter the search begins with the mean of its values by their probabilities: of many that are nearly
+    as likely it is wrong by less than the likeliest."""
+    probabilities = {}
+    for parameter, row in zip(program.parameters, chances, strict=True):
+        shown = row[: len(parameter.values)]
+        probabilities[parameter.name] = shown / max(float(shown.sum()), 1e-300)
+    start = Guess(probabilities).values(program)
+    for parameter in program.parameters:
+        if parameter.kind == "continuous":
+            low, *_, high = places = np.array(parameter.values, dtype=np.float64)
+            start[parameter.name] = float(np.clip(probabilities[parameter.name] @ places, low, high))
+    return Guess(probabilities, start)
 
 
 def base_guess(program: Program) -> Guess:
