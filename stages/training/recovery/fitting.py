@@ -36,6 +36,8 @@ LEAST_MISSING, MOST_MISSING = 0.1, 0.75
 PRIOR = 0.01
 """The share of the distance that a nat of surprise costs in the search for what a torn cloud is a part of: of what is
 not seen only the network knows anything."""
+BY_CHANCE = 1.3
+"""In that search what is nearer than so many times the distance of a cloud of the shape itself is no better."""
 
 _UPRIGHT: Mapping[str, FloatArray] = {
     "y": np.eye(3),
@@ -163,8 +165,10 @@ def _is_part(torn: Fit, whole: Fit, share: float) -> bool:
 
 def _fit(look: Look, budget: int, seed: int) -> Fit:
     rng = np.random.default_rng(seed)
-    prior = PRIOR if look.model is not None and isinstance(look.target, PartialTarget) else 0.0
-    refined = refine(look.program, look.guess, look.target, budget, rng, prior)
+    prior = near = 0.0
+    if budget > 1 and look.model is not None and isinstance(look.target, PartialTarget):
+        prior, near = PRIOR, BY_CHANCE * _fit(look, 1, seed).floor
+    refined = refine(look.program, look.guess, look.target, budget, rng, prior, near)
     base = refine(look.program, base_guess(look.program), look.target, 1, rng).distance
     parts = look.program.parts(refined.values)
     missing = refined.target.missing(parts) if isinstance(refined.target, PartialTarget) else 0.0

@@ -51,11 +51,18 @@ class Refined:
 
 
 def refine(
-    program: Program, guess: Guess, target: Target, budget: int, rng: np.random.Generator, prior: float = 0.0
+    program: Program,
+    guess: Guess,
+    target: Target,
+    budget: int,
+    rng: np.random.Generator,
+    prior: float = 0.0,
+    near: float = 0.0,
 ) -> Refined:
     """The nearest shape that is found with `budget` shapes at most; never farther than that of the guess itself, as the
-    target was aligned to it. prior: the share of its distance that a shape costs for each nat of surprise."""
-    search = _Search(program, guess, target, budget, rng, prior, guess.values(program))
+    target was aligned to it. prior: the share of its distance that a shape costs for each nat of surprise; near:
+    what is nearer is no better, but by chance."""
+    search = _Search(program, guess, target, budget, rng, prior, near, guess.values(program))
     search.begin()
     while search.tried < budget:
         before = search.cost
@@ -81,6 +88,7 @@ class _Search:
     budget: int
     rng: np.random.Generator
     prior: float
+    near: float
     wanted: dict[str, Value]
     settled: dict[str, Value] = field(default_factory=dict)
     distance: float = float("inf")
@@ -219,7 +227,8 @@ class _Search:
         self._known = {self.program.schema.text(self.settled)}
 
     def _cost(self, distance: float, settled: Values) -> float:
-        return distance * (1.0 + self.prior * self.guess.surprise(self.program, settled)) if self.prior else distance
+        surprise = self.guess.surprise(self.program, settled) if self.prior else 0.0
+        return max(distance, self.near) * (1.0 + self.prior * surprise)
 
     def _visible(self) -> frozenset[str]:
         return self.program.schema.settled(self.settled)[1]

@@ -49,14 +49,21 @@ def test_a_value_that_is_held_impossible_is_only_unlikely() -> None:
     assert np.isfinite(certain.surprise(STOOL, settled))
 
 
-def test_a_search_that_trusts_the_guess_stays_with_it() -> None:
-    def height(prior: float) -> float:
-        rng = np.random.default_rng(0)
-        target = cloud_target(cloud_of(TALL), rng)
-        return float(refine(STOOL, believed(), target, 200, rng, prior).values["height"])
+def found_height(prior: float, near: float) -> float:
+    rng = np.random.default_rng(0)
+    target = cloud_target(cloud_of(TALL), rng)
+    return float(refine(STOOL, believed(), target, 200, rng, prior, near).values["height"])
 
-    assert height(0.0) == pytest.approx(TALL["height"], abs=0.05)
-    assert height(1e6) == pytest.approx(float(STOOL.schema.by_name["height"].values[2]))
+
+def test_a_search_that_trusts_the_guess_stays_with_it() -> None:
+    likeliest = STOOL.schema.by_name["height"].values[2]
+    assert found_height(0.0, 0.0) == pytest.approx(TALL["height"], abs=0.05)
+    assert found_height(1e6, 0.0) == pytest.approx(float(likeliest))
+
+
+def test_what_is_near_enough_is_not_made_nearer() -> None:
+    likeliest = STOOL.schema.by_name["height"].values[2]
+    assert found_height(0.0, 1e6) == likeliest
 
 
 def test_who_knows_nothing_begins_with_the_base_shape() -> None:
