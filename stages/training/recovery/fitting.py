@@ -31,8 +31,9 @@ may be torn."""
 BETTER, EXPLAINED = 0.75, 0.25
 """It is, if a part of the guess, or of the best shape of which it may be one, is missing and leaves no more than
 this share of the distance, and"""
-LEAST_MISSING, MOST_MISSING = 0.1, 0.75
-"""so much of the shape at least, and at most: a stick lies on every chair."""
+LEAST_MISSING, MOST_MISSING = 0.15, 0.75
+"""so much of the shape at least, and at most: with longer legs any table goes on below the ground, and a stick lies on
+every chair."""
 PRIOR = 0.01
 """The share of the distance that a nat of surprise costs in the search for what a torn cloud is a part of: of what is
 not seen only the network knows anything."""
