@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,16 @@ import pytest
 
 from eval.recovery import methods, tried
 from eval.spoilt import SPOILS, foreign_inputs, foreign_rows, foreign_table, spoilt_inputs, spoilt_table, ways_to_spoil
+from eval.subject import load_subject
+from eval.tables.recovery_spoilt import _parts
 from pipeline.errors import ConfigError
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.reading import Input
 from stages.training.recovery.shapes import TEST, random_shapes
 from stages.training.recovery.surface import sampled_points
 from tests.eval.test_recovery import STOOL, model
+
+CHAIRS = Path(__file__).resolve().parents[2] / "configs" / "chairs.yaml"
 
 
 def cloud(n: int = 2000) -> np.ndarray:
@@ -82,3 +87,17 @@ def test_a_foreign_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     np.save(tmp_path / "one.npy", np.zeros((1, 3)))
     with pytest.raises(ConfigError, match="has 1 point"):
         foreign_inputs(tmp_path, "points")
+
+
+def test_foreign_shapes_are_parts_of_their_own_and_may_stand_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    np.save(folder / "one.npy", cloud(400))
+    subject = load_subject(CHAIRS, tmp_path)
+
+    def named(spoilt: int, foreign: list[Path]) -> list[str]:
+        return [each.name for each in _parts(subject, Namespace(programs=["chair"], spoilt=spoilt, foreign=foreign))]
+
+    assert named(0, [folder]) == ["chair, points, from scans"]
+    assert named(2, []) == [f"chair, {kind}, {how}" for kind in ("points", "sketch") for how in ways_to_spoil(kind)]
+    assert len(set(named(2, [folder]))) == 11
