@@ -32,13 +32,15 @@ class Part:
     """A part of a long table, such as the rows of one model.
 
     name: no other part of the table has it; reads: the files that its figures depend on; make: makes it; code: modules
-    that it finds at run time, by a name. Of the config it depends on the dataset's name and seed alone.
+    that it finds at run time, by a name; options: of the table's options those that its figures depend on, by name; all
+    where it is None. Of the config it depends on the dataset's name and seed alone.
     """
 
     name: str
     reads: Sequence[Path]
     make: Callable[[], Answer]
     code: Sequence[str] = ()
+    options: Sequence[str] | None = None
 
 
 class _Kept(BaseModel):
@@ -62,16 +64,14 @@ def in_parts(
         own = ArgumentParser()
         options(own)
         digest = cache(file_digest)
-        common = {
-            "libraries": library_versions(),
-            "options": {name: getattr(asked, name) for name in vars(own.parse_args([]))},
-            "dataset": (subject.config.name, subject.config.seed),
-        }
+        common = {"libraries": library_versions(), "dataset": (subject.config.name, subject.config.seed)}
 
         def each_part() -> Iterator[Answer]:
             for part in parts(subject, asked):
                 code, read = code_digest(reached([module, *part.code])), [digest(path) for path in part.reads]
-                described = {**common, "part": part.name, "code": code, "reads": read}
+                names = vars(own.parse_args([])) if part.options is None else part.options
+                chosen = {name: getattr(asked, name) for name in names}
+                described = {**common, "options": chosen, "part": part.name, "code": code, "reads": read}
                 key = hashlib.sha256(json_bytes(described)).hexdigest()
                 yield _answer_of(part, key, subject.results / "parts" / table / f"{part.name}.json")
 

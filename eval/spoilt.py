@@ -26,9 +26,9 @@ __all__ = [
     "foreign_inputs",
     "foreign_rows",
     "foreign_table",
-    "other_views",
     "spoilt_inputs",
     "spoilt_table",
+    "ways_to_spoil",
 ]
 
 WAYS = ("network", "network, refined")
@@ -126,39 +126,55 @@ SPOILS: Mapping[str, Mapping[str, Spoil]] = {
 """What is done to inputs of each kind, by name."""
 
 
-def spoilt_inputs(kind: str, inputs: Sequence[Input], seed: int) -> Mapping[str, list[Input]]:
-    """All inputs, spoilt in each of the ways of their kind."""
-    return {
-        name: [spoil(given, np.random.default_rng((seed, place))) for place, given in enumerate(inputs)]
-        for name, spoil in SPOILS[kind].items()
-    }
+VIEWS: Mapping[str, tuple[float, float]] = {
+    "nearly from the front": (8.0, 15.0),
+    "other side, from above": (-50.0, 50.0),
+}
+"""Where drawings are seen from that no model has learnt: degrees around, and above, or below what hangs."""
 
 
-def other_views(model: TrainedRecovery, shapes: Sequence[RandomShape], seed: int) -> Mapping[str, list[Input]]:
-    """For a model of drawings, shapes as they are seen from elsewhere than it has learnt: nearly from the front, and
-    from the other side and above."""
-    if model.entry.input == "points":
-        return {}
-    base, side = model.sketches.views[0], 1.0 if model.program.elevation > 0 else -1.0
-    found = {}
-    for name, azimuth, elevation in (("nearly from the front", 8.0, 15.0), ("other side, from above", -50.0, 50.0)):
-        view = base.model_copy(update={"azimuth": azimuth, "elevation": side * elevation})
-        rng = np.random.default_rng(seed)
-        inks = [drawn(model.program, each.parts, view, model.sketches, rng) for each in shapes]
-        found[name] = [Input(f"{place:03}", ink=ink) for place, ink in enumerate(inks)]
-    return found
+def ways_to_spoil(kind: str) -> tuple[str, ...]:
+    """What `spoilt_inputs` does to inputs of a kind, by name."""
+    return (*SPOILS[kind], *(VIEWS if kind == "sketch" else ()))
+
+
+def spoilt_inputs(
+    model: TrainedRecovery, how: str, shapes: Sequence[RandomShape], inputs: Sequence[Input], seed: int
+) -> list[Input]:
+    """All inputs, which are of `shapes`, spoilt in one of the ways of their kind; or drawn from another side than the
+    model has learnt."""
+    kind = model.entry.input
+    if how in SPOILS[kind]:
+        spoil = SPOILS[kind][how]
+        return [spoil(given, np.random.default_rng((seed, place))) for place, given in enumerate(inputs)]
+    azimuth, elevation = VIEWS[how]
+    side = 1.0 if model.program.elevation > 0 else -1.0
+    view = model.sketches.views[0].model_copy(update={"azimuth": azimuth, "elevation": side * elevation})
+    rng = np.random.default_rng(seed)
+    inks = [drawn(model.program, each.parts, view, model.sketches, rng) for each in shapes]
+    return [replace(given, ink=ink) for given, ink in zip(inputs, inks, strict=True)]
 
 
 def spoilt_table(found: Sequence[Found]) -> Table:
     """One row a method and way to spoil; `found` is of `eval.recovery.tried`."""
-    rows = tuple((each.label, float(each.distances.mean()), float(np.median(each.distances))) for each in found)
+    rows = tuple(
+        (
+            each.label,
+            len(each.distances),
+            float(each.distances.mean()),
+            float(np.median(each.distances)),
+            sum(result.missing > 0.0 for result in each.results),
+        )
+        for each in found
+    )
     notes = (
         "Held-out shapes as clouds and drawings that were spoilt: chamfer is from the shape that was recovered to the "
         "true one, not to what was seen of it, as in the table of recovery. Noise: standard deviation in sides of the "
-        "box. Broken: a third of the squares of eight pixels is blank. The published sets out of the distribution "
+        "box. Broken: a third of the squares of eight pixels is blank. partial: how many clouds were said "
+        "to be a part of the shape that was found; without search none is. The published sets out of the distribution "
         "(AmateurSketch, ProSketch, ScanNet, ShapeNet) are not to be had here.",
     )
-    return Table("Recovery of spoilt inputs", ("input", "chamfer", "median"), rows, notes)
+    return Table("Recovery of spoilt inputs", ("input", "shapes", "chamfer", "median", "partial"), rows, notes)
 
 
 def foreign_inputs(folder: Path, kind: str) -> list[Input]:

@@ -33,7 +33,8 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
     reads = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(SHIPPED, "recovery")]
     for (program, kind), model in sorted(usable_models(subject.models, asked.programs).items()):
         make = partial(_of_model, model, asked, subject.config.seed)
-        yield Part(f"{program}, {kind}", reads, make, (program_module(program),))
+        options = ("shapes", "refined", "budget")
+        yield Part(f"{program}, {kind}", reads, make, (program_module(program),), options)
 
 
 def _of_model(model: TrainedRecovery, asked: Namespace, seed: int) -> Answer:

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from eval.evaluation import Answer, Evaluation, Strip
 from eval.needs import CURVE_PROGRAM
+from eval.parts import Part, in_parts
 from eval.subject import Subject
+from stages.training.checkpoint import weights_of_kind
+
+if TYPE_CHECKING:
+    from stages.training.recovery.reading import Input
+    from stages.training.recovery.recover import Recovered
+    from stages.training.recovery.trained import TrainedRecovery
 
 __all__ = ["TABLE"]
 
@@ -15,46 +25,63 @@ SHOWN = 8
 """Recoveries of each kind that the report shows."""
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.recovery import held_out, methods, tried, usable_models
-    from eval.spoilt import WAYS, foreign_inputs, foreign_rows, foreign_table, other_views, spoilt_inputs, spoilt_table
+def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+    """One for each program and way to spoil, and one for each program and folder from elsewhere."""
+    from eval.recovery import usable_models
+    from eval.spoilt import foreign_inputs, ways_to_spoil
+    from stages.programs.program import program_module
+    from stages.training.recovery.recover import SHIPPED
+
+    weights = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(SHIPPED, "recovery")]
+    models, seed = usable_models(subject.models, asked.programs), subject.config.seed
+    brought = {(folder, kind): foreign_inputs(folder, kind) for folder in asked.foreign for _, kind in models}
+    for (program, kind), model in sorted(models.items()):
+        code = (program_module(program),)
+        for how in ways_to_spoil(kind) if asked.spoilt else ():
+            make = partial(_of_spoilt, model, how, asked, seed)
+            yield Part(f"{program}, {kind}, {how}", weights, make, code, ("spoilt", "tries"))
+        for folder in asked.foreign:
+            if brought[folder, kind]:
+                make = partial(_of_folder, model, folder.name, brought[folder, kind], asked, seed)
+                reads = [*weights, *sorted(each for each in (folder, *folder.glob("*")) if each.is_file())]
+                yield Part(f"{program}, {kind}, from {folder.name}", reads, make, code, ("tries",))
+
+
+def _of_spoilt(model: TrainedRecovery, how: str, asked: Namespace, seed: int) -> Answer:
+    from eval.recovery import held_out, methods, tried
+    from eval.spoilt import WAYS, spoilt_inputs, spoilt_table
     from pipeline.randomness import decision_rng
+
+    ways, rng = methods(model, asked.tries, seed), decision_rng(seed, "recovery", model.header["program"])
+    # the novel angle comes after the trained ones
+    name, shapes, inputs = next(held_out(model, asked.spoilt, rng))
+    given = spoilt_inputs(model, how, shapes, inputs, seed)
+    label = f"{model.program.name}, {name}, {how}"
+    found = [tried(f"{label}: {way}", model.program, ways[way], shapes, given) for way in WAYS]
+    return Answer([spoilt_table(found)], strips=[_strip(label, given, found[-1].results)])
+
+
+def _of_folder(model: TrainedRecovery, folder: str, inputs: Sequence[Input], asked: Namespace, seed: int) -> Answer:
+    from eval.spoilt import foreign_rows, foreign_table
+
+    label, found = f"{model.program.name}, {folder}", foreign_rows(model, inputs, asked.tries, seed)
+    table = foreign_table([(f"{label}: {way}", distances, results) for way, distances, results in found])
+    return Answer([table], strips=[_strip(label, inputs, found[-1][2])])
+
+
+def _strip(label: str, inputs: Sequence[Input], results: Sequence[Recovered]) -> Strip:
     from stages.shape.views.sheet import picture_png
     from stages.training.recovery.files import recovery_picture
 
-    models = usable_models(subject.models, asked.programs)
-    rows, foreign, strips, seed = [], [], [], subject.config.seed
-    brought = {(folder, kind): foreign_inputs(folder, kind) for folder in asked.foreign for _, kind in models}
-    for (program, kind), model in sorted(models.items()):
-        ways = methods(model, asked.tries, seed)
-        for name, shapes, inputs in held_out(model, asked.spoilt, decision_rng(seed, "recovery", program)):
-            if "novel" in name:
-                continue
-            spoilt = {**spoilt_inputs(kind, inputs, seed), **other_views(model, shapes, seed)}
-            for how, given in spoilt.items():
-                label = f"{model.program.name}, {name}, {how}"
-                found = [tried(f"{label}: {way}", model.program, ways[way], shapes, given) for way in WAYS]
-                rows += found
-                pairs = list(zip(given, found[-1].results, strict=True))[:SHOWN]
-                pictures = [(each.name, picture_png(recovery_picture(each, result))) for each, result in pairs]
-                strips.append(Strip(f"Input and result, {label}", pictures))
-        for folder in asked.foreign:
-            strangers = brought[folder, kind]
-            if not strangers:
-                continue
-            label = f"{model.program.name}, {folder.name}"
-            found_there = foreign_rows(model, strangers, asked.tries, seed)
-            foreign += [(f"{label}: {way}", distances, results) for way, distances, results in found_there]
-            _, _, last = found_there[-1]
-            pairs = list(zip(strangers, last, strict=True))[:SHOWN]
-            pictures = [(each.name, picture_png(recovery_picture(each, result))) for each, result in pairs]
-            strips.append(Strip(f"Input and result, {label}", pictures))
-    tables = [spoilt_table(rows), *([foreign_table(foreign)] if foreign else [])]
-    return Answer(tables, strips=strips)
+    pairs = list(zip(inputs, results, strict=True))[:SHOWN]
+    pictures = [(given.name, picture_png(recovery_picture(given, result))) for given, result in pairs]
+    return Strip(f"Input and result, {label}", pictures)
 
 
 def _options(parser: ArgumentParser) -> None:
-    parser.add_argument("--spoilt", type=int, default=4, help="shapes that are recovered, of each kind of input")
+    parser.add_argument(
+        "--spoilt", type=int, default=4, help="shapes that are recovered, of each kind of input; 0: foreign ones alone"
+    )
     parser.add_argument("--tries", type=int, default=300, help="shapes that a refinement of them makes at most")
     parser.add_argument(
         "--foreign",
@@ -70,6 +97,6 @@ TABLE = Evaluation(
     question="How near does recovery come where inputs are noisy, torn, drawn otherwise, or of no program at all?",
     needs=(CURVE_PROGRAM,),
     seconds=lambda subject: 900.0,
-    answer=_answer,
+    answer=in_parts(_parts, _options),
     options=_options,
 )

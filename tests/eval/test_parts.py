@@ -117,6 +117,19 @@ def test_an_answer_comes_back_as_it_was_and_is_made_again_where_it_may_be_anothe
     assert asked.made == [3, 4, 3, 3, 3], "what the disk has spoilt is made again"
 
 
+def test_a_part_hangs_on_the_options_that_it_names(tmp_path: Path) -> None:
+    made: list[str] = []
+
+    def parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+        for name, options in (("none", ()), ("shapes", ("shapes",))):
+            yield Part(name, [], lambda name=name: made.append(name) or Answer([]), (), options)  # type: ignore[misc]
+
+    answer = in_parts(parts, options_of)
+    for shapes in (1, 2, 2):
+        answer(load_subject(DEFAULT, tmp_path), Namespace(shapes=shapes, folder=Path("elsewhere")))
+    assert made == ["none", "shapes", "shapes"]
+
+
 def test_rows_and_lines_stand_together_and_what_all_say_is_said_once() -> None:
     published = [Published("p", "s", {"b": 2.0})]
     tables = [Table("T", ("a", "b"), ((name, 1),), ("note", name), published) for name in "xy"]

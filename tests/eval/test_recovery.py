@@ -33,8 +33,9 @@ from tests.stages.training.recovery.toy import PROGRAM, SMALL
 STOOL = find_program(PROGRAM)
 
 
-def model() -> TrainedRecovery:
-    entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8), "channels": (2,) * 8, "decoder": (16, 8)})
+def model(**settings: str) -> TrainedRecovery:
+    small = {**SMALL, "widths": (8, 8), "channels": (2,) * 8, "decoder": (16, 8)}
+    entry = RecoveryEntry.model_validate({**small, **settings})
     header = {"program": PROGRAM, "figures": {"val_loss": 1.0, "val_chamfer_high": 0.01}}
     return TrainedRecovery(new_model(entry, STOOL, 0).eval(), STOOL, entry, header)
 

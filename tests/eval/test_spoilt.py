@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from eval.recovery import methods, tried
-from eval.spoilt import SPOILS, foreign_inputs, foreign_rows, foreign_table, spoilt_inputs, spoilt_table
+from eval.spoilt import SPOILS, foreign_inputs, foreign_rows, foreign_table, spoilt_inputs, spoilt_table, ways_to_spoil
+from eval.subject import load_subject
+from eval.tables.recovery_spoilt import _parts
 from pipeline.errors import ConfigError
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.reading import Input
 from stages.training.recovery.shapes import TEST, random_shapes
 from stages.training.recovery.surface import sampled_points
 from tests.eval.test_recovery import STOOL, model
+
+CHAIRS = Path(__file__).resolve().parents[2] / "configs" / "chairs.yaml"
 
 
 def cloud(n: int = 2000) -> np.ndarray:
@@ -24,7 +29,7 @@ def cloud(n: int = 2000) -> np.ndarray:
 
 def test_clouds_are_spoilt_as_they_are_said_to_be() -> None:
     points = cloud()
-    spoilt = {name: each[0].points for name, each in spoilt_inputs("points", [Input("one", points)], 3).items()}
+    spoilt = {how: spoilt_inputs(model(), how, [], [Input("one", points)], 3)[0].points for how in SPOILS["points"]}
     noise = (spoilt["noise of 1 %"] - points) / frame_of(points).size
     assert noise.std() == pytest.approx(0.01, rel=0.1)
     strays = ~np.isin(spoilt["5 % outliers"], points).all(axis=1)
@@ -41,8 +46,8 @@ def test_clouds_are_spoilt_as_they_are_said_to_be() -> None:
 def test_drawings_are_spoilt_as_they_are_said_to_be() -> None:
     ink = np.zeros((224, 224), np.bool_)
     ink[100, 20:200] = ink[20:200, 60] = True
-    spoilt = {name: each[0].ink for name, each in spoilt_inputs("sketch", [Input("one", ink=ink)], 3).items()}
-    assert set(spoilt) == set(SPOILS["sketch"])
+    drawer = model(input="sketch")
+    spoilt = {how: spoilt_inputs(drawer, how, [], [Input("one", ink=ink)], 3)[0].ink for how in SPOILS["sketch"]}
     assert 4.0 < spoilt["thick lines"].sum() / ink.sum() < 5.5
     assert (spoilt["thick lines"] & ink).sum() == ink.sum()
     assert not (spoilt["broken lines"] & ~ink).any()
@@ -53,9 +58,9 @@ def test_drawings_are_spoilt_as_they_are_said_to_be() -> None:
 
 def test_equal_seeds_spoil_equally() -> None:
     given = [Input("one", cloud(350)), Input("two", cloud(400))]
-    first, second, other = (spoilt_inputs("points", given, seed) for seed in (1, 1, 2))
-    for name in first:
-        for one, again, differs in zip(first[name], second[name], other[name], strict=True):
+    for how in ways_to_spoil("points"):
+        first, second, other = (spoilt_inputs(model(), how, [], given, seed) for seed in (1, 1, 2))
+        for one, again, differs in zip(first, second, other, strict=True):
             assert np.array_equal(one.points, again.points)
             assert not np.array_equal(one.points, differs.points)
 
@@ -63,11 +68,12 @@ def test_equal_seeds_spoil_equally() -> None:
 def test_tables_have_a_row_for_each_way(tmp_path: Path) -> None:
     trained = model()
     shape = next(random_shapes(STOOL, TEST, np.random.default_rng(0)))
-    spoilt = spoilt_inputs("points", [Input("one", cloud())], 0)["half missing"]
+    spoilt = spoilt_inputs(trained, "half missing", [shape], [Input("one", cloud())], 0)
     way = methods(trained, 10, 0)["network"]
     table = spoilt_table([tried("stool, half missing: network", STOOL, way, [shape], spoilt)])
     assert table.rows[0][0] == "stool, half missing: network"
-    assert table.rows[0][1] > 0
+    assert table.rows[0][1] == 1
+    assert table.rows[0][2] > 0
     np.save(tmp_path / "strange.npy", cloud() @ np.diag([2.0, 1.0, 1.0]))
     strangers = foreign_inputs(tmp_path, "points")
     assert not foreign_inputs(tmp_path, "sketch")
@@ -81,3 +87,17 @@ def test_a_foreign_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     np.save(tmp_path / "one.npy", np.zeros((1, 3)))
     with pytest.raises(ConfigError, match="has 1 point"):
         foreign_inputs(tmp_path, "points")
+
+
+def test_foreign_shapes_are_parts_of_their_own_and_may_stand_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    np.save(folder / "one.npy", cloud(400))
+    subject = load_subject(CHAIRS, tmp_path)
+
+    def named(spoilt: int, foreign: list[Path]) -> list[str]:
+        return [each.name for each in _parts(subject, Namespace(programs=["chair"], spoilt=spoilt, foreign=foreign))]
+
+    assert named(0, [folder]) == ["chair, points, from scans"]
+    assert named(2, []) == [f"chair, {kind}, {how}" for kind in ("points", "sketch") for how in ways_to_spoil(kind)]
+    assert len(set(named(2, [folder]))) == 11

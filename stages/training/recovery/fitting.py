@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -13,9 +14,10 @@ from stages.shape.arrays import FloatArray
 from stages.shape.views.camera import Camera
 from stages.sketches.settings import SketchesConfig
 from stages.training.recovery.clouds import Frame, frame_of
+from stages.training.recovery.guess import Guess, base_guess
 from stages.training.recovery.partial import PartialTarget, partial_target
 from stages.training.recovery.reading import Input
-from stages.training.recovery.refinement import Guess, Refined, base_guess, refine
+from stages.training.recovery.refinement import Refined, refine
 from stages.training.recovery.targets import CloudTarget, DrawingTarget, Target, cloud_target, drawing_target
 from stages.training.recovery.trained import TrainedRecovery
 
@@ -23,12 +25,20 @@ __all__ = ["Fit", "Look", "Up", "best_fit", "first_look"]
 
 Up = Literal["x", "y", "z", ""]
 
-TORN = 4.0
-"""A cloud that is so many times farther from the best whole shape than a cloud of that shape itself may be torn."""
-EXPLAINED = 0.25
-"""It is, if a part that is missing leaves no more than this share of the distance, and"""
-LEAST_MISSING, MOST_MISSING = 0.1, 0.75
-"""so much of the shape at least, and at most: a stick lies on every chair."""
+UNSURE, TORN = 2.0, 4.0
+"""A cloud that is so many times farther from a guess, or from the best whole shape, than a cloud of that shape itself
+may be torn."""
+BETTER, EXPLAINED = 0.75, 0.25
+"""It is, if a part of the guess, or of the best shape of which it may be one, is missing and leaves no more than
+this share of the distance, and"""
+LEAST_MISSING, MOST_MISSING = 0.15, 0.75
+"""so much of the shape at least, and at most: with longer legs any table goes on below the ground, and a stick lies on
+every chair."""
+PRIOR = 0.01
+"""The share of the distance that a nat of surprise costs in the search for what a torn cloud is a part of: of what is
+not seen only the network knows anything."""
+BY_CHANCE = 1.3
+"""In that search what is nearer than so many times the distance of a cloud of the shape itself is no better."""
 
 _UPRIGHT: Mapping[str, FloatArray] = {
     "y": np.eye(3),
@@ -125,25 +135,42 @@ class Fit:
 
 
 def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: int) -> Fit:
-    """The nearest whole shape; or, where a cloud lies far from it, that of which the cloud may be a part."""
+    """The nearest whole shape; or, of a torn cloud, that of which the cloud may be a part.
+
+    Networks learn from torn clouds, too, and guess the whole shape. Where a cloud lies much better on a part of that
+    shape than on all of it, it is torn. Where no network says whether it is, both are searched for.
+    """
+    if given.points is None or budget == 1:
+        return _fit(look, budget, seed)
+    partial = cache(lambda: first_look(look.program, look.model, given, up, turned, seed, partial_target))
+    if look.model is not None:
+        guess = _fit(look, 1, seed)
+        part = _fit(partial(), 1, seed) if guess.distance > UNSURE * guess.floor else None
+        if part is None or part.missing < LEAST_MISSING:
+            return _fit(look, budget, seed)
+        if _is_part(part, guess, BETTER):
+            torn = _fit(partial(), budget, seed)
+            if LEAST_MISSING <= torn.missing <= MOST_MISSING:
+                return torn
     whole = _fit(look, budget, seed)
-    if given.points is None or budget == 1 or whole.distance <= TORN * whole.floor:
+    if whole.distance <= TORN * whole.floor:
         return whole
-    torn = _fit(first_look(look.program, look.model, given, up, turned, seed, partial_target), budget, seed)
-    return replace(min(whole, torn, key=_unexplained), tried=whole.tried + torn.tried)
+    torn = _fit(partial(), budget, seed)
+    return replace(torn if _is_part(torn, whole, EXPLAINED) else whole, tried=whole.tried + torn.tried)
+
+
+def _is_part(torn: Fit, whole: Fit, share: float) -> bool:
+    """Whether a part that is missing leaves no more than a share of the distance."""
+    return LEAST_MISSING <= torn.missing <= MOST_MISSING and torn.distance <= share * whole.distance
 
 
 def _fit(look: Look, budget: int, seed: int) -> Fit:
     rng = np.random.default_rng(seed)
-    refined = refine(look.program, look.guess, look.target, budget, rng)
+    prior = near = 0.0
+    if budget > 1 and look.model is not None and isinstance(look.target, PartialTarget):
+        prior, near = PRIOR, BY_CHANCE * _fit(look, 1, seed).floor
+    refined = refine(look.program, look.guess, look.target, budget, rng, prior, near)
     base = refine(look.program, base_guess(look.program), look.target, 1, rng).distance
     parts = look.program.parts(refined.values)
     missing = refined.target.missing(parts) if isinstance(refined.target, PartialTarget) else 0.0
     return Fit(look, refined, refined.target.floor(parts, rng), base, missing, refined.tried)
-
-
-def _unexplained(fit: Fit) -> float:
-    """The distance, by which a fit that leaves something out is held against one of the whole shape."""
-    if isinstance(fit.refined.target, CloudTarget):
-        return EXPLAINED * fit.distance
-    return fit.distance if LEAST_MISSING <= fit.missing <= MOST_MISSING else float("inf")

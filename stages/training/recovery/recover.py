@@ -17,8 +17,9 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.views.camera import Camera
 from stages.training.checkpoint import CheckpointError, weights_of_kind
 from stages.training.recovery.fitting import Fit, Up, best_fit, first_look
+from stages.training.recovery.guess import Guess
 from stages.training.recovery.reading import Input, checked_cloud, ink_of
-from stages.training.recovery.refinement import Guess, Refined, refine
+from stages.training.recovery.refinement import Refined, refine
 from stages.training.recovery.strays import strays_of
 from stages.training.recovery.trained import KIND, TrainedRecovery, load_recovery
 

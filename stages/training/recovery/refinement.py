@@ -16,11 +16,11 @@ import numpy as np
 from stages.programs.parameters import Parameter, Value
 from stages.programs.program import BuildError, Program
 from stages.programs.schema import Values
-from stages.shape.arrays import FloatArray
+from stages.training.recovery.guess import Guess
 from stages.training.recovery.shapes import valid_values
 from stages.training.recovery.targets import Target
 
-__all__ = ["Guess", "Refined", "base_guess", "refine"]
+__all__ = ["Refined", "refine"]
 
 EVOLUTION = 60
 """Shapes in which several discrete parameters are changed at once, before each alone is looked at again."""
@@ -41,26 +41,6 @@ SMALLEST_STEP = 0.1
 
 
 @dataclass(frozen=True)
-class Guess:
-    """What is known before anything is tried. probabilities: of the values of each parameter, float64 (values,), by
-    name, were it visible; start: the values where the search begins, the likeliest if there are none."""
-
-    probabilities: dict[str, FloatArray]
-    start: Values | None = None
-
-    def values(self, program: Program) -> dict[str, Value]:
-        """The value of each parameter where the search begins, whether it is visible or not."""
-        if self.start is not None:
-            return dict(self.start)
-        likeliest = {name: int(each.argmax()) for name, each in self.probabilities.items()}
-        return {each.name: each.values[likeliest[each.name]] for each in program.parameters}
-
-    def certainty(self, name: str) -> float:
-        """The probability of the likeliest value."""
-        return float(self.probabilities[name].max())
-
-
-@dataclass(frozen=True)
 class Refined:
     """values: settled and valid; distance: from the target; target: as it was aligned; tried: shapes that were made."""
 
@@ -70,30 +50,29 @@ class Refined:
     tried: int
 
 
-def base_guess(program: Program) -> Guess:
-    """The guess of who knows nothing but the program: its base shape, every other value as likely as any."""
-    probabilities = {}
-    for each in program.parameters:
-        chances = np.full(len(each.values), 1.0 / (len(each.values) + 1))
-        chances[each.class_of(each.base)] *= 2.0
-        probabilities[each.name] = chances
-    return Guess(probabilities, program.schema.base)  # which need not be among the values of classes
-
-
-def refine(program: Program, guess: Guess, target: Target, budget: int, rng: np.random.Generator) -> Refined:
+def refine(
+    program: Program,
+    guess: Guess,
+    target: Target,
+    budget: int,
+    rng: np.random.Generator,
+    prior: float = 0.0,
+    near: float = 0.0,
+) -> Refined:
     """The nearest shape that is found with `budget` shapes at most; never farther than that of the guess itself, as the
-    target was aligned to it."""
-    search = _Search(program, guess, target, budget, rng, guess.values(program))
+    target was aligned to it. prior: the share of its distance that a shape costs for each nat of surprise; near:
+    what is nearer is no better, but by chance."""
+    search = _Search(program, guess, target, budget, rng, prior, near, guess.values(program))
     search.begin()
     while search.tried < budget:
-        before = search.distance
+        before = search.cost
         search.by_classes(1)
         search.by_structure()
         search.by_classes(2)
         search.by_evolution(EVOLUTION)
         search.by_classes(None)
         search.between_classes()
-        if search.distance >= before:
+        if search.cost >= before:
             break
     return Refined(search.settled, search.distance, search.target, search.tried)
 
@@ -101,16 +80,19 @@ def refine(program: Program, guess: Guess, target: Target, budget: int, rng: np.
 @dataclass
 class _Search:
     """wanted: a value for each parameter, also of those that are hidden now: what comes into view has what was guessed
-    of it. settled: the valid values that it stands for; distance: theirs."""
+    of it. settled: the valid values that it stands for; distance: theirs; cost: what is made less."""
 
     program: Program
     guess: Guess
     target: Target
     budget: int
     rng: np.random.Generator
+    prior: float
+    near: float
     wanted: dict[str, Value]
     settled: dict[str, Value] = field(default_factory=dict)
     distance: float = float("inf")
+    cost: float = float("inf")
     tried: int = 0
     _effects: dict[str, float] = field(default_factory=dict)
     _known: set[str] = field(default_factory=set)
@@ -189,16 +171,16 @@ class _Search:
     def _leap(self, name: str, value: Value) -> None:
         if name not in self._visible():
             return
-        before = self.wanted, self.settled, self.distance, self.target
-        seen, share = self._visible(), self.distance
-        self.distance = 1e9
+        before = self.wanted, self.settled, self.distance, self.cost, self.target
+        seen, share = self._visible(), self.cost
+        self.distance = self.cost = 1e9
         if self._try({name: value}):
             fresh = [each for each in self._unsure_first() if each.name in self._visible() - seen]
-            for parameter in fresh[:FITTED] if self.distance < HOPELESS * share else []:
+            for parameter in fresh[:FITTED] if self.cost < HOPELESS * share else []:
                 for values in self._ways(parameter):
                     self._walk(parameter, values)
-        if self.distance >= share:
-            self.wanted, self.settled, self.distance, self.target = before
+        if self.cost >= share:
+            self.wanted, self.settled, self.distance, self.cost, self.target = before
 
     def _walk(self, parameter: Parameter, values: Iterator[Value]) -> bool:
         """Go on while it gets better."""
@@ -228,9 +210,10 @@ class _Search:
         for name in change if len(change) == 1 else ():
             effect = abs(distance - self.distance) / max(self.distance, TINY)
             self._effects[name] = max(self._effects.get(name, 0.0), effect)
-        if distance >= self.distance:
+        cost = self._cost(distance, settled)
+        if cost >= self.cost:
             return False
-        self.distance, self.settled, self.target = distance, settled, target
+        self.distance, self.cost, self.settled, self.target = distance, cost, settled, target
         self.wanted = {**wanted, **{name: settled[name] for name in self._visible()}}
         return True
 
@@ -239,8 +222,13 @@ class _Search:
         parts = self.program.parts(self.settled)
         self.target = self.target.aligned(parts)
         self.distance, self.target = self.target.compared(parts)
+        self.cost = self._cost(self.distance, self.settled)
         self.tried += 1
         self._known = {self.program.schema.text(self.settled)}
+
+    def _cost(self, distance: float, settled: Values) -> float:
+        surprise = self.guess.surprise(self.program, settled) if self.prior else 0.0
+        return max(distance, self.near) * (1.0 + self.prior * surprise)
 
     def _visible(self) -> frozenset[str]:
         return self.program.schema.settled(self.settled)[1]

@@ -135,16 +135,16 @@ class DrawingTarget:
         return 0.0
 
     def aligned(self, parts: Sequence[Part]) -> DrawingTarget:
-        """Seen from where the shape's lines are nearest: at first from any view of the config and all around, then from
-        beside where it was seen before, nearer each time."""
+        """Seen from where the shape's lines are nearest: at first from any view of the config and all around, and so
+        once more when the shape is another than was guessed; then from beside where it was seen before, nearer each
+        time."""
         step = self.step / 2.0 if self.step else FIRST_STEP
-        if not self.step:
-            views = [*map(_steady, self.config.views), *_around(self.program)]
-        elif step >= LEAST_STEP:
-            moves = ((0.0, 0.0), (step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step))
-            views = [_moved(self.view, *move) for move in moves]
-        else:
+        if step < LEAST_STEP:
             return self
+        moves = ((0.0, 0.0), (step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step))
+        views = [_moved(self.view, *move) for move in moves if self.step]
+        if step >= FIRST_STEP / 2.0:
+            views += [*map(_steady, self.config.views), *_around(self.program)]
         seen = [replace(self, view=view, step=step) for view in views]
         return min(seen, key=lambda each: each.compared(parts)[0])
 
@@ -158,7 +158,7 @@ def drawing_target(program: Program, config: SketchesConfig, ink: BoolArray) -> 
 
 def _around(program: Program) -> Iterator[SketchView]:
     """Views that people draw from: from the front and both sides, from a little to well above, or below what hangs."""
-    for azimuth, elevation in product((-55.0, -35.0, -15.0, 0.0, 15.0, 35.0, 55.0), (12.0, 30.0)):
+    for azimuth, elevation in product((-55.0, -35.0, -15.0, 0.0, 15.0, 35.0, 55.0), (12.0, 30.0, 50.0)):
         yield SketchView(azimuth=azimuth, elevation=elevation if program.elevation > 0 else -elevation)
 
 

@@ -12,15 +12,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from stages.programs.parameters import Parameter
 from stages.programs.program import Program, find_program
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.sketches.settings import SketchesConfig
 from stages.training.checkpoint import CheckpointError, load_checkpoint
 from stages.training.recovery.answers import Answers
 from stages.training.recovery.clouds import frame_of, taken
+from stages.training.recovery.guess import Guess, guess_of
 from stages.training.recovery.model import RecoveryNet
-from stages.training.recovery.refinement import Guess
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.training import described_parameters
 
@@ -69,15 +68,7 @@ class TrainedRecovery:
         device = next(self.module.parameters()).device
         outputs, answers = self.module(inputs.to(device)), Answers.of(self.entry, self.program.parameters).to(device)
         chances = answers.chances(outputs).mean(dim=0).double().cpu().numpy()
-        probabilities = {}
-        for parameter, row in zip(self.program.parameters, chances, strict=True):
-            shown = row[: len(parameter.values)]
-            probabilities[parameter.name] = shown / max(float(shown.sum()), 1e-300)
-        start = Guess(probabilities).values(self.program)
-        for parameter in self.program.parameters:
-            if parameter.kind == "continuous":
-                start[parameter.name] = _expected(parameter, probabilities[parameter.name])
-        return Guess(probabilities, start)
+        return guess_of(self.program, chances)
 
 
 def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedRecovery:
@@ -113,10 +104,3 @@ def _in_floats(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
         elif not name.endswith(STEP):
             found[name] = each.float() if each.is_floating_point() else each
     return found
-
-
-def _expected(parameter: Parameter, probabilities: FloatArray) -> float:
-    """The mean of a continuous parameter's values, by their probabilities (values,). Of many values that are nearly as
-    likely it is wrong by less than the likeliest."""
-    low, *_, high = parameter.values
-    return float(np.clip(probabilities @ np.array(parameter.values, dtype=np.float64), low, high))

@@ -18,12 +18,14 @@ from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.programs.program import Program, find_program
+from stages.shape.arrays import FloatArray
 from stages.sketches.settings import SketchesConfig
 from stages.training.loop import device_of
 from stages.training.recovery.answers import Answers
 from stages.training.recovery.augmentation import inked, seen_clouds, seen_drawings, stored
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import drawn
+from stages.training.recovery.guess import guess_of
 from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TRAIN, VAL, random_shapes, valid_values
@@ -160,17 +162,19 @@ class RecoveryLearner:
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """On shapes that are never learnt from: nats; of the parameters that are visible, the share that is right and
-        that within one class; and the mean and the 95th percentile of how far the shapes that come out are from the
-        true ones, squared, in sides of their boxes."""
+        that within one class; and the mean and the 95th percentile of how far the shapes with which a search begins are
+        from the true ones, squared, in sides of their boxes."""
         inputs = torch.from_numpy(self.val["inputs"]).to(self.device)
         read = inked if self.entry.input == "sketch" else Tensor.float
         found = torch.cat([self.module(read(each)) for each in torch.split(inputs, self.entry.batch)])
         classes = torch.from_numpy(self.val["classes"].astype(np.int64)).to(self.device)
         counts = self.answers.counts
-        best, visible = self.answers.chances(found).argmax(dim=-1), classes < counts
+        chances, visible = self.answers.chances(found), classes < counts
+        best = chances.argmax(dim=-1)
         near = (best - classes).abs() <= 1
         distances = [
-            self._distance(chosen, text) for chosen, text in zip(best[:JUDGED].tolist(), self.texts, strict=False)
+            self._distance(each, text)
+            for each, text in zip(chances[:JUDGED].double().cpu().numpy(), self.texts, strict=False)
         ]
         return {
             "loss": float(self.answers.nats(found, classes)),
@@ -180,8 +184,8 @@ class RecoveryLearner:
             "chamfer_high": float(np.quantile(distances, 0.95)),
         }
 
-    def _distance(self, classes: Sequence[int], text: str) -> float:
+    def _distance(self, chances: FloatArray, text: str) -> float:
         schema = self.program.schema
-        recovered = valid_values(self.program, schema.from_classes(classes))
+        recovered = valid_values(self.program, guess_of(self.program, chances).values(self.program))
         clouds = (shape_points(self.program.parts(each), MEASURED) for each in (recovered, schema.values(text)))
         return chamfer_distance(*(frame_of(each).normalized(each) for each in clouds))

@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from eval.spoilt import SPOILS
+from stages.programs.program import find_program
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.partial import PartialTarget, partial_target
-from stages.training.recovery.recover import recover
+from stages.training.recovery.reading import Input
+from stages.training.recovery.recover import recover, recover_input
+from stages.training.recovery.shapes import TEST, random_shapes
+from stages.training.recovery.surface import sampled_points
 from stages.training.recovery.targets import cloud_target
-from tests.stages.training.recovery.test_recover import STOOL, TALL, cloud_of, off_by
+from tests.stages.training.recovery.test_recover import SHIPPED_MODELS, STOOL, TALL, cloud_of, off_by
 
 PARTS = STOOL.parts(TALL)
 
@@ -102,3 +107,20 @@ def test_a_stick_is_no_part_of_a_stool() -> None:
     found = recover(stick, "tests.stages.programs.stool", up="y", budget=30)
     assert found.missing == 0.0
     assert any("unlike any stool" in each for each in found.warnings)
+
+
+@pytest.mark.parametrize("program", ["chair", "table", "vase"])
+def test_a_network_tells_torn_clouds_from_clouds_that_are_spoilt_otherwise(program: str) -> None:
+    made, rng = find_program(program), np.random.default_rng(5)
+    shape = next(random_shapes(made, TEST, rng))
+    given = Input("cloud", points=sampled_points(shape.parts, 2048, rng))
+    clouds = {
+        "whole": given,
+        **{how: spoil(given, np.random.default_rng(1)) for how, spoil in SPOILS["points"].items()},
+    }
+    missing = {
+        how: recover_input(each, program, SHIPPED_MODELS, "y", 30, 0, turned=False).missing
+        for how, each in clouds.items()
+    }
+    assert missing.pop("half missing") > 0.2
+    assert not any(missing.values())

@@ -21,9 +21,10 @@ from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.recovery.__main__ import main
 from stages.training.recovery.drawings import drawn
+from stages.training.recovery.guess import base_guess
 from stages.training.recovery.reading import Input, InputError, read_inputs
 from stages.training.recovery.recover import SHIPPED, find_models, recover, recover_input
-from stages.training.recovery.refinement import base_guess, refine
+from stages.training.recovery.refinement import refine
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TEST, TRAIN, VAL, random_shapes
 from stages.training.recovery.ship import slim_bytes
@@ -96,14 +97,15 @@ def test_clouds_of_any_place_size_and_axis_come_back(up: str, asked: bool) -> No
     assert any("no trained model" in each for each in found.warnings)
 
 
-def test_a_drawing_says_from_where_it_is_seen() -> None:
-    view = SketchView(azimuth=-30.0, elevation=20.0)
+@pytest.mark.parametrize(("azimuth", "elevation"), [(-30.0, 20.0), (8.0, 15.0), (-50.0, 50.0)])
+def test_a_drawing_says_from_where_it_is_seen(azimuth: float, elevation: float) -> None:
+    view = SketchView(azimuth=azimuth, elevation=elevation)
     ink = drawn(STOOL, tuple(STOOL.parts(TALL)), view, SketchesConfig(), np.random.default_rng(0))
     found = recover_input(Input("stool", ink=ink), PROGRAM, {}, "y", 60, 0)
     assert found.placement is None
     assert found.camera is not None
-    assert found.camera.azimuth == pytest.approx(-30.0, abs=12.0)
-    assert found.camera.elevation == pytest.approx(20.0, abs=12.0)
+    assert found.camera.azimuth == pytest.approx(azimuth, abs=12.0)
+    assert found.camera.elevation == pytest.approx(elevation, abs=12.0)
     assert found.described()["camera"]["azimuth"] == found.camera.azimuth
     assert recover(cloud_of(TALL, n=300), PROGRAM, up="y", budget=1).described()["camera"] is None
 
