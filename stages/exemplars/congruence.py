@@ -14,6 +14,10 @@ __all__ = ["ComparableMesh", "comparable_mesh", "congruences"]
 
 QUICK_CHECK = 24
 CANDIDATES = 4096
+CLOSE = 0.2
+"""Rotations with entries farther apart than this move corners of any part."""
+EXACT = 0.1
+"""Share of the tolerance within which a turn must be exact that moves nothing by more than the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -60,33 +64,38 @@ def congruences(source: ComparableMesh, target: ComparableMesh, tolerance: float
     `tolerance` is a share of the diagonal. With `source is target` this is the part's group of symmetries, the
     identity first. The result is empty where the surfaces are not congruent. A motion is accepted when every
     corner and triangle centre of each surface falls on the other, so an open box is not as symmetric as a closed
-    one. Motions of surfaces of revolution are those that their tessellation allows.
+    one. Motions of surfaces of revolution are those that their tessellation allows. What moves no corner farther than
+    `tolerance` from where another motion has it would be accepted whatever the part looks like, as a small turn of a
+    long thin part about itself: it is a motion of its own only where it is exact.
     """
     slack = tolerance * source.diagonal
     if abs(source.area - target.area) > max(8 * slack * source.diagonal, 1e-2 * source.area):
         return np.empty((0, 4, 4))
     if np.ptp([np.linalg.norm(each.vertices, axis=1).max() for each in (source, target)]) > 4 * slack:
         return np.empty((0, 4, 4))
-    accepted: list[FloatArray] = []
+    # Of a part that is a hair thin the frames of two corners are rounding, and no candidate may be the identity.
+    accepted: list[FloatArray] = [np.eye(3)] if source is target else []
     for rotation in _candidate_rotations(source, target, slack, reflections):
         known = np.array(accepted).reshape(-1, 9)
-        is_known = (np.abs(known - rotation.ravel()).max(axis=1) * source.diagonal < 4 * slack).any()
-        if not is_known and _maps_onto(source, target, rotation, slack):
+        apart = np.abs(known - rotation.ravel()).max(axis=1)
+        if (apart * source.diagonal < 4 * slack).any():
+            continue
+        close = known[apart < CLOSE].reshape(-1, 3, 3)
+        asked = EXACT * slack if _is_like_one(source.vertices, rotation, close, slack) else slack
+        if _maps_onto(source, target, rotation, asked):
             accepted.append(rotation)
     motions = np.tile(np.eye(4), (len(accepted), 1, 1))
     for motion, rotation in zip(motions, accepted, strict=True):
         motion[:3, :3] = rotation
         motion[:3, 3] = target.centroid - rotation @ source.centroid
-    if source is target:
-        # Of a part that is a hair thin the frames of two corners are rounding, and no candidate may be the identity.
-        turned = np.abs(motions[:, :3, :3] - np.eye(3)).max(axis=(1, 2))
-        if turned.min(initial=np.inf) * source.diagonal < 4 * slack:
-            motions[np.argmin(rotation_angle(motions))] = np.eye(4)
-        else:
-            motions = np.concatenate([np.eye(4)[None], motions])
     # Ordered by angle, then by the matrix itself, so that the identity is first and nothing depends on the search.
     rank = np.round(np.concatenate([rotation_angle(motions)[:, None], motions[:, :3, :3].reshape(-1, 9)], axis=1), 3)
     return motions[np.lexsort(rank.T[::-1])]
+
+
+def _is_like_one(vertices: FloatArray, rotation: FloatArray, others: FloatArray, slack: float) -> bool:
+    """Whether a rotation moves no corner (v, 3) farther than `slack` from where one of some others (k, 3, 3) does."""
+    return any(np.linalg.norm(vertices @ (rotation - other).T, axis=1).max() <= slack for other in others)
 
 
 def _maps_onto(source: ComparableMesh, target: ComparableMesh, rotation: FloatArray, slack: float) -> bool:

@@ -12,7 +12,7 @@ from pipeline.errors import ConfigError
 from pipeline.places import write_file
 from stages.exemplars.model import Model
 from stages.exemplars.settings import ReadLimits
-from stages.exemplars.symmetry.cloud import Cloud, radius_for
+from stages.exemplars.symmetry.cloud import Cloud, points_for, radius_for
 from stages.exemplars.symmetry.parts import about_size
 from stages.grammars.clouds import written_clouds
 from stages.grammars.description import describe_grammar
@@ -78,6 +78,8 @@ def written_grammar(
                 f"{path}: too thin or too noisy: it takes a radius of {radius:.0%} of its longest side, at most "
                 f"{LARGEST_RADIUS:.0%} make sense; scan more densely, or take the noise out"
             )
+        if radius > config.radius:
+            yield "radius", _coarse(surface, radius, config.radius)
         config = config.model_copy(update={"radius": radius})
     found = extract(surface, name, config.radius, "z" if up == "z" else "y", np.random.default_rng(0))
     said = _sentence(found)
@@ -122,6 +124,13 @@ def _prospect(counts: dict[str, int]) -> str:
         f"{found}, {many} for a dataset: all else looks like the model, for what may dock at a site is nearly what is "
         "there. A smaller grammars.models[].radius finds more sites; else take the model by its parts"
     )
+
+
+def _coarse(cloud: Cloud, radius: float, usual: float) -> str:
+    """What a scan is too thin or too noisy for."""
+    points = points_for(cloud, usual)
+    more = "less noise" if points is None else f"about {points:,} points, {len(cloud.points):,} are there,"
+    return f"{radius:.1%} of the longest side: what is finer is not seen; with {more} it could be {usual:.1%}"
 
 
 def _sentence(found: Extraction) -> str:

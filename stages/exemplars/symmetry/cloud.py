@@ -13,7 +13,7 @@ from stages.exemplars.symmetry.patches import planar_patches
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SHIFT, SurfaceGrid
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["Cloud", "ScannedGrid", "cloud_grid", "radius_for"]
+__all__ = ["Cloud", "ScannedGrid", "cloud_grid", "points_for", "radius_for"]
 
 FEWEST_POINTS = 500
 FARTHEST = 1e30
@@ -135,11 +135,24 @@ def radius_for(cloud: Cloud, least: float) -> float:
     """The radius of similarity that suits a cloud, at least `least`, as a share of the longest side: with it cells hold
     twice the points that they must, and noise is half as much as it may be. Raises ConfigError as `cloud_grid` does for
     points that are no surface."""
+    return max(least, float(np.ceil(1000 * max(_shares_that_suit(cloud))) / 1000))
+
+
+def points_for(cloud: Cloud, share: float) -> int | None:
+    """About how many points a scan like `cloud` must have for a radius of `share` of the longest side; None where it
+    would drown in noise. Raises ConfigError as `radius_for`."""
+    by_points, by_noise = _shares_that_suit(cloud)
+    points = len(cloud.points) * (by_points / share) ** 2
+    return None if by_noise > share else int(round(points, 1 - int(np.log10(points))))
+
+
+def _shares_that_suit(cloud: Cloud) -> tuple[float, float]:
+    """The radius that suits how dense the points are, and that which suits their noise, shares of the longest side."""
     _check(cloud.points)
     noise, reach, count = glance(cloud.points)
-    size = max((2 * A_CELL * np.pi / count) ** 0.5 * reach, 2 * noise / MOST_NOISE)
     low, high = np.quantile(cloud.points, [0.001, 0.999], axis=0)
-    return max(least, float(np.ceil(1000 * CELLS_A_RADIUS * size / (high - low).max()) / 1000))
+    a_cell = CELLS_A_RADIUS / float((high - low).max())
+    return (2 * A_CELL * np.pi / count) ** 0.5 * reach * a_cell, 2 * noise / MOST_NOISE * a_cell
 
 
 def _check(points: FloatArray) -> None:

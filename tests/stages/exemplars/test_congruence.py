@@ -129,6 +129,20 @@ def test_a_screw_and_its_mirror_image_are_two_types_unless_reflections_count() -
     assert (np.linalg.det(motions[:, :3, :3]) < 0).all()
 
 
+def test_a_small_turn_of_a_long_part_about_itself_is_none_of_its_motions() -> None:
+    """It moves all of the part by less than the tolerance, whatever the part looks like."""
+    vertices, faces = prism(6, 1.0, 60.0)
+    turn = np.array([0.0, 0.01, 2.0, 2.01, 4.0, 4.01])
+    reach = np.array([1.0, 1.0, 0.8, 0.8, 0.6, 0.6])
+    ring = reach[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    vertices[:12, :2] = np.tile(ring, (2, 1))
+    assert len(group((vertices, faces))) == 1
+    pose = placed(3, -2, 7, random_rotation(np.random.default_rng(4)))
+    other = comparable_mesh(*moved((vertices, faces), pose))
+    motions = congruences(comparable_mesh(vertices, faces), other, TOLERANCE, False)
+    assert len(motions) == 1
+
+
 def test_a_random_mesh_is_no_mirror_image_of_itself() -> None:
     for seed in range(5):
         body = hull(np.random.default_rng(seed))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError
-from stages.exemplars.symmetry.cloud import Cloud, ScannedGrid, cloud_grid
+from stages.exemplars.symmetry.cloud import Cloud, ScannedGrid, cloud_grid, points_for, radius_for
 from stages.exemplars.symmetry.matching import eroded, symmetric_cells
 from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.neighbourhoods import neighbourhoods
@@ -118,6 +118,13 @@ def test_a_plane_and_a_ball_are_like_themselves_everywhere() -> None:
     for points in (flat, ball / np.linalg.norm(ball, axis=1)[:, None]):
         found = cloud_grid(Cloud(points, np.zeros((len(points), 3), np.uint8)), 0.1)
         assert len(candidate_motions(found.grid, 24, None, ridge_frames(found))) == 0
+
+
+def test_how_many_points_a_finer_radius_takes() -> None:
+    thin, dense, noisy = cloud_of(wall(4), 0.0, 10_000), cloud_of(wall(4), 0.0, 40_000), cloud_of(wall(4), 0.6, 10_000)
+    assert radius_for(dense, 0.0) == pytest.approx(radius_for(thin, 0.0) / 2, rel=0.1)
+    assert points_for(thin, radius_for(dense, 0.0)) == pytest.approx(40_000, rel=0.2)
+    assert points_for(noisy, 0.01) is None
 
 
 class TestRefused:
