@@ -12,8 +12,9 @@ import numpy as np
 from stages.exemplars.symmetry.derivations import Derivation, row_seams
 from stages.grammars.derivation import Piece, Resized, pieces_of
 from stages.grammars.grammar import ShapeGrammar
+from stages.grammars.recent import Recent
 from stages.grammars.samples import TerminalSamples
-from stages.shape.arrays import BoolArray, FloatArray
+from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
 __all__ = ["Collisions"]
@@ -24,6 +25,10 @@ BESIDE = 2.0
 """At a seam they may be near as far as so many radii from it."""
 DECIMALS = 6
 """Digits of relative poses, shifts in cells, that count."""
+HELD = 100_000_000
+"""Bytes of answers that are held."""
+BYTES_A_KEY = 500
+"""Of an answer's key, about."""
 SAME = 0.5
 """Cells by which the corners of a piece may lie elsewhere and the piece still stand as another one does."""
 
@@ -35,21 +40,20 @@ class Collisions:
         self._grammar = grammar
         self.samples = TerminalSamples(grammar)
         self._cell = self.samples.cell
-        self._answers: dict[tuple[int, int, bytes], BoolArray | None] = {}
-        self._trees: dict[int, Any] = {}
+        self._answers: Recent[tuple[int, int, bytes], IntArray] = Recent(
+            lambda key: self._points_near(*key), lambda near: BYTES_A_KEY + near.nbytes, HELD
+        )
         self._seam_trees: dict[int, Any] = {}
 
     def collides(self, piece: Piece, others: Sequence[Piece], seams: Sequence[tuple[int, FloatArray]]) -> bool:
         """Whether a piece is near one of others where no seam is, a class of sites and its frame (4, 4) each, and
         nothing in the exemplar is so near."""
-        own: FloatArray | None = None
         for other in others:
             near = self._near(piece, other)
-            if near is None or self._as_in_exemplar(piece, other):
+            if not len(near) or self._as_in_exemplar(piece, other):
                 continue
-            if own is None:
-                own = transform_points(piece.pose, self.samples[piece.mesh].points)
-            if (near & ~self._at_seams(own, near, seams)).any():
+            points = transform_points(piece.pose, self.samples[piece.mesh].points[near])
+            if not self._at_seams(points, seams).all():
                 return True
         return False
 
@@ -76,7 +80,7 @@ class Collisions:
                 for other in pieces[:place]:
                     pose = invert(one.pose) @ other.pose
                     listed = found.setdefault((one.mesh, other.mesh), [])
-                    if not self._listed(listed, other.mesh, pose) and self._near(one, other) is not None:
+                    if not self._listed(listed, other.mesh, pose) and len(self._near(one, other)):
                         listed.append(pose)
                         found.setdefault((other.mesh, one.mesh), []).append(invert(pose))
         return found
@@ -87,56 +91,45 @@ class Collisions:
 
     def _listed(self, listed: Sequence[FloatArray], mesh: int, pose: FloatArray) -> bool:
         """Whether a pose of a mesh is one of those listed."""
-        corners = self._grammar.meshes[mesh].bounds
+        corners = self._grammar.bounds[mesh]
         here = transform_points(pose, corners)
         return any(np.abs(transform_points(each, corners) - here).max() < SAME * self._cell for each in listed)
 
-    def _tree(self, mesh: int) -> Any:
-        from scipy.spatial import KDTree
-
-        if mesh not in self._trees:
-            self._trees[mesh] = KDTree(self.samples[mesh].points)
-        return self._trees[mesh]
-
-    def _near(self, one: Piece, other: Piece) -> BoolArray | None:
-        """Which points of a piece are near another piece, bool (n,); None for none. Relative poses recur, so that each
-        is answered once, at its rounded value."""
+    def _near(self, one: Piece, other: Piece) -> IntArray:
+        """Which points of a piece are near another piece, int32 (k,). Relative poses recur, so that answers are held,
+        each for the rounded value of its pose."""
         pose = invert(other.pose) @ one.pose
         pose[:3, 3] /= self._cell
         pose = np.round(pose, DECIMALS) + 0.0
-        key = (one.mesh, other.mesh, pose.tobytes())
-        if key not in self._answers:
-            pose[:3, 3] *= self._cell
-            self._answers[key] = self._points_near(one.mesh, other.mesh, pose)
-        return self._answers[key]
+        return self._answers[one.mesh, other.mesh, pose.tobytes()]
 
-    def _points_near(self, mesh: int, other: int, pose: FloatArray) -> BoolArray | None:
-        """Which points of a mesh at a pose in the coordinates of another are near that."""
-        low, high = self._grammar.meshes[other].bounds
+    def _points_near(self, mesh: int, other: int, key: bytes) -> IntArray:
+        """Which points of a mesh are near another in whose coordinates it has a pose, float64 (4, 4), shifts in cells,
+        as bytes."""
+        pose = np.frombuffer(key).reshape(4, 4).copy()
+        pose[:3, 3] *= self._cell
+        low, high = self._grammar.bounds[other]
         reach = NEAR * self._cell
-        box = self._grammar.meshes[mesh].bounds
+        box = self._grammar.bounds[mesh]
         middle, half = box.mean(axis=0), (box[1] - box[0]) / 2
         around, wide = transform_points(pose, middle), np.abs(pose[:3, :3]) @ half
         if ((around - wide > high + reach) | (around + wide < low - reach)).any():
-            return None
+            return np.empty(0, dtype=np.int32)
         moved = transform_points(pose, self.samples[mesh].points)
         close = np.flatnonzero(((moved > low - reach) & (moved < high + reach)).all(axis=1))
-        away, _ = self._tree(other).query(moved[close], distance_upper_bound=reach)
-        found = np.zeros(len(moved), dtype=bool)
-        found[close] = np.isfinite(away)
-        return found if found.any() else None
+        away, _ = self.samples[other].tree.query(moved[close], distance_upper_bound=reach)
+        return close[np.isfinite(away)].astype(np.int32)
 
-    def _at_seams(self, points: FloatArray, asked: BoolArray, seams: Sequence[tuple[int, FloatArray]]) -> BoolArray:
-        """Which of the points asked for lie beside a seam, bool (n,)."""
+    def _at_seams(self, points: FloatArray, seams: Sequence[tuple[int, FloatArray]]) -> BoolArray:
+        """Which of some points lie beside a seam, bool (n,)."""
         from scipy.spatial import KDTree
 
         found = np.zeros(len(points), dtype=bool)
-        places = np.flatnonzero(asked)
         for site, frame in seams:
             if site not in self._seam_trees:
                 self._seam_trees[site] = KDTree(self._grammar.seams[site])
             away, _ = self._seam_trees[site].query(
-                transform_points(invert(frame), points[places]), distance_upper_bound=BESIDE * self._grammar.radius
+                transform_points(invert(frame), points), distance_upper_bound=BESIDE * self._grammar.radius
             )
-            found[places] |= np.isfinite(away)
+            found |= np.isfinite(away)
         return found

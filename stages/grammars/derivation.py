@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ __all__ = [
     "Resized",
     "derivation_text",
     "exemplar_shape",
+    "lone_shape",
     "pieces_of",
     "read_derivation",
     "shape_of_text",
@@ -145,11 +147,25 @@ def pieces_of(grammar: ShapeGrammar, made: Derivation | Resized) -> list[Piece]:
 
 
 def shape_of_text(grammar: ShapeGrammar, text: str) -> Shape:
-    """The shape of a text. Raises DerivationError for one that is no derivation of the grammar."""
+    """The shape of a text, with all meshes of the grammar, so that what is known of them serves all of its shapes.
+    Raises DerivationError for a text that is no derivation of the grammar."""
     pieces = pieces_of(grammar, read_derivation(grammar, text))
-    types = np.array([each.mesh for each in pieces], dtype=np.int16)
+    return _shape(grammar, pieces, np.arange(len(grammar.meshes)))
+
+
+def lone_shape(grammar: ShapeGrammar, text: str) -> Shape:
+    """The shape of a text, with no more meshes than stand in it: all that a grammar makes as they are asked for are
+    gigabytes. Raises DerivationError for a text that is no derivation of the grammar."""
+    pieces = pieces_of(grammar, read_derivation(grammar, text))
+    return _shape(grammar, pieces, np.unique([each.mesh for each in pieces]))
+
+
+def _shape(grammar: ShapeGrammar, pieces: Sequence[Piece], meshes: np.ndarray) -> Shape:
+    """The shape of some pieces, with the meshes at these places, int64 (k,) ascending."""
+    types = np.searchsorted(meshes, [each.mesh for each in pieces]).astype(np.int16)
     poses = np.array([each.pose for each in pieces])
-    return Shape(tuple(grammar.meshes), Assembly(types, poses, np.empty((0, 2), np.int32)), grammar.up, grammar.labels)
+    chosen = tuple(grammar.meshes[each] for each in meshes.tolist())
+    return Shape(chosen, Assembly(types, poses, np.empty((0, 2), np.int32)), grammar.up, grammar.labels)
 
 
 def exemplar_shape(grammar: ShapeGrammar) -> Shape:

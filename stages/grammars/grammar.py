@@ -80,6 +80,11 @@ class ShapeGrammar:
         return tuple(each.name for each in self.meshes)
 
     @cached_property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of the box around each mesh, float64 (m, 2, 3)."""
+        return np.array([each.bounds for each in self.meshes]).reshape(-1, 2, 3)
+
+    @cached_property
     def of_site(self) -> Mapping[int, tuple[int, ...]]:
         """The rules of each class of sites, by their places."""
         found: dict[int, list[int]] = {}

@@ -70,9 +70,9 @@ class Known:
 
     def sight(self, pieces: Sequence[Piece]) -> Sight:
         """What one sees of pieces."""
-        corners = [transform_points(each.pose, self._grammar.meshes[each.mesh].vertices) for each in pieces]
-        low = np.min([each.min(axis=0) for each in corners], axis=0)
-        high = np.max([each.max(axis=0) for each in corners], axis=0)
+        corners = (transform_points(each.pose, self._grammar.meshes[each.mesh].vertices) for each in pieces)
+        boxes = np.array([(each.min(axis=0), each.max(axis=0)) for each in corners])
+        low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
         return sight_of([(self._samples[each.mesh], each.pose) for each in pieces], low, high, self._grammar.radius)
 
     def nearest(self, sight: Sight) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.exemplars.symmetry.carve import Soup, carve
 from stages.exemplars.symmetry.welding import welded
-from stages.grammars.derivation import Piece, Resized, exemplar_shape, pieces_of, shape_of_text
+from stages.grammars.derivation import Piece, Resized, exemplar_shape, lone_shape, pieces_of
 from stages.grammars.editing import Option, edited, options_of
 from stages.grammars.extraction import Extraction
 from stages.grammars.grammar import GridRule, ShapeGrammar, site_name
@@ -66,7 +66,7 @@ def shapes_sheet(grammar: ShapeGrammar, texts: Sequence[str]) -> bytes:
 
 def shapes_row(grammar: ShapeGrammar, texts: Sequence[str]) -> list[Cell]:
     """The shapes of some derivations, each with its text."""
-    return [Cell(_pictured(shape_of_text(grammar, each), grammar.splats), each) for each in texts]
+    return [Cell(_pictured(lone_shape(grammar, each), grammar.splats), each) for each in texts]
 
 
 def dockers_row(found: Extraction, most: int) -> list[Cell]:

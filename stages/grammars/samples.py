@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from stages.exemplars.symmetry.clip import fragments
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS
 from stages.grammars.grammar import ShapeGrammar
+from stages.grammars.recent import Recent
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 
@@ -16,6 +19,10 @@ __all__ = ["Samples", "TerminalSamples", "facing", "sampled"]
 
 TILT = np.array([1.0, 1.0137, 1.0271])
 """By so much an axis weighs more where a surface faces between two: what faces halfway must not go by rounding."""
+HELD = 300_000_000
+"""Bytes of samples that are held. Hundreds of terminals that have most of a large surface each have gigabytes."""
+BYTES_A_POINT = 72
+"""Of a point, its normal, and its place in a tree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +32,22 @@ class Samples:
     points: FloatArray
     normals: FloatArray
 
+    @cached_property
+    def tree(self) -> Any:
+        """A `scipy.spatial.KDTree` of the points."""
+        from scipy.spatial import KDTree
+
+        return KDTree(self.points)
+
 
 class TerminalSamples:
-    """The samples of each mesh of a grammar, taken when they are first asked for."""
+    """The samples of each mesh of a grammar, taken when they are asked for; those asked for last are held."""
 
     def __init__(self, grammar: ShapeGrammar) -> None:
         self._grammar = grammar
-        self._taken: dict[int, Samples] = {}
+        self._taken: Recent[int, Samples] = Recent(
+            lambda mesh: sampled(grammar.meshes[mesh], self.cell), lambda taken: BYTES_A_POINT * len(taken.points), HELD
+        )
 
     @property
     def cell(self) -> float:
@@ -39,8 +55,6 @@ class TerminalSamples:
         return self._grammar.radius / CELLS_A_RADIUS
 
     def __getitem__(self, mesh: int) -> Samples:
-        if mesh not in self._taken:
-            self._taken[mesh] = sampled(self._grammar.meshes[mesh], self.cell)
         return self._taken[mesh]
 
 

@@ -15,6 +15,7 @@ from stages.grammars.derivation import (
     Piece,
     Resized,
     derivation_text,
+    lone_shape,
     pieces_of,
     read_derivation,
     shape_of_text,
@@ -94,6 +95,13 @@ class TestDerivations:
         text = derivation_text(grammar, original(grammar, 0))
         with pytest.raises(DerivationError, match=f"at {len(text)} of"):
             read_derivation(grammar, text + "A0")
+
+    def test_a_shape_alone_has_the_meshes_that_stand_in_it(self, grammar: ShapeGrammar) -> None:
+        text = derivation_text(grammar, original(grammar, 0))
+        whole, alone = shape_of_text(grammar, text), lone_shape(grammar, text)
+        assert {each.name for each in alone.meshes} == {whole.meshes[each].name for each in whole.assembly.types}
+        assert np.array_equal(triangles_of(alone), triangles_of(whole))
+        assert alone.part_labels.tolist() == whole.part_labels.tolist()
 
 
 class TestCollisions:

@@ -5,7 +5,10 @@ from functools import partial
 from itertools import combinations
 from pathlib import Path
 
+import pytest
+
 from pipeline.randomness import decision_rng
+from stages.grammars import collisions, samples
 from stages.grammars.derivation import pieces_of, read_derivation
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.likeness import Known, difference
@@ -46,6 +49,15 @@ def test_a_grammar_without_more_shapes_ends_and_is_told_of(grammar: ShapeGrammar
     assert why["like one drawn before"]
     assert "3 of 200 shapes" in few(config(), 3)
     assert "exemplars.kits" in few(config(), 3)
+
+
+def test_shapes_are_the_same_where_next_to_nothing_is_held(
+    grammar: ShapeGrammar, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = drawn(grammar, 3)
+    for module in (samples, collisions):
+        monkeypatch.setattr(module, "HELD", 1)
+    assert drawn(grammar, 3) == expected
 
 
 def test_where_all_that_can_be_drawn_is_like_the_exemplar_there_is_nothing(grammar: ShapeGrammar) -> None:
