@@ -118,7 +118,8 @@ class Collisions:
         moved = transform_points(pose, self.samples[mesh].points)
         close = np.flatnonzero(((moved > low - reach) & (moved < high + reach)).all(axis=1))
         away, _ = self.samples[other].tree.query(moved[close], distance_upper_bound=reach)
-        return close[np.isfinite(away)].astype(np.int32)
+        near: IntArray = close[np.isfinite(away)].astype(np.int32)
+        return near
 
     def _at_seams(self, points: FloatArray, seams: Sequence[tuple[int, FloatArray]]) -> BoolArray:
         """Which of some points lie beside a seam, bool (n,)."""
