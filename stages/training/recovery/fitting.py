@@ -25,6 +25,9 @@ __all__ = ["Fit", "Look", "Up", "best_fit", "first_look"]
 
 Up = Literal["x", "y", "z", ""]
 
+WELL = 1.5
+"""A whole shape that is no farther from a cloud than so many times as a cloud of it itself explains all of it, whatever
+a network says that has learnt little."""
 UNSURE, TORN = 2.0, 4.0
 """A cloud that is so many times farther from a guess, or from the best whole shape, than a cloud of that shape itself
 may be torn."""
@@ -138,25 +141,25 @@ def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: 
     """The nearest whole shape; or, of a torn cloud, that of which the cloud may be a part.
 
     Networks learn from torn clouds, too, and guess the whole shape. Where a cloud lies much better on a part of that
-    shape than on all of it, it is torn. Where no network says whether it is, both are searched for.
+    shape than on all of it, it is torn, unless a whole shape explains all of it. Where no network says whether it is,
+    both are searched for.
     """
     if given.points is None or budget == 1:
         return _fit(look, budget, seed)
     partial = cache(lambda: first_look(look.program, look.model, given, up, turned, seed, partial_target))
+    told = False
     if look.model is not None:
         guess = _fit(look, 1, seed)
         part = _fit(partial(), 1, seed) if guess.distance > UNSURE * guess.floor else None
         if part is None or part.missing < LEAST_MISSING:
             return _fit(look, budget, seed)
-        if _is_part(part, guess, BETTER):
-            torn = _fit(partial(), budget, seed)
-            if LEAST_MISSING <= torn.missing <= MOST_MISSING:
-                return torn
+        told = _is_part(part, guess, BETTER)
     whole = _fit(look, budget, seed)
-    if whole.distance <= TORN * whole.floor:
+    if whole.distance <= (WELL if told else TORN) * whole.floor:
         return whole
     torn = _fit(partial(), budget, seed)
-    return replace(torn if _is_part(torn, whole, EXPLAINED) else whole, tried=whole.tried + torn.tried)
+    is_torn = LEAST_MISSING <= torn.missing <= MOST_MISSING if told else _is_part(torn, whole, EXPLAINED)
+    return replace(torn if is_torn else whole, tried=whole.tried + torn.tried)
 
 
 def _is_part(torn: Fit, whole: Fit, share: float) -> bool:
