@@ -42,6 +42,12 @@ class Move(NamedTuple):
             for part, other in zip(inner[across].tolist(), outer[across].tolist(), strict=True)
         ]
 
+    def left(self, base: OrderedGraph, poses: FloatArray) -> Docked:
+        """The parts of the giver that lie upon parts of the base which lose a neighbour, each with the part it lies
+        upon and its own of the giver's `poses` (m, 4, 4): where nothing comes, these show how it may end."""
+        ends = base.tails[self.taken[base.tails[base.twins]] & ~self.taken[base.tails]]
+        return [(int(part), int(self.image[part]), poses[part]) for part in np.flatnonzero(np.isin(self.image, ends))]
+
 
 @dataclass(frozen=True)
 class Moves:

@@ -229,11 +229,11 @@ class Replacer:
             return Outcome.KNOWN, 0.0
         self.known.add(key)
         self._turns -= 1
-        self._docked = move.docked(giver, pair.giver.assembly.poses)
+        poses = pair.giver.assembly.poses
+        self._docked = move.docked(giver, poses)
         self._bent = self._cut = self.stretches = None
-        put_together(
-            self.tables, pair.giver, self.base, Exchanged(move.taken, move.piece), move.motion, self._docked, ws
-        )
+        told = self._docked if move.piece.any() else move.left(base, poses)
+        put_together(self.tables, pair.giver, self.base, Exchanged(move.taken, move.piece), move.motion, told, ws)
         return Outcome.OK, EMBEDDING_WORK
 
     def _times(self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray) -> int:

@@ -122,6 +122,27 @@ def test_several_regions_along_one_motion_change_places_at_once() -> None:
     assert several > 20
 
 
+def test_where_nothing_comes_the_parts_are_told_upon_which_the_other_shape_ends() -> None:
+    kit = kit_of(CHAIN, [chain(3), chain(4)[1:]])
+    base, giver = placed(kit)
+    moves = find_moves(kit, 1, base, giver)
+    motion = int((moves.images >= 0).sum(axis=1).argmax())
+    assert (moves.images[motion] >= 0).sum() == 3, "all links of the base"
+    came = set()
+    for cap in np.flatnonzero(np.diff(base[1].starts) == 1):
+        move = moves.along(motion, np.arange(moves.regions.shape[1]) == cap)
+        came.add(bool(move.piece.any()))
+        beside = base[1].tails[base[1].twins[base[1].starts[cap]]]
+        assert np.flatnonzero(move.taken).tolist() == [cap]
+        if move.piece.any():
+            assert [hold for _, hold, _ in move.docked(giver[1], giver[0].poses)] == [beside]
+        else:
+            [(part, hold, _)] = move.left(base[1], giver[0].poses)
+            assert (hold, move.image[part]) == (beside, beside)
+            assert move.docked(giver[1], giver[0].poses) == []
+    assert came == {True, False}
+
+
 def test_a_choice_of_regions_is_changed_until_the_grammar_admits_what_stands_around_every_part() -> None:
     rng, changed = np.random.default_rng(0), 0
     kit = kit_of(TILES, [tiling(rng, tiles) for tiles in (9, 12)])
