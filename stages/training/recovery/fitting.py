@@ -141,8 +141,8 @@ def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: 
     """The nearest whole shape; or, of a torn cloud, that of which the cloud may be a part.
 
     Networks learn from torn clouds, too, and guess the whole shape. Where a cloud lies much better on a part of that
-    shape than on all of it, it is torn, unless a whole shape explains all of it. Where no network says whether it is,
-    both are searched for.
+    shape than on all of it, it is torn, unless a whole shape explains all of it. Where no network says so, it is if
+    the best part explains it much better than the best whole shape.
     """
     if given.points is None or budget == 1:
         return _fit(look, budget, seed)
