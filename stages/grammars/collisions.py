@@ -66,7 +66,7 @@ class Collisions:
 
     @cached_property
     def _known(self) -> dict[tuple[int, int], list[FloatArray]]:
-        """For each two meshes how the second stands to the first where both are near in the exemplar."""
+        """For each two meshes how the second stands to the first in the exemplar, near to it or not."""
         grammar = self._grammar
         shown: list[Derivation | Resized] = [
             Derivation(number, tuple(place.original for place in rule.places))
@@ -80,7 +80,7 @@ class Collisions:
                 for other in pieces[:place]:
                     pose = invert(one.pose) @ other.pose
                     listed = found.setdefault((one.mesh, other.mesh), [])
-                    if not self._listed(listed, other.mesh, pose) and len(self._near(one, other)):
+                    if not self._listed(listed, other.mesh, pose):
                         listed.append(pose)
                         found.setdefault((other.mesh, one.mesh), []).append(invert(pose))
         return found

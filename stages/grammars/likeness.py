@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.grammars.derivation import Piece
 from stages.grammars.grammar import ShapeGrammar
-from stages.grammars.samples import Samples, TerminalSamples, facing, sampled
+from stages.grammars.samples import FACING, Samples, TerminalSamples, facing, sampled
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import transform_points
 
@@ -20,8 +20,6 @@ ASKED = 8
 """Every so many-th voxel is looked for in the other shape."""
 AXIS = 16
 """Bits of a key that say where a voxel lies along an axis."""
-FACING = 3
-"""Bits of a key that say which way the surface faces."""
 EDGE = 0.381966
 """Where in its voxel the box's corner lies: surfaces of models stand at round numbers."""
 STEPS = np.array([(x << 2 * AXIS) + (y << AXIS) + z for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)])

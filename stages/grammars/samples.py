@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stages.exemplars.symmetry.cells import pack
 from stages.exemplars.symmetry.clip import fragments
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS
 from stages.grammars.grammar import ShapeGrammar
@@ -15,10 +16,12 @@ from stages.grammars.recent import Recent
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 
-__all__ = ["Samples", "TerminalSamples", "facing", "sampled"]
+__all__ = ["FACING", "Samples", "TerminalSamples", "facing", "sampled"]
 
 TILT = np.array([1.0, 1.0137, 1.0271])
 """By so much an axis weighs more where a surface faces between two: what faces halfway must not go by rounding."""
+FACING = 3
+"""Bits of a key that say which way the surface faces."""
 HELD = 300_000_000
 """Bytes of samples that are held. Hundreds of terminals that have most of a large surface each have gigabytes."""
 BYTES_A_POINT = 72
@@ -64,7 +67,7 @@ def sampled(part: PartMesh, size: float) -> Samples:
     ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = ways / np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
     where, owner, middles = fragments(corners, corners.min(axis=(0, 1)) - size / 3, size)
-    _, first = np.unique(np.column_stack([where, facing(normals)[owner]]), axis=0, return_index=True)
+    _, first = np.unique((pack(where) << FACING) + facing(normals)[owner], return_index=True)
     return Samples(np.ascontiguousarray(middles[first, :3]), normals[owner[first]])
 
 
