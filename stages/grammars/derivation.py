@@ -165,13 +165,14 @@ def _shape(grammar: ShapeGrammar, pieces: Sequence[Piece], meshes: np.ndarray) -
     types = np.searchsorted(meshes, [each.mesh for each in pieces]).astype(np.int16)
     poses = np.array([each.pose for each in pieces])
     chosen = tuple(grammar.meshes[each] for each in meshes.tolist())
-    return Shape(chosen, Assembly(types, poses, np.empty((0, 2), np.int32)), grammar.up, grammar.labels)
+    parts = Assembly(types, poses, np.empty((0, 2), np.int32))
+    return Shape(chosen, parts, grammar.up, grammar.labels, one_surface=True)
 
 
 def exemplar_shape(grammar: ShapeGrammar) -> Shape:
     """The exemplar, as one part."""
     alone = Assembly(np.zeros(1, dtype=np.int16), np.eye(4)[None], np.empty((0, 2), np.int32))
-    return Shape((grammar.exemplar,), alone, grammar.up, (grammar.exemplar.name,))
+    return Shape((grammar.exemplar,), alone, grammar.up, (grammar.exemplar.name,), one_surface=True)
 
 
 def surface_digest(grammar: ShapeGrammar, pieces: list[Piece]) -> str:

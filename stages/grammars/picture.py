@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +19,7 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
-from stages.shape.views.camera import Camera
+from stages.shape.views.camera import Camera, eye_rotation
 from stages.shape.views.palette import label_colors
 from stages.shape.views.portrait import points_portrait, portrait
 from stages.shape.views.scene import scene_of
@@ -30,7 +32,9 @@ COLUMNS = 4
 CAMERA = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.06)
 STAYS, COMES, GOES = (196, 192, 186), (204, 72, 58), (232, 186, 64)
 SITES = 5
-"""So many classes of sites are shown, those at which most can dock."""
+"""So many classes of sites are shown, those at which what may dock differs most in size."""
+SIDES = 4
+"""From so many sides it is looked at editing options, each time from that which the docker faces most."""
 POINTS = 100_000
 """So many points of a cloud are drawn at most."""
 OPTIONS = 3
@@ -98,26 +102,36 @@ def _sites(found: Extraction) -> list[tuple[Soup, tuple[int, int, int]]]:
 
 
 def _editing(found: Extraction) -> Iterator[list[Cell]]:
-    """For the site of each class at which most may dock what is there, and what may be."""
+    """For the site of each class at which sizes differ most what is there, and what may be."""
     options = options_of(found)
-    best: dict[int, int] = {}
-    for place in options:
-        site = found.dockers[place].site
-        if site not in best or len(options[place]) > len(options[best[site]]):
-            best[site] = place
-    ranked = sorted(best.items(), key=lambda each: (-len(options[each[1]]), each[0]))
-    for site, place in ranked[:SITES]:
+    best: dict[int, tuple[float, int]] = {}
+    for place, own in options.items():
         docker = found.dockers[place]
+        most = max(abs(found.dockers[each.other].area - docker.area) for each in own)
+        best[docker.site] = max(best.get(docker.site, (-1.0, 0)), (most, -place))
+    ranked = sorted(best.items(), key=lambda each: (-each[1][0], each[0]))
+    for site, (_, place) in ranked[:SITES]:
+        docker = found.dockers[-place]
         inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
-        cells = [_cell(found, [(outside, STAYS), (inside, GOES)], f"{site_name(site)}: {docker.area:.0%} of it")]
-        chosen = sorted(options[place], key=lambda each: -abs(found.dockers[each.other].area - docker.area))
-        cells += [_option(found, each) for each in chosen[:OPTIONS]]
+        camera = _facing(inside, found.grammar.up)
+        caption = f"{site_name(site)}: {docker.area:.0%} of it"
+        cells = [_cell(found, [(outside, STAYS), (inside, GOES)], caption, camera)]
+        chosen = sorted(options[-place], key=lambda each: -abs(found.dockers[each.other].area - docker.area))
+        cells += [_option(found, each, camera) for each in chosen[:OPTIONS]]
         yield cells
 
 
-def _option(found: Extraction, option: Option) -> Cell:
+def _facing(soup: Soup, up: Literal["y", "z"]) -> Camera:
+    """Of cameras all around that which sees most of a surface, if nothing stands before it."""
+    sides = [replace(CAMERA, azimuth=CAMERA.azimuth + 360.0 / SIDES * each) for each in range(SIDES)]
+    ways = np.cross(soup.corners[:, 1] - soup.corners[:, 0], soup.corners[:, 2] - soup.corners[:, 0])
+    seen = [np.clip(ways @ eye_rotation(each.azimuth, each.elevation, up)[2], 0.0, None).sum() for each in sides]
+    return sides[int(np.argmax(np.round(seen, 9)))]
+
+
+def _option(found: Extraction, option: Option, camera: Camera) -> Cell:
     stays, comes = edited(found, option)
-    return _cell(found, [(stays, STAYS), (comes, COMES)], f"{option.kind}: docker {option.other}")
+    return _cell(found, [(stays, STAYS), (comes, COMES)], f"{option.kind}: docker {option.other}", camera)
 
 
 def _grid_row(found: Extraction, number: int, grid: GridRule) -> list[Cell]:
@@ -144,24 +158,27 @@ def _soup(mesh: PartMesh, piece: Piece) -> Soup:
     return Soup(corners, np.zeros(len(corners), dtype=np.int32))
 
 
-def _cell(found: Extraction, parts: Sequence[tuple[Soup, tuple[int, int, int]]], caption: str) -> Cell:
+def _cell(
+    found: Extraction, parts: Sequence[tuple[Soup, tuple[int, int, int]]], caption: str, camera: Camera = CAMERA
+) -> Cell:
     filled = [(each, color) for each, color in parts if len(each)]
     meshes = tuple(_mesh(each.corners, color) for each, color in filled)
     types = np.arange(len(meshes), dtype=np.int16)
     assembly = Assembly(types, np.tile(np.eye(4), (len(meshes), 1, 1)), np.empty((0, 2), np.int32))
-    return Cell(_pictured(Shape(meshes, assembly, found.grammar.up, ("part",)), found.grammar.splats), caption)
+    shape = Shape(meshes, assembly, found.grammar.up, ("part",), one_surface=True)
+    return Cell(_pictured(shape, found.grammar.splats, camera), caption)
 
 
-def _pictured(shape: Shape, splats: bool) -> ByteArray:
+def _pictured(shape: Shape, splats: bool, camera: Camera = CAMERA) -> ByteArray:
     """A portrait of a shape, or of the points that its splats stand for, of evenly many of them."""
     if not splats:
-        return portrait(scene_of(shape), CAMERA, (CELL, CELL))
+        return portrait(scene_of(shape), camera, (CELL, CELL))
     placed = [(shape.meshes[kind], pose) for kind, pose in zip(shape.assembly.types, shape.assembly.poses, strict=True)]
     step = 1 + sum(len(mesh.faces) for mesh, _ in placed) // POINTS
     points = [transform_points(pose, mesh.vertices[mesh.faces[::step]].mean(axis=1)) for mesh, pose in placed]
     paint: ByteArray = np.concatenate([mesh.face_colors[::step] for mesh, _ in placed])
     every = np.concatenate(points)
-    return points_portrait(every, np.arange(len(every), dtype=np.int32), CAMERA, (CELL, CELL), shape.up, paint)
+    return points_portrait(every, np.arange(len(every), dtype=np.int32), camera, (CELL, CELL), shape.up, paint)
 
 
 def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:

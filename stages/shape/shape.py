@@ -29,6 +29,7 @@ class Shape:
     one kit or program, in a fixed order. The label of each mesh is one of them.
     own_names: a name for each part that no other part of the shape has; without, its mesh's name and a number.
     first_class: in a dataset the id of the class of the first of `labels`; the others follow.
+    one_surface: whether its parts are pieces of one surface, so that no line is seen where one goes on in the next.
     """
 
     meshes: tuple[PartMesh, ...]
@@ -37,6 +38,7 @@ class Shape:
     labels: tuple[str, ...]
     own_names: tuple[str, ...] = ()
     first_class: int = 0
+    one_surface: bool = False
 
     @cached_property
     def label_of(self) -> TypeArray:

@@ -104,6 +104,7 @@ class Scene:
 
     mesh_of: int32 (n,), the mesh of each part; poses: float64 (n, 4, 4), rigid; up: the axis that points up.
     layers: int32 (n,): where faces of two parts lie in one plane, the part of the lower layer is seen.
+    one_surface: whether no line is drawn where the surface of one part goes on in that of the next.
     """
 
     meshes: MeshSet
@@ -111,6 +112,7 @@ class Scene:
     poses: FloatArray
     layers: IntArray
     up: Literal["y", "z"]
+    one_surface: bool = False
 
     def __len__(self) -> int:
         return len(self.mesh_of)
@@ -155,7 +157,8 @@ def scene_of(shape: Shape) -> Scene:
     """The scene of a shape. Scenes of shapes with the same meshes share one mesh set."""
     parts = shape.assembly
     layers = _layers(len(parts), parts.edges)
-    return Scene(mesh_set(shape.meshes), parts.types.astype(np.int32), parts.poses, layers, shape.up)
+    types = parts.types.astype(np.int32)
+    return Scene(mesh_set(shape.meshes), types, parts.poses, layers, shape.up, shape.one_surface)
 
 
 def mesh_scene(vertices: FloatArray, faces: IntArray, face_colors: ByteArray, up: Literal["y", "z"]) -> Scene:

@@ -6,7 +6,8 @@ it is walked across the edges of its triangles from the one pixel towards the ot
 - The walk arrives: one surface. A sharp edge on the way is a crease, and it lies where the walk crossed it.
 - The walk ends at a border or where the surface turns away from the viewer. If what the other pixel shows lies
   farther back there, that end is a contour; if it lies at the same depth, two surfaces meet: a boundary where they
-  belong to two parts, a crease where they meet at an angle, nothing where one plane goes on.
+  belong to two parts that are no pieces of one surface, else a crease where they meet at an angle, nothing where one
+  plane goes on.
 - Both surfaces go on under each other: they pass through each other, and the line is where their depths are equal.
 
 So every crossing is known to a fraction of a pixel, a tessellated plane or cylinder has no lines of its own, and
@@ -71,12 +72,13 @@ class _Triangles(NamedTuple):
 
 
 class _Parts(NamedTuple):
-    """Whose the triangles are: the part of each, (t,), and by part what is to be added to a face for its triangle, and
-    the layer, both (n,)."""
+    """Whose the triangles are: the part of each, (t,); by part what is to be added to a face for its triangle, and the
+    layer, both (n,); whether parts are pieces of one surface."""
 
     of: np.ndarray
     shifts: np.ndarray
     layers: np.ndarray
+    one_surface: bool
 
 
 class _Thresholds(NamedTuple):
@@ -100,7 +102,7 @@ def _triangles(seen: Visible) -> _Triangles:
 def _parts(seen: Visible) -> _Parts:
     scene = seen.scene
     shifts = scene.triangle_first[:-1] - scene.meshes.face_first[scene.mesh_of]
-    return _Parts(scene.triangle_part, shifts, scene.layers)
+    return _Parts(scene.triangle_part, shifts, scene.layers, scene.one_surface)
 
 
 def _thresholds(seen: Visible, crease_angle: float, step: float) -> _Thresholds:
@@ -214,7 +216,7 @@ def _between(triangles, parts, thresholds, projection, a, b, p, q):
         s, gap = start_b, at_start
     if abs(gap) > tolerance:
         return CONTOUR, s
-    if part_a != part_b:
+    if part_a != part_b and not parts.one_surface:
         return BOUNDARY, s
     if _cosine(normals, last_a, last_b) < crease:
         return CREASE, s

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,9 +9,9 @@ from hypothesis import strategies as st
 
 from stages.shape.views.buffers import visible_triangles
 from stages.shape.views.camera import Camera
-from stages.shape.views.scene import mesh_scene
+from stages.shape.views.scene import MeshSet, Scene, mesh_scene
 from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, find_strokes
-from tests.stages.shape.views.solids import BOX_CORNERS, BOX_EDGES, boxes_scene, cylinder
+from tests.stages.shape.views.solids import BOX_CORNERS, BOX_EDGES, box, boxes_scene, cylinder
 
 SIZE = 256
 CORNER = Camera(30.0, 25.0)
@@ -102,6 +104,23 @@ def test_two_boxes_side_by_side_differ_from_one_long_box_by_their_seam():
     view = CORNER.look(boxes_scene([(0.5, 0, 0)], [(2, 1, 1)]).points, "y")
     ring = on_screen(view, np.array([[0.5, -0.5, 0.5], [0.5, 0.5, 0.5], [0.5, 0.5, -0.5]]))
     assert seam == pytest.approx(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum(), rel=0.03)
+
+
+def test_pieces_of_one_surface_have_no_line_where_it_goes_on_and_a_crease_where_they_meet_at_an_angle():
+    vertices, faces = box()
+    half = faces[~(vertices[faces][:, :, 0] == 0.5).all(axis=1)]
+    turned = np.diag([-1.0, 1.0, -1.0, 1.0])
+    turned[0, 3] = 1.0
+    mesh, twice = MeshSet.of([(vertices, half, np.full((len(half), 3), 128))]), np.zeros(2, dtype=np.int32)
+    one = Scene(mesh, twice, np.array([np.eye(4), turned]), twice, "y", one_surface=True)
+    long = strokes_of(boxes_scene([(0.5, 0, 0)], [(2, 1, 1)]), CORNER)
+    assert BOUNDARY in strokes_of(replace(one, one_surface=False), CORNER).kinds
+    assert lengths(strokes_of(one, CORNER)).sum() == pytest.approx(lengths(long).sum(), abs=3.0)
+    scene = boxes_scene([(0, 0, 0), (0, 0.45, 0)], [(1, 1, 1), (0.5, 1, 0.5)])
+    met, creased = strokes_of(scene, CORNER), strokes_of(replace(scene, one_surface=True), CORNER)
+    assert BOUNDARY in met.kinds
+    assert BOUNDARY not in creased.kinds
+    assert lengths(creased).sum() == pytest.approx(lengths(met).sum(), rel=0.01)
 
 
 def test_where_two_boxes_pass_into_each_other_the_line_is_where_they_meet():
