@@ -40,6 +40,9 @@ TRY_WORK = 1.5
 """What a try of the exchange costs on average."""
 LEAST = 0.2
 """Least share of the work for either method."""
+IN_VAIN = 5000.0
+"""Growth that brings nothing for so much work has the least share from then on, until it does: a grown shape of a large
+kit costs as much as thousands of exchanges, and what was learnt of it is forgotten between two of them."""
 FIRST_GUESS = 100.0
 """What growing a shape costs, before any is grown."""
 PARTNERS = 4
@@ -72,7 +75,7 @@ class Steering:
         self._exchanged = len(exchanged)
         self._gains = np.zeros(len(self.choices))
         self._work = np.zeros(len(self.choices))
-        self._grown_work, self._grown = FIRST_GUESS, 1
+        self._grown_work, self._grown, self._grown_gain = FIRST_GUESS, 1, 0.0
 
     def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[Choice]:
         """The next `count` tries."""
@@ -102,6 +105,7 @@ class Steering:
         if choice.way == NOTHING:
             self._grown_work += work
             self._grown += 1
+            self._grown_gain += gain
 
     def _odds(self, exemplars: int) -> FloatArray:
         """How likely each choice is: of the exchange a share for all alike, the rest by the square of what it gains."""
@@ -120,6 +124,8 @@ class Steering:
 
     def _grown_share(self) -> float:
         """The share of the work that is given to growth: that of what it gains for its work, within limits."""
+        if not self._grown_gain and self._grown_work > IN_VAIN:
+            return LEAST
         gains, work = self._gains[: self._exchanged].sum(), self._work[: self._exchanged].sum()
         exchanged, grown = (gains + 1.0) / (work + 50.0), (self._gains[-1] + 1.0) / (self._work[-1] + 50.0)
         return float(np.clip(grown / (grown + exchanged), LEAST, 1.0 - LEAST))

@@ -72,3 +72,19 @@ def test_growth_gets_the_share_of_the_work_that_its_finds_earn(guided: bool) -> 
         assert shares[1] == pytest.approx(0.8, abs=0.05)
     else:
         assert shares == pytest.approx([0.5, 0.5], abs=0.1)
+
+
+def test_growth_in_vain_gets_the_least_share_until_it_brings_something() -> None:
+    """Exchange has brought nothing either, so that both are worth the same but for what was forgotten."""
+    line, shares = Search(line_of(2).answers, SearchConfig(method="both")), []
+    choices = line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 1000)
+    exchanged, growth = (next(each for each in choices if (each.way == NOTHING) == grown) for grown in (False, True))
+    for gain in (0.0, 1.0):
+        for _ in range(100):
+            line.steering.learn(growth, gain, 60.0)
+        for _ in range(4000):
+            line.steering.learn(exchanged, 0.0, 1.5)
+        tried = planned(line, 10_000)  # and what is planned is forgotten
+        shares.append(60.0 * tried[len(CHOICES)] / (60.0 * tried[len(CHOICES)] + 1.5 * (10_000 - tried[len(CHOICES)])))
+    assert shares[0] == pytest.approx(0.2, abs=0.06)
+    assert shares[1] == pytest.approx(0.8, abs=0.06)
