@@ -9,11 +9,14 @@ from typing import Any
 
 from pipeline.errors import ConfigError
 from stages.choices.choose import Choices, choose
+from stages.choices.forecast import forecast
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import Identified, identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
+from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.settings import CHOSEN_COPIED
 
 __all__ = ["CHOSEN_PARTS", "Reading", "cut_if_nothing_comes", "read_and_choose"]
 
@@ -52,7 +55,8 @@ def read_and_choose(config: KitConfig, limits: ReadLimits, tries: int, require: 
 
 def cut_if_nothing_comes(first: Reading, limits: ReadLimits, tries: int, require: Sequence[str]) -> Reading:
     """Models cut by sections where `auto` took pieces of meshes for parts and a search found nothing in them, if it
-    finds enough then, under the strictest rules; else as they were read first."""
+    finds enough then under the strictest rules, or under others what a longer search makes a dataset of: the first find
+    of slabs is rare, for all that passes a section must fit at once. Else as they were read first."""
     finds = first.choices.finds
     by_author = any(each.segmentation in ("nodes", "objects") for each in first.models)
     if first.config.parts != "auto" or by_author or finds is None or finds.graphs:
@@ -68,9 +72,25 @@ def cut_if_nothing_comes(first: Reading, limits: ReadLimits, tries: int, require
     searched = ("contact.kinds", "grammar", "hubs.types")
     strictest = {key: STRICTEST[key] for key in config.left_open() if key in searched}
     choices = choose(config.decide(strictest), models, identified, tries, require)
+    values = {**strictest, **choices.values}
+    reasons = {**dict.fromkeys(strictest, "the strictest, and it gives enough"), **choices.reasons}
     if not choices.enough:
-        return first
+        choices = choose(config, models, identified, tries, require)
+        values, reasons = dict(choices.values), dict(choices.reasons)
+        if not _is_dataset(Reading(config, models, identified, choices), tries):
+            return first
     why = f"cut across: nothing comes of {len(first.models[0].parts)} {first.models[0].segmentation}"
-    values = {CHOSEN_PARTS: config.parts, **strictest, **choices.values}
-    reasons = {CHOSEN_PARTS: why, **dict.fromkeys(strictest, "the strictest, and it gives enough"), **choices.reasons}
+    values, reasons = {CHOSEN_PARTS: config.parts, **values}, {CHOSEN_PARTS: why, **reasons}
     return Reading(config, models, identified, replace(choices, values=values, reasons=reasons))
+
+
+def _is_dataset(reading: Reading, tries: int) -> bool:
+    """Whether a longer search of what a short one found anything in promises enough that is neither dull nor broken."""
+    choices = reading.choices
+    if choices.finds is None or not choices.finds.graphs:
+        return False
+    built = reading.observe(choices.values)
+    if built.refusals:
+        return False
+    copied = choices.values.get(CHOSEN_COPIED, 1.0)
+    return not forecast(built.kit, ContactAnswers(built.kit), tries, choices.finds.graphs, copied=copied).is_poor

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,13 +18,16 @@ from stages.choices.reading import Reading, cut_if_nothing_comes
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ReadLimits
+from stages.shape.kit import Kit
 from tests.stages.variations.toy import CHAIN, Placed, chain, models_of
 
 LUMP: list[Placed] = chain(2)[1:2]
 
 
-def told(graphs: int, enough: bool) -> Choices:
-    return Choices({"up": "z"}, {"up": "so it is"}, Finds(100, graphs, graphs, 0.1, 0.1), 1.0, enough, 1)
+def told(graphs: int, enough: bool, **values: Any) -> Choices:
+    said = {"up": "z", **values}
+    reasons = dict.fromkeys(said, "so it is")
+    return Choices(said, reasons, Finds(100, graphs, graphs, 0.1, 0.1), 1.0, enough, 1)
 
 
 def read_first(graphs: int = 0, segmentation: Any = "components", parts: Any = "auto", **stated: Any) -> Reading:
@@ -85,7 +89,7 @@ def test_a_cut_that_cannot_be_made_or_gives_too_little_changes_nothing(
     asked: list[KitConfig], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = read_first()
-    monkeypatch.setattr(reading, "choose", lambda *_: told(3, False))
+    monkeypatch.setattr(reading, "choose", lambda *_: told(0, False))
     assert cut(first) is first
 
     def refuse(*_: Any) -> Model:
@@ -93,6 +97,33 @@ def test_a_cut_that_cannot_be_made_or_gives_too_little_changes_nothing(
 
     monkeypatch.setattr(reading, "read_model", refuse)
     assert cut(first) is first
+
+
+@pytest.mark.parametrize("poor", [True, False])
+def test_under_looser_rules_a_longer_search_says_whether_a_cut_is_a_dataset(
+    asked: list[KitConfig], monkeypatch: pytest.MonkeyPatch, poor: bool
+) -> None:
+    loose = {key: STRICTEST[key] for key in read_first().config.left_open()} | {"grammar": "slots", "up": "z"}
+    known: list[int] = []
+
+    def choose(config: KitConfig, *_: Any) -> Choices:
+        return told(2, False, **loose) if config.grammar == "auto" else told(0, False)
+
+    def forecast(kit: Kit, _: Any, __: int, graphs: int, **___: Any) -> Any:
+        assert kit.grammar.strictness == "slots"
+        known.append(graphs)
+        return SimpleNamespace(is_poor=poor)
+
+    monkeypatch.setattr(reading, "choose", choose)
+    monkeypatch.setattr(reading, "forecast", forecast)
+    first = read_first()
+    found = cut(first)
+    assert known == [2]
+    if poor:
+        assert found is first
+    else:
+        assert found.choices.values == {"parts": "sections", **loose}
+        assert found.choices.reasons["grammar"] == "so it is"
 
 
 def test_what_a_run_builds_is_built_once_for_the_same_values() -> None:
