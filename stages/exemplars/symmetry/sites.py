@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from stages.exemplars.symmetry.docking import docking_sites, slippable_motions
+from stages.exemplars.symmetry.continuation import carries_corners, corner_cells, parted_at
+from stages.exemplars.symmetry.docking import (
+    DockingSite,
+    OperationKind,
+    docking_sites,
+    operation_kind,
+    slippable_motions,
+)
 from stages.exemplars.symmetry.matching import cells_within, eroded_twice, mutual, symmetric_cells
 from stages.exemplars.symmetry.seams import stands, widened
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SurfaceGrid
@@ -34,6 +41,8 @@ STEP = 1e-2
 """Radians that a motion more weighs: of ways that turn as little the shorter is taken."""
 MOST = 400
 """So many dockers are looked at, those of the most fruitful motions first."""
+UNDOES: dict[OperationKind, OperationKind] = {"insert": "delete", "delete": "insert"}
+"""What takes back an operation."""
 
 
 @dataclass(frozen=True)
@@ -58,19 +67,32 @@ def dockers_of(grid: SurfaceGrid, motions: FloatArray) -> list[Docker]:
     """The dockers of the elementary docking sites of rigid motions (m, 4, 4) and their inverses, each once, those of a
     class of sites together and the smallest first.
 
-    Sites that slip on the surface in three ways, where a docker could stand anywhere, are left out. Two sites are equal
-    under a motion if the whole site is r-symmetric under it and comes to lie on the other, with the docker on one side.
+    A row goes on as far as its motion takes its sites. Made several times the motion may be none of those that are
+    looked at: there are only so many, and turns and diagonals may carry more of the surface. But made so many times it
+    must carry corners, as each candidate does. Sites that slip on the surface in three ways, where a docker could
+    stand anywhere, are left out. Two sites are equal under a motion if the whole site is r-symmetric under it and comes
+    to lie on the other, with the docker on one side.
     """
     kept: list[BoolArray] = []
-    found: list[_Site] = []
-    for motion in motions:
+    found = _Sites(grid)
+    ends: list[tuple[int, int, OperationKind]] = []
+    both = np.stack([each for one in motions for each in (one, invert(one))])
+    for number, motion in enumerate(motions):
         forth, back = (eroded_twice(grid, each, BEYOND) for each in symmetric_cells(grid, motion))
         kept += [forth[0], back[0]]
-        for docker in _of_motion(grid, motion, *mutual(grid, motion, forth[1], back[1])):
-            site = _Site(grid, docker)
-            if len(found) < MOST and not any(site.lies_on(each, np.eye(4)) for each in found):
-                found.append(site)
-    return _identified(grid, found, np.stack([each for one in motions for each in (one, invert(one))]), kept)
+        for site, primary, secondary in _of_motion(grid, motion, *mutual(grid, motion, forth[1], back[1])):
+            first, last = found.place_of(primary), found.place_of(secondary)
+            if first is None or last is None or site.kind == "replace":
+                continue
+            ends += [(last, 2 * number, site.kind), (first, 2 * number + 1, UNDOES[site.kind])]
+    corners = corner_cells(grid)
+    for end, way, kind in ends:
+        at: int | None = end
+        whole = both[way]  # from the other docker of the site, and on to the next
+        while at is not None and carries_corners(grid, corners, whole := both[way] @ whole):
+            docker = _next_in_row(grid, found.sites[at], both[way], kept[way], kind)
+            at = None if docker is None else found.place_of(docker)
+    return _identified(grid, found.sites, both, kept)
 
 
 def beside(grid: SurfaceGrid, cells: np.ndarray) -> IntArray:
@@ -80,21 +102,59 @@ def beside(grid: SurfaceGrid, cells: np.ndarray) -> IntArray:
     return np.flatnonzero(around).astype(np.int32)
 
 
-def _of_motion(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray) -> Iterator[Docker]:
-    """Both dockers of each elementary docking site of a motion."""
-    whole = grid.area.sum()
+def _of_motion(
+    grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray
+) -> Iterator[tuple[DockingSite, Docker, Docker]]:
+    """The elementary docking sites of a motion, each with its primary and its secondary docker."""
     for site in docking_sites(grid, motion, kept, kept_back):
         if site.slips >= SLIPPERY:
             continue
-        pair = [
-            Docker(each, beside(grid, each), float(grid.area[each].sum() / whole))
-            for each in (site.primary, site.secondary)
-        ]
+        pair = _docker(grid, site.primary), _docker(grid, site.secondary)
         # a site whose dockers are the same piece on both sides changes nothing; one without a border parts nothing
         if min(each.area for each in pair) < LEAST or not all(len(each.border) for each in pair):
             continue
         if all(slippable_motions(grid, each.border) < SLIPPERY for each in pair):
-            yield from pair
+            yield site, *pair
+
+
+def _docker(grid: SurfaceGrid, cells: IntArray) -> Docker:
+    return Docker(cells, beside(grid, cells), float(grid.area[cells].sum() / grid.area.sum()))
+
+
+def _next_in_row(
+    grid: SurfaceGrid, site: _Site, motion: FloatArray, symmetric: BoolArray, kind: OperationKind
+) -> Docker | None:
+    """What a site parts where a motion (4, 4) takes it, if all around it is r-symmetric under that and it takes the
+    place of the docker as `kind` says: in a row always with a cell more, or always with one less."""
+    docker = site.docker
+    if symmetric[docker.border].mean() < grid.agreement:
+        return None
+    cells = parted_at(grid, docker.cells, docker.border, motion)
+    if cells is None or operation_kind(docker.cells, cells, grid.slack) != kind:
+        return None
+    after = _docker(grid, cells)
+    if min(after.area, abs(after.area - docker.area)) < LEAST or not len(after.border):
+        return None
+    return after if site.lies_on(_Site(grid, after), motion) else None
+
+
+class _Sites:
+    """Sites that are found, each once and at most MOST."""
+
+    def __init__(self, grid: SurfaceGrid) -> None:
+        self.sites: list[_Site] = []
+        self._grid = grid
+
+    def place_of(self, docker: Docker) -> int | None:
+        """Where the site of a docker is among them, put there if it is new; None where there is no room."""
+        site = _Site(self._grid, docker)
+        for place, each in enumerate(self.sites):
+            if site.lies_on(each, np.eye(4)):
+                return place
+        if len(self.sites) == MOST:
+            return None
+        self.sites.append(site)
+        return len(self.sites) - 1
 
 
 class _Site:

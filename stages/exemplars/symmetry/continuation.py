@@ -1,0 +1,59 @@
+"""What a docking site parts where a motion takes it: rows go on farther than one motion tells (symmetry §3.4.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.exemplars.symmetry.docking import regions_of
+from stages.exemplars.symmetry.matching import cells_within, matched_items
+from stages.exemplars.symmetry.places import among, items_in, items_moved_into
+from stages.exemplars.symmetry.surface import SurfaceGrid
+from stages.shape.arrays import FloatArray, IntArray
+
+__all__ = ["carries_corners", "corner_cells", "parted_at"]
+
+BAND = 3.0
+"""Cells around a site that tell its sides apart: all that is r-symmetric around it, but for what rounding takes."""
+HELD = 0.05
+"""Least share of what holds the surface of a corner in place, of the direction in which that is most, in any other."""
+CORNERS = 3
+"""Corners that a motion must carry onto the surface, as those by which candidates are found."""
+
+
+def corner_cells(grid: SurfaceGrid) -> IntArray:
+    """The cells whose surface no shift takes along itself, int32 ascending: a plane holds it along its normal, a line
+    across itself."""
+    held = grid.directions[:, :, None] * grid.directions[:, None, :]
+    held[grid.is_line] = np.eye(3) - held[grid.is_line]
+    values = np.linalg.eigvalsh(np.add.reduceat(held, grid.starts[:-1], axis=0))
+    return np.flatnonzero(values[:, 0] > HELD * values[:, 2]).astype(np.int32)
+
+
+def carries_corners(grid: SurfaceGrid, corners: IntArray, motion: FloatArray) -> bool:
+    """Whether a rigid motion (4, 4) carries as many of the `corner_cells` onto the surface as a candidate must."""
+    items = items_in(grid, corners)
+    lost = np.unique(grid.item_cell[items[~matched_items(grid, motion, items)]])
+    return len(corners) - len(lost) >= CORNERS
+
+
+def parted_at(grid: SurfaceGrid, cells: IntArray, border: IntArray, motion: FloatArray) -> IntArray | None:
+    """The cells that a docking site parts from the rest where a rigid motion (4, 4) takes it, int32 ascending; None
+    where it parts nothing there.
+
+    cells, border: of a docker and around it, int32 ascending; around the border the surface must be r-symmetric under
+    the motion. The two sides of the site are moved; what hangs together with the side of the docker is the new one.
+    """
+    band = cells_within(grid, border, BAND)
+    moved = grid.item_cell[items_moved_into(grid, band, motion)]
+    moved_within = grid.item_cell[items_moved_into(grid, band[among(cells, band)], motion)]
+    count, count_within = (np.bincount(each, minlength=len(grid)) for each in (moved, moved_within))
+    within, beyond = 2 * count_within > count, (count > 0) & (2 * count_within <= count)
+    docker = within.copy()
+    for region in regions_of(grid, ~(within | beyond)):
+        around = grid.neighbours[region]
+        around = around[around >= 0]
+        if within[around].any():
+            if beyond[around].any():
+                return None
+            docker[region] = True
+    return np.flatnonzero(docker).astype(np.int32)
