@@ -140,7 +140,7 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 test: style  ## Check style and types and run the tests, on WORKERS cores
 	@$(PYTHON) -m mypy > types.tmp & types=$$!; code=0; \
 	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder || code=$$?; \
-	wait "$$types" || code=$$?; cat types.tmp; exit "$$code"
+	wait "$$types" || code=$$?; cat types.tmp; rm types.tmp; exit "$$code"
 chaos: setup  ## Kill, starve and spoil ROUNDS runs over the real stages, and see that each ends as it must
 	$(PYTHON) -m tests.chaos --rounds "$$ROUNDS" $(SEEDED)
 style: setup  ## Check style
