@@ -31,7 +31,7 @@ def rules() -> Rules:
 
 def entry(**changes: Any) -> StringVaeEntry:
     """Settings of a model that learns in seconds."""
-    settings = {"name": "tiny", "latent": 8, "embedding": 8, "hidden": 64, "batch": 20, "steps": 400, "rounds": 1}
+    settings = {"name": "tiny", "latent": 8, "embedding": 8, "hidden": 64, "batch": 20, "steps": 300, "rounds": 1}
     return StringVaeEntry.model_validate({**settings, "anneal": 50, "kl_weight": 0.01, "word_dropout": 0.1, **changes})
 
 
