@@ -136,14 +136,17 @@ doctor: setup  ## Try everything that Shapemill needs on this machine, with the 
 
 # Working on it ------------------------------------------------------------------------------------------------------
 
-.PHONY: test chaos lint bench kits keys lock
-test: lint  ## Check style and types, then run the tests on WORKERS cores
-	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder
+.PHONY: test chaos style lint bench kits keys lock
+test: style  ## Check style and types and run the tests, on WORKERS cores
+	@$(PYTHON) -m mypy > types.tmp & types=$$!; code=0; \
+	$(PYTHON) -m pytest --numprocesses "$$WORKERS" --dist loadfile --no-loadscope-reorder || code=$$?; \
+	wait "$$types" || code=$$?; cat types.tmp; rm types.tmp; exit "$$code"
 chaos: setup  ## Kill, starve and spoil ROUNDS runs over the real stages, and see that each ends as it must
 	$(PYTHON) -m tests.chaos --rounds "$$ROUNDS" $(SEEDED)
-lint: setup  ## Check style and types
+style: setup  ## Check style
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+lint: style  ## Check style and types
 	$(PYTHON) -m mypy
 bench: setup  ## Measure the whole way and every piece beside a public peer, and mark what has changed
 	$(PYTHON) -m pip install -q -r tests/bench/peers.txt || echo 'some peers cannot be built here: measured without' >&2

@@ -29,6 +29,8 @@ CONFIG = {
     "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
     "package": {"previewed": 4},
 }
+pytestmark = pytest.mark.slow
+
 WHOLE_WAY = """
 import sys
 from pathlib import Path

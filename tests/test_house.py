@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import ast
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -16,6 +15,9 @@ BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}
 
 GLOBAL_RANDOMNESS = {"default_rng", "Generator", "SeedSequence", "PCG64", "BitGenerator"}
 """What `numpy.random` holds that keeps no global state."""
+
+EXECUTING = {"pickle", "cloudpickle", "dill", "shelve", "marshal"}
+"""Modules that run what they read."""
 
 CLOCKS = {"time.time", "time.time_ns", "datetime.now", "datetime.utcnow", "datetime.today", "date.today"}
 
@@ -25,6 +27,12 @@ ALL = sorted([*CODE, *(ROOT / "tests").rglob("*.py")])
 
 def relative(path: Path) -> str:
     return str(path.relative_to(ROOT))
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    """What stands in a file, read once for all rules."""
+    return ast.parse(path.read_text())
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
@@ -45,6 +53,11 @@ def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:
             yield ast.unparse(node.func), node
 
 
+def faults(rule: Callable[[Path], Iterator[str]], files: list[Path]) -> list[str]:
+    """What a rule finds in each of the files, with the file's name."""
+    return [f"{relative(path)}: {fault}" for path in files for fault in rule(path)]
+
+
 def allowed(path: Path, module: str) -> bool:
     """Whether the arrows of the house let the file `path` import `module`."""
     target = module.split(".")
@@ -62,10 +75,13 @@ def allowed(path: Path, module: str) -> bool:
     return target[0] == "stages" and (place[1] != "shape" or target[1] == "shape")
 
 
-@pytest.mark.parametrize("path", [path for path in CODE if path.parent != ROOT / "stages"], ids=relative)
-def test_imports_run_along_the_way_of_the_data(path: Path) -> None:
-    wrong = [module for module in imports(ast.parse(path.read_text())) if not allowed(path, module)]
-    assert not wrong, f"{relative(path)} may not import {wrong}"
+def against_the_way(path: Path) -> Iterator[str]:
+    yield from (f"may not import {each}" for each in imports(parsed(path)) if not allowed(path, each))
+
+
+def test_imports_run_along_the_way_of_the_data() -> None:
+    files = [path for path in CODE if path.parent != ROOT / "stages"]
+    assert faults(against_the_way, files) == []
 
 
 def test_folders_of_stages_do_not_import_each_other_in_a_circle() -> None:
@@ -74,7 +90,7 @@ def test_folders_of_stages_do_not_import_each_other_in_a_circle() -> None:
     for path in CODE:
         place = path.relative_to(ROOT).parts
         if place[0] == "stages" and len(place) > 2:
-            modules = [module.split(".") for module in imports(ast.parse(path.read_text()))]
+            modules = [module.split(".") for module in imports(parsed(path))]
             targets = {each[1] for each in modules if each[0] == "stages" and len(each) > 1}
             reads.setdefault(place[1], set()).update(targets - {place[1]})
     order = list(TopologicalSorter(reads).static_order())
@@ -82,19 +98,22 @@ def test_folders_of_stages_do_not_import_each_other_in_a_circle() -> None:
     assert not any("package" in read for read in reads.values())
 
 
-@pytest.mark.parametrize("path", CODE, ids=relative)
-def test_bytes_depend_on_no_global_randomness_no_clock_no_uuid(path: Path) -> None:
-    tree = ast.parse(path.read_text())
-    modules = set(imports(tree))
-    assert not {each for each in modules if each.split(".")[0] in {"random", "uuid", "secrets"}}
+def uncertain(path: Path) -> Iterator[str]:
+    """What in a file takes bytes from the moment, the machine or a state that anybody changes."""
+    tree = parsed(path)
+    yield from {each for each in imports(tree) if each.split(".")[0] in {"random", "uuid", "secrets"}}
     for name, call in calls(tree):
         tail = name.split(".")
-        if tail[-2:-1] == ["random"] and tail[0] in {"np", "numpy"}:
-            assert tail[-1] in GLOBAL_RANDOMNESS, f"line {call.lineno}: {name} draws from a global"
-        if tail[-1] == "default_rng":
-            assert call.args or call.keywords, f"line {call.lineno}: an unseeded generator"
-        if path.is_relative_to(ROOT / "stages"):
-            assert ".".join(tail[-2:]) not in CLOCKS, f"line {call.lineno}: {name} is a clock"
+        if tail[-2:-1] == ["random"] and tail[0] in {"np", "numpy"} and tail[-1] not in GLOBAL_RANDOMNESS:
+            yield f"line {call.lineno}: {name} draws from a global"
+        if tail[-1] == "default_rng" and not (call.args or call.keywords):
+            yield f"line {call.lineno}: an unseeded generator"
+        if path.is_relative_to(ROOT / "stages") and ".".join(tail[-2:]) in CLOCKS:
+            yield f"line {call.lineno}: {name} is a clock"
+
+
+def test_bytes_depend_on_no_global_randomness_no_clock_no_uuid() -> None:
+    assert faults(uncertain, CODE) == []
 
 
 def test_bytes_depend_on_no_file_that_a_fingerprint_does_not_know() -> None:
@@ -102,22 +121,26 @@ def test_bytes_depend_on_no_file_that_a_fingerprint_does_not_know() -> None:
     assert {path.suffix for path in files} <= {".py", ".md"}, "pipeline/code.py digests Python alone"
 
 
-@pytest.mark.parametrize("path", CODE, ids=relative)
-def test_nothing_executes_what_it_reads(path: Path) -> None:
-    tree = ast.parse(path.read_text())
-    assert not {each.split(".")[0] for each in imports(tree)} & {"pickle", "cloudpickle", "dill", "shelve", "marshal"}
+def executing(path: Path) -> Iterator[str]:
+    """What in a file would run what it reads."""
+    tree = parsed(path)
+    yield from {each for each in imports(tree) if each.split(".")[0] in EXECUTING}
     for name, call in calls(tree):
-        assert name not in {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "eval", "exec"}, f"line {call.lineno}"
+        if name in {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "eval", "exec"}:
+            yield f"line {call.lineno}: {name}"
         keywords = {keyword.arg: ast.unparse(keyword.value) for keyword in call.keywords}
-        if name == "torch.load":
-            assert keywords.get("weights_only") == "True", f"line {call.lineno}"
-        if name in {"np.load", "numpy.load", "np.save", "numpy.save"}:
-            assert keywords.get("allow_pickle") == "False", f"line {call.lineno}: say allow_pickle=False"
+        if name == "torch.load" and keywords.get("weights_only") != "True":
+            yield f"line {call.lineno}: say weights_only=True"
+        if name in {"np.load", "numpy.load", "np.save", "numpy.save"} and keywords.get("allow_pickle") != "False":
+            yield f"line {call.lineno}: say allow_pickle=False"
 
 
-@pytest.mark.parametrize("path", CODE, ids=relative)
-def test_random_streams_are_handed_in_and_never_a_default(path: Path) -> None:
-    for node in ast.walk(ast.parse(path.read_text())):
+def test_nothing_executes_what_it_reads() -> None:
+    assert faults(executing, CODE) == []
+
+
+def defaulted_streams(path: Path) -> Iterator[str]:
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
             named = [*node.args.posonlyargs, *node.args.args]
             defaulted = named[len(named) - len(node.args.defaults) :]
@@ -126,7 +149,12 @@ def test_random_streams_are_handed_in_and_never_a_default(path: Path) -> None:
                 for argument, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
                 if default is not None
             ]
-            assert "rng" not in {argument.arg for argument in defaulted}, f"line {node.lineno}"
+            if "rng" in {argument.arg for argument in defaulted}:
+                yield f"line {node.lineno}"
+
+
+def test_random_streams_are_handed_in_and_never_a_default() -> None:
+    assert faults(defaulted_streams, CODE) == []
 
 
 def kernels(tree: ast.Module) -> list[ast.FunctionDef]:
@@ -143,31 +171,42 @@ def test_types_are_asked_for_everywhere_but_in_files_with_kernels() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
     assert settings["strict"]
     spared = [each["module"] for each in settings["overrides"] if each.get("disallow_untyped_defs") is False]
-    files = [path for path in CODE if kernels(ast.parse(path.read_text()))]
+    files = [path for path in CODE if kernels(parsed(path))]
     assert spared == [[relative(path).removesuffix(".py").replace("/", ".") for path in files]]
 
 
-@pytest.mark.parametrize("path", CODE, ids=relative)
-def test_every_function_but_kernels_says_its_types(path: Path) -> None:
-    tree = ast.parse(path.read_text())
+def untyped(path: Path) -> Iterator[str]:
+    """The functions of a file, but for kernels, that do not say all their types."""
+    tree = parsed(path)
     compiled = kernels(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node not in compiled:
             named = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-            untyped = [each.arg for each in named if each.annotation is None and each.arg not in {"self", "cls"}]
-            assert node.returns is not None, f"line {node.lineno}: what does {node.name} return?"
-            assert not untyped, f"line {node.lineno}: {node.name} has {', '.join(untyped)} without a type"
+            without = [each.arg for each in named if each.annotation is None and each.arg not in {"self", "cls"}]
+            if node.returns is None:
+                yield f"line {node.lineno}: what does {node.name} return?"
+            if without:
+                yield f"line {node.lineno}: {node.name} has {', '.join(without)} without a type"
 
 
-@pytest.mark.parametrize("path", ALL, ids=relative)
-def test_every_file_says_its_subject_in_its_name_and_its_first_line(path: Path) -> None:
-    assert path.stem not in BANNED_NAMES
-    assert not BANNED_NAMES & set(path.relative_to(ROOT).parts)
+def test_every_function_but_kernels_says_its_types() -> None:
+    assert faults(untyped, CODE) == []
+
+
+def misnamed(path: Path) -> Iterator[str]:
+    """What a file does not say in its name and its first lines."""
+    names = {path.stem, *path.relative_to(ROOT).parts} & BANNED_NAMES
+    if names:
+        yield f"is called {', '.join(names)}"
     text = path.read_text()
-    if text and path in CODE:
-        assert ast.get_docstring(ast.parse(text)), "a file begins with what it is for"
-    if "import " in text:
-        assert "from __future__ import annotations" in text
+    if text and path in CODE and not ast.get_docstring(parsed(path)):
+        yield "a file begins with what it is for"
+    if "import " in text and "from __future__ import annotations" not in text:
+        yield "has no annotations of the future"
+
+
+def test_every_file_says_its_subject_in_its_name_and_its_first_line() -> None:
+    assert faults(misnamed, ALL) == []
 
 
 def test_every_stage_file_holds_the_stage_of_its_folder() -> None:

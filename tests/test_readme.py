@@ -20,6 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 SECTION = (ROOT / "README.md").read_text().partition("\n## Using it from Python\n")[2].partition("\n## ")[0]
 BLOCKS = dict(re.findall(r"\n([A-Z][^\n]*):\n\n```python\n(.*?)```", SECTION, re.DOTALL))
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:

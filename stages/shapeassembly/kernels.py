@@ -119,7 +119,8 @@ def _execute(rows, boxes, child, mirrored, decisions):
     """
     events = _Events(np.empty((len(decisions), 2), np.int64), np.empty((len(decisions), 2, 3)))
     aligned = np.empty(len(boxes), np.bool_)
-    made, count = 0, 0
+    # Not plain zeros: constants have a type of their own, for which all that is called would be compiled once more.
+    made, count = np.int64(0), np.int64(0)
     for row in rows:
         kind, a, b, c = int(row[0]), int(row[1]), int(row[2]), int(row[3])
         if kind == DECLARE:

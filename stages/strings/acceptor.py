@@ -479,31 +479,33 @@ def _take_all(rules, state, tokens):
 
 
 @numba.njit(cache=True)
-def _is_followed(rules, state, tokens):
+def _is_followed(rules, state, i, most, tokens):
+    # Row and room are arguments: constants have a type of their own, for which all that is called would be compiled
+    # once more.
     for place in range(len(tokens)):
-        _find_witnesses(rules, state, 0)
-        if not _may_come(rules, state, 0, NEVER, tokens[place]):
+        _find_witnesses(rules, state, i)
+        if not _may_come(rules, state, i, most, tokens[place]):
             return False
-        _take(rules, state, 0, tokens[place])
+        _take(rules, state, i, tokens[place])
     return True
 
 
 @numba.njit(cache=True)
-def _follow(rules, state, tokens, allowed):
-    """The masks along one string, and the most tokens that any beginning of it needs to end without more cycles: -1
-    where the string has a token that is not allowed."""
-    most = 0
+def _follow(rules, state, i, most, tokens, allowed):
+    """The masks along a string of at most `most` tokens, and the most that any beginning of it needs to end without
+    more cycles: -1 where the string has a token that is not allowed."""
+    needed = 0
     for place in range(len(tokens)):
-        _allow(rules, state, 0, NEVER, allowed[place])
+        _allow(rules, state, i, most, allowed[place])
         if not allowed[place, tokens[place]]:
             return -1
-        _take(rules, state, 0, tokens[place])
-        if state.previous[0] != _OPEN and state.previous[0] != _ENDED:
-            total = state.length[0] + state.need[0, state.current[0]] + _open_cycles(state, 0)
-            for d in range(state.depth[0]):
-                total += state.need[0, state.stack[0, d]] + 1
-            most = max(most, total)
-    return most
+        _take(rules, state, i, tokens[place])
+        if state.previous[i] != _OPEN and state.previous[i] != _ENDED:
+            total = state.length[i] + state.need[i, state.current[i]] + _open_cycles(state, i)
+            for d in range(state.depth[i]):
+                total += state.need[i, state.stack[i, d]] + 1
+            needed = max(needed, total)
+    return needed
 
 
 class Acceptor:
@@ -555,7 +557,7 @@ class Acceptor:
 
 def is_followed(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> bool:
     """Whether each token of a whole string, int64 (n,), END among them, is allowed after those before it."""
-    return bool(_is_followed(rules, Acceptor(rules, cycles, 1, len(tokens))._state, tokens))
+    return bool(_is_followed(rules, Acceptor(rules, cycles, 1, len(tokens))._state, 0, NEVER, tokens))
 
 
 def follow(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.bool_], int]:
@@ -566,7 +568,7 @@ def follow(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> tuple[np
     """
     beginning = Acceptor(rules, cycles, 1, len(tokens))
     allowed = np.zeros((len(tokens), beginning.tokens), np.bool_)
-    most = int(_follow(rules, beginning._state, tokens, allowed))
+    most = int(_follow(rules, beginning._state, 0, NEVER, tokens, allowed))
     if most < 0:
         place = int(np.argmax(~allowed.any(axis=1) | ~allowed[np.arange(len(tokens)), tokens]))
         raise ValueError(f"token {place} is not allowed there by the grammar")

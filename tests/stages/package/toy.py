@@ -108,8 +108,8 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
     return samples
 
 
-REFUSED = toy_samples("train", 1, 2)[1].key
-"""The sample that the toy sketches refuse."""
+REFUSED = "planks-00011"
+"""The sample that the toy sketches refuse, the second of the second shard of train."""
 
 
 def toy_keys(split: str, shards: int = 4) -> list[str]:

@@ -63,5 +63,5 @@ def test_the_command_prints_a_line_a_parameter(capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize("name", program_names())
 def test_every_parameter_of_the_library_can_be_read_from_its_shapes(name: str) -> None:
     # A few of the forty that `python -m stages.programs movement` looks at, which say that none is weak.
-    found = list(movements(find_program(name), 8, 0))
+    found = list(movements(find_program(name), 5, 0))
     assert not [each for each in found if each.seen < 0.6], movement_table(found)

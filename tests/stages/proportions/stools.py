@@ -6,10 +6,11 @@ from functools import cache
 
 import trimesh
 
-from stages.shape.kit import Kit
+from stages.proportions.warp import Lattice, lattice_of
+from stages.shape.kit import Assembly, Kit
 from tests.stages.variations.toy import Placed, box, kit_of, pose
 
-__all__ = ["MESHES", "STOOL", "kit"]
+__all__ = ["MESHES", "STOOL", "kit", "lattice", "whole"]
 
 FRAME = trimesh.util.concatenate(
     [box(0.1, 1.0, 0.1).apply_translation((x, 0.5, 0.0)) for x in (0.05, 0.95)]
@@ -29,3 +30,12 @@ STOOL: list[Placed] = [
 @cache
 def kit() -> Kit:
     return kit_of(MESHES, [STOOL], ("point", "line", "face"))
+
+
+def whole() -> Assembly:
+    return kit().exemplars[0].whole
+
+
+@cache
+def lattice() -> Lattice:
+    return lattice_of(kit(), whole())

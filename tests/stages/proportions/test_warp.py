@@ -8,13 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stages.proportions.faults import warp_fault
-from stages.proportions.warp import lattice_of, warped
+from stages.proportions.warp import warped
 from stages.shape.geometry.contact import ContactTest, world_boxes
 from stages.shape.shape import Shape
-from tests.stages.proportions.stools import kit
-
-WHOLE = kit().exemplars[0].whole
-LATTICE = lattice_of(kit(), WHOLE)
+from tests.stages.proportions.stools import kit, lattice, whole
 
 
 def boxes(shape: Shape) -> np.ndarray:
@@ -22,42 +19,42 @@ def boxes(shape: Shape) -> np.ndarray:
 
 
 def drawn(seed: int, spread: float = 0.3) -> Shape:
-    return warped(kit(), WHOLE, LATTICE, LATTICE.draw(np.random.default_rng(seed), spread, 2.0))
+    return warped(kit(), whole(), lattice(), lattice().draw(np.random.default_rng(seed), spread, 2.0))
 
 
 def test_knots_are_the_ends_of_parts() -> None:
-    np.testing.assert_allclose(LATTICE.knots[0], [-0.5, -0.4, 0.4, 0.5], atol=1e-6)
-    np.testing.assert_allclose(LATTICE.knots[1], [0.0, 0.8, 0.85, 1.0, 1.1], atol=1e-6)
-    np.testing.assert_allclose(LATTICE.knots[2], [-0.05, 0.0, 0.05, 0.45, 0.5, 0.55], atol=1e-6)
-    assert LATTICE.lengths[0][0] == LATTICE.lengths[0][2] == LATTICE.lengths[1][3]
+    np.testing.assert_allclose(lattice().knots[0], [-0.5, -0.4, 0.4, 0.5], atol=1e-6)
+    np.testing.assert_allclose(lattice().knots[1], [0.0, 0.8, 0.85, 1.0, 1.1], atol=1e-6)
+    np.testing.assert_allclose(lattice().knots[2], [-0.05, 0.0, 0.05, 0.45, 0.5, 0.55], atol=1e-6)
+    assert lattice().lengths[0][0] == lattice().lengths[0][2] == lattice().lengths[1][3]
 
 
 def test_factors_of_one_leave_the_exemplar_as_it_is() -> None:
-    same = warped(kit(), WHOLE, LATTICE, [np.ones(len(each)) for each in LATTICE.lengths])
-    np.testing.assert_allclose(boxes(same), world_boxes(kit().types, WHOLE.types, WHOLE.poses), atol=1e-9)
+    same = warped(kit(), whole(), lattice(), [np.ones(len(each)) for each in lattice().lengths])
+    np.testing.assert_allclose(boxes(same), world_boxes(kit().types, whole().types, whole().poses), atol=1e-9)
     assert same.labels == kit().labels
-    assert [mesh.label for mesh in same.meshes] == [kit().types[each].label for each in WHOLE.types]
-    assert len(set(same.part_names)) == len(WHOLE)
+    assert [mesh.label for mesh in same.meshes] == [kit().types[each].label for each in whole().types]
+    assert len(set(same.part_names)) == len(whole())
 
 
 @given(st.integers(0, 1000))
 def test_what_touches_goes_on_touching_and_nothing_else_does(seed: int) -> None:
     shape = drawn(seed)
     test = ContactTest(shape.meshes, kit().contact_tolerance)
-    np.testing.assert_array_equal(test.contacts(shape.assembly.types, shape.assembly.poses), WHOLE.edges)
-    assert warp_fault(kit(), WHOLE, shape) is None
+    np.testing.assert_array_equal(test.contacts(shape.assembly.types, shape.assembly.poses), whole().edges)
+    assert warp_fault(kit(), whole(), shape) is None
 
 
 @given(st.integers(0, 1000))
 def test_equal_lengths_stay_equal_along_all_axes_and_the_mirror_image_remains(seed: int) -> None:
     shape = drawn(seed)
     sides = np.ptp(boxes(shape), axis=1)
-    first, second = np.flatnonzero(WHOLE.types == WHOLE.types[0])
+    first, second = np.flatnonzero(whole().types == whole().types[0])
     np.testing.assert_allclose(sides[first], sides[second])
     middle = boxes(shape)[:, :, 0].mean(axis=1)
     np.testing.assert_allclose(middle, middle[0], atol=1e-9)
     left, right = post_widths(shape, int(first))
-    top = int(np.flatnonzero(WHOLE.types == kit().labels.index("top"))[0])
+    top = int(np.flatnonzero(whole().types == kit().labels.index("top"))[0])
     assert left == pytest.approx(right) == pytest.approx(sides[top, 1]), "posts are as wide as the top is thick"
 
 
@@ -71,32 +68,32 @@ def post_widths(shape: Shape, part: int) -> tuple[float, float]:
 
 def test_the_bar_of_a_frame_stays_beside_the_board_that_lies_on_it() -> None:
     """A part is moved a vertex at a time: as a whole the frame would take its bar elsewhere."""
-    factors = [np.ones(len(each)) for each in LATTICE.lengths]
+    factors = [np.ones(len(each)) for each in lattice().lengths]
     factors[1][0] = 2.0
-    shape = warped(kit(), WHOLE, LATTICE, factors)
-    frame, board = (int(np.flatnonzero(WHOLE.types == kit().labels.index(name))[0]) for name in ("frame", "board"))
+    shape = warped(kit(), whole(), lattice(), factors)
+    frame, board = (int(np.flatnonzero(whole().types == kit().labels.index(name))[0]) for name in ("frame", "board"))
     heights = np.unique(np.round(shape.meshes[frame].vertices[:, 1] + shape.assembly.poses[frame, 1, 3], 6))
     assert boxes(shape)[board, 0, 1] == pytest.approx(heights[-2])
 
 
 def test_factors_stay_within_their_bounds_and_signatures_know_no_size() -> None:
     for seed in range(20):
-        for factors in LATTICE.draw(np.random.default_rng(seed), 1.0, 1.5):
+        for factors in lattice().draw(np.random.default_rng(seed), 1.0, 1.5):
             assert ((factors >= np.round(1 / 1.5, 3)) & (factors <= 1.5)).all()
-    twice = [np.full(len(each), 2.0) for each in LATTICE.lengths]
-    once = [np.ones(len(each)) for each in LATTICE.lengths]
-    np.testing.assert_allclose(LATTICE.signature(twice), LATTICE.signature(once), atol=1e-9)
+    twice = [np.full(len(each), 2.0) for each in lattice().lengths]
+    once = [np.ones(len(each)) for each in lattice().lengths]
+    np.testing.assert_allclose(lattice().signature(twice), lattice().signature(once), atol=1e-9)
 
 
 @pytest.mark.parametrize("wrong", [[1.0], [1.0, -1.0, 1.0], [1.0, np.nan, 1.0]])
 def test_factors_of_another_lattice_are_refused(wrong: list[float]) -> None:
-    factors = [np.array(wrong), *(np.ones(len(each)) for each in LATTICE.lengths[1:])]
+    factors = [np.array(wrong), *(np.ones(len(each)) for each in lattice().lengths[1:])]
     with pytest.raises(ValueError, match="axis x has 3 intervals: it needs as many positive factors"):
-        warped(kit(), WHOLE, LATTICE, factors)
+        warped(kit(), whole(), lattice(), factors)
 
 
 def test_a_shape_that_came_apart_is_told() -> None:
     shape = drawn(0)
-    top = int(np.flatnonzero(WHOLE.types == kit().labels.index("top"))[0])
+    top = int(np.flatnonzero(whole().types == kit().labels.index("top"))[0])
     shape.assembly.poses[top, 1, 3] += 0.2
-    assert warp_fault(kit(), WHOLE, shape) == "contact lost"
+    assert warp_fault(kit(), whole(), shape) == "contact lost"

@@ -7,17 +7,29 @@ import pytest
 
 from stages.shapeassembly import execute, execute_all, parse, print_program
 from stages.shapeassembly.checks import overflow, violations
+from stages.shapeassembly.program import Program
 from stages.shapeassembly.statistics import cluster_curves, program_statistics
 from tests.stages.shapeassembly.shared_programs import CATEGORIES, SHARED, needs_shared, shared_texts
 
 pytestmark = needs_shared
 
 
-@pytest.mark.parametrize("category", CATEGORIES)
-def test_every_program_prints_back_equal_and_is_executed_to_finite_boxes(category: str) -> None:
+@pytest.fixture(scope="module", params=CATEGORIES)
+def category(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def programs(category: str) -> list[Program]:
+    """All programs of a category, in the order of their texts: of one category at a time, for they are many."""
+    return [parse(text) for text in shared_texts(category).values()]
+
+
+def test_every_program_prints_back_equal_and_is_executed_to_finite_boxes(
+    category: str, programs: list[Program]
+) -> None:
     texts = shared_texts(category)
     assert len(texts) == CATEGORIES[category]
-    programs = [parse(text) for text in texts.values()]
     assert [print_program(program) for program in programs] == list(texts.values())
     executions = execute_all(programs)
     assert all(len(done) and np.isfinite(done.corners).all() for done in executions)
@@ -54,9 +66,8 @@ PUBLISHED = {
 Reflects are left out: the table's 0.0880 for chairs and its total do not agree by 0.003, ours do."""
 
 
-@pytest.mark.parametrize("category", CATEGORIES)
-def test_statistics_are_the_published_ones(category: str) -> None:
-    found = program_statistics([parse(text) for text in shared_texts(category).values()])
+def test_statistics_are_the_published_ones(category: str, programs: list[Program]) -> None:
+    found = program_statistics(programs)
     lines, translates, squeezes, macros, parts = PUBLISHED[category]
     assert found.lines == pytest.approx(lines, abs=0.1)
     assert found.translates == pytest.approx(translates, abs=3e-4)

@@ -151,7 +151,7 @@ def test_what_is_known_of_open_cycles_changes_no_answer(seed: int, partial: bool
         asking.take(token)
 
 
-@given(st.integers(0, 2**32), st.integers(0, len(toy.graphs()) - 1), st.sampled_from(ALL_LEVELS))
+@given(st.integers(0, 2**32), st.integers(0, toy.SHAPES * len(toy.SPLITS) - 1), st.sampled_from(ALL_LEVELS))
 def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, strictness: Strictness) -> None:
     types, edges = toy.graphs()[number]
     grammar = Grammar(toy.grammar().neighbourhoods, (), {}, strictness)

@@ -9,6 +9,7 @@ from pipeline.places import Places
 from stages.shape.collection.packaged import Packaged
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.graphs.canonical import graph_digest
+from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import write_kit
 from stages.shape.shape import kit_shape
 from stages.strings.audit import AUDIT, string_faults
@@ -16,22 +17,27 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import Edges
 from tests.stages.strings.test_kit_strings import kit_of
 
-KIT = kit_of("cubes")
-ASSEMBLY = KIT.exemplars[0].assembly
+
+def kit() -> Kit:
+    return kit_of("cubes")
+
+
+def assembly() -> Assembly:
+    return kit().exemplars[0].assembly
 
 
 def written(edges: Edges) -> list[str]:
-    writer = KitStrings(KIT, edges)
-    return [each.string for each in writer.strings(writer.graph(ASSEMBLY), 3, np.random.default_rng(2))]
+    writer = KitStrings(kit(), edges)
+    return [each.string for each in writer.strings(writer.graph(assembly()), 3, np.random.default_rng(2))]
 
 
 def sample(strings: list[str], said: Edges | None) -> Packaged:
     """A sample with these strings, of a dataset that says what they tell of, or is older than that."""
-    labelled = KIT.labelled(ASSEMBLY)
+    labelled = kit().labelled(assembly())
     record = {"language": "kit", "kit": "cubes", "graph": graph_digest(labelled.types, labelled.edges)}
-    members = {"txt": "".join(f"{each}\n" for each in strings).encode(), CONTACTS: pair_bytes(ASSEMBLY.edges)}
+    members = {"txt": "".join(f"{each}\n" for each in strings).encode(), CONTACTS: pair_bytes(assembly().edges)}
     sections = {"strings": {"strings_per_shape": 3, **({"edges": said} if said else {})}}
-    return Packaged("cubes-0", record, members, {}, kit_shape(KIT, ASSEMBLY), sections)
+    return Packaged("cubes-0", record, members, {}, kit_shape(kit(), assembly()), sections)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +47,7 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> Places:
     folder = found.stage("exemplars").root
     folder.mkdir(parents=True)
     with open(folder / "cubes.json", "wb") as text, open(folder / "cubes.tar", "wb") as tar:
-        write_kit(KIT, text, tar)
+        write_kit(kit(), text, tar)
     return found
 
 

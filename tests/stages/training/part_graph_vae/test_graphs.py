@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import torch
@@ -18,7 +20,11 @@ from stages.training.part_graph_vae.training import PartGraphVaeLearner, new_mod
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 ENTRY = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=48, batch=2, kl_weight=0.0)
-GRAPHS = Graphs.of([nodes_of(execute(parse(text))) for text in (BOX, STOOL)])
+
+
+@cache
+def graphs() -> Graphs:
+    return Graphs.of([nodes_of(execute(parse(text))) for text in (BOX, STOOL)])
 
 
 def test_nodes_are_the_assemblies_and_their_parts_the_cuboids_and_copies() -> None:
@@ -42,17 +48,17 @@ def test_a_node_with_too_many_parts_is_refused() -> None:
 def test_losses_of_a_batch_are_those_of_its_shapes_one_by_one() -> None:
     module = new_model(ENTRY, 1)
     points = torch.randn(2, ENTRY.latent, generator=torch.Generator().manual_seed(0))
-    together = reconstruction(module, batch_of(GRAPHS, np.array([0, 1])), points)
-    alone = [reconstruction(module, batch_of(GRAPHS, np.array([row])), points[row : row + 1]) for row in (0, 1)]
+    together = reconstruction(module, batch_of(graphs(), np.array([0, 1])), points)
+    alone = [reconstruction(module, batch_of(graphs(), np.array([row])), points[row : row + 1]) for row in (0, 1)]
     for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
         assert whole.item() == pytest.approx(sum(each.item() for each in parts), rel=1e-5)
-    means = module.encode(batch_of(GRAPHS, np.array([0, 1])))[0]
+    means = module.encode(batch_of(graphs(), np.array([0, 1])))[0]
     for row in (0, 1):
-        torch.testing.assert_close(module.encode(batch_of(GRAPHS, np.array([row])))[0][0], means[row])
+        torch.testing.assert_close(module.encode(batch_of(graphs(), np.array([row])))[0][0], means[row])
 
 
 def test_a_model_learns_two_shapes_and_writes_them() -> None:
-    learner = PartGraphVaeLearner(new_model(ENTRY, 0), {}, ENTRY, GRAPHS, GRAPHS)
+    learner = PartGraphVaeLearner(new_model(ENTRY, 0), {}, ENTRY, graphs(), graphs())
     optimizer = torch.optim.Adam(learner.module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
@@ -63,7 +69,7 @@ def test_a_model_learns_two_shapes_and_writes_them() -> None:
         optimizer.step()
     with torch.no_grad():
         learner.validate(noise)
-        means = learner.module.encode(batch_of(GRAPHS, np.array([0, 1])))[0].numpy()
+        means = learner.module.encode(batch_of(graphs(), np.array([0, 1])))[0].numpy()
     model = TrainedPartGraphVae(learner.module.eval(), {})
     for text, found in zip((BOX, STOOL), model.decode(means), strict=True):
         wanted = boxes_of(execute(parse(text)))

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from stages.strings.acceptor import follow
-from stages.strings.rules import make_rules, patterns_of
+from stages.strings.rules import Rules, make_rules, patterns_of
 from stages.training.loop import Trainee, train
 from stages.training.string_vae.batches import Strings
 from stages.training.string_vae.settings import StringVaeEntry
@@ -21,13 +21,17 @@ from tests.stages.training import toy
 __all__ = ["MOST", "VOCABULARY", "entry", "random_vae", "toy_strings", "trained_vae"]
 
 VOCABULARY = Vocabulary(toy.ALPHABET, 2)
-RULES = make_rules(toy.grammar(), 3, 2)
 MOST = 60
+
+
+@cache
+def rules() -> Rules:
+    return make_rules(toy.grammar(), 3, 2)
 
 
 def entry(**changes: Any) -> StringVaeEntry:
     """Settings of a model that learns in seconds."""
-    settings = {"name": "tiny", "latent": 8, "embedding": 8, "hidden": 64, "batch": 20, "steps": 400, "rounds": 1}
+    settings = {"name": "tiny", "latent": 8, "embedding": 8, "hidden": 64, "batch": 20, "steps": 300, "rounds": 1}
     return StringVaeEntry.model_validate({**settings, "anneal": 50, "kl_weight": 0.01, "word_dropout": 0.1, **changes})
 
 
@@ -41,7 +45,7 @@ def numbered() -> Strings:
     """The strings as a learner takes them."""
     shapes = [strings for shard in toy.SPLITS for _, strings in toy.strings(shard)]
     codes = [np.append(VOCABULARY.codes(each), np.int16(END)) for each in toy_strings()]
-    masks = [follow(RULES, 2, each.astype(np.int64))[0] for each in codes]
+    masks = [follow(rules(), 2, each.astype(np.int64))[0] for each in codes]
     return Strings(
         tokens=np.concatenate(codes),
         first=np.cumsum([0, *map(len, codes)]),
@@ -57,12 +61,12 @@ def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringV
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "most": MOST,
-        "patterns": patterns_of(RULES),
+        "patterns": patterns_of(rules()),
         "names": list(toy.LABELS),
         "cycles": 2,
         "canonical": True,
     }
-    return TrainedStringVae(module.eval(), VOCABULARY, RULES, header)
+    return TrainedStringVae(module.eval(), VOCABULARY, rules(), header)
 
 
 def random_vae(decoder: str, seed: int = 0, look_back: bool = True) -> TrainedStringVae:
