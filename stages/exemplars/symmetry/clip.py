@@ -19,10 +19,10 @@ EVERYWHERE = np.array([[-(2**62)] * 3, [2**62] * 3])
 
 
 @numba.njit(cache=True)
-def _half(polygon, count, axis, bound, above, out):
-    """The part of a polygon beyond a plane across an axis, into `out`; its number of corners."""
+def _half(polygon, count, axis, bound, sign, out):
+    """The part of a polygon beyond a plane across an axis, or before it where `sign` is -1.0, into `out`; its number of
+    corners."""
     kept = 0
-    sign = 1.0 if above else -1.0
     for k in range(count):
         here, after = polygon[k], polygon[(k + 1) % count]
         one, two = sign * (here[axis] - bound), sign * (after[axis] - bound)
@@ -41,7 +41,7 @@ def _half(polygon, count, axis, bound, above, out):
 @numba.njit(cache=True)
 def _slab(polygon, count, axis, low, high, spare, out):
     """The part of a polygon between two planes across an axis, into `out`; its number of corners."""
-    return _half(spare, _half(polygon, count, axis, low, True, spare), axis, high, False, out)
+    return _half(spare, _half(polygon, count, axis, low, 1.0, spare), axis, high, -1.0, out)
 
 
 @numba.njit(cache=True)
@@ -72,27 +72,29 @@ def _all_fragments(corners, origin, size, low_cell, high_cell):
     cells = np.empty((4 * len(corners) + 16, 3), dtype=np.int64)
     faces = np.empty(4 * len(corners) + 16, dtype=np.int64)
     middles = np.empty((4 * len(corners) + 16, 4))
-    total = 0
+    total = np.int64(0)
+    # not plain numbers: constants have types of their own, for which all that is called would be compiled once more
+    x, y, z, three = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
     spare, whole = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
     of_x, of_y, of_z = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
     for face in range(len(corners)):
         whole[:3] = corners[face]
-        first_i, last_i = _reach(whole, 3, 0, origin, size)
+        first_i, last_i = _reach(whole, three, x, origin, size)
         for i in range(max(first_i, low_cell[0]), min(last_i, high_cell[0]) + 1):
             low = origin[0] + i * size
-            in_x = _slab(whole, 3, 0, low, low + size, spare, of_x)
+            in_x = _slab(whole, three, x, low, low + size, spare, of_x)
             if in_x < 3:
                 continue
-            first_j, last_j = _reach(of_x, in_x, 1, origin, size)
+            first_j, last_j = _reach(of_x, in_x, y, origin, size)
             for j in range(max(first_j, low_cell[1]), min(last_j, high_cell[1]) + 1):
                 low = origin[1] + j * size
-                in_y = _slab(of_x, in_x, 1, low, low + size, spare, of_y)
+                in_y = _slab(of_x, in_x, y, low, low + size, spare, of_y)
                 if in_y < 3:
                     continue
-                first_k, last_k = _reach(of_y, in_y, 2, origin, size)
+                first_k, last_k = _reach(of_y, in_y, z, origin, size)
                 for k in range(max(first_k, low_cell[2]), min(last_k, high_cell[2]) + 1):
                     low = origin[2] + k * size
-                    in_z = _slab(of_y, in_y, 2, low, low + size, spare, of_z)
+                    in_z = _slab(of_y, in_y, z, low, low + size, spare, of_z)
                     area = _area(of_z, in_z) if in_z > 2 else 0.0
                     if area <= SPECK * size * size:
                         continue
@@ -187,22 +189,23 @@ def _run(found, start, count):
 def _all_cuts(corners, origin, size, cells, owner_starts, inside, box):
     triangles = np.empty((4 * len(corners) + 16, 3, 3))
     sides, faces = np.empty(len(triangles), dtype=np.int64), np.empty(len(triangles), dtype=np.int64)
-    total = 0
+    total = np.int64(0)
+    x, y, z, three = np.int64(0), np.int64(1), np.int64(2), np.int64(3)  # as in _all_fragments
     spare, whole = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
     of_x, of_y, of_z = np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 3))
     for face in range(len(corners)):
         whole[:3] = corners[face]
         begin, end = owner_starts[face], owner_starts[face + 1]
-        first_i, last_i = _reach(whole, 3, 0, origin, size)
+        first_i, last_i = _reach(whole, three, x, origin, size)
         along_x = np.empty(last_i - first_i + 1, dtype=np.int64)
         _sides_along(
-            cells, inside, begin, end, 0, 0, 0, first_i, last_i, along_x, whole, 3, origin, size, box, spare, of_x
+            cells, inside, begin, end, x, x, x, first_i, last_i, along_x, whole, three, origin, size, box, spare, of_x
         )
-        start_x = 0
+        start_x = np.int64(0)
         while start_x < len(along_x):
             end_x, side = _run(along_x, start_x, len(along_x))
             low = origin[0] + (first_i + start_x) * size
-            in_x = _slab(whole, 3, 0, low, origin[0] + (first_i + end_x) * size, spare, of_x)
+            in_x = _slab(whole, three, x, low, origin[0] + (first_i + end_x) * size, spare, of_x)
             i = first_i + start_x
             start_x = end_x
             if side != 2:
@@ -210,16 +213,16 @@ def _all_cuts(corners, origin, size, cells, owner_starts, inside, box):
                 continue
             if in_x < 3:
                 continue
-            first_j, last_j = _reach(of_x, in_x, 1, origin, size)
+            first_j, last_j = _reach(of_x, in_x, y, origin, size)
             along_y = np.empty(last_j - first_j + 1, dtype=np.int64)
             _sides_along(
-                cells, inside, begin, end, 1, i, 0, first_j, last_j, along_y, of_x, in_x, origin, size, box, spare, of_y
+                cells, inside, begin, end, y, i, x, first_j, last_j, along_y, of_x, in_x, origin, size, box, spare, of_y
             )
-            start_y = 0
+            start_y = np.int64(0)
             while start_y < len(along_y):
                 end_y, side = _run(along_y, start_y, len(along_y))
                 low = origin[1] + (first_j + start_y) * size
-                in_y = _slab(of_x, in_x, 1, low, origin[1] + (first_j + end_y) * size, spare, of_y)
+                in_y = _slab(of_x, in_x, y, low, origin[1] + (first_j + end_y) * size, spare, of_y)
                 j = first_j + start_y
                 start_y = end_y
                 if side != 2:
@@ -227,17 +230,17 @@ def _all_cuts(corners, origin, size, cells, owner_starts, inside, box):
                     continue
                 if in_y < 3:
                     continue
-                first_k, last_k = _reach(of_y, in_y, 2, origin, size)
+                first_k, last_k = _reach(of_y, in_y, z, origin, size)
                 along_z = np.empty(last_k - first_k + 1, dtype=np.int64)
                 _sides_along(
-                    cells, inside, begin, end, 2, i, j, first_k, last_k, along_z,
+                    cells, inside, begin, end, z, i, j, first_k, last_k, along_z,
                     of_y, in_y, origin, size, box, spare, of_z,
                 )  # fmt: skip
-                start_z = 0
+                start_z = np.int64(0)
                 while start_z < len(along_z):
                     end_z, side = _run(along_z, start_z, len(along_z))
                     low = origin[2] + (first_k + start_z) * size
-                    in_z = _slab(of_y, in_y, 2, low, origin[2] + (first_k + end_z) * size, spare, of_z)
+                    in_z = _slab(of_y, in_y, z, low, origin[2] + (first_k + end_z) * size, spare, of_z)
                     start_z = end_z
                     triangles, sides, faces, total = _emit(of_z, in_z, size, side, face, triangles, sides, faces, total)
     return triangles[:total], sides[:total], faces[:total]
