@@ -88,7 +88,7 @@ def choose(
     stated = config.decide(values)
     fitting = config.fit_tolerance if config.types == "meaning" else None
     sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up, fitting)
-    one_surface = any(each.segmentation in ("symmetry", "sections") for each in models)
+    one_surface = any(each.is_cut for each in models)
     rungs = climb(sight, _rails(stated, sight, open_keys, one_surface), tries)
     for key, (value, why) in _required(sight, rungs).items():
         if key in require:

@@ -140,6 +140,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         pose_tolerance=pose_tolerance,
         contact_kinds=made.kinds,
         up=made.up,
+        one_surface=all(each.is_cut for each in models),
     )
     return Observation(
         kit=kit,

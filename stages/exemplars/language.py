@@ -100,7 +100,7 @@ def _anew(places: Places) -> Anew:
         types = np.array([places[each] for each in meshes], dtype=np.int16)
         rigid, stretches = split(np.array(poses, dtype=np.float64))
         meshes_in_use, assembly = bake(kit.types, Assembly(types, rigid, contacts, stretches))
-        return Shape(meshes_in_use, assembly, "y", kit.labels)
+        return Shape(meshes_in_use, assembly, "y", kit.labels, one_surface=kit.one_surface)
 
     return shape
 

@@ -53,6 +53,11 @@ class Model:
     warnings: tuple[str, ...]
     up: Literal["y", "z"] | None = None
 
+    @property
+    def is_cut(self) -> bool:
+        """Whether its parts are pieces that one surface was cut into: what meets there goes on."""
+        return self.segmentation in ("symmetry", "sections")
+
 
 def pack_model(model: Model) -> bytes:
     """A model without its path as bytes, which `unpack_model` reads: an npz file of plain arrays."""

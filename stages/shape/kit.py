@@ -231,6 +231,7 @@ class Kit:
     pose_tolerance: largest displacement of relative poses that are one docking, in the kit's units.
     contact_kinds: the kinds of contact that make neighbours.
     up: the axis that points up in the exemplars' coordinates, `"y"` or `"z"`.
+    one_surface: whether its parts are pieces that one surface was cut into; then no line is seen where they meet.
     """
 
     name: str
@@ -241,6 +242,7 @@ class Kit:
     pose_tolerance: float
     contact_kinds: tuple[ContactKind, ...]
     up: Literal["y", "z"]
+    one_surface: bool = False
 
     def type_names(self) -> tuple[str, ...]:
         """Names of the types, in order."""

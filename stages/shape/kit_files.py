@@ -26,6 +26,7 @@ def describe_kit(kit: Kit) -> dict[str, Any]:
         "contact_tolerance": kit.contact_tolerance,
         "pose_tolerance": kit.pose_tolerance,
         "contact_kinds": list(kit.contact_kinds),
+        **({"one_surface": True} if kit.one_surface else {}),
         "types": [
             {
                 "name": each.name,
@@ -124,6 +125,7 @@ def load_kit(text: Path, arrays: Path) -> Kit:
         pose_tolerance=described["pose_tolerance"],
         contact_kinds=tuple(described["contact_kinds"]),
         up=described["up"],
+        one_surface=described.get("one_surface", False),
     )
 
 

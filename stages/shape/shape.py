@@ -87,7 +87,7 @@ class Shape:
 def kit_shape(kit: Kit, assembly: Assembly) -> Shape:
     """The shape of an assembly of the kit's types; parts that are stretched have meshes of their own."""
     meshes, baked = bake(kit.types, assembly)
-    return Shape(meshes, baked, kit.up, kit.labels)
+    return Shape(meshes, baked, kit.up, kit.labels, one_surface=kit.one_surface)
 
 
 def mesh_name(part_name: str) -> str:

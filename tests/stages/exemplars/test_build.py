@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,6 +50,10 @@ class TestTypes:
             again = transform_points(pose, kit.types[index].vertices)
             gaps = np.linalg.norm(world[:, None] - again[None], axis=2)
             assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-6
+
+    @pytest.mark.parametrize(("cut_by", "one_surface"), [("sections", True), ("symmetry", True), ("components", False)])
+    def test_parts_that_a_surface_was_cut_into_are_one_surface(self, cut_by: Any, one_surface: bool) -> None:
+        assert block_kit(replace(ring(), segmentation=cut_by)).one_surface is one_surface
 
     def test_the_origin_of_a_type_is_its_centroid(self) -> None:
         kit = block_kit(model({"a": (SCREW, (0, 0, 0)), "b": (SCREW, (2, 0, 0))}))

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from stages.exemplars.settings import ContactConfig
 from stages.shape.kit import Kit
 from stages.shape.kit_files import describe_kit, load_kit, write_kit
+from stages.shape.shape import kit_shape
 from tests.stages.exemplars.blocks import CUBE, SLAB, block_kit, model, ring
 from tests.stages.shape.geometry.bodies import box
 
@@ -64,6 +66,12 @@ def test_parts_inside_others_come_back_too(tmp_path: Path) -> None:
     parts = {**INSIDE, "beside": (CUBE, (1, 0, 0)), "under": (box(4, 4, 4), (0, 0, -2.5))}
     kit = block_kit(model(parts), disconnected="largest")
     assert_same_kit(read_back(kit, tmp_path), kit)
+
+
+def test_a_kit_of_pieces_of_one_surface_says_so_and_its_shapes_do(tmp_path: Path) -> None:
+    kit = replace(make_kit(), one_surface=True)
+    assert kit_shape(read_back(kit, tmp_path), kit.exemplars[0].assembly).one_surface
+    assert not kit_shape(read_back(make_kit(), tmp_path), kit.exemplars[0].assembly).one_surface
 
 
 def test_the_same_kit_is_written_in_the_same_bytes() -> None:
