@@ -25,9 +25,11 @@ CORNERS = 3
 
 def corner_cells(grid: SurfaceGrid) -> IntArray:
     """The cells whose surface no shift takes along itself, int32 ascending: a plane holds it along its normal, a line
-    across itself."""
+    across itself. What may be missing holds nothing."""
     held = grid.directions[:, :, None] * grid.directions[:, None, :]
     held[grid.is_line] = np.eye(3) - held[grid.is_line]
+    if grid.weak is not None:
+        held[grid.weak] = 0.0
     values = np.linalg.eigvalsh(np.add.reduceat(held, grid.starts[:-1], axis=0))
     return np.flatnonzero(values[:, 0] > HELD * values[:, 2]).astype(np.int32)
 

@@ -24,6 +24,13 @@ def cut_at(grid: SurfaceGrid, across: float) -> np.ndarray:
     return np.flatnonzero(grid.origin[0] + grid.size * (grid.cells[:, 0] + 0.5) > across).astype(np.int32)
 
 
+def scan_grid(triangles: np.ndarray, share: float, points: int) -> SurfaceGrid:
+    """The grid of a scan with noise of a fifth of a cell and eight holes."""
+    cell = share / CELLS_A_RADIUS * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    at, _ = scanned(triangles, points, 0.2 * cell, 8, 1.5 * cell, np.random.default_rng(0))
+    return cloud_grid(Cloud(at, np.full((points, 3), 160, np.uint8)), share).grid
+
+
 def has_ends(areas: list[float], period: float, count: int, ends: int) -> bool:
     """Whether dockers of these areas are ends with none to `count` - 1 periods, so many of each; all but the cells
     along the cuts."""
@@ -72,10 +79,7 @@ class TestSites:
         assert most <= len(beside(grid, cells)), "but for the cells along the cut"
 
     def test_holes_of_a_scan_beside_the_site_do_not_let_its_sides_run_together(self) -> None:
-        triangles, share, points = wall(3), 0.05, 40_000
-        cell = share / CELLS_A_RADIUS * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
-        at, _ = scanned(triangles, points, 0.2 * cell, 8, 1.5 * cell, np.random.default_rng(0))
-        grid = cloud_grid(Cloud(at, np.full((points, 3), 160, np.uint8)), share).grid
+        grid = scan_grid(wall(3), 0.05, 40_000)
         cells = cut_at(grid, 2.6)
         after = parted_at(grid, cells, beside(grid, cells), shift(-1, 0, 0))
         assert after is not None
@@ -108,3 +112,9 @@ class TestSites:
         corners = corner_cells(grid)
         assert carries_corners(grid, corners, shift(2, 0, 0))
         assert not carries_corners(grid, corners, shift(3, 0, 0))
+
+    def test_what_may_be_missing_of_a_scan_makes_no_corners(self) -> None:
+        grid = scan_grid(wall(4, 3), SHARE, 250_000)
+        corners = corner_cells(grid)
+        assert carries_corners(grid, corners, shift(3, 0, 0))
+        assert not carries_corners(grid, corners, shift(4, 0, 0))
