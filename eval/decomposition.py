@@ -23,7 +23,7 @@ from stages.shape.arrays import IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
-__all__ = ["Returned", "decomposition_table", "merged", "rand_index", "returned"]
+__all__ = ["Returned", "decomposition_table", "merged", "points_of_parts", "rand_index", "returned", "scene_of_parts"]
 
 POINTS = 8192
 """Points of the surface by which parts are compared."""
@@ -75,7 +75,7 @@ def returned(name: str, shape: Shape, cut: Segmentation) -> Returned:
         nothing = (known[0], 0), (known[1], 0), 0.0, 0.0, 0.0, 0.0, time.perf_counter() - begun
         return Returned(name, cut, *nothing, why=str(error).partition(": ")[2].partition(";")[0])
     seconds = time.perf_counter() - begun
-    cloud = _uncovered(shape, sample_shape(shape, POINTS, np.random.default_rng(0)))
+    cloud = points_of_parts(shape)
     truth, nearest = cloud.instances.astype(np.int64), _nearest_parts(found, cloud.points)
     matched = _matched(truth, nearest, known[0])
     types = shape.assembly.types[truth].astype(np.int64), found.assembly.types[nearest].astype(np.int64)
@@ -105,9 +105,10 @@ def _cut(shape: Shape, cut: Segmentation) -> Shape:
     return Shape(kit.types, kit.exemplars[0].whole, kit.up, kit.type_names())
 
 
-def _uncovered(shape: Shape, cloud: SurfacePoints) -> SurfacePoints:
-    """The points that do not lie where two parts meet, and so belong to one alone."""
-    scene, _ = _scene(shape)
+def points_of_parts(shape: Shape) -> SurfacePoints:
+    """Points of the surface of a shape, but for those where two parts meet: each belongs to one part alone."""
+    cloud = sample_shape(shape, POINTS, np.random.default_rng(0))
+    scene, _ = scene_of_parts(shape)
     reach = COVERED * float(np.linalg.norm(np.ptp(cloud.points, axis=0)))
     rays = np.concatenate([cloud.points - reach * cloud.normals, cloud.normals], axis=1).astype(np.float32)
     # from behind its own face: that is hit once, and again what lies on it
@@ -119,12 +120,12 @@ def _uncovered(shape: Shape, cloud: SurfacePoints) -> SurfacePoints:
 
 def _nearest_parts(shape: Shape, points: np.ndarray) -> IntArray:
     """The part of a shape that is nearest to each point (n, 3), int64 (n,)."""
-    scene, part_of = _scene(shape)
+    scene, part_of = scene_of_parts(shape)
     closest = scene.compute_closest_points(o3d.core.Tensor(points.astype(np.float32)))
     return np.array([part_of[each] for each in closest["geometry_ids"].numpy().tolist()], dtype=np.int64)
 
 
-def _scene(shape: Shape) -> tuple[o3d.t.geometry.RaycastingScene, dict[int, int]]:
+def scene_of_parts(shape: Shape) -> tuple[o3d.t.geometry.RaycastingScene, dict[int, int]]:
     """The parts of a shape to be looked at, and the part of each geometry."""
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
     part_of: dict[int, int] = {}

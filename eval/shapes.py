@@ -17,10 +17,19 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shape.arrays import FloatArray
 from stages.shape.collection.pairs import CONTACTS, pairs_of
-from stages.shape.kit import Assembly, PartMesh
+from stages.shape.kit import Assembly, Kit, PartMesh
 from stages.shape.shape import Shape
 
-__all__ = ["NO_CONTACTS", "box_shape", "box_shapes", "dataset_shapes", "model_shapes", "shared_meshes", "split_shapes"]
+__all__ = [
+    "NO_CONTACTS",
+    "box_shape",
+    "box_shapes",
+    "dataset_shapes",
+    "model_kits",
+    "model_shapes",
+    "shared_meshes",
+    "split_shapes",
+]
 
 NO_CONTACTS = np.empty((0, 2), dtype=np.int32)
 QUADS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -62,12 +71,17 @@ def split_shapes(folder: Path) -> Iterator[tuple[str, str, str, Shape]]:
 
 
 def model_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:
-    """The shape in a model file, with the file's name, or its folder's where the file is just called `model`."""
+    """The shape in a model file, with the name of `model_kits`."""
+    for name, kit in model_kits(path, up):
+        yield name, Shape(kit.types, kit.exemplars[0].assembly, kit.up, kit.type_names())
+
+
+def model_kits(path: Path, up: str) -> Iterator[tuple[str, Kit]]:
+    """The kit of a model file, with the file's name, or its folder's where the file is just called `model`."""
     name = path.parent.name if path.stem == "model" else path.stem
     config = KitConfig(name="model", shapes=(ShapeFile(path=path),), up="z" if up == "z" else "y")
     config = config.decide(STRICTEST)
-    kit = observe_models(config, [read_model(path, config.parts)]).kit
-    yield name, Shape(kit.types, kit.exemplars[0].assembly, kit.up, kit.type_names())
+    yield name, observe_models(config, [read_model(path, config.parts)]).kit
 
 
 def box_shapes(path: Path, up: str) -> Iterator[tuple[str, Shape]]:

@@ -1,4 +1,5 @@
-"""`python -m eval decomposition a.glb`: are parts found again that were merged to one mesh? (symmetry)"""
+"""`python -m eval decomposition a.glb`: are parts found again that were merged to one mesh, and what may be exchanged?
+(symmetry)"""
 
 from __future__ import annotations
 
@@ -26,16 +27,20 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 
 def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
     from eval.decomposition import decomposition_table
-    from eval.shapes import model_shapes
+    from eval.grammar_returned import grammar_table
+    from eval.shapes import model_kits
+    from stages.shape.shape import kit_shape
 
     for path in paths:
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")
-    return Answer([decomposition_table((each for path in paths for each in model_shapes(path, "y")), asked.cuts)])
+    kits = [each for path in paths for each in model_kits(path, "y")]
+    shapes = [(name, kit_shape(kit, kit.exemplars[0].assembly)) for name, kit in kits]
+    return Answer([decomposition_table(shapes, asked.cuts), grammar_table(kits)])
 
 
 TABLE = Evaluation(
-    question="Are parts found again that were merged to one mesh?",
+    question="Are parts found again that were merged to one mesh, and what may be exchanged?",
     needs=(Need("model files", lambda subject: f"it takes {FILES}"),),  # a minute or two each: no part of `all`
     seconds=lambda subject: 120.0,
     answer=_answer,

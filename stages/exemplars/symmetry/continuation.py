@@ -6,14 +6,17 @@ import numpy as np
 
 from stages.exemplars.symmetry.docking import regions_of
 from stages.exemplars.symmetry.matching import cells_within, matched_items
-from stages.exemplars.symmetry.places import among, items_in, items_moved_into
+from stages.exemplars.symmetry.places import among, items_in
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.pose import invert, transform_points
 
 __all__ = ["carries_corners", "corner_cells", "parted_at"]
 
 BAND = 3.0
 """Cells around a site that tell its sides apart: all that is r-symmetric around it, but for what rounding takes."""
+REACH = 1.5
+"""Cells are beside a site that was moved if their middles are so near to cells beside it; unit: cells."""
 HELD = 0.05
 """Least share of what holds the surface of a corner in place, of the direction in which that is most, in any other."""
 CORNERS = 3
@@ -22,9 +25,11 @@ CORNERS = 3
 
 def corner_cells(grid: SurfaceGrid) -> IntArray:
     """The cells whose surface no shift takes along itself, int32 ascending: a plane holds it along its normal, a line
-    across itself."""
+    across itself. What may be missing holds nothing."""
     held = grid.directions[:, :, None] * grid.directions[:, None, :]
     held[grid.is_line] = np.eye(3) - held[grid.is_line]
+    if grid.weak is not None:
+        held[grid.weak] = 0.0
     values = np.linalg.eigvalsh(np.add.reduceat(held, grid.starts[:-1], axis=0))
     return np.flatnonzero(values[:, 0] > HELD * values[:, 2]).astype(np.int32)
 
@@ -43,11 +48,14 @@ def parted_at(grid: SurfaceGrid, cells: IntArray, border: IntArray, motion: Floa
     cells, border: of a docker and around it, int32 ascending; around the border the surface must be r-symmetric under
     the motion. The two sides of the site are moved; what hangs together with the side of the docker is the new one.
     """
+    from scipy.spatial import KDTree
+
     band = cells_within(grid, border, BAND)
-    moved = grid.item_cell[items_moved_into(grid, band, motion)]
-    moved_within = grid.item_cell[items_moved_into(grid, band[among(cells, band)], motion)]
-    count, count_within = (np.bincount(each, minlength=len(grid)) for each in (moved, moved_within))
-    within, beyond = 2 * count_within > count, (count > 0) & (2 * count_within <= count)
+    inside = among(cells, band)
+    middles = grid.origin + (grid.cells + 0.5) * grid.size
+    back = (transform_points(invert(motion), middles) - grid.origin) / grid.size - 0.5
+    _, nearest = KDTree(grid.cells[band]).query(back, distance_upper_bound=REACH)
+    within, beyond = np.r_[inside, False][nearest], np.r_[~inside, False][nearest]
     docker = within.copy()
     for region in regions_of(grid, ~(within | beyond)):
         around = grid.neighbours[region]

@@ -27,12 +27,7 @@ from stages.grammars.editing import edited, options_of
 from stages.grammars.extraction import Extraction
 from stages.grammars.files import load_grammar, write_grammar
 from stages.grammars.grammar import ShapeGrammar
-from tests.stages.exemplars.symmetry.planted import wall
-
-
-def area(triangles: np.ndarray) -> float:
-    ways = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return float(np.linalg.norm(ways, axis=1).sum() / 2)
+from tests.stages.exemplars.symmetry.planted import area, wall
 
 
 def original(grammar: ShapeGrammar, start: int) -> Derivation:

@@ -75,6 +75,19 @@ def moved(triangles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     return turned
 
 
+def area(triangles: np.ndarray) -> float:
+    """Of triangles (f, 3, 3)."""
+    ways = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return float(np.linalg.norm(ways, axis=1).sum() / 2)
+
+
+def shift(*by: float) -> np.ndarray:
+    """A shift as a motion (4, 4)."""
+    pose = np.eye(4)
+    pose[:3, 3] = by
+    return pose
+
+
 def screw(angle: float, rise: float) -> np.ndarray:
     """A turn about z by `angle` radians with a rise along it."""
     c, s = np.cos(angle), np.sin(angle)

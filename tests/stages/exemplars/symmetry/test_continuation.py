@@ -5,32 +5,30 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from stages.exemplars.symmetry.cloud import Cloud, cloud_grid
 from stages.exemplars.symmetry.continuation import carries_corners, corner_cells, parted_at
 from stages.exemplars.symmetry.grids import crossing, rows_of
 from stages.exemplars.symmetry.motions import candidate_motions
 from stages.exemplars.symmetry.productions import seams_of
 from stages.exemplars.symmetry.sites import beside, dockers_of
-from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
-from tests.stages.exemplars.symmetry.planted import box, wall
+from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SurfaceGrid, surface_grid
+from tests.stages.exemplars.symmetry.planted import area, box, shift, wall
+from tests.stages.exemplars.symmetry.scanned import scanned
 
 SHARE = 0.03
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def shift(*by: float) -> np.ndarray:
-    pose = np.eye(4)
-    pose[:3, 3] = by
-    return pose
-
-
-def area(triangles: np.ndarray) -> float:
-    ways = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return float(np.linalg.norm(ways, axis=1).sum() / 2)
-
-
-def cut_at(grid: SurfaceGrid, height: float) -> np.ndarray:
+def cut_at(grid: SurfaceGrid, across: float) -> np.ndarray:
     """The cells whose x is larger."""
-    return np.flatnonzero(grid.origin[0] + grid.size * (grid.cells[:, 0] + 0.5) > height).astype(np.int32)
+    return np.flatnonzero(grid.origin[0] + grid.size * (grid.cells[:, 0] + 0.5) > across).astype(np.int32)
+
+
+def scan_grid(triangles: np.ndarray, share: float, points: int) -> SurfaceGrid:
+    """The grid of a scan with noise of a fifth of a cell and eight holes."""
+    cell = share / CELLS_A_RADIUS * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    at, _ = scanned(triangles, points, 0.2 * cell, 8, 1.5 * cell, np.random.default_rng(0))
+    return cloud_grid(Cloud(at, np.full((points, 3), 160, np.uint8)), share).grid
 
 
 def has_ends(areas: list[float], period: float, count: int, ends: int) -> bool:
@@ -80,6 +78,13 @@ class TestSites:
         most = len(np.setxor1d(after, cut_at(grid, 1.6)))
         assert most <= len(beside(grid, cells)), "but for the cells along the cut"
 
+    def test_holes_of_a_scan_beside_the_site_do_not_let_its_sides_run_together(self) -> None:
+        grid = scan_grid(wall(3), 0.05, 40_000)
+        cells = cut_at(grid, 2.6)
+        after = parted_at(grid, cells, beside(grid, cells), shift(-1, 0, 0))
+        assert after is not None
+        assert len(np.setxor1d(after, cut_at(grid, 1.6))) <= len(beside(grid, cells))
+
     def test_a_site_that_parts_nothing_where_it_is_taken_has_no_docker_there(self) -> None:
         """A bar cut across, taken to where the bar is a ring: its other way round goes around the cut."""
         bar = box((-4.0, 0.0, 0.0), (-1.0, 0.2, 0.2))
@@ -107,3 +112,9 @@ class TestSites:
         corners = corner_cells(grid)
         assert carries_corners(grid, corners, shift(2, 0, 0))
         assert not carries_corners(grid, corners, shift(3, 0, 0))
+
+    def test_what_may_be_missing_of_a_scan_makes_no_corners(self) -> None:
+        grid = scan_grid(wall(4, 3), SHARE, 250_000)
+        corners = corner_cells(grid)
+        assert carries_corners(grid, corners, shift(3, 0, 0))
+        assert not carries_corners(grid, corners, shift(4, 0, 0))

@@ -14,15 +14,19 @@ from stages.exemplars.symmetry.productions import seams_of
 from stages.exemplars.symmetry.seams import cut_out
 from stages.exemplars.symmetry.sites import dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
-from tests.stages.exemplars.symmetry.planted import blocks, box, moved, prongs_and_bridge, screw, spiral_stair, wall
+from tests.stages.exemplars.symmetry.planted import (
+    area,
+    blocks,
+    box,
+    moved,
+    prongs_and_bridge,
+    screw,
+    shift,
+    spiral_stair,
+    wall,
+)
 
 SHARE = 0.03
-
-
-def shift(*by: float) -> np.ndarray:
-    pose = np.eye(4)
-    pose[:3, 3] = by
-    return pose
 
 
 def sites_of(grid: SurfaceGrid, motion: np.ndarray) -> list[DockingSite]:
@@ -188,11 +192,6 @@ class TestDockingSites:
         top = around[z[around] > 1 - grid.size]
         inner = top[np.abs(grid.cells[top, 1] - np.median(grid.cells[top, 1])) < 5]
         assert (slippable_motions(grid, around), slippable_motions(grid, inner)) == (1, 3)
-
-
-def area(triangles: np.ndarray) -> float:
-    ways = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return float(np.linalg.norm(ways, axis=1).sum() / 2)
 
 
 def period_area() -> float:

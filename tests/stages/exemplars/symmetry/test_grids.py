@@ -13,7 +13,7 @@ from stages.exemplars.symmetry.productions import Production, productions, seams
 from stages.exemplars.symmetry.sites import Docker, beside, dockers_of
 from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from stages.shape.geometry.pose import transform_points
-from tests.stages.exemplars.symmetry.planted import screw, spiral_stair, wall
+from tests.stages.exemplars.symmetry.planted import area, screw, spiral_stair, wall
 
 SHARE = 0.03
 
@@ -44,11 +44,6 @@ class Planted:
     def similar(self, triangles: np.ndarray) -> float:
         rng = np.random.default_rng(0)
         return r_similarity(self.triangles, triangles, self.grid.radius, 80, rng).share
-
-
-def area(triangles: np.ndarray) -> float:
-    ways = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return float(np.linalg.norm(ways, axis=1).sum() / 2)
 
 
 @pytest.fixture(scope="module")
