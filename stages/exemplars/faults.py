@@ -112,7 +112,9 @@ def _faults(kit: Kit, assembly: Assembly, meshes: Sequence[Any], names: Sequence
     for i, j in sorted(stored - found - doubtful):
         faults.append(f"{names[i]} and {names[j]} are recorded as neighbours and do not touch")
     for i, j in sorted(found - stored):
-        if contact.kind(int(types[i]), int(types[j]), invert(poses[i]) @ poses[j]) in kit.contact_kinds:
+        # what is a short line seen from one part and a point from the other is too near to either to say
+        a, b, pose = int(types[i]), int(types[j]), invert(poses[i]) @ poses[j]
+        if {contact.kind(a, b, pose), contact.kind(b, a, invert(pose))} <= set(kit.contact_kinds):
             faults.append(f"{names[i]} and {names[j]} touch and are not recorded as neighbours")
     faults.extend(_grammar_faults(kit, assembly, names))
     faults.extend(_penetration_faults(kit, assembly, shape, boxes, pairs, names))

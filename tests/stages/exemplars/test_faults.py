@@ -10,6 +10,8 @@ import pytest
 from stages.exemplars.faults import assembly_faults, geometry_faults
 from stages.package.glb import glb_bytes
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
+from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from tests.stages.variations.toy import ROAD, kit_of, ring
@@ -41,6 +43,27 @@ def test_a_contact_that_is_not_recorded_is_named(kit: Kit) -> None:
     first, second = (kit_shape(kit, whole).part_names[each] for each in whole.edges[0])
     assert any(f"{first} and {second} touch and are not recorded" in each for each in found)
     assert any("neighbourhood that the grammar does not admit" in each for each in found)
+
+
+def test_a_contact_that_counts_as_seen_from_one_part_alone_may_be_recorded_or_not() -> None:
+    """An edge rests on another at a slant: the one has a short line near the other, that no more than a point."""
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)], kinds=("line", "face"))
+    corner = kit.type_names().index("corner")
+    aslant = np.array(
+        [
+            [0.73086204, 0.54207241, -0.41472664, -0.0263769],
+            [-0.6825204, 0.58274381, -0.4411072, -0.10801633],
+            [0.00256733, 0.6054479, 0.7958808, 0.96171885],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+    contact = ContactTest(kit.types, kit.contact_tolerance)
+    assert contact.kind(corner, corner, aslant) == "line"
+    assert contact.kind(corner, corner, invert(aslant)) == "point"
+    types, poses = np.array([corner, corner], dtype=np.int16), np.stack([np.eye(4), aslant])
+    for placed in (poses, poses[::-1]):
+        found = assembly_faults(kit, Assembly(types, placed, np.empty((0, 2), dtype=np.int32)))
+        assert not any("touch and are not recorded" in each for each in found)
 
 
 def test_a_recorded_contact_that_is_none_is_named(kit: Kit) -> None:
