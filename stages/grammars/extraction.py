@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid, with_ar
 from stages.exemplars.symmetry.terminals import Terminal, alone
 from stages.exemplars.symmetry.welding import welded
 from stages.grammars.grammar import GridRule, Rule, ShapeGrammar, site_name
-from stages.grammars.meshes import TerminalMeshes, part_around_middle
+from stages.grammars.meshes import TerminalMeshes, part_around
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
@@ -132,17 +132,17 @@ def extract(
         grid_rules.append(GridRule(f"G{number}", one.motions, one.counts, one.sites, one.frames, tuple(cut)))
     colors = surface.colors[grid.faces]
     meshes = TerminalMeshes(grid.corners, pieces, colors, terminals, WELDED * grid.size)
-    middle, whole = part_around_middle("exemplar", *welded(grid.corners, 0.0), colors)
+    faces, vertices = welded(grid.corners, 0.0)
     grammar = ShapeGrammar(
         name=name,
         up=up,
         radius=grid.radius,
         meshes=meshes,
-        middles=meshes.middles(),
+        middles=meshes.middles,
         rules=tuple(rules),
         grids=tuple(grid_rules),
         seams={site: grid.origin + (grid.cells[each.band] + 0.5) * grid.size for site, each in seams.items()},
-        exemplar=replace(whole, vertices=whole.vertices + middle),
+        exemplar=part_around(np.zeros(3), "exemplar", faces, vertices, colors),
         splats=grid.splats,
     )
     return Extraction(grammar, grid, len(motions), dockers, seams, rows, seconds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import overload
 
 import numpy as np
@@ -13,7 +14,7 @@ from stages.exemplars.symmetry.welding import WeldedSurface
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.kit import PartMesh
 
-__all__ = ["TerminalMeshes", "part_around_middle"]
+__all__ = ["TerminalMeshes", "part_around"]
 
 
 class TerminalMeshes(Sequence[PartMesh]):
@@ -45,26 +46,25 @@ class TerminalMeshes(Sequence[PartMesh]):
     def __getitem__(self, place: int | slice) -> PartMesh | Sequence[PartMesh]:
         if isinstance(place, slice):
             return [self[each] for each in range(*place.indices(len(self)))]
-        return self._made(place)[1]
-
-    def middles(self) -> FloatArray:
-        """Where the middle of each is in the exemplar, float64 (m, 3)."""
-        return np.array([self._made(place)[0] for place in range(len(self))]).reshape(-1, 3)
-
-    def _made(self, place: int) -> tuple[FloatArray, PartMesh]:
         name, terminal = self._terminals[place]
         whole, pieces = terminal.whole.places, self._first + terminal.pieces
         faces, vertices = self._surface.around(whole, terminal.cut.corners, pieces)
         colors = self._colors[np.concatenate([whole, terminal.cut.faces, self._faces[pieces]])]
-        return part_around_middle(name, faces, vertices, colors)
+        return part_around(self.middles[place], name, faces, vertices, colors)
+
+    @cached_property
+    def middles(self) -> FloatArray:
+        """Where the middle of each is in the exemplar, float64 (m, 3)."""
+        boxes = [
+            self._surface.box(each.whole.places, each.cut.corners, self._first + each.pieces)
+            for _, each in self._terminals
+        ]
+        found: FloatArray = np.array(boxes).reshape(-1, 2, 3).mean(axis=1)
+        return found
 
 
-def part_around_middle(
-    name: str, faces: IntArray, vertices: FloatArray, colors: ByteArray
-) -> tuple[FloatArray, PartMesh]:
-    """Where the middle of a mesh's box is, float64 (3,), and the mesh around it, without triangles that have fewer than
-    three vertices."""
-    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+def part_around(middle: FloatArray, name: str, faces: IntArray, vertices: FloatArray, colors: ByteArray) -> PartMesh:
+    """A mesh with its origin at `middle` (3,), without triangles that have fewer than three vertices."""
     one, two, three = faces.T
     real = (one != two) & (two != three) & (three != one)
-    return middle, PartMesh(name, vertices - middle, faces[real], colors[real])
+    return PartMesh(name, vertices - middle, faces[real], colors[real])

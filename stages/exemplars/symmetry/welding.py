@@ -55,6 +55,14 @@ class WeldedSurface:
         found[own], found[~own] = self._points[source[own]], vertices[-1 - source[~own]]
         return faces, found
 
+    def box(self, first: IntArray, others: FloatArray, last: IntArray) -> FloatArray:
+        """Lowest and highest corner of the box around the same triangles, float64 (2, 3)."""
+        found = np.array([np.full(3, np.inf), np.full(3, -np.inf)])
+        for chosen in (first, last):
+            _stretch(self._points, chosen, found)
+        _stretch(others.reshape(-1, 3), np.arange(len(others), dtype=np.int32), found)
+        return found
+
 
 @dataclass(frozen=True)
 class Sides:
@@ -154,6 +162,15 @@ def _merged(places, rows, first, others, other_rows, last):
             faces[n, k] = number[places[triangle, k]]
         n += 1
     return faces, source[:total].copy()
+
+
+@numba.njit(cache=True)
+def _stretch(points, chosen, box):
+    """Make a box (2, 3) hold the triangles at some places, three of `points` (3 f, 3) each."""
+    for triangle in chosen:
+        for corner in range(3 * triangle, 3 * triangle + 3):
+            for d in range(3):
+                box[0, d], box[1, d] = min(box[0, d], points[corner, d]), max(box[1, d], points[corner, d])
 
 
 @numba.njit(cache=True)
