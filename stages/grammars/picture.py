@@ -104,19 +104,20 @@ def _sites(found: Extraction) -> list[tuple[Soup, tuple[int, int, int]]]:
 def _editing(found: Extraction) -> Iterator[list[Cell]]:
     """For the site of each class at which sizes differ most what is there, and what may be."""
     options = options_of(found)
-    best: dict[int, tuple[float, int]] = {}
-    for place, own in options.items():
+
+    def most(place: int) -> float:
+        return max(abs(found.dockers[each.other].area - found.dockers[place].area) for each in options[place])
+
+    best: dict[int, int] = {}
+    for place in sorted(options, key=lambda each: (-most(each), each)):
+        best.setdefault(found.dockers[place].site, place)
+    for site, place in list(best.items())[:SITES]:
         docker = found.dockers[place]
-        most = max(abs(found.dockers[each.other].area - docker.area) for each in own)
-        best[docker.site] = max(best.get(docker.site, (-1.0, 0)), (most, -place))
-    ranked = sorted(best.items(), key=lambda each: (-each[1][0], each[0]))
-    for site, (_, place) in ranked[:SITES]:
-        docker = found.dockers[-place]
         inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
         camera = _facing(inside, found.grammar.up)
         caption = f"{site_name(site)}: {docker.area:.0%} of it"
         cells = [_cell(found, [(outside, STAYS), (inside, GOES)], caption, camera)]
-        chosen = sorted(options[-place], key=lambda each: -abs(found.dockers[each.other].area - docker.area))
+        chosen = sorted(options[place], key=lambda each: -abs(found.dockers[each.other].area - docker.area))
         cells += [_option(found, each, camera) for each in chosen[:OPTIONS]]
         yield cells
 
