@@ -27,8 +27,6 @@ from pipeline.config import nearest
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
 
-__all__ = ["main"]
-
 ALL = "all"
 REPORT = "report.html"
 

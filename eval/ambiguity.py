@@ -17,8 +17,6 @@ from stages.strings.kit_strings import KitStrings
 from stages.synthesis.instantiation.instantiate import Instantiator
 from stages.synthesis.instantiation.layout import STANDARD
 
-__all__ = ["Ambiguity", "ambiguity", "ambiguity_table"]
-
 NOTES = (
     "The graph of each shape, from its canonical string, is put together anew several times by chance, and each valid "
     "shape that comes out is read along the same string. Shapes: different ones of a graph, in the mean. Tokens, open: "

@@ -23,11 +23,6 @@ from stages.strings.encoder import Encoded, NotConnectedError
 from stages.strings.kit_strings import KitStrings
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
 
-__all__ = [
-    "PUBLISHED", "Judged", "Shares", "categories_table", "category_models", "clusters_table", "judge", "made_shapes",
-    "read_back",
-]  # fmt: skip
-
 PUBLISHED = (Published("validation samples", "strings, §6", {"tokens %": 90.0}),)
 
 NOTES = (

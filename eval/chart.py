@@ -8,8 +8,6 @@ from html import escape
 
 from eval.evaluation import Curve
 
-__all__ = ["COLORS", "chart_svg", "ticks"]
-
 COLORS = 8
 """So many lines have colours of their own, the classes `line0`, `line1` and so on; then they begin again."""
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["MATCHED", "cloud_similarity"]
-
 MATCHED = 0.95
 """A neighbourhood is matched if this share of its points, and of those that it lies on, have one of the other near."""
 ANCHORS = 5.0

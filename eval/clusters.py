@@ -13,8 +13,6 @@ from stages.shape.geometry.pose import pose_vectors, relative_poses
 from stages.shape.kit import Assembly, Kit
 from stages.strings.categories import CategorySpace
 
-__all__ = ["Clusters", "clusters_of", "mean_shift"]
-
 BANDWIDTH = 4.0
 """Radius of the flat kernel, in tolerances of poses: places of a kit are further apart, and noise is less."""
 MOST_SHIFTS = 100

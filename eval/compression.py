@@ -16,8 +16,6 @@ from stages.strings.compression import Codebook, describe, pack, restore, unpack
 from stages.strings.encoder import Encoded
 from stages.strings.settings import Edges
 
-__all__ = ["COLUMNS", "Stored", "Trip", "compression_row", "compression_table", "round_trip"]
-
 COLUMNS = (
     "shapes of",
     "strings tell of",

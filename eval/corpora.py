@@ -14,8 +14,6 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import Edges
 from stages.strings.statistics import measure_string
 
-__all__ = ["COLUMNS", "PUBLISHED", "corpora_table", "corpus_row"]
-
 COLUMNS = (
     "shapes of",
     "strings tell of",

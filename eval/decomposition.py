@@ -23,8 +23,6 @@ from stages.shape.arrays import IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
-__all__ = ["Returned", "decomposition_table", "merged", "points_of_parts", "rand_index", "returned", "scene_of_parts"]
-
 POINTS = 8192
 """Points of the surface by which parts are compared."""
 COVERED = 1e-3

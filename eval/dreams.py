@@ -23,8 +23,6 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.kit import Assembly, Kit
 from stages.variations.copied import CopyTest
 
-__all__ = ["COLUMNS", "Dream", "dream_row", "dreams_table", "finished_shapes"]
-
 COLUMNS = (
     "shapes of",
     "shapes",

@@ -10,8 +10,6 @@ from pathlib import Path
 from eval.subject import Subject
 from eval.table import Table
 
-__all__ = ["Answer", "Curve", "Evaluation", "Need", "Sheet", "Strip"]
-
 
 @dataclass(frozen=True)
 class Curve:

@@ -14,8 +14,6 @@ from stages.variations.substructures.motions import find_moves
 from stages.variations.substructures.moves import Moves
 from stages.variations.substructures.sites import contact_graph
 
-__all__ = ["LARGEST", "Exchange", "known_exchanges"]
-
 LARGEST = 0.5
 """Share of the surface that a piece has at most: to exchange more is to exchange the rest."""
 TRIED = 4096

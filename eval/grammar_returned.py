@@ -25,8 +25,6 @@ from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import Kit
 from stages.shape.shape import Shape, kit_shape
 
-__all__ = ["GrammarReturned", "grammar_returned", "grammar_table"]
-
 RADIUS = 0.016
 """Radius of similarity, as a share of the longest side of the box (symmetry §5)."""
 SAME = 0.8

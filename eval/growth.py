@@ -18,8 +18,6 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import StringsConfig
 from stages.variations.pool import FoundVariants
 
-__all__ = ["Find", "Grown", "Size", "generation_table", "grown", "growth_table", "read_finds", "sizes_by"]
-
 NOTES = (
     "Shapes, distinct graphs and strings after each iteration: a round of the search, with parents from what "
     "earlier rounds have found, and from its own. Strings: as many of each distinct graph as the config asks for. "

@@ -28,20 +28,6 @@ from stages.training.edge_categories.trained import TrainedEdgeCategories, load_
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import VariationsConfig
 
-__all__ = [
-    "DRAWS",
-    "METHODS",
-    "Attempt",
-    "attempts",
-    "distinct_graphs",
-    "dream_rng",
-    "edge_categories",
-    "guides_of",
-    "instantiator_of",
-    "methods_table",
-    "outcome_table",
-]
-
 DRAWS = 4
 """So many strings are drawn from a model for each graph that is wanted of it."""
 

@@ -20,8 +20,6 @@ from stages.training.string_vae.sampling import linear_points, path_points
 from stages.training.string_vae.structuring import interpolation, search_graph
 from stages.training.string_vae.trained import TrainedStringVae
 
-__all__ = ["journey_strips", "journeys"]
-
 STOPS = 8
 """Segments of a way along a line or a path; a power of two."""
 

@@ -14,8 +14,6 @@ from eval.table import Cell
 from pipeline.errors import ConfigError
 from stages.training.checkpoint import CheckpointError, weights_header, weights_of_kind
 
-__all__ = ["Trained", "by_group", "over_seeds", "trained_models", "training_curve"]
-
 Model = TypeVar("Model")
 Figures = TypeVar("Figures")
 

@@ -21,18 +21,6 @@ from pipeline.randomness import decision_rng
 from stages.points.area_sampling import sample_shape
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = [
-    "TWIN",
-    "Clouds",
-    "Nearest",
-    "cloud_distance",
-    "dataset_clouds",
-    "near_twins",
-    "near_twins_table",
-    "nearest_by_split",
-    "nearest_in_train",
-]
-
 Clouds = Mapping[tuple[str, str], Sequence[tuple[FloatArray, FloatArray]]]
 """By kit and split two independent clouds, float (n, 3), y up, of each shape."""
 

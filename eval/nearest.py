@@ -10,8 +10,6 @@ import numpy as np
 from stages.shapeassembly.program import Program
 from stages.shapeassembly.structure import token_distance, tokens
 
-__all__ = ["nearest", "nearest_and_which", "nearest_programs", "paired"]
-
 CELLS = 24
 """Cells along each axis of the grid that bounds of distances are looked up in."""
 

@@ -7,20 +7,6 @@ from eval.subject import Subject
 from stages.shape.collection.declared import language_of, producers
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = [
-    "CORPUS",
-    "CURVE_PROGRAM",
-    "EDGE_CATEGORIES",
-    "EXEMPLARS",
-    "FINISHED",
-    "KITS",
-    "PROGRAMS",
-    "PROGRAM_WRITERS",
-    "RECOVERY",
-    "SEARCH",
-    "STRING_VAE",
-]
-
 
 def _finished(subject: Subject) -> str:
     return "" if subject.manifest else f"no finished dataset in {subject.folder}; make dataset"

@@ -25,8 +25,6 @@ from stages.training.recovery.shapes import TRAIN, random_shapes
 from stages.training.recovery.surface import even_points
 from stages.training.standing import drawn as drawn_points
 
-__all__ = ["PartSurfaces", "curve_parts", "surface_of", "surfaces_sheet", "trained_surfaces"]
-
 POINTS = 256
 """Points of a part."""
 

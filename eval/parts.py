@@ -22,8 +22,6 @@ from pipeline.places import file_digest, write_file
 from pipeline.shards import json_bytes
 from stages.package.made_with import library_versions
 
-__all__ = ["Part", "in_parts", "joined"]
-
 Said = TypeVar("Said")
 
 

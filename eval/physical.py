@@ -13,8 +13,6 @@ from stages.shape.physics.judge import Judge, Validity
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
 
-__all__ = ["PUBLISHED", "PUSH", "Judged", "judge_all", "judged_by_name", "physical_table", "stays_up"]
-
 COLUMNS = (
     "shapes of",
     "shapes",

@@ -8,8 +8,6 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.shape import Shape
 from stages.shape.views.picture import ABOVE
 
-__all__ = ["SIZE", "cloud_picture", "cloud_portrait", "shape_picture", "shape_portrait"]
-
 SIZE = (264, 264)
 
 

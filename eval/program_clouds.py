@@ -30,8 +30,6 @@ from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.standing import Points
 
-__all__ = ["FITS", "Encoder", "Rebuilt", "clouds_table", "described", "f_score", "reconstructions", "trained_encoder"]
-
 NEAR = 0.02
 """Points agree that are no further apart, as a share of the diagonal of the target, as in `extraction.distance`."""
 

@@ -26,8 +26,6 @@ from stages.shapeassembly.structure import signature
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 
-__all__ = ["beside_sheet", "drawn", "edits_sheet", "journey_sheet", "neighbours", "neighbours_table", "sheet_of"]
-
 WIDTH = 200
 """Of a picture on a sheet; unit: pixels."""
 

@@ -25,8 +25,6 @@ from stages.training.program_lm.trained import load_program_lm
 from stages.training.program_vae.lines import node_lines
 from stages.training.program_vae.trained import load_program_vae
 
-__all__ = ["PROGRAM_KINDS", "category_programs", "program_models", "program_shards", "read_by_all", "told_without"]
-
 PROGRAM_KINDS = ("program_vae", "program_lm")
 """The kinds that write whole programs; the others write cuboids."""
 

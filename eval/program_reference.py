@@ -15,8 +15,6 @@ from eval.subject import Subject
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.program import Program
 
-__all__ = ["Reference", "read_reference"]
-
 
 @dataclass(frozen=True)
 class Reference:

@@ -10,8 +10,6 @@ from eval.table import Cell, Published, Table
 from stages.shapeassembly.program import Program
 from stages.shapeassembly.statistics import program_statistics
 
-__all__ = ["editability_table", "quality_table", "smoothness_table", "variability_table"]
-
 _CATEGORIES = ("chair", "table", "storage")
 _METHODS = ("3D-PRNN", "StructureNet", "ShapeAssembly", "validation")
 _ABLATED = (*_METHODS[:2], "flat", "no order", "no align", "no macros", "no reject", *_METHODS[2:])

@@ -27,20 +27,6 @@ from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.standing import Points
 
-__all__ = [
-    "POINTS",
-    "Physics",
-    "Variability",
-    "boxes_of_programs",
-    "clouds_of",
-    "novelty",
-    "physics_of",
-    "shape_of_boxes",
-    "smoothness",
-    "unrejected",
-    "variability",
-]
-
 POINTS = 256
 """Points of a shape's surface that Chamfer distances are measured with."""
 

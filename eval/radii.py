@@ -16,8 +16,6 @@ from stages.grammars.settings import GrammarConfig
 from stages.grammars.variety import some_shapes
 from stages.shape.views.sheet import Section, contact_sheet, picture_png
 
-__all__ = ["extractions", "radii_sheet", "radii_table"]
-
 DOCKERS = 3
 """So many dockers are shown of each radius."""
 SHAPES = 2

@@ -16,8 +16,6 @@ from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of, taken
 from stages.training.recovery.recover import SHIPPED, find_models
 
-__all__ = ["FEATURES", "POINTS", "Realism", "features_of", "fooled", "frechet_distance", "realism"]
-
 FEATURES = ("chair", "points")
 """The frozen network whose features are compared is the encoder of the recovery model of this program and input that
 comes with Shapemill: it was trained on curve chairs, and on none of the shapes that are compared."""

@@ -26,22 +26,6 @@ from stages.training.recovery.shapes import TEST, TRAIN, RandomShape, random_sha
 from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
 from stages.training.recovery.trained import TrainedRecovery
 
-__all__ = [
-    "PUBLISHED",
-    "Found",
-    "accuracy_chart",
-    "alike",
-    "baselines_table",
-    "floor",
-    "held_out",
-    "methods",
-    "parameters_table",
-    "published_chamfer",
-    "recovery_table",
-    "tried",
-    "usable_models",
-]
-
 MEASURED = 10_000
 """Points that Chamfer distances are measured with."""
 GIVEN = 2048

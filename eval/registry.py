@@ -7,8 +7,6 @@ from pkgutil import iter_modules
 
 from eval.evaluation import Evaluation
 
-__all__ = ["find_tables"]
-
 
 def find_tables(package: str = "eval.tables") -> dict[str, Evaluation]:
     """The `TABLE` of each `eval/tables/<name>.py`, by name. Raises TypeError for a module without it."""

@@ -27,8 +27,6 @@ from eval.table import cell_text
 from stages.package.made_with import code_version, library_versions
 from stages.package.manifest import config_sections
 
-__all__ = ["Made", "report_html"]
-
 TEMPLATE = Path(__file__).with_suffix(".html")
 
 

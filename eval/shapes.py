@@ -20,17 +20,6 @@ from stages.shape.collection.pairs import CONTACTS, pairs_of
 from stages.shape.kit import Assembly, Kit, PartMesh
 from stages.shape.shape import Shape
 
-__all__ = [
-    "NO_CONTACTS",
-    "box_shape",
-    "box_shapes",
-    "dataset_shapes",
-    "model_kits",
-    "model_shapes",
-    "shared_meshes",
-    "split_shapes",
-]
-
 NO_CONTACTS = np.empty((0, 2), dtype=np.int32)
 QUADS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 BOX_FACES = np.array([face for a, b, c, d in QUADS for face in ((a, b, c), (a, c, d))], dtype=np.int32)

@@ -17,8 +17,6 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
-__all__ = ["COLUMNS", "Similarity", "apart", "r_similarity", "similarity_row", "similarity_table", "triangles_of"]
-
 COLUMNS = ("shapes of", "exemplars", "shapes", "radius", "similar %", "probes", "matched %", "worst", "motions")
 
 NOTES = (

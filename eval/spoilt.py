@@ -20,17 +20,6 @@ from stages.training.recovery.shapes import RandomShape
 from stages.training.recovery.surface import sampled_points
 from stages.training.recovery.trained import TrainedRecovery
 
-__all__ = [
-    "SPOILS",
-    "WAYS",
-    "foreign_inputs",
-    "foreign_rows",
-    "foreign_table",
-    "spoilt_inputs",
-    "spoilt_table",
-    "ways_to_spoil",
-]
-
 WAYS = ("network", "network, refined")
 
 

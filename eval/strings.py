@@ -20,22 +20,6 @@ from stages.training.string_vae.sampling import TEMPERATURE, sample
 from stages.training.string_vae.structuring import PathFigures, naive_graph, path_figures, search_graph
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 
-__all__ = [
-    "PUBLISHED",
-    "Reconstruction",
-    "Sampling",
-    "corpus_strings",
-    "model_rng",
-    "reconstruction",
-    "reconstruction_table",
-    "sampling",
-    "sampling_table",
-    "shape_graphs",
-    "string_vaes",
-    "structure",
-    "structure_table",
-]
-
 NODES = 1000
 """Nodes of the graphs of latent points (strings Table 2)."""
 

@@ -14,8 +14,6 @@ from pipeline.places import Places
 from pipeline.registry import find_stages
 from stages.package.layout import MANIFEST
 
-__all__ = ["Subject", "load_subject"]
-
 
 @dataclass(frozen=True)
 class Subject:

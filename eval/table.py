@@ -8,8 +8,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Cell", "Published", "Table", "cell_text"]
-
 Cell = str | int | float
 
 

@@ -22,8 +22,6 @@ from typing import BinaryIO, NoReturn
 
 from pipeline.endings import die_with_parent
 
-__all__ = ["Escaped", "in_child"]
-
 PATIENCE = 10
 """A child is given up after so many times its CPU seconds by the clock, where nobody says."""
 _PIPE = 1 << 20

@@ -11,8 +11,6 @@ from pipeline.records import ShardRecord, read_record
 from pipeline.stage import Stage
 from pipeline.survey import StageSurvey, Survey
 
-__all__ = ["damaged_files", "damaged_shards", "withdraw_damaged"]
-
 
 def damaged_shards(config: Config, stages: Mapping[str, Stage], places: Places) -> Iterator[str]:
     """A line for each stage that is unfinished, for each file whose bytes differ from its record, and for each file in

@@ -26,8 +26,6 @@ from pipeline.places import Places
 from pipeline.registry import find_stages
 from pipeline.stage import Stage
 
-__all__ = ["main"]
-
 app = typer.Typer(
     name="pipeline",
     help="The mill of Shapemill.",

@@ -21,8 +21,6 @@ from pipeline.workers import Workers
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-__all__ = ["ClusterWorkers"]
-
 _ANSWERS_WITHIN = 10.0
 """Seconds that a scheduler has to answer."""
 

@@ -10,8 +10,6 @@ import time
 
 from pipeline.endings import die_with_parent, ends_in_order
 
-__all__ = ["serve"]
-
 _ENVIRONMENT = {
     # Deaths are counted by the mill, shard by shard: the scheduler's own count blames whatever a dead worker held.
     "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1000000",

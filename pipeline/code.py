@@ -23,8 +23,6 @@ from typing import Any
 
 from pipeline.shards import json_bytes
 
-__all__ = ["code_digest", "reached", "starts_of"]
-
 _DECLARATIONS = ("language",)
 """Files beside a `stage.py` that others find at run time when they read what the stage has made."""
 

@@ -18,8 +18,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pipeline.errors import ConfigError
 from pipeline.yaml_text import KeyPath, read_yaml
 
-__all__ = ["Config", "DatasetFacts", "ExistingFile", "StrictModel", "existing_file", "load_config", "nearest"]
-
 MOST_MISTAKES = 50
 """Mistakes that are told at once."""
 LONGEST_SHOWN = 200

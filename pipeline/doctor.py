@@ -22,8 +22,6 @@ from typing import Literal
 
 from pipeline.space import byte_size
 
-__all__ = ["Finding", "examine", "findings"]
-
 _HERE = Path(__file__).parent
 _LOCK = _HERE.parent / "requirements.lock"
 _LIBRARIES = _HERE / "libraries.txt"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["ConfigError", "Fatal", "Rejected", "ShardFailed"]
-
 
 class ConfigError(Exception):
     """Nothing starts: names the file and the key that are wrong, and what would be right."""

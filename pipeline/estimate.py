@@ -21,8 +21,6 @@ from pipeline.stage import Stage
 from pipeline.survey import Survey
 from pipeline.trial import Costs, costs_of, run_trial, short_config
 
-__all__ = ["plan_lines"]
-
 _HEADER = ("stage", "shards", "samples", "disk", "time")
 _TRIAL = "trial"
 

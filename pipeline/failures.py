@@ -11,8 +11,6 @@ from pipeline.records import fingerprint
 from pipeline.shards import json_bytes
 from pipeline.task import Job, Report
 
-__all__ = ["Failures"]
-
 _DEATHS_BEFORE_ALONE = 3
 
 

@@ -11,8 +11,6 @@ from pipeline.places import Places, file_digest, read_note, remove, sync_folder,
 from pipeline.shards import json_bytes
 from pipeline.survey import StageSurvey, Survey
 
-__all__ = ["finish_stage", "publish"]
-
 
 def finish_stage(survey: Survey, name: str, places: Places) -> None:
     """Close a stage whose every planned shard is done; done again, it changes nothing.

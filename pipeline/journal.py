@@ -14,8 +14,6 @@ from tqdm import tqdm
 
 from pipeline.time_left import TimeLeft
 
-__all__ = ["Journal", "Standing", "figures", "span"]
-
 _LINE_EVERY = 20.0
 """Seconds between two lines where there is no terminal."""
 

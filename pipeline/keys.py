@@ -14,8 +14,6 @@ from pydantic_core import PydanticUndefined
 from pipeline.config import DatasetFacts, StrictModel
 from pipeline.stage import Stage
 
-__all__ = ["key_tables"]
-
 
 def key_tables(stages: Mapping[str, Stage]) -> str:
     """One table for the dataset's own facts and one for each stage's section, as a Markdown page."""

@@ -15,8 +15,6 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Stage
 from pipeline.survey import StageSurvey, Survey
 
-__all__ = ["let_go"]
-
 
 def let_go(survey: Survey, stages: Mapping[str, Stage], name: str) -> int:
     """Take away the files of all shards that the finished stage `name` reads, directly or not; the bytes that this

@@ -14,8 +14,6 @@ from pathlib import Path
 from pipeline.places import StagePlaces
 from pipeline.task import Job
 
-__all__ = ["DEFAULT_PATIENCE", "Patience"]
-
 DEFAULT_PATIENCE = 60.0
 """Minutes. A shard is minutes of work at most; on a machine that is too busy, some that tell nothing take many."""
 

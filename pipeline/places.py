@@ -28,19 +28,6 @@ from typing import Any
 
 from pipeline.errors import ConfigError, Fatal
 
-__all__ = [
-    "Places",
-    "StagePlaces",
-    "file_digest",
-    "read_note",
-    "remove",
-    "stops_everything",
-    "sync_folder",
-    "temporary",
-    "write_file",
-    "write_whole",
-]
-
 _FATAL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM}
 
 

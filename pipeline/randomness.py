@@ -6,8 +6,6 @@ import hashlib
 
 import numpy as np
 
-__all__ = ["decision_rng"]
-
 
 def decision_rng(seed: int, *decision: str | int) -> np.random.Generator:
     """The random stream of one decision.

@@ -8,8 +8,6 @@ from pipeline.places import read_note
 from pipeline.records import ShardRecord
 from pipeline.survey import StageSurvey
 
-__all__ = ["reasons"]
-
 _NAMED = {
     "code": "code",
     "config": "config",

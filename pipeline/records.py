@@ -13,8 +13,6 @@ from pipeline.places import StagePlaces, read_note
 from pipeline.shards import json_bytes
 from pipeline.stage import Shard
 
-__all__ = ["ShardRecord", "fingerprint", "read_record", "recipe"]
-
 
 @dataclass(frozen=True)
 class ShardRecord:

@@ -10,8 +10,6 @@ from pathlib import Path
 
 from pipeline.stage import Stage
 
-__all__ = ["find_stages", "folders_with", "upstream"]
-
 
 def find_stages(package: str = "stages") -> dict[str, Stage]:
     """The `STAGE` of each `<package>/<name>/stage.py`, earlier stages first.

@@ -30,8 +30,6 @@ from pipeline.survey import StageSurvey, Survey
 from pipeline.task import Job, Report
 from pipeline.workers import DIED, Workers
 
-__all__ = ["RunResult", "run_stage"]
-
 _LOOK_EVERY = 0.5
 """Seconds between two looks at how far the running shards are."""
 

@@ -18,8 +18,6 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["ShardWriter", "array_bytes", "bytes_array", "json_bytes", "read_shard"]
-
 
 def json_bytes(value: Any) -> bytes:
     """`value` as one line of canonical JSON: sorted keys, no NaN, UTF-8, newline at the end."""

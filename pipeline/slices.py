@@ -11,8 +11,6 @@ from typing import BinaryIO
 from pipeline.errors import ConfigError
 from pipeline.places import StagePlaces
 
-__all__ = ["WHOLE", "Slice", "locked"]
-
 
 @dataclass(frozen=True)
 class Slice:

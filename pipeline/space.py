@@ -8,8 +8,6 @@ from pathlib import Path
 from pipeline.errors import ConfigError
 from pipeline.survey import StageSurvey
 
-__all__ = ["byte_size", "check_space"]
-
 
 def byte_size(count: float) -> str:
     """A number of bytes for people: `512 B`, `3.4 GB` (powers of 1000)."""

@@ -38,8 +38,6 @@ import numpy as np
 
 from pipeline.config import Config, StrictModel
 
-__all__ = ["Outcome", "Plan", "Shard", "Stage", "Task"]
-
 
 @dataclass(frozen=True)
 class Shard:

@@ -9,8 +9,6 @@ from pipeline.places import StagePlaces
 from pipeline.space import byte_size
 from pipeline.survey import StageSurvey
 
-__all__ = ["closing_words", "counted", "standing"]
-
 
 def standing(surveyed: StageSurvey, running: Iterable[str], failed: int) -> Standing:
     """How far the stage is while the shards `running` are made and so many have `failed`."""

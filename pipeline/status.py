@@ -13,8 +13,6 @@ from pipeline.space import byte_size
 from pipeline.stage import Stage
 from pipeline.survey import StageSurvey, Survey
 
-__all__ = ["status_lines"]
-
 _HEADER = ("stage", "done", "failed", "samples", "rejects", "time", "left", "memory", "disk")
 
 

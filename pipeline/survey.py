@@ -16,8 +16,6 @@ from pipeline.registry import upstream
 from pipeline.stage import Plan, Shard, Stage
 from pipeline.task import Job
 
-__all__ = ["StageSurvey", "Survey"]
-
 _SHARD_NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 

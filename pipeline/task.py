@@ -33,8 +33,6 @@ from pipeline.records import ShardRecord, fingerprint, read_record
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
 
-__all__ = ["Job", "Report", "make_shard"]
-
 _PROGRESS_EVERY = 0.5
 """Seconds between two notes on how far a shard is."""
 

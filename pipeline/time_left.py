@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["TimeLeft"]
-
 _LEAST_SECONDS, _ENOUGH_SECONDS = 5.0, 60.0
 _LEAST_SHARE = 0.02
 _CALM = 10.0

@@ -13,8 +13,6 @@ from pipeline.survey import StageSurvey, Survey
 from pipeline.task import Job
 from pipeline.workers import Workers
 
-__all__ = ["Costs", "costs_of", "run_trial", "short_config"]
-
 _SHARDS = 4
 """So many shards of samples are made, evenly spread over the plan."""
 

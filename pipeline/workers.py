@@ -22,8 +22,6 @@ from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoo
 from pipeline.endings import die_with_parent
 from pipeline.task import Job, Report, make_shard
 
-__all__ = ["DIED", "Workers"]
-
 DIED = "its worker process died (out of memory, or a crash in a native library)"
 
 _RECYCLED_AFTER = 64

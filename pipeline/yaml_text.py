@@ -15,8 +15,6 @@ import yaml
 
 from pipeline.errors import ConfigError
 
-__all__ = ["KeyPath", "read_yaml"]
-
 KeyPath = tuple[str | int, ...]
 
 

@@ -8,8 +8,6 @@ from contextlib import redirect_stderr, redirect_stdout
 
 from pipeline.cli import main
 
-__all__ = ["mill"]
-
 
 def mill(*arguments: object) -> tuple[int, str]:
     """The exit code of `python -m pipeline` with these arguments, and all that it printed."""

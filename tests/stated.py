@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["stated"]
-
 
 def stated(kit: dict[str, Any]) -> dict[str, Any]:
     """The kit of a config with every key that may be `auto` typed out, the strictest where it says nothing."""

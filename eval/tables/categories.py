@@ -9,8 +9,6 @@ from eval.needs import EDGE_CATEGORIES, KITS
 from eval.subject import Subject
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["TABLE"]
-
 DRAWS = 3
 """How often each graph is put together by chance, to see what it leaves open."""
 SHOWN = 3

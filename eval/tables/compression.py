@@ -10,8 +10,6 @@ from eval.needs import FINISHED, KITS
 from eval.subject import Subject
 from stages.strings.settings import Edges
 
-__all__ = ["TABLE"]
-
 EDGES: tuple[Edges, ...] = ("all", "tree")
 
 

@@ -9,8 +9,6 @@ from eval.evaluation import Answer, Evaluation
 from eval.needs import KITS
 from eval.subject import Subject
 
-__all__ = ["TABLE"]
-
 MOST = 100
 """So many variants of a kit are measured at most."""
 

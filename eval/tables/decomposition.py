@@ -11,8 +11,6 @@ from eval.evaluation import Answer, Evaluation, Need
 from eval.subject import Subject
 from pipeline.errors import ConfigError
 
-__all__ = ["TABLE"]
-
 CUTS = ("symmetry", "sections", "components")
 FILES = "models whose parts are known, as files: python -m eval decomposition a.glb b.glb"
 

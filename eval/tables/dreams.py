@@ -8,8 +8,6 @@ from eval.evaluation import Answer, Evaluation, Need, Strip
 from eval.needs import FINISHED, KITS
 from eval.subject import Subject
 
-__all__ = ["TABLE"]
-
 SHOWN = 4
 """Pictures of each row."""
 MOST = 1000

@@ -13,8 +13,6 @@ from stages.shape.kit import Kit
 if TYPE_CHECKING:
     from eval.growth import Grown
 
-__all__ = ["TABLE"]
-
 GENERATIONS = 5
 """So many generations of each kit are drawn at most."""
 

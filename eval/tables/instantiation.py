@@ -12,8 +12,6 @@ from eval.needs import CORPUS, KITS
 from eval.subject import Subject
 from stages.synthesis.settings import Way
 
-__all__ = ["TABLE"]
-
 SHOWN = 4
 """Pictures of what each model dreamt."""
 WARMING = 8

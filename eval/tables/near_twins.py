@@ -9,8 +9,6 @@ from eval.evaluation import Answer, Curve, Evaluation, Strip
 from eval.needs import FINISHED
 from eval.subject import Subject
 
-__all__ = ["TABLE"]
-
 SHOWN = 3
 """So many pairs of nearest shapes are drawn."""
 

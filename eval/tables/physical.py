@@ -16,8 +16,6 @@ from stages.shape.shape import Shape
 if TYPE_CHECKING:
     from eval.physical import Judged
 
-__all__ = ["TABLE"]
-
 MOST = 200
 SHOWN = 6
 """So many of the weakest shapes are drawn."""

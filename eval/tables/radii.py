@@ -10,8 +10,6 @@ from eval.evaluation import Answer, Evaluation, Need
 from eval.subject import Subject
 from pipeline.errors import ConfigError
 
-__all__ = ["TABLE"]
-
 RADII = (0.008, 0.016, 0.032, 0.064)
 FILE = "a model as a file: python -m eval radii a.glb"
 

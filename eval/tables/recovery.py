@@ -16,8 +16,6 @@ from stages.training.checkpoint import weights_of_kind
 if TYPE_CHECKING:
     from stages.training.recovery.trained import TrainedRecovery
 
-__all__ = ["TABLE"]
-
 SHOWN = 16
 """Recoveries of each kind of input that the report shows."""
 LOOKED_AT = 8

@@ -9,8 +9,6 @@ from eval.needs import RECOVERY
 from eval.subject import Subject
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["TABLE"]
-
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
     from eval.recovery import baselines_table, held_out, methods, tried

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from stages.training.recovery.recover import Recovered
     from stages.training.recovery.trained import TrainedRecovery
 
-__all__ = ["TABLE"]
-
 SHOWN = 8
 """Recoveries of each kind that the report shows."""
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from stages.shapeassembly.extraction.hierarchy import Box
     from stages.shapeassembly.program import Program
 
-__all__ = ["TABLE"]
-
 SHOWN = 16
 SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part_graph_vae": 120.0}
 

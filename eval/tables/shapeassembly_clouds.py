@@ -9,8 +9,6 @@ from eval.needs import PROGRAMS
 from eval.subject import Subject
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["TABLE"]
-
 KINDS = ("program_vae", "part_graph_vae")
 DENSE = 8
 """So many times as many points as a cloud has say where its surface is, when F1 is measured."""

@@ -10,8 +10,6 @@ from eval.needs import PROGRAM_WRITERS, PROGRAMS
 from eval.subject import Subject
 from stages.training.checkpoint import weights_of_kind
 
-__all__ = ["TABLE"]
-
 CURVES = ("chair", "table")
 """Categories that are called as a curve program is, from whose parts surfaces are learnt."""
 

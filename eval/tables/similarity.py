@@ -11,8 +11,6 @@ from eval.needs import EXEMPLARS, FINISHED
 from eval.subject import Subject
 from stages.shape.arrays import FloatArray
 
-__all__ = ["TABLE"]
-
 MOST = 24
 PROBES = 300
 RADIUS = 0.016

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from stages.training.string_vae.structuring import PathFigures
     from stages.training.string_vae.trained import TrainedStringVae
 
-__all__ = ["TABLE"]
-
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
     from eval.models import training_curve

@@ -14,8 +14,6 @@ from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.parser import parse
 
-__all__ = ["AUDIT"]
-
 AROUND = 0.35
 """By how much of the sample's diagonal a corner of the box around a program may miss that of the sample: it was let
 through by its surface, and its parts may reach out a little."""

@@ -13,8 +13,6 @@ from stages.shapeassembly.extraction.boxes import around, box_corners, gap
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy, bounded
 from stages.shapeassembly.extraction.minimum_box import minimum_box
 
-__all__ = ["Boxes", "hierarchy_of"]
-
 NEAR = 0.01
 """Up to which boxes count as touching, as a share of the diagonal of the shape."""
 

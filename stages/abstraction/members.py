@@ -9,8 +9,6 @@ from pipeline.stage import Plan
 from stages.abstraction.settings import AbstractionConfig
 from stages.shape.collection.members import Field, Member, Members
 
-__all__ = ["FOUND", "MEMBERS", "PROGRAM", "figures"]
-
 PROGRAM = "program.txt"
 FOUND = "not refused"
 """What a record says of a sample that has a program."""

@@ -7,8 +7,6 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shapeassembly.extraction.settings import Cleaning, Gates
 
-__all__ = ["AbstractionConfig"]
-
 
 class AbstractionConfig(StrictModel):
     """Samples as ShapeAssembly programs."""

@@ -18,8 +18,6 @@ from stages.shapeassembly.extraction.extract import Extraction, extract
 from stages.shapeassembly.extraction.rules import RULES
 from stages.shapeassembly.printer import print_program
 
-__all__ = ["STAGE"]
-
 BYTES_A_SAMPLE = 4096
 
 

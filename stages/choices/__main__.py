@@ -17,8 +17,6 @@ from stages.choices.settings import ChoicesConfig
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import KitConfig
 
-__all__ = ["main"]
-
 HEADER = ("model", "parts", "types", "up", "tolerance", "kinds", "grammar", "hubs", "stay", "graphs", "histograms",
           "distance", "CPU s", "forecast")  # fmt: skip
 

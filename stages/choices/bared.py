@@ -14,8 +14,6 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.kit import Assembly, Kit
 
-__all__ = ["bared"]
-
 GAP = 0.1
 """A part is covered by what is farther from its end by no more than this share of its height."""
 BESIDE = 0.1

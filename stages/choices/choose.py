@@ -24,8 +24,6 @@ from stages.variations.carcass import carcass
 from stages.variations.dullness import COPIED
 from stages.variations.settings import CHOSEN_CARCASS, CHOSEN_COPIED, CHOSEN_STABLE
 
-__all__ = ["REQUIREMENTS", "Choices", "choose", "found_words", "most_copied", "must_stand"]
-
 
 @dataclass(frozen=True)
 class Choices:

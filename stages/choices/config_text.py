@@ -14,8 +14,6 @@ from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.variations.settings import CHOSEN_HUBS
 
-__all__ = ["config_text", "dataset_name", "proportions_section", "variations_section"]
-
 MOST = 200
 """Variants that the config asks for, if there are as many."""
 _DUPLICATES = (

@@ -17,8 +17,6 @@ from stages.variations.advice import another_model, what_keeps
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import DUPLICATE, Variant
 
-__all__ = ["LOOK", "Forecast", "forecast", "rounded"]
-
 MANY = 300
 """The search for a forecast ends at so many distinct graphs."""
 LISTS = 50

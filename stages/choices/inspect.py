@@ -30,8 +30,6 @@ from stages.grammars.reading import is_cloud
 from stages.shape.kit import ContactKind, Strictness
 from stages.variations.settings import CHOSEN_INSTEAD_STABLE
 
-__all__ = ["main"]
-
 FOLDER = Path("datasets", "inspect")
 """Where the config and the pictures go if nobody says where."""
 

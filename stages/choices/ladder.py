@@ -18,8 +18,6 @@ from stages.variations.dullness import COPIED
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import CHOSEN_HUBS
 
-__all__ = ["FEW", "GRAPHS", "STAY", "TELLING", "Rails", "Rung", "climb", "is_dull", "peeled"]
-
 GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
 HISTOGRAMS = 16

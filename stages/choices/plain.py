@@ -11,8 +11,6 @@ from stages.shape.views.buffers import visible_triangles
 from stages.shape.views.camera import Camera
 from stages.shape.views.scene import mesh_scene
 
-__all__ = ["is_closed_box", "plain_shares"]
-
 SIDES = ((0, 0), (90, 0), (180, 0), (270, 0), (0, 90), (0, -90))
 """Azimuth and elevation, in degrees, from which each side of a box is seen."""
 PIXELS = 64

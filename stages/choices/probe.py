@@ -23,8 +23,6 @@ from stages.variations.search.search import Search, Variant
 from stages.variations.selection import farthest_first
 from stages.variations.settings import SearchConfig
 
-__all__ = ["SHOWN", "Finds", "Probe", "type_counts"]
-
 SHOWN = 24
 """So many of the finds, those most different, say how different finds can be."""
 

@@ -23,8 +23,6 @@ from stages.shape.physics.settings import Requirements
 from stages.shape.shape import Shape, kit_shape
 from stages.variations.settings import CHOSEN_INSTEAD, CHOSEN_INSTEAD_STABLE
 
-__all__ = ["Instead", "Proportioned", "in_proportions", "instead_of_layouts"]
-
 TRIES = 36
 """Draws of a probe, of all exemplars together."""
 LEAST = 0.2

@@ -25,8 +25,6 @@ from stages.variations.facing import Facing
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
 
-__all__ = ["Prospect", "foreseen", "look_at"]
-
 ACROSS = (
     "cut it across, between bays and storeys with all that passes there: `parts: sections`; or where it is like itself "
     "elsewhere: `parts: symmetry`, which writes a shape grammar, too"

@@ -18,8 +18,6 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import CHOSEN_COPIED
 
-__all__ = ["CHOSEN_PARTS", "Reading", "cut_if_nothing_comes", "read_and_choose"]
-
 CHOSEN_PARTS = "parts"
 """What `parts` is called among the keys that are chosen for a kit."""
 COPIES = 2.0

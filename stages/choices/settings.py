@@ -6,8 +6,6 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["ChoicesConfig"]
-
 
 class ChoicesConfig(StrictModel):
     """How keys of kits that are `auto` are chosen."""

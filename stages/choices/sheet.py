@@ -12,8 +12,6 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
-__all__ = ["SHOWN", "forecast_sheet"]
-
 SHOWN = 12
 COLUMNS = 4
 CELL = 300

@@ -17,8 +17,6 @@ from stages.exemplars.identify import Identified
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Assembly, ContactKind, Docking, Exemplar, Grammar, Kit, Strictness, labels_of
 
-__all__ = ["Setting", "Sight", "contact_tolerance"]
-
 MORE_CONTACTS = 1.1
 """A tolerance is good if the next looser one finds at most so many times the contacts."""
 AS_LARGE = 0.98

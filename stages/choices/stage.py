@@ -15,8 +15,6 @@ from stages.exemplars.settings import ExemplarsConfig, KitConfig
 from stages.variations.instead import comes_instead
 from stages.variations.settings import CHOSEN_CARCASS, VariationsConfig
 
-__all__ = ["STAGE"]
-
 BYTES_A_KIT = 4_000
 
 

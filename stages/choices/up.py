@@ -15,8 +15,6 @@ from stages.points.area_sampling import sample_surface
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import rotation_angle, transform_points
 
-__all__ = ["upward"]
-
 FOOT = 0.01
 """What lies below this share of the height is the foot."""
 STANDS, FOOT_COUNTS, MIRROR_COUNTS = 0.8, 0.27, 0.19

@@ -10,8 +10,6 @@ from stages.exemplars.language import LANGUAGE, made_kits
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["AUDIT"]
-
 
 def _anew(sample: Packaged, places: Places) -> Iterator[str]:
     """Contacts, grammar and penetration, from the mesh as it stands in the file."""

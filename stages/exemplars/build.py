@@ -22,8 +22,6 @@ from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import NOTHING, Assembly, ContactKind, Exemplar, Kit
 
-__all__ = ["KitReport", "Observation", "build_kit", "observe_models", "observe_parts", "read_kit"]
-
 
 @dataclass(frozen=True)
 class KitReport:

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 
 from pipeline.stage import Plan
 
-__all__ = ["chosen_table"]
-
 
 def chosen_table(plan: Plan) -> Sequence[str]:
     """What was chosen for each kit whose config left keys open, and why, as a table."""

@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["connected_corners", "connected_faces", "joined_corners"]
-
 
 def joined_corners(vertices: FloatArray, faces: IntArray, kinds: np.ndarray) -> np.ndarray:
     """Pairs of face corners that are one vertex of one surface, int64 (p, 2); corner `3 * face + k`.

@@ -10,8 +10,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle
 
-__all__ = ["ComparableMesh", "comparable_mesh", "congruences"]
-
 QUICK_CHECK = 24
 CANDIDATES = 4096
 CLOSE = 0.2

@@ -27,8 +27,6 @@ from stages.shape.physics.stability import components
 from stages.shape.shape import Shape, kit_shape, mesh_name
 from stages.shape.stretch import STRETCHED_DEPTH, StretchedMesh, split
 
-__all__ = ["assembly_faults", "geometry_faults"]
-
 BORDERLINE = 0.03
 """A distance that differs from the contact tolerance by less than this share of it is no evidence either way: poses
 in a GLB are 32-bit numbers."""

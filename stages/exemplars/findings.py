@@ -15,8 +15,6 @@ from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 
-__all__ = ["hubs", "kit_warnings", "mirror_twins", "pieces", "refusals", "some"]
-
 LETTERS = 52
 """Part types beyond this number have names in brackets for string tokens, not letters."""
 HUB_CONTACTS = 20

@@ -18,8 +18,6 @@ from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.pose import invert, pose_vectors, transform_points
 from stages.shape.kit import Assembly, ContactKind, Docking, PartType, labels_of
 
-__all__ = ["fitting_dockings"]
-
 OF_CONTACT = 0.25
 """Anchors miss each other by at most this share of the smaller contact, or by the pose tolerance."""
 AS_LARGE = 0.5

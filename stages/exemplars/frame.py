@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["extremal_frame"]
-
 SAME_DISTANCE = 1e-6
 """Vertices whose distances differ by less than this share of the diagonal are equally far."""
 

@@ -14,16 +14,6 @@ from stages.shape.geometry.penetration import PenetrationTest
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, ContactKind, Docking, Grammar, Multiset, PartType, labels_of
 
-__all__ = [
-    "Contacts",
-    "observe_contacts",
-    "observe_dockings",
-    "observe_grammar",
-    "observe_neighbourhoods",
-    "observe_nested",
-    "with_depths",
-]
-
 IMAGES = 24
 """Most symmetric images of a docking whose penetration is measured; round parts have hundreds."""
 

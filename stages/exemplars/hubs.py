@@ -14,8 +14,6 @@ from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.kit import Assembly, ContactKind, Grammar, PartType
 
-__all__ = ["chosen_hubs", "set_hubs_aside", "with_touching"]
-
 NO_EDGES = np.empty((0, 2), dtype=np.int32)
 
 

@@ -22,8 +22,6 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, PartType
 
-__all__ = ["Identified", "identify_parts", "standing_twice"]
-
 
 @dataclass(frozen=True)
 class Identified:

@@ -13,8 +13,6 @@ from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.shape.kit_files import describe_kit
 
-__all__ = ["inspection", "inspection_lines"]
-
 MOST_ROWS = 40
 """So many part types are listed for people."""
 MOST_PIECES = 8

@@ -19,8 +19,6 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, mesh_name, part_count
 from stages.shape.stretch import bake, split
 
-__all__ = ["LANGUAGE", "Kits", "made_kits"]
-
 
 class Kits:
     """The kits that a shard reads."""

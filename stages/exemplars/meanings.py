@@ -10,8 +10,6 @@ from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, RawPart
 from stages.exemplars.settings import KitConfig
 
-__all__ = ["meant"]
-
 NAMED = 8
 """So many names of parts are shown to somebody whose pattern fits none."""
 

@@ -13,8 +13,6 @@ import numpy as np
 from stages.exemplars.segment import Segmentation
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["STATED", "Model", "RawPart", "pack_model", "unpack_model"]
-
 STATED = "as the config says"
 """Why a model has the parts that it has where nobody looked for others."""
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["face_outward", "flipped_faces"]
-
 
 def face_outward(vertices: FloatArray, faces: IntArray, original: IntArray) -> IntArray:
     """`faces` int32 (f, 3), one orientation in each sheet already, with whole sheets turned around where needed.

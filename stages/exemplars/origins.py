@@ -10,8 +10,6 @@ from pipeline.places import file_digest
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.origin import Origin
 
-__all__ = ["exemplar_origins"]
-
 
 def exemplar_origins(config: Config) -> list[Origin]:
     """The model files of all kits, in the order of the config."""

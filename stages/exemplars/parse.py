@@ -26,8 +26,6 @@ from stages.exemplars.segment import Segmentation, count_parts, pick, segment
 from stages.exemplars.settings import ReadLimits
 from stages.shape.arrays import FloatArray
 
-__all__ = ["FORMATS", "parse_model"]
-
 FORMATS: dict[str, Callable[[Path, Enclosure], Scene]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,

@@ -10,8 +10,6 @@ import numpy as np
 from stages.exemplars.formats.scene import Placement, Surface, UniqueNames
 from stages.shape.arrays import FloatArray
 
-__all__ = ["bake", "centre", "distance_from_origin"]
-
 SAME_STRETCH = 1e-5
 """Stretches closer than this, relative to their size, are one: 32-bit matrices differ in their last digits."""
 

@@ -13,8 +13,6 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
-__all__ = ["kit_sheet"]
-
 CELL = 200
 COLUMNS = 6
 EXEMPLAR = Camera(azimuth=-36.0, elevation=28.0, fov=24.0, margin=0.04)

@@ -11,8 +11,6 @@ from stages.exemplars.parse import parse_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ReadLimits
 
-__all__ = ["read_model"]
-
 
 def read_model(path: Path, segmentation: Segmentation = "auto", limits: ReadLimits | None = None) -> Model:
     """The parts of a model file: GLB, glTF, OBJ with MTL, PLY, STL, OFF or DAE; as `parse_model`.

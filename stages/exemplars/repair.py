@@ -10,8 +10,6 @@ from stages.exemplars.components import connected_corners, connected_faces
 from stages.exemplars.orientation import face_outward, flipped_faces
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["Repair", "repair_mesh"]
-
 FLAT = 1e-7
 """Height of a face, as a share of the mesh's diagonal, that 32-bit coordinates cannot carry: it has no area."""
 

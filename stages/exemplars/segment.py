@@ -12,8 +12,6 @@ from stages.exemplars.components import connected_faces
 from stages.exemplars.formats.scene import Placement, Scene, Surface, UniqueNames
 from stages.exemplars.symmetry.parts import by_sections, by_symmetry, search_size
 
-__all__ = ["SOURCES", "Segmentation", "count_parts", "pick", "segment"]
-
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")
 

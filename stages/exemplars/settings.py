@@ -13,19 +13,6 @@ from pipeline.errors import ConfigError
 from stages.shape.collection.origin import Credit
 from stages.shape.kit import ContactKind, Strictness
 
-__all__ = [
-    "LOOSEST",
-    "OPEN_KEYS",
-    "STRICTEST",
-    "ContactConfig",
-    "Decided",
-    "ExemplarsConfig",
-    "HubConfig",
-    "KitConfig",
-    "ReadLimits",
-    "ShapeFile",
-]
-
 OPEN_KEYS = ("up", "contact.tolerance", "contact.kinds", "grammar", "hubs.types", "disconnected")
 """The keys of a kit that may be left at `auto`, in the order in which they are decided."""
 

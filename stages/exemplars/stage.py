@@ -12,8 +12,6 @@ from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.origin import unstated
 
-__all__ = ["STAGE"]
-
 BYTES_A_KIT = 8_000_000
 
 

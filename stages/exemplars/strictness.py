@@ -20,8 +20,6 @@ from pipeline.places import write_file
 from stages.shape.graphs.neighbourhoods import STRICTNESS, admits
 from stages.shape.kit import Grammar, Multiset, Strictness
 
-__all__ = ["main", "newly_admitted"]
-
 CENTRE, WALL, FLOOR, DOOR = range(4)
 COLORS = {CENTRE: "#3d3a40", WALL: "#c8693f", FLOOR: "#4f8a8b", DOOR: "#e0b04a"}
 SEEN: tuple[Multiset, ...] = (((WALL, 2), (FLOOR, 1)), ((FLOOR, 1), (DOOR, 1)))

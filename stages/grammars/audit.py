@@ -11,8 +11,6 @@ from stages.grammars.language import LANGUAGE
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["AUDIT"]
-
 
 def _anew(sample: Packaged, places: Places) -> Iterator[str]:
     """The text is read, and written again, and the surface that it makes is the one of which the record has a

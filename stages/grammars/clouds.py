@@ -23,8 +23,6 @@ from stages.grammars.files import load_grammar
 from stages.grammars.grammar import ShapeGrammar
 from stages.shape.geometry.pose import transform_points
 
-__all__ = ["cloud_of_text", "ply_bytes", "written_clouds"]
-
 ROW = np.dtype([("place", "<f8", 3), ("normal", "<f4", 3), ("color", "u1", 3)])
 HEADER = """\
 ply

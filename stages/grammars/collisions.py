@@ -17,8 +17,6 @@ from stages.grammars.samples import TerminalSamples
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Collisions"]
-
 NEAR = 1.8
 """Pieces are apart where no two of their points, one in each cell, are closer than so many cells."""
 BESIDE = 2.0

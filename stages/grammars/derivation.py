@@ -16,19 +16,6 @@ from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
-__all__ = [
-    "DerivationError",
-    "Piece",
-    "Resized",
-    "derivation_text",
-    "exemplar_shape",
-    "lone_shape",
-    "pieces_of",
-    "read_derivation",
-    "shape_of_text",
-    "surface_digest",
-]
-
 DIGITS = 5
 """Moments of shapes that agree to so many decimals are one."""
 MOST = 100_000

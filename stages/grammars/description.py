@@ -12,8 +12,6 @@ from stages.grammars.editing import options_of
 from stages.grammars.extraction import Extraction
 from stages.grammars.grammar import GridRule, site_name
 
-__all__ = ["describe_grammar"]
-
 
 def describe_grammar(found: Extraction) -> dict[str, Any]:
     """All that there is to say of a grammar, with the editing options at each docking site. `tree` and `frame` are what

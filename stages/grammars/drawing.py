@@ -11,8 +11,6 @@ from stages.grammars.grammar import ShapeGrammar
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert
 
-__all__ = ["Collided", "random_counts", "random_derivation"]
-
 TRIES = 10
 """So many random rules are tried at a site before it gets what the exemplar has (symmetry §4.2)."""
 

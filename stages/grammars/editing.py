@@ -16,8 +16,6 @@ from stages.grammars.extraction import Extraction
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Option", "edited", "options_of"]
-
 SAMPLE = 200
 """Items of a docker that are looked at to see whether another one is like it."""
 ALIKE = 0.995

@@ -27,8 +27,6 @@ from stages.grammars.meshes import TerminalMeshes, part_around
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
-__all__ = ["Extraction", "Mesh", "extract", "mesh_of"]
-
 MOTIONS = 24
 """So many motions are looked at, of a grid of many cells fewer."""
 WORK = 8_000_000

@@ -17,8 +17,6 @@ from stages.exemplars.symmetry.derivations import ENDS, Derivation, Place
 from stages.grammars.grammar import GridRule, Rule, ShapeGrammar
 from stages.shape.kit import PartMesh
 
-__all__ = ["load_grammar", "made_grammars", "write_grammar"]
-
 
 def write_grammar(described: Mapping[str, Any], grammar: ShapeGrammar, text: Any, arrays: Any) -> None:
     """Write a grammar to two binary streams: what `describe_grammar` says of it to `text`, the tar to `arrays`."""

@@ -13,8 +13,6 @@ from stages.exemplars.symmetry.derivations import START, Place
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 
-__all__ = ["GridRule", "Rule", "ShapeGrammar", "site_name"]
-
 LETTERS = "ABCDEFHIJKLMNOPQRTUVWXYZ"
 
 

@@ -22,8 +22,6 @@ from stages.grammars.reading import read_surface
 from stages.grammars.settings import LARGEST_RADIUS, GrammarConfig
 from stages.grammars.variety import METHODS, some_shapes
 
-__all__ = ["has_grammar", "written_grammar"]
-
 SHOWN = 12
 """So many shapes by each method are drawn to see what will come."""
 CLOUDS = 4

@@ -19,8 +19,6 @@ from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
-__all__ = ["LANGUAGE", "Derivations", "drawing_name", "grammar_shards", "input_grammars"]
-
 
 class Derivations:
     """The grammars that a shard reads."""

@@ -14,8 +14,6 @@ from stages.grammars.samples import FACING, Samples, TerminalSamples, facing, sa
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import transform_points
 
-__all__ = ["Known", "Sight", "difference", "sight_of"]
-
 ASKED = 8
 """Every so many-th voxel is looked for in the other shape."""
 AXIS = 16

@@ -14,8 +14,6 @@ from stages.exemplars.symmetry.welding import WeldedSurface
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.kit import PartMesh
 
-__all__ = ["TerminalMeshes", "part_around"]
-
 
 class TerminalMeshes(Sequence[PartMesh]):
     """A mesh for each terminal, around the middle of its box, made anew whenever it is asked for: hundreds that hold

@@ -7,8 +7,6 @@ from pipeline.stage import Plan
 from stages.grammars.settings import GrammarsConfig
 from stages.shape.collection.origin import Origin
 
-__all__ = ["mesh_origins"]
-
 
 def mesh_origins(plan: Plan) -> list[Origin]:
     """The model files of all grammars, in the order of the config."""

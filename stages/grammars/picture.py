@@ -25,8 +25,6 @@ from stages.shape.views.portrait import points_portrait, portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
-__all__ = ["dockers_row", "grammar_sheet", "shapes_row", "shapes_sheet"]
-
 CELL = 200
 COLUMNS = 4
 CAMERA = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.06)

@@ -6,8 +6,6 @@ from stages.grammars.origins import mesh_origins
 from stages.grammars.settings import GrammarsConfig
 from stages.shape.collection.producer import Producer
 
-__all__ = ["PRODUCER"]
-
 PRODUCER = Producer(
     language="derivation",
     keys="grammars.models",

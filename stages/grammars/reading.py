@@ -18,8 +18,6 @@ from stages.exemplars.settings import ReadLimits
 from stages.exemplars.symmetry.cloud import Cloud
 from stages.grammars.extraction import Mesh, mesh_of
 
-__all__ = ["is_cloud", "read_cloud", "read_surface"]
-
 TABLES = {".xyz": None, ".xyzn": "normals", ".xyzrgb": "colours"}
 """Clouds as text, a point a line: x, y, z, and what else, colours from 0 to 1 (as Open3D writes them)."""
 MESH = b""

@@ -16,8 +16,6 @@ from stages.grammars.recent import Recent
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 
-__all__ = ["FACING", "Samples", "TerminalSamples", "facing", "sampled"]
-
 TILT = np.array([1.0, 1.0137, 1.0271])
 """By so much an axis weighs more where a surface faces between two: what faces halfway must not go by rounding."""
 FACING = 3

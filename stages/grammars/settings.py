@@ -9,8 +9,6 @@ from pydantic import Field, field_validator, model_validator
 from pipeline.config import ExistingFile, StrictModel
 from stages.shape.collection.origin import Credit
 
-__all__ = ["LARGEST_RADIUS", "LEAST_RADIUS", "GrammarConfig", "GrammarSplitConfig", "GrammarsConfig"]
-
 LEAST_RADIUS, LARGEST_RADIUS = 0.004, 0.1
 """Of similarity, as shares of the longest side."""
 

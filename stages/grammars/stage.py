@@ -28,8 +28,6 @@ from stages.shape.collection.shards import made_shards
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
 
-__all__ = ["STAGE"]
-
 BYTES_A_GRAMMAR = 20_000_000
 BYTES_A_SAMPLE = 4_000
 

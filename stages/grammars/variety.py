@@ -17,8 +17,6 @@ from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.likeness import Known, Sight, difference
 from stages.grammars.settings import GrammarConfig
 
-__all__ = ["METHODS", "Drawn", "Variety", "few", "some_shapes", "wanted"]
-
 METHODS = ("random rules", "resized grid")
 """How shapes are made of a grammar."""
 CANDIDATES = 3

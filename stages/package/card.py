@@ -12,9 +12,6 @@ from stages.package.layout import CHECKSUMS, CROISSANT, MANIFEST, PREVIEW, SCHEM
 from stages.package.sources import SourceTally
 from stages.package.tables import class_table, member_table, origin_table, reject_table, source_table, split_table
 
-__all__ = ["Story", "card", "citation", "size_category"]
-
-
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 USES = (

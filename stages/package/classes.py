@@ -12,8 +12,6 @@ import numpy as np
 from stages.shape.collection.classes import Classes
 from stages.shape.shape import Shape
 
-__all__ = ["ClassTally", "counted_classes", "table_bytes"]
-
 UNSEEN = (160, 160, 160)
 """The colour of a class that has none of its own and of which there is no part."""
 

@@ -20,8 +20,6 @@ from stages.package.sources import SourceTally
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.declared import language_of
 
-__all__ = ["compose_dataset"]
-
 
 def compose_dataset(task: Task) -> Outcome:
     """Write card, Croissant, schema, classes, manifest, checksums and index.

@@ -15,8 +15,6 @@ from typing import Any
 
 from stages.package.layout import CLASSES
 
-__all__ = ["INDEX", "croissant"]
-
 VOCABULARY = {
     "@language": "en",
     "@vocab": "https://schema.org/",

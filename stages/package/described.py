@@ -10,8 +10,6 @@ from stages.shape.collection.declared import members
 from stages.shape.collection.language import Language
 from stages.shape.collection.members import TEXT, Member
 
-__all__ = ["described_members"]
-
 OWN = (
     Member(
         "glb",

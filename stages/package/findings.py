@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-__all__ = ["Findings"]
-
 LISTED = 20
 """So many faults of one check are printed."""
 

@@ -19,8 +19,6 @@ from stages.shape.arrays import ByteArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
-__all__ = ["glb_bytes", "linear_colors"]
-
 FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT = 5126, 5121, 5123, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 ASSET = {"version": "2.0", "generator": "Shapemill"}

@@ -11,8 +11,6 @@ from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 from stages.shape.views.palette import linear_to_srgb
 
-__all__ = ["glb_shape"]
-
 
 def glb_shape(content: bytes) -> Shape:
     """The parts of a sample by the bytes of its member `glb`: their names, meshes, poses, and colours within 2 of 255;

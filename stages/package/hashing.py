@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 from typing import BinaryIO
 
-__all__ = ["HashingStream"]
-
 
 class HashingStream:
     """What a file is written to: passes all on to `stream`, and knows its length and SHA-256."""

@@ -11,8 +11,6 @@ from typing import Any, BinaryIO
 from stages.shape.collection.declared import members
 from stages.shape.collection.members import Column
 
-__all__ = ["column_kinds", "columns", "index_row", "read_rows", "tar_bytes", "write_index"]
-
 COLUMNS = {
     "key": Column("string", ("key",)),
     "split": Column("string", ("split",)),

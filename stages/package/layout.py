@@ -4,18 +4,6 @@ from __future__ import annotations
 
 from pipeline.config import Config
 
-__all__ = [
-    "CARD",
-    "CHECKSUMS",
-    "CLASSES",
-    "CROISSANT",
-    "MANIFEST",
-    "PREVIEW",
-    "SCHEMA",
-    "index_path",
-    "shard_path",
-]
-
 CARD = "README.md"
 CROISSANT = "croissant.json"
 MANIFEST = "manifest.json"

@@ -15,8 +15,6 @@ import pipeline
 import stages
 from pipeline.code import code_digest, reached
 
-__all__ = ["code_version", "library_versions"]
-
 PROJECT = Path(pipeline.__file__).parent.parent / "pyproject.toml"
 
 

@@ -9,8 +9,6 @@ from typing import Any
 
 from pipeline.config import Config
 
-__all__ = ["checksums", "config_sections", "manifest"]
-
 
 def config_sections(config: Config) -> dict[str, Any]:
     """All sections of the config as JSON; of a file's path only the name and its folder's, since what lies above

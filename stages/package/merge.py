@@ -22,8 +22,6 @@ from stages.shape.collection.members import TEXT
 from stages.shape.geometry.pose import rounded
 from stages.shape.sample import Sample
 
-__all__ = ["merge_shard"]
-
 
 def merge_shard(task: Task) -> Outcome:
     """Files of the shard: `.tar`, the dataset's, `.jsonl`, its rows of the index, and `.classes.json`, what its

@@ -23,8 +23,6 @@ from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.sketches.settings import SketchesConfig
 
-__all__ = ["draw_preview", "varied"]
-
 COLUMNS = 8
 CELL = 232
 MARK = 12

@@ -13,8 +13,6 @@ from stages.shape.kit import Assembly
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
-__all__ = ["describe_sample", "piece_count"]
-
 
 def describe_sample(
     sample: Sample, language: str, shape: Shape, members: Mapping[str, bytes], added: Mapping[str, Any]

@@ -17,8 +17,6 @@ from stages.shape.collection.declared import language_of, members, producers
 if TYPE_CHECKING:
     from jsonschema.protocols import Validator
 
-__all__ = ["record_schema", "schema_faults", "validator_of"]
-
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 LISTED_FAULTS = 5
 

@@ -6,8 +6,6 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["PackageConfig"]
-
 
 class PackageConfig(StrictModel):
     """What the card, `croissant.json` and the preview picture say and show."""

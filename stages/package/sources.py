@@ -8,8 +8,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-__all__ = ["SPANS", "SourceTally"]
-
 SPANS = ("parts", "contacts", "cycles")
 """The columns of the index of which a card tells least, median and most."""
 

@@ -31,8 +31,6 @@ from stages.shape.collection.shards import (
 from stages.shape.views.probe import check_backend
 from stages.sketches.settings import SketchesConfig
 
-__all__ = ["STAGE"]
-
 WHOLE = "dataset"
 PICTURE = "preview"
 PICTURE_SHARDS = 8

@@ -8,9 +8,6 @@ from typing import Any
 from stages.package.layout import CLASSES
 from stages.package.sources import SPANS, SourceTally
 
-__all__ = ["class_table", "member_table", "origin_table", "reject_table", "source_table", "split_table"]
-
-
 LISTED_CLASSES = 60
 """So many classes at most stand in the card."""
 

@@ -26,8 +26,6 @@ from stages.package.layout import MANIFEST
 from stages.package.verify_files import Row, Tally, check_classes, check_files, check_index, check_splits, read_schema
 from stages.package.verify_shard import check_shard
 
-__all__ = ["main", "verify_dataset"]
-
 
 def main(argv: Sequence[str]) -> int:
     """Verify the dataset that `argv` names, by its folder or by config and output folder; print a table; return the

@@ -16,17 +16,6 @@ from stages.package.croissant import INDEX
 from stages.package.findings import Findings
 from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, MANIFEST, SCHEMA
 
-__all__ = [
-    "Row",
-    "Tally",
-    "check_classes",
-    "check_files",
-    "check_index",
-    "check_splits",
-    "read_document",
-    "read_schema",
-]
-
 Row = tuple[str, str, str, str, str]
 """Key, shard, split, kit and graph of a sample."""
 

@@ -21,17 +21,6 @@ from stages.shape.geometry.pose import rounded
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
-__all__ = [
-    "SampleError",
-    "array_faults",
-    "empty_values",
-    "read_packaged",
-    "read_record",
-    "record_faults",
-    "sample_faults",
-]
-
-
 LAST_DIGITS = 1e-6
 """As a share of the shape's size, so near are positions that are made anew on another processor."""
 

@@ -30,8 +30,6 @@ from stages.shape.collection.declared import audits, languages
 from stages.shape.collection.declared import members as declared_members
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["check_shard", "shard_samples"]
-
 
 def check_shard(
     folder: Path,

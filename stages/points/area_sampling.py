@@ -15,8 +15,6 @@ from stages.shape.arrays import FloatArray, IntArray, TypeArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
-__all__ = ["SurfacePoints", "SurfaceTable", "mesh_table", "sample_shape", "sample_surface", "surface_table"]
-
 
 @dataclass(frozen=True)
 class SurfaceTable:

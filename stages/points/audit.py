@@ -11,8 +11,6 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["AUDIT", "point_faults"]
-
 NEAR = 1e-5
 """Points are 32-bit numbers: as a share of the shape's size they lie as near to its surface as this."""
 ALONG = 1e-3

@@ -10,8 +10,6 @@ from stages.points.visibility import seen_from_outside
 from stages.shape.geometry.casting import Casting
 from stages.shape.shape import Shape
 
-__all__ = ["sample_cloud"]
-
 MOST_DRAWS = 1000
 """So many times as many points as asked are drawn at most, until enough of them are seen."""
 

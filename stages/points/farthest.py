@@ -14,8 +14,6 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["farthest_points"]
-
 BOX_POINTS = 64
 
 

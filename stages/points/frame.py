@@ -11,8 +11,6 @@ from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
-__all__ = ["Normalization", "normalization"]
-
 NormalizeMode = Literal["none", "unit_sphere", "unit_box"]
 
 

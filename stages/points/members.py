@@ -13,8 +13,6 @@ from stages.shape.arrays import ByteArray
 from stages.shape.collection.members import Field, Member, Members, Row
 from stages.shape.views.camera import Camera
 
-__all__ = ["MEMBERS"]
-
 POINTS = {"all": "Point cloud.", "visible": "Point cloud of what is seen from outside."}
 
 

@@ -8,8 +8,6 @@ from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
 
-__all__ = ["PointsConfig", "Surface"]
-
 Surface = Literal["all", "visible"]
 
 

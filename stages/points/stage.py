@@ -15,8 +15,6 @@ from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
 
-__all__ = ["STAGE"]
-
 
 def run_shard(task: Task) -> Outcome:
     """The members of each sample that `members.py` declares."""

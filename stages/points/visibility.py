@@ -9,8 +9,6 @@ import numpy as np
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.casting import Casting
 
-__all__ = ["OBLIQUE", "SHORTEST", "VIEWS", "seen_from_outside", "view_directions"]
-
 VIEWS = 64
 """From so many directions, evenly around, a shape is looked at."""
 

@@ -24,8 +24,6 @@ from stages.programs.schema import Values
 from stages.programs.sheets import parameter_sheet, row_sheet
 from stages.shape.views.sheet import picture_png
 
-__all__ = ["main"]
-
 OUT = Path("datasets", "programs")
 """Where files go if nobody says where."""
 

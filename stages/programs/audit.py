@@ -10,8 +10,6 @@ from stages.programs.sampling import structure_digest
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["AUDIT"]
-
 
 def _faults(sample: Packaged) -> Iterator[str]:
     record = sample.record

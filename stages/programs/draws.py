@@ -16,8 +16,6 @@ import numpy.typing as npt
 from stages.programs.schema import Schema
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["Draws", "Interval", "Share", "draw"]
-
 Interval = tuple[float, float]
 
 DECIMALS = 4

@@ -9,8 +9,6 @@ from stages.programs.program import Program
 from stages.programs.repair import repaired
 from stages.programs.schema import Values
 
-__all__ = ["interpolate", "mix"]
-
 
 def mix(program: Program, target: Values, source: Values, groups: Collection[str]) -> dict[str, Value]:
     """`target` with the parameters of `groups` as they are in `source`, repaired to the constraints.

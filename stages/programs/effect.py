@@ -11,8 +11,6 @@ from stages.programs.program import Program
 from stages.programs.repair import repaired
 from stages.programs.schema import Values
 
-__all__ = ["has_effect", "same_geometry"]
-
 SAME = 1e-6
 """Vertices nearer than this, in the program's units, are at one place."""
 

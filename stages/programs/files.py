@@ -15,8 +15,6 @@ from stages.programs.sampling import Sampler
 from stages.programs.schema import Values
 from stages.shape.views.palette import srgb_to_linear
 
-__all__ = ["named_values", "random_shapes", "shape_glb"]
-
 
 def named_values(program: Program, name: str) -> dict[str, Value]:
     """The values that a command line means: `base`, a whole number for the random shape of that seed, or a JSON file:

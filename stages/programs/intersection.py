@@ -11,8 +11,6 @@ from stages.programs.curves.part import Part
 from stages.programs.program import Program
 from stages.shape.arrays import FloatArray
 
-__all__ = ["intersecting", "meshes_meet"]
-
 
 def intersecting(program: Program, parts: Sequence[Part]) -> tuple[str, str] | None:
     """The first pair of labels that shall stay apart and do not, or None."""

@@ -12,8 +12,6 @@ from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 
-__all__ = ["LANGUAGE"]
-
 
 class Parameters:
     """The program of the config."""

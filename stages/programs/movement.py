@@ -18,8 +18,6 @@ from stages.programs.program import BuildError, Program
 from stages.programs.sampling import NoMoreShapes, Sampler
 from stages.shape.arrays import FloatArray
 
-__all__ = ["FAINT", "STEP", "Movement", "moved", "movement_table", "movements"]
-
 FAINT, STEP = 0.005, 0.0025
 """What is moved less by its whole range, and by one class, as shares of the diagonal, is hard to read."""
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from stages.programs.rules import Rule
 
-__all__ = ["Kind", "Parameter", "ParameterError", "Value", "binary", "continuous", "discrete"]
-
 Kind = Literal["discrete", "binary", "continuous"]
 
 Value = bool | int | float

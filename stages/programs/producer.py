@@ -12,8 +12,6 @@ from stages.programs.settings import ProgramsConfig
 from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
 
-__all__ = ["PRODUCER"]
-
 
 def _recipe(plan: Plan) -> Sequence[str]:
     return [recipe_markdown(find_program(plan.config.section(ProgramsConfig).program)).rstrip()]

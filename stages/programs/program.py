@@ -21,18 +21,6 @@ from stages.programs.schema import Schema, Values
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
 
-__all__ = [
-    "BuildError",
-    "Constraint",
-    "Program",
-    "find_program",
-    "program_module",
-    "program_names",
-    "shape_of",
-    "shape_of_parts",
-    "shape_of_text",
-]
-
 
 class BuildError(ValueError):
     """A program fails at values that keep its constraints."""

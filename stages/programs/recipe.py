@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from stages.programs.parameters import Parameter, Value
 from stages.programs.program import Program
 
-__all__ = ["parameter_range", "recipe_markdown", "value_text"]
-
 
 def recipe_markdown(program: Program) -> str:
     """A section of Markdown: what the program makes, a table of parameters for each group, its constraints, its part

@@ -9,8 +9,6 @@ from stages.programs.parameters import Parameter, Value
 from stages.programs.program import Program
 from stages.programs.schema import Values
 
-__all__ = ["repaired"]
-
 
 def repaired(program: Program, values: Values, keep: Collection[str] = ()) -> dict[str, Value] | None:
     """Settled `values` that break no constraint, or None where that takes a change of the parameters `keep`.

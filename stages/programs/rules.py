@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any
 
-__all__ = ["Rule"]
-
 Term = Callable[[Mapping[str, Any]], Any]
 
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {

@@ -19,8 +19,6 @@ from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 
-__all__ = ["Cell", "NoMoreShapes", "Sampler", "cells", "structure_digest"]
-
 MOST_TRIES = 2000
 """So many draws of a shard's own are tried for one shape."""
 FEWEST_DRAWS, MOST_DRAWS = 32, 8192

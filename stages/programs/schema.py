@@ -16,8 +16,6 @@ from pipeline.config import nearest
 from stages.programs.parameters import Parameter, ParameterError, Value
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["Schema", "Values"]
-
 Values = Mapping[str, Any]
 """A value for each parameter, by name, in the parameters' order: float, int or bool as its kind says."""
 

@@ -9,8 +9,6 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 
-__all__ = ["EachValueConfig", "ProgramSplitConfig", "ProgramsConfig", "SweepConfig"]
-
 
 class EachValueConfig(StrictModel):
     """How many shapes have each value of each parameter fixed, all others being random (geocode §4)."""

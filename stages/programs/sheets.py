@@ -16,8 +16,6 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet
 
-__all__ = ["parameter_sheet", "reveal", "row_sheet", "shape_picture"]
-
 AZIMUTH = 35.0
 CELL = 200
 COLUMNS, WIDE = 8, 15

@@ -24,8 +24,6 @@ from stages.programs.sweep import listed_shapes, plan_sweep
 from stages.shape.sample import Sample, write_sample
 from stages.shape.splits import SPLITS
 
-__all__ = ["STAGE"]
-
 BYTES_A_SAMPLE = 8192
 TRIED = 8
 """Samples of a shard of a trial."""

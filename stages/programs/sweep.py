@@ -23,8 +23,6 @@ from stages.programs.settings import SweepConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.splits import SPLITS
 
-__all__ = ["Sweep", "listed_shapes", "plan_sweep"]
-
 MOST_LISTED = 4096
 """Shapes of a program are listed if its parameters have no more combinations."""
 LOOKED_AT = 4096

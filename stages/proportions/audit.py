@@ -12,8 +12,6 @@ from stages.proportions.text import ProportionError, exemplar_of, proportion_tex
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["AUDIT"]
-
 
 def _anew(sample: Packaged, places: Places) -> Iterator[str]:
     """The text is read, and written again; the shape that it makes holds together as the exemplar does."""

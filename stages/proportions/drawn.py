@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.proportions.warp import Lattice, Warp
 
-__all__ = ["Drawn"]
-
 LEAST = 1e-9
 """What differs by less is the same."""
 

@@ -10,8 +10,6 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import Shape
 from stages.shape.stretch import STRETCHED_DEPTH
 
-__all__ = ["warp_fault"]
-
 
 def warp_fault(kit: Kit, exemplar: Assembly, shape: Shape) -> str | None:
     """Why a shape that `warped` has made is none, or None: `contact lost`, where parts that touch in the exemplar are

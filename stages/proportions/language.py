@@ -16,8 +16,6 @@ from stages.shape.kit_input import input_kits
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape, kit_shape, part_count, upright
 
-__all__ = ["LANGUAGE"]
-
 
 class Proportions:
     """The kits that a shard reads."""

@@ -7,8 +7,6 @@ from stages.exemplars.origins import exemplar_origins
 from stages.proportions.settings import ProportionsConfig
 from stages.shape.collection.producer import Producer
 
-__all__ = ["PRODUCER"]
-
 PRODUCER = Producer(
     language="proportions",
     keys="proportions.per_kit",

@@ -7,8 +7,6 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 
-__all__ = ["MOST", "ProportionSplitConfig", "ProportionsConfig"]
-
 MOST = 1_000_000
 """No more are made of a kit."""
 

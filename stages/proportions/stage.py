@@ -32,8 +32,6 @@ from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
 from stages.variations.instead import chosen_instead
 from stages.variations.settings import CHOSEN_INSTEAD_STABLE, VariationsConfig
 
-__all__ = ["OVERSAMPLED", "STAGE"]
-
 BYTES_A_SAMPLE = 8_000
 OVERSAMPLED = 2
 """So many times the shapes wanted are found, for the choice."""

@@ -12,8 +12,6 @@ from stages.shape.arrays import FloatArray
 from stages.shape.kit import Exemplar, Kit
 from stages.shape.shape import Shape
 
-__all__ = ["ProportionError", "exemplar_of", "proportion_text", "read_proportions", "shape_of_text"]
-
 AXES = ("x", "y", "z")
 
 

@@ -18,8 +18,6 @@ from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, Kit, PartMesh
 from stages.shape.shape import Shape, kit_shape
 
-__all__ = ["Lattice", "Warp", "WarpedMesh", "lattice_of", "warped"]
-
 NEAR = 2e-3
 """Ends of parts that are nearer to each other than this share of the longest side are one."""
 EQUAL = 0.02

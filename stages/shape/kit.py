@@ -16,21 +16,6 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray, TypeArray
 
-__all__ = [
-    "NOTHING",
-    "Assembly",
-    "ContactKind",
-    "Docking",
-    "Exemplar",
-    "Grammar",
-    "Kit",
-    "Multiset",
-    "PartMesh",
-    "PartType",
-    "Strictness",
-    "labels_of",
-]
-
 ContactKind = Literal["point", "line", "face"]
 
 Strictness = Literal[

@@ -13,8 +13,6 @@ from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, r
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, Docking, Exemplar, Grammar, Kit, PartType, labels_of
 
-__all__ = ["describe_kit", "load_kit", "write_kit"]
-
 
 def describe_kit(kit: Kit) -> dict[str, Any]:
     """The kit as JSON that a person can read: types, exemplars, neighbourhoods by label, dockings by type name."""

@@ -9,8 +9,6 @@ from pipeline.stage import Task
 from stages.shape.kit import Kit
 from stages.shape.kit_files import load_kit
 
-__all__ = ["input_kit", "input_kits"]
-
 
 def input_kits(task: Task) -> dict[str, Kit]:
     """The kits among the inputs of a shard, by name."""

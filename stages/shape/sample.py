@@ -11,8 +11,6 @@ from typing import Any
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes, read_shard
 from stages.shape.kit import NOTHING, Assembly
 
-__all__ = ["Sample", "read_samples", "write_sample"]
-
 
 @dataclass(frozen=True)
 class Sample:

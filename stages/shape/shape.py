@@ -13,8 +13,6 @@ from stages.shape.arrays import FloatArray, TypeArray
 from stages.shape.kit import Assembly, Kit, PartMesh
 from stages.shape.stretch import StretchedMesh, bake, placements
 
-__all__ = ["Shape", "kit_shape", "mesh_name", "part_count", "upright"]
-
 Z_TO_Y = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["SPLITS", "shard_sizes", "shards_of_split", "share_out"]
-
 SPLITS = ("train", "val", "test")
 
 

@@ -15,8 +15,6 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import rounded
 from stages.shape.kit import Assembly, PartMesh
 
-__all__ = ["STRETCHED_DEPTH", "StretchedMesh", "bake", "moved_by", "placements", "split"]
-
 SAME = 1e-6
 """A linear map whose singular values are as near to 1 is a rotation."""
 DECIMALS = 9

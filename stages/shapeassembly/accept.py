@@ -21,8 +21,6 @@ from stages.shapeassembly.shape import shape_of_execution
 from stages.shapeassembly.sources import program_texts
 from stages.shapeassembly.structure import signature
 
-__all__ = ["accepted_rows"]
-
 TRIES = 8
 """Edits of a program that are tried for one that passes."""
 

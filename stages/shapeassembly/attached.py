@@ -11,8 +11,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.interpreter import parts_of
 from stages.shapeassembly.program import BBOX, FACES, Attach, Block, Point, Squeeze
 
-__all__ = ["both_ends", "ends_of"]
-
 
 def ends_of(block: Block, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Where a cuboid of an assembly is attached, in the order of the lines: the points of its own, local coordinates,

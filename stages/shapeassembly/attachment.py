@@ -10,23 +10,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = [
-    "ADD",
-    "GROW",
-    "HINGE",
-    "MOVE",
-    "SCALE",
-    "STAY",
-    "SWING",
-    "across",
-    "grow",
-    "hinge",
-    "hold",
-    "local",
-    "point",
-    "swing",
-]
-
 MOVE, STAY, GROW, HINGE, SWING = range(5)
 """What an attachment did: nothing was attached before; an aligned cuboid was near enough; it grew; one prior
 attachment; two or more."""

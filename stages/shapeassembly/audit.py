@@ -10,8 +10,6 @@ from stages.shapeassembly.language import LANGUAGE
 from stages.shapeassembly.parser import parse
 from stages.shapeassembly.structure import signature
 
-__all__ = ["AUDIT"]
-
 
 def _faults(sample: Packaged) -> Iterator[str]:
     record = sample.record

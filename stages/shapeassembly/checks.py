@@ -14,8 +14,6 @@ from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.printer import print_line
 from stages.shapeassembly.program import BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
 
-__all__ = ["RULES", "SIDE", "Rule", "Violation", "overflow", "reaching_out", "violations"]
-
 Rule = Literal[
     "name taken",
     "unknown name",

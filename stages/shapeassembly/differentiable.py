@@ -21,8 +21,6 @@ from stages.shapeassembly.kernels import Executed, run
 from stages.shapeassembly.parameters import parameter_places
 from stages.shapeassembly.program import Program
 
-__all__ = ["DifferentiableProgram"]
-
 _CORNERS = torch.tensor([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)], dtype=torch.float64)
 _UPRIGHT = torch.eye(3, dtype=torch.float64)
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["edit_distance"]
-
 
 @numba.njit(cache=True)
 def edit_distance(a, b):

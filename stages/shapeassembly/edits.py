@@ -11,8 +11,6 @@ from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.printer import rounded
 from stages.shapeassembly.program import Attach, Cuboid, Line, Point, Program, Squeeze
 
-__all__ = ["edited"]
-
 STEEPEST = 0.6
 """Largest change of an exponent: sizes and places keep their order and do not all become one."""
 

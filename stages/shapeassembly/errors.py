@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["ProgramError"]
-
 
 class ProgramError(ValueError):
     """A program that cannot be read or executed.

@@ -10,8 +10,6 @@ import numpy as np
 from stages.shapeassembly.program import Program
 from stages.shapeassembly.statistics import cluster_curves
 
-__all__ = ["cluster_figure"]
-
 
 def cluster_figure(programs: Mapping[str, Sequence[Program]]) -> bytes:
     """A PNG: for each category the share of its programs (left) and assemblies (right) that its most frequent

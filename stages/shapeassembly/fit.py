@@ -18,8 +18,6 @@ from stages.shapeassembly.interpreter import Execution, execute
 from stages.shapeassembly.parameters import SMALLEST, parameter_ranges, parameters, with_parameters
 from stages.shapeassembly.program import Program
 
-__all__ = ["FitResult", "chamfer_distance", "fit", "fit_cuboids", "surface_points"]
-
 _SIGNS = torch.tensor([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)], dtype=torch.float64)
 
 RESAMPLED = 20

@@ -13,8 +13,6 @@ from stages.shapeassembly.limits import MAX_LINES, MAX_PARTS, MIN_SIZE
 from stages.shapeassembly.printer import print_line
 from stages.shapeassembly.program import AXES, BBOX, FACES, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
 
-__all__ = ["ATTACH", "DECLARE", "REFLECT", "SQUEEZE", "TRANSLATE", "Flat", "Indices", "copy_name", "flatten"]
-
 Indices = np.ndarray
 """int64."""
 

@@ -14,8 +14,6 @@ from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.limits import MAX_PARTS
 from stages.shapeassembly.program import Program
 
-__all__ = ["without_hierarchy"]
-
 GATES = Gates(fewest_leaves=1, most_leaves=MAX_PARTS)
 """The fit that an extracted program must have, and nothing about its size."""
 

@@ -16,8 +16,6 @@ from stages.shapeassembly.program import Block, Program
 if TYPE_CHECKING:
     from stages.shapeassembly.kernels import Executed
 
-__all__ = ["Execution", "check", "execute", "execute_all", "execute_flat", "parts_of"]
-
 _REFUSALS = {
     1: ("too many cuboids", f"expanded it has more than {MAX_PARTS}"),
     2: ("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle"),

@@ -11,8 +11,6 @@ from stages.shapeassembly.attachment import MOVE, grow, hinge, hold, local, poin
 from stages.shapeassembly.flat import ATTACH, DECLARE, REFLECT, SQUEEZE
 from stages.shapeassembly.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS, MAX_REACH
 
-__all__ = ["Executed", "run"]
-
 OK, TOO_MANY_PARTS, TOO_DEEP, TOO_MANY_EVENTS, TOO_FAR = range(5)
 
 

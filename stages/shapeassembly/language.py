@@ -12,8 +12,6 @@ from stages.shape.sample import Sample
 from stages.shape.shape import Shape, upright
 from stages.shapeassembly.shape import label_colors, shape_of_text
 
-__all__ = ["LANGUAGE", "assignment_name"]
-
 
 class Programs:
     """The categories of programs that the assignment has listed with the labels of their parts."""

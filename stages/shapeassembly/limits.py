@@ -2,18 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "MAX_COPIES",
-    "MAX_DEPTH",
-    "MAX_EVENTS",
-    "MAX_LINES",
-    "MAX_PARTS",
-    "MAX_REACH",
-    "MAX_SIZE",
-    "MAX_TEXT",
-    "MIN_SIZE",
-]
-
 MAX_TEXT = 1_000_000
 """Characters of a program's text."""
 

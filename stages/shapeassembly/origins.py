@@ -11,8 +11,6 @@ from stages.shapeassembly.extraction.settings import NamedFiles
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.shapeassembly.sources import source_digest
 
-__all__ = ["program_origins"]
-
 
 def program_origins(plan: Plan) -> list[Origin]:
     """The folders and archives of the config, in its order, and the weights of the models that write programs. The

@@ -11,8 +11,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.flat import ATTACH, DECLARE, REFLECT, SQUEEZE, TRANSLATE, Indices
 from stages.shapeassembly.program import Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
 
-__all__ = ["SMALLEST", "parameter_places", "parameter_ranges", "parameters", "with_parameters"]
-
 SMALLEST = 0.01
 """Smallest size of a cuboid that a model or a fit may choose (shapeassembly App. D)."""
 

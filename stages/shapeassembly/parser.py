@@ -29,8 +29,6 @@ from stages.shapeassembly.program import (
     Translate,
 )
 
-__all__ = ["parse"]
-
 _TOKEN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*|[-+.0-9](?:[A-Za-z0-9_.]|(?<=[eE])[-+])*|[=(),{}]|[^ \t\r\n]")
 _COMMANDS = ("attach", "squeeze", "reflect", "translate")
 _RESERVED = frozenset({"Assembly", "Cuboid", "True", "False", *_COMMANDS})

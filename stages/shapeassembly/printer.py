@@ -6,8 +6,6 @@ from dataclasses import replace
 
 from stages.shapeassembly.program import Attach, Block, Cuboid, Line, Point, Program, Reflect, Squeeze
 
-__all__ = ["print_line", "print_program", "rounded"]
-
 DECIMALS = 3
 
 

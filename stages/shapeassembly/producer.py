@@ -6,8 +6,6 @@ from stages.shape.collection.producer import Producer
 from stages.shapeassembly.origins import program_origins
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 
-__all__ = ["PRODUCER"]
-
 PRODUCER = Producer(
     language="shapeassembly",
     keys="shapeassembly.programs, hierarchies or written",

@@ -11,23 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
 
-__all__ = [
-    "AXES",
-    "BBOX",
-    "FACES",
-    "Attach",
-    "Axis",
-    "Block",
-    "Cuboid",
-    "Face",
-    "Line",
-    "Point",
-    "Program",
-    "Reflect",
-    "Squeeze",
-    "Translate",
-]
-
 Axis = Literal["X", "Y", "Z"]
 Face = Literal["right", "left", "top", "bot", "front", "back"]
 Point = tuple[float, float, float]

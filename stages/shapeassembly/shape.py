@@ -12,8 +12,6 @@ from stages.shape.shape import Shape
 from stages.shapeassembly.interpreter import Execution, execute
 from stages.shapeassembly.parser import parse
 
-__all__ = ["label_colors", "shape_of_execution", "shape_of_text"]
-
 _FACES = np.array(
     [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
      [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5]], dtype=np.int32,

@@ -14,8 +14,6 @@ from stages.shape.splits import SPLITS, share_out
 from stages.shapeassembly.settings import ProgramFiles, ShapeAssemblyConfig
 from stages.shapeassembly.sources import listed_names
 
-__all__ = ["splits_of"]
-
 
 def splits_of(
     rows: Sequence[Mapping[str, Any]], config: ShapeAssemblyConfig, rng: np.random.Generator

@@ -11,8 +11,6 @@ from pathlib import Path
 from pipeline.places import file_digest
 from stages.shapeassembly.limits import MAX_TEXT
 
-__all__ = ["existing_programs", "listed_names", "program_texts", "source_digest"]
-
 
 def existing_programs(path: Path) -> Path:
     """`path` itself. Raises ValueError when it is neither a folder nor a tar archive."""

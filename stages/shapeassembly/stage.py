@@ -31,8 +31,6 @@ from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.shapeassembly.sharing import splits_of
 from stages.shapeassembly.sources import program_texts, source_digest
 
-__all__ = ["STAGE"]
-
 BYTES_A_PROGRAM = 12_000
 """A sample in its shard, and its line in the assignment."""
 

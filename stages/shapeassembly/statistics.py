@@ -13,8 +13,6 @@ from stages.shapeassembly.interpreter import execute_all
 from stages.shapeassembly.program import Program, Reflect, Squeeze, Translate
 from stages.shapeassembly.structure import block_signatures, signature
 
-__all__ = ["ProgramStatistics", "cluster_curve", "cluster_curves", "program_statistics"]
-
 
 @dataclass(frozen=True)
 class ProgramStatistics:

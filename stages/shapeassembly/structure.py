@@ -15,8 +15,6 @@ from stages.shapeassembly.flat import copy_name
 from stages.shapeassembly.limits import MAX_DEPTH, MAX_TEXT
 from stages.shapeassembly.program import BBOX, Attach, Block, Cuboid, Program, Reflect, Squeeze
 
-__all__ = ["block_signatures", "program_distance", "signature", "token_distance", "tokens"]
-
 
 def tokens(program: Program) -> list[str]:
     """The program as words: commands, numbers of cuboids, flags, faces, axes, counts; no continuous parameter.

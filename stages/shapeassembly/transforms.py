@@ -25,8 +25,6 @@ from stages.shapeassembly.program import (
     Translate,
 )
 
-__all__ = ["unaligned", "unordered", "without_macros"]
-
 
 def unaligned(program: Program) -> Program:
     """The program in which no cuboid but the bounding boxes is aligned: some turn that did not."""

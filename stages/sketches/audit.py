@@ -15,8 +15,6 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 from stages.sketches.cameras import projected
 
-__all__ = ["AUDIT", "outline_shares", "sketch_faults"]
-
 INK = (2e-4, 0.9)
 """How much of a drawing is ink, at least and at most, as a share of a black picture."""
 RIGID = 1e-9

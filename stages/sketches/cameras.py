@@ -10,8 +10,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.views.camera import View
 
-__all__ = ["CAMERA_FIELDS", "camera_fields", "projected"]
-
 OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 DECIMALS = 12
 """Further digits of a matrix are noise."""

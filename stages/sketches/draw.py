@@ -11,8 +11,6 @@ from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 from stages.sketches.settings import SketchView, StrokeOptions
 
-__all__ = ["draw_sketch", "jittered_camera"]
-
 
 def jittered_camera(view: SketchView, rng: np.random.Generator) -> Camera:
     """The camera of a view for one sample: each jittered value drawn uniformly, in a fixed order, from `rng`."""

@@ -12,8 +12,6 @@ from pipeline.errors import ShardFailed
 from stages.shape.arrays import ByteArray
 from stages.sketches.settings import Augmentation
 
-__all__ = ["Augmented", "augment", "dilate", "erode", "flip", "png_array", "png_bytes"]
-
 
 class Augmented(NamedTuple):
     """A changed drawing (h, w), whether it is mirrored, and by how many pixels its lines have grown wider at most."""

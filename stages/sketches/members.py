@@ -14,8 +14,6 @@ from stages.shape.views.camera import Camera
 from stages.sketches.cameras import CAMERA_FIELDS
 from stages.sketches.settings import SketchesConfig
 
-__all__ = ["MEMBERS"]
-
 
 def _members(config: Config) -> tuple[Member, ...]:
     section = config.section(SketchesConfig)

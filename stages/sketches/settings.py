@@ -9,8 +9,6 @@ from pydantic import Field, field_validator, model_validator
 from pipeline.config import StrictModel
 from stages.shape.views.buffers import Backend
 
-__all__ = ["Augmentation", "SketchView", "SketchesConfig", "StrokeOptions"]
-
 
 class SketchView(StrictModel):
     """One drawing of each sample, and how far its camera wanders from sample to sample."""

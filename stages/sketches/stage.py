@@ -20,8 +20,6 @@ from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.image import augment, png_bytes
 from stages.sketches.settings import SketchesConfig
 
-__all__ = ["STAGE", "drawings"]
-
 
 def run_shard(task: Task) -> Outcome:
     """The members of each sample that `members.py` declares.

@@ -22,8 +22,6 @@ import numpy.typing as npt
 
 from stages.strings.rules import NEVER, Rules
 
-__all__ = ["END", "NONE", "Acceptor", "follow", "is_followed", "tokens_to_complete"]
-
 END = 0
 NONE = -1
 """No token, and no node."""

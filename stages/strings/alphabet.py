@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-__all__ = ["LETTERS", "Alphabet", "make_alphabet"]
-
 LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 

@@ -21,8 +21,6 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import Edges, StringsConfig
 from stages.strings.tokens import StringError
 
-__all__ = ["AUDIT", "string_faults"]
-
 
 def string_faults(sample: Packaged) -> Iterator[str]:
     """A sentence for a shape graph that is not the record's, and for strings that stand for another graph."""

@@ -35,8 +35,6 @@ from stages.strings.encoder import Encoded
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-__all__ = ["DUMMY", "CategorySpace", "Labelled", "NoCategoryError", "PairPlaces", "token_edges"]
-
 DUMMY = 0
 """The category of brackets."""
 REACH = 2.0

@@ -26,8 +26,6 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import Edges
 from stages.strings.tokens import number_text, number_value, split_tokens
 
-__all__ = ["DUMMY", "Codebook", "Described", "describe", "pack", "restore", "unpack"]
-
 DUMMY = -1
 """The category of what is no part."""
 MOST_TOKENS = 1_000_000

@@ -12,8 +12,6 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import StringError, Token, TokenKind, number_value, split_tokens
 
-__all__ = ["Decoded", "decode", "equivalent"]
-
 
 @dataclass(frozen=True)
 class Decoded:

@@ -14,8 +14,6 @@ from stages.shape.graphs.canonical import canonical_order
 from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import number_text
 
-__all__ = ["Encoded", "NotConnectedError", "canonical_string", "encode", "random_strings"]
-
 Indices = npt.NDArray[np.int64]
 
 PATIENCE = 5

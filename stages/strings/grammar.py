@@ -11,8 +11,6 @@ from stages.strings.decoder import Decoded, decode
 from stages.strings.settings import Edges
 from stages.strings.tokens import StringError
 
-__all__ = ["check"]
-
 
 def check(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges = "all") -> Decoded:
     """The graph of `string`, if the grammar admits the neighbours of every node: just these, or, where strings do not

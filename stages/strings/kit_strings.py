@@ -21,8 +21,6 @@ from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded, canonical_string, random_strings
 from stages.strings.settings import Edges
 
-__all__ = ["KitStrings"]
-
 _STRENGTH: dict[ContactKind | None, int] = {"face": 0, "line": 1, "point": 2, None: 2}
 
 

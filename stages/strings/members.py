@@ -9,8 +9,6 @@ from pipeline.stage import Plan
 from stages.shape.collection.members import TEXT, Member, Members
 from stages.strings.settings import MEANINGS, StringsConfig
 
-__all__ = ["CORPUS", "MEMBERS"]
-
 CORPUS = "corpus"
 """Name of the shard that makes the corpus, and stem of its files."""
 

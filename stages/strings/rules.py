@@ -16,8 +16,6 @@ import numpy as np
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Grammar, Multiset
 
-__all__ = ["ANY", "NEVER", "Rules", "make_rules", "patterns_of", "rules_of"]
-
 ANY = -1
 """Size of a pattern that any number of neighbours fits."""
 MANY = 1 << 14

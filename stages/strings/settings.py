@@ -8,8 +8,6 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["MEANINGS", "Edges", "StringsConfig"]
-
 Edges = Literal["all", "faces", "tree"]
 
 MEANINGS: dict[Edges, str] = {

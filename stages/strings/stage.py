@@ -21,8 +21,6 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.members import CORPUS
 from stages.strings.settings import StringsConfig
 
-__all__ = ["STAGE"]
-
 BYTES_A_STRING = 3000
 """About as long as the string of a shape of two hundred parts with six hundred contacts is."""
 

@@ -9,8 +9,6 @@ from typing import Any
 
 from stages.strings.tokens import number_value, split_tokens
 
-__all__ = ["StringFigures", "StringStatistics", "measure_string", "whole"]
-
 
 @dataclass(frozen=True)
 class StringFigures:

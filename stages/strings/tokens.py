@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-__all__ = ["StringError", "Token", "TokenKind", "number_text", "number_value", "split_tokens"]
-
 TokenKind = Literal["node", "cycle", "open", "close"]
 
 _TOKEN = re.compile(r"%\([0-9]{1,6}\)|%[0-9][0-9]|\[[^\[\]]*\]|.", re.DOTALL)

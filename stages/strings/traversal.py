@@ -8,8 +8,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["depth_first_tree", "first_edges_tree", "walk"]
-
 
 @numba.njit(cache=True)
 def _arcs(n, edges, edge_order):

@@ -16,8 +16,6 @@ from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.synthesis.rounds import Dreaming, read_pool
 from stages.synthesis.settings import DreamSplitConfig, SynthesisConfig
 
-__all__ = ["assignment_shard", "planned_collection", "run_assignment", "run_collection"]
-
 
 def assignment_shard(plan: Plan, models: Sequence[Dreaming]) -> Shard:
     """The shard that shares out what all models have found, once they have ended."""

@@ -25,8 +25,6 @@ from stages.synthesis.settings import SourceConfig, SynthesisConfig
 from stages.synthesis.source import Source, read_source
 from stages.variations.kernels.answers import ContactAnswers
 
-__all__ = ["run_lane"]
-
 NO_STRING, DUPLICATE, FAULTY = "no valid string", "duplicate", "not valid by its meshes"
 NEW, TRAIN, EXEMPLAR = "new", "train", "exemplar"
 

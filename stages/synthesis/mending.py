@@ -18,8 +18,6 @@ from stages.training.string_vae.sampling import Found
 from stages.training.string_vae.trained import TrainedStringVae
 from stages.training.string_vae.writing import Draft
 
-__all__ = ["first_impossible", "mended"]
-
 TRIED = 2000
 """Parts that are put down at most to learn whether an arrangement is left: most that have none are told by less."""
 

@@ -14,8 +14,6 @@ from stages.shape.collection.producer import Producer
 from stages.synthesis.rounds import dreaming
 from stages.synthesis.settings import SynthesisConfig
 
-__all__ = ["PRODUCER"]
-
 
 def _measures(plan: Plan) -> Mapping[str, Any]:
     """For each model what it drew, what of it became shapes, and why the rest did not."""

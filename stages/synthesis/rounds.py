@@ -13,8 +13,6 @@ from stages.shape.sample import read_samples
 from stages.synthesis.settings import SourceConfig, SynthesisConfig
 from stages.synthesis.source import source_shard
 
-__all__ = ["Dreaming", "dreaming", "read_pool", "run_pool"]
-
 
 @dataclass(frozen=True)
 class Dreaming:

@@ -9,8 +9,6 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 
-__all__ = ["DreamSplitConfig", "SourceConfig", "SynthesisConfig", "Way"]
-
 Way = Literal["gaussian", "prior", "perturbation", "linear", "path"]
 """How strings are drawn from a string VAE (strings §5.2)."""
 

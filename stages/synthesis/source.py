@@ -26,8 +26,6 @@ from stages.synthesis.settings import SourceConfig
 if TYPE_CHECKING:
     from stages.training.string_vae.trained import TrainedStringVae
 
-__all__ = ["Source", "read_source", "run_source", "source_shard"]
-
 
 @dataclass(frozen=True)
 class Source:

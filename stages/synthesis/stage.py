@@ -21,8 +21,6 @@ from stages.synthesis.settings import SynthesisConfig
 from stages.synthesis.source import run_source
 from stages.variations.settings import VariationsConfig
 
-__all__ = ["STAGE"]
-
 BYTES_A_SAMPLE = 40_000
 BYTES_A_MODEL = 8_000_000
 

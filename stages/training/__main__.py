@@ -15,8 +15,6 @@ from pipeline.errors import ConfigError
 from pipeline.registry import find_stages
 from stages.training.stage import reads_samples
 
-__all__ = ["main"]
-
 
 def main(arguments: list[str]) -> int:
     """The exit code; see the module."""

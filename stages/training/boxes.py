@@ -9,8 +9,6 @@ from stages.shapeassembly.extraction.boxes import nearest_axes
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.parameters import SMALLEST
 
-__all__ = ["CENTRE", "SIZE", "TURN", "WIDTH", "box_of_numbers", "numbers_of_box"]
-
 CENTRE, SIZE, TURN = slice(0, 3), slice(3, 6), slice(6, 9)
 WIDTH = 9
 

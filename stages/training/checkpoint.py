@@ -10,16 +10,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from torch import Tensor
 
-__all__ = [
-    "VERSION",
-    "CheckpointError",
-    "checkpoint_bytes",
-    "load_checkpoint",
-    "tensors_of",
-    "weights_header",
-    "weights_of_kind",
-]
-
 VERSION = 1
 """Of what stands in the header. A file of another version is refused."""
 

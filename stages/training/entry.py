@@ -8,8 +8,6 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["KitModelEntry", "ModelEntry", "Source", "Subject"]
-
 Subject = Literal["kit", "program"]
 """What a model learns from: the samples of a kit, or a program."""
 

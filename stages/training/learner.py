@@ -11,8 +11,6 @@ from torch import Generator, Tensor, nn
 from pipeline.places import file_digest
 from pipeline.stage import Task
 
-__all__ = ["Learner", "mean_figures", "sample_digests"]
-
 
 class Learner(Protocol):
     """A model and the samples it learns from. A kind's `training.py` makes one: `learner(task, entry) -> Learner`."""

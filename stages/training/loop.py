@@ -16,8 +16,6 @@ from stages.training.checkpoint import tensors_of
 from stages.training.entry import ModelEntry
 from stages.training.learner import Learner
 
-__all__ = ["Trainee", "device_of", "precision_of", "same_arithmetic", "train"]
-
 LAST_RATE = 0.05
 """Share of the learning rate that is left at the last step."""
 LARGEST_GRADIENT = 1.0

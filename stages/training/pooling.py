@@ -7,8 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["pooled"]
-
 POOLED = 16
 """Samples of like length stand together in a batch, chosen from so many batches at once."""
 

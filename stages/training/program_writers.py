@@ -13,8 +13,6 @@ from stages.training.checkpoint import weights_header
 from stages.training.program_lm.trained import load_program_lm
 from stages.training.program_vae.trained import load_program_vae
 
-__all__ = ["ProgramWriter", "load_program_writer"]
-
 
 class ProgramWriter(Protocol):
     """What writes programs."""

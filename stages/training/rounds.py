@@ -15,8 +15,6 @@ from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.programs.program import program_module
 from stages.training.entry import ModelEntry, Subject
 
-__all__ = ["Chain", "Kind", "kind_of", "model_name", "module_of", "rounds", "run_round", "subject_of"]
-
 
 class Kind(Protocol):
     """What the `training.py` of a kind holds; its folder is found by the kind's name."""

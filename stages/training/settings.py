@@ -15,8 +15,6 @@ from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.string_vae.settings import StringVaeEntry
 
-__all__ = ["AnyEntry", "TrainingConfig"]
-
 AnyEntry = Annotated[
     StringVaeEntry
     | EdgeCategoriesEntry

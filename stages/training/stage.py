@@ -26,8 +26,6 @@ from stages.training.rounds import Chain, kind_of, model_name, module_of, rounds
 from stages.training.settings import AnyEntry, TrainingConfig
 from stages.training.trained import FILES, run_trained
 
-__all__ = ["STAGE"]
-
 LEARNT = ("train", "val")
 """The splits that models see."""
 BYTES_A_ROUND = 16_000_000

@@ -9,8 +9,6 @@ import numpy.typing as npt
 import torch
 from torch import Generator, Tensor, nn
 
-__all__ = ["Points", "Standing", "drawn"]
-
 Points = npt.NDArray[np.float32]
 """Points of the latent space, float32 (n, latent)."""
 

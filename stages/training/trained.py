@@ -11,8 +11,6 @@ from typing import Any
 from pipeline.stage import Outcome, Task
 from stages.training.rounds import subject_of
 
-__all__ = ["FILES", "curves_csv", "curves_png", "model_card", "run_trained"]
-
 FILES = {"weights.safetensors", "curves.csv", "curves.png", "README.md"}
 """What a model's folder holds."""
 

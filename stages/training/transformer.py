@@ -6,8 +6,6 @@ import torch
 from torch import Tensor, cat, nn
 from torch.nn.functional import scaled_dot_product_attention
 
-__all__ = ["Block"]
-
 
 def _heads(width: int, head: int) -> int:
     """About as many heads as `head` goes into the width, so that they share it evenly."""

@@ -15,8 +15,6 @@ from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.physics.stability import components
 
-__all__ = ["AUDIT", "contradictions", "judged_anew"]
-
 ROUNDED = 2e-6
 """Numbers of a record are rounded to so many."""
 SLACK = 1e-3

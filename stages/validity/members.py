@@ -9,8 +9,6 @@ from pipeline.config import Config
 from stages.shape.collection.members import Column, Field, Member, Members
 from stages.shape.collection.pairs import CONTACTS, JOINTS
 
-__all__ = ["MEMBERS"]
-
 
 def _number(description: str, **limits: float) -> dict[str, Any]:
     return {"type": "number", "description": description, **limits}

@@ -17,8 +17,6 @@ from stages.shape.physics.judge import judge_of, physical_fields
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.sample import Sample
 
-__all__ = ["STAGE"]
-
 COUNTED = ("rooted", "stable")
 BYTES_A_SAMPLE = 4096
 

@@ -12,8 +12,6 @@ from stages.variations.backdrop import NO_BACKDROP
 from stages.variations.carcass import NO_CARCASS, carcass
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
-__all__ = ["SAME_LAYOUT", "another_model", "what_keeps", "what_was_left"]
-
 SAME_LAYOUT = "make the same layout in other proportions (`variations.per_kit: 0`, `proportions.per_kit`)"
 """What always helps where there are too few layouts, or all of them alike."""
 REGULAR = 0.01

@@ -10,8 +10,6 @@ import numpy as np
 from pipeline.stage import Task
 from stages.variations.pool import FoundVariants, PoolIndex
 
-__all__ = ["Ancestry", "read_ancestry"]
-
 Ancestor = int | str
 """A variant by its place in the pool, or an exemplar by its name."""
 

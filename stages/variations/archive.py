@@ -12,8 +12,6 @@ import numpy as np
 from stages.shape.arrays import Float32Array
 from stages.variations.features import AXES, Axis
 
-__all__ = ["Archive", "Cell", "Place", "cell_of"]
-
 Cell = tuple[int, ...]
 
 Place = tuple[int, int]

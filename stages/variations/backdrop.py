@@ -19,8 +19,6 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import FORBIDDEN, NONE
 from stages.variations.settings import CHOSEN_HUBS, VariationsConfig
 
-__all__ = ["NO_BACKDROP", "Backdrop", "backdrop_of", "hubs_by_choice"]
-
 NO_BACKDROP = "no backdrop"
 """Why a variant is refused that does not get back the hubs that are required."""
 FIT_SHARE = 0.75

@@ -16,8 +16,6 @@ from stages.shape.geometry.contact import world_boxes
 from stages.shape.kit import Assembly, Exemplar, Kit
 from stages.variations.labels import named_labels
 
-__all__ = ["NO_CARCASS", "carcass", "carcass_test", "spanning_hubs"]
-
 SPAN = 2 / 3
 """A part belongs to the carcass if the diagonal of its box is so much of the exemplar's."""
 NO_CARCASS = "without its carcass"

@@ -29,8 +29,6 @@ from stages.variations.rounds import last_pool
 from stages.variations.selection import select
 from stages.variations.settings import VariationsConfig
 
-__all__ = ["assignment_shard", "collection_shards_of", "run_assignment", "run_collection"]
-
 
 def assignment_shard(plan: Plan, search: list[Shard]) -> Shard:
     """The shard that shares out the variants, once the search of every kit has ended."""

@@ -17,18 +17,6 @@ from stages.variations.labels import named_labels
 from stages.variations.resizing import Resizer
 from stages.variations.stretched import contact_fault
 
-__all__ = [
-    "Constraint",
-    "Labels",
-    "Mend",
-    "Test",
-    "find_constraints",
-    "made_mend",
-    "made_test",
-    "module_of",
-    "unknown_in",
-]
-
 Labels = Mapping[str, Sequence[str]]
 """What a config says of a constraint: labels of parts, by what they are to it."""
 Test = Callable[[Assembly], str | None]

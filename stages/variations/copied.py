@@ -15,8 +15,6 @@ from stages.variations.kernels.copies import Dockings, Groups, Joints, Target, c
 from stages.variations.kernels.layout import ShapeTables
 from stages.variations.kernels.tables import shape_tables
 
-__all__ = ["Copied", "CopyTest"]
-
 BUDGET = 2_000_000
 """Contacts that are looked at for one shape at most. Rare dockings are looked at first, so that what is left unseen
 beyond it are repetitions of common ones: `largest` may then be too small, and `pieces` too many."""

@@ -11,8 +11,6 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Kit, Strictness
 
-__all__ = ["COPIED", "dullness", "mutual_distance"]
-
 COPIED = 0.9
 """Share of parts in the largest copied piece above which a shape is a near copy, and from which on, in the median, a
 pool is dull."""

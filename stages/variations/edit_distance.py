@@ -13,8 +13,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Assembly
 
-__all__ = ["edit_bounds"]
-
 
 def edit_bounds(first: Assembly, second: Assembly) -> tuple[int, int]:
     """The least and the most that the graph edit distance of two assemblies of one kit can be.

@@ -13,8 +13,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Assembly, Kit
 
-__all__ = ["Facing", "vertical_turn"]
-
 DEGREES = 5
 """Turns that differ by less may count as one; unit: degrees."""
 BETTER = 0.5

@@ -15,8 +15,6 @@ import numpy.typing as npt
 
 from stages.shape.splits import SPLITS
 
-__all__ = ["LET_GO", "Cut", "Near", "cut_families"]
-
 LET_GO = -1
 REGIONS = (16, 8, 4, 2, 1)
 """Regions of a split, tried in turn until enough is left for train: many small regions show more of the pool, few large

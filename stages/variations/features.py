@@ -11,8 +11,6 @@ from stages.shape.arrays import Float32Array, FloatArray
 from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.kit import Assembly, Kit
 
-__all__ = ["AXES", "MIXED", "Axis", "FeatureTest", "material_shares"]
-
 Axis = Literal[
     "parts", "footprint", "height", "aspect", "cycle_rank", "mixture", "blend", "distance", "copied", "dominant"
 ]

@@ -10,8 +10,6 @@ from pipeline.stage import Plan
 from stages.exemplars.settings import ExemplarsConfig
 from stages.variations.settings import CHOSEN_INSTEAD, VariationsConfig
 
-__all__ = ["chosen_instead", "comes_instead"]
-
 
 def comes_instead(config: Config) -> bool:
     """Whether other proportions may come instead of layouts: of a single kit, for a dataset is made in one way."""

@@ -11,8 +11,6 @@ from pipeline.errors import ConfigError
 from stages.shape.arrays import BoolArray
 from stages.shape.kit import Kit
 
-__all__ = ["named_labels"]
-
 
 def named_labels(kit: Kit, names: Iterable[str], key: str) -> BoolArray:
     """Which labels of a kit are among the `names` that a config has at `key`, bool (labels,).

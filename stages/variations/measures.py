@@ -16,8 +16,6 @@ from stages.variations.meeting import meeting_words
 from stages.variations.settings import NoveltyConfig
 from stages.variations.split_report import shortage
 
-__all__ = ["SAMPLE", "described", "edit_measures", "growth", "measure_table", "pool_measures"]
-
 QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 SAMPLE = 24
 """So many of the chosen variants are compared with the exemplars part by part."""

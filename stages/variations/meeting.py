@@ -9,8 +9,6 @@ from typing import Any
 from stages.exemplars.grammar import observe_neighbourhoods
 from stages.shape.kit import Kit, Multiset
 
-__all__ = ["meeting", "meeting_words"]
-
 Rule = tuple[int, Multiset]
 
 

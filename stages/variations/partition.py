@@ -19,8 +19,6 @@ from stages.variations.selection import select
 from stages.variations.settings import SplitConfig, VariationsConfig
 from stages.variations.shared_surface import PackedShapes
 
-__all__ = ["Chosen", "candidates", "choose_by_family", "nearness_of", "packed_shapes", "wanted_sizes"]
-
 COMPARED = 64
 """So many shapes of val and of test at most are compared with train."""
 

@@ -31,8 +31,6 @@ from stages.shape.kit import Assembly, Kit
 from stages.variations.features import AXES
 from stages.variations.search.search import Variant
 
-__all__ = ["FoundVariants", "PoolIndex", "write_kept", "write_variants"]
-
 _INDEX = ("counts", "features", "keys", "digests")
 _LANE = ("types", "origins", "poses", "stretched", "stretches", "edges", "labels", "offsets", *_INDEX[1:])
 

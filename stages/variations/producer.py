@@ -16,8 +16,6 @@ from stages.variations.measures import measure_table
 from stages.variations.settings import VariationsConfig
 from stages.variations.split_report import splits_table
 
-__all__ = ["PRODUCER"]
-
 
 def _measures(plan: Plan) -> Mapping[str, Any]:
     """What the variants of each kit are worth."""

@@ -12,8 +12,6 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import moved_by
 from stages.variations.labels import named_labels
 
-__all__ = ["Resizer", "heights_of", "rigid_types", "spans_of"]
-
 UP = {"y": 1, "z": 2}
 
 

@@ -38,8 +38,6 @@ from stages.variations.settings import (
     VariationsConfig,
 )
 
-__all__ = ["last_pool", "run_lane", "run_pool", "search_shards"]
-
 ROUND_FIND = 400
 """Most variants that one lane finds in a round before the lanes exchange what they have."""
 ROUND_SHARE = 40

@@ -10,8 +10,6 @@ from stages.shape.kit import Kit
 from stages.variations.features import AXES, FeatureTest
 from stages.variations.settings import SelectionConfig
 
-__all__ = ["farthest_first", "select", "selection_space"]
-
 _SIZES = ("parts", "footprint", "height", "aspect")
 _SKIPPED = "dominant"
 

@@ -10,21 +10,6 @@ from pipeline.config import StrictModel
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.variations.features import Axis
 
-__all__ = [
-    "CHOSEN_CARCASS",
-    "CHOSEN_COPIED",
-    "CHOSEN_HUBS",
-    "CHOSEN_INSTEAD",
-    "CHOSEN_INSTEAD_STABLE",
-    "CHOSEN_STABLE",
-    "GrownConfig",
-    "NoveltyConfig",
-    "SearchConfig",
-    "SelectionConfig",
-    "SplitConfig",
-    "VariationsConfig",
-]
-
 CHOSEN_HUBS = 0.5
 """What is required of hubs that were chosen and not stated: a mile of rail on which one brick of the road fits is no
 bridge."""

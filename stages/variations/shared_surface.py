@@ -17,8 +17,6 @@ import numpy.typing as npt
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
 from stages.shape.kit import Assembly, Kit
 
-__all__ = ["PackedShapes"]
-
 SEEDS = 24
 """Parts of each shape, drawn by area, by which motions are found and first judged."""
 SPARE_MISSES = 3

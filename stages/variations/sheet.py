@@ -33,8 +33,6 @@ from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.variations.substructures.sheet import replacements_sheet
 
-__all__ = ["kit_variants_sheet", "main"]
-
 SHOWN = 24
 COLUMNS = 8
 CELL = 232

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["shortage", "splits_table"]
-
 
 def shortage(measures: Mapping[str, Any]) -> str:
     """Which splits of a kit have fewer samples than asked for, in words; empty where none has."""

@@ -20,8 +20,6 @@ from stages.variations.measures import described, growth
 from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
 from stages.variations.settings import VariationsConfig
 
-__all__ = ["STAGE"]
-
 BYTES_A_VARIANT = 60_000
 
 _JOBS = {"lane": run_lane, "pool": run_pool, "assignment": run_assignment, "collection": run_collection}

@@ -10,8 +10,6 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from stages.shape.stretch import STRETCHED_DEPTH
 
-__all__ = ["contact_fault"]
-
 NEAR = 1.1
 """Parts nearer to each other than so many contact tolerances are held against the record, as when it is verified."""
 

@@ -9,8 +9,6 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 
-__all__ = ["vary"]
-
 
 def vary(kit: Kit, count: int, rng: np.random.Generator, config: SearchConfig | None = None) -> list[Assembly]:
     """`count` new assemblies of the kit's parts, or fewer where `config.tries` tries find no more.

@@ -6,8 +6,6 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["WritingConfig"]
-
 
 class WritingConfig(StrictModel):
     """How the models of `shapeassembly.written` write their programs."""

@@ -17,8 +17,6 @@ from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig, WrittenPrograms
 from stages.writing.settings import WritingConfig
 
-__all__ = ["STAGE"]
-
 BYTES_A_PROGRAM = 3_000
 
 

@@ -17,8 +17,6 @@ from pathlib import Path
 from tests.bench.kept import HEADER, figures, keep, row
 from tests.bench.measure import Measure
 
-__all__ = ["measures"]
-
 KEPT = Path(__file__).parent / "report.json"
 
 

@@ -14,8 +14,6 @@ from joblib.externals.loky.process_executor import ProcessPoolExecutor
 from tests.bench.measure import Measure
 from tests.pipeline.turn import turn
 
-__all__ = ["bench"]
-
 SHARDS = 400
 FEW = 20
 

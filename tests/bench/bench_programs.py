@@ -13,8 +13,6 @@ from stages.programs.program import Program, find_program, program_names, shape_
 from stages.programs.sampling import Cell, Sampler, cells
 from tests.bench.measure import Measure, rate
 
-__all__ = ["bench"]
-
 SHAPES = 50
 INFINIGEN = 1 / 0.36
 """Chairs a second of Infinigen's chair factory on a core like ours, as measured beside this project."""

@@ -19,8 +19,6 @@ from stages.sketches.image import png_bytes
 from stages.sketches.settings import StrokeOptions
 from tests.bench.measure import Measure, rate
 
-__all__ = ["bench"]
-
 SIZE, SUPERSAMPLE = 224, 2
 COLUMNS, SIDES = 6, 40
 

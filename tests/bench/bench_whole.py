@@ -21,8 +21,6 @@ import yaml
 from pipeline.registry import find_stages, upstream
 from tests.bench.measure import Measure
 
-__all__ = ["bench"]
-
 ROOT = Path(__file__).resolve().parents[2]
 
 

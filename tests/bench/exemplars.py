@@ -29,8 +29,6 @@ from pipeline.places import Places
 from pipeline.records import read_record
 from stages.choices.config_text import dataset_name
 
-__all__ = ["kits", "main"]
-
 HEADER = (
     "| model | parts / types | up, tolerance, kinds, grammar, hubs | forecast | chosen of pool | histograms | E "
     "| copied | mixed | inspect, CPU s | making, CPU s | MB |\n"

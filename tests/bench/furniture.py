@@ -13,8 +13,6 @@ import numpy as np
 
 from stages.exemplars.model import Model
 
-__all__ = ["FURNITURE", "MEANINGS", "side_by_side"]
-
 FURNITURE = {
     "h01_wooden_cabinet": 0,
     "h03_kitchen_cabinet": -90,

@@ -12,8 +12,6 @@ from pathlib import Path
 
 from tests.bench.measure import Measure
 
-__all__ = ["HEADER", "NOISE", "change", "figures", "keep", "row"]
-
 HEADER = "| what | ours, a second and core | peer | ratio | change | note |\n|---|---:|---:|---:|---:|---|"
 NOISE = 0.25
 """Share by which a figure may differ from the last kept one by noise: on a busy machine with two threads a core, CPU

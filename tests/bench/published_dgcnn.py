@@ -9,8 +9,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
-__all__ = ["PublishedDGCNN"]
-
 
 class PublishedDGCNN(nn.Module):
     """DGCNN: k 20, widths 16, 16, 32, 64, embedding 64; a perceptron 128-128-64-n a parameter, dropout a half. A graph

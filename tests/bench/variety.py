@@ -37,8 +37,6 @@ from stages.variations.search.search import Search, Variant
 from stages.variations.selection import farthest_first
 from stages.variations.settings import SearchConfig, VariationsConfig
 
-__all__ = ["Finds", "configured", "explore"]
-
 OWN = ("default/castle", "default/temple", "default/space-base", "default/playground")
 CONFIGS = (
     *OWN,

@@ -19,8 +19,6 @@ from pipeline.records import read_record
 from pipeline.shards import json_bytes
 from tests.chaos.running import Run
 
-__all__ = ["Arena", "Step"]
-
 Step = tuple[str, str]
 """A dataset and one of its stages."""
 

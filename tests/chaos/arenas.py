@@ -14,8 +14,6 @@ from pipeline.registry import find_stages
 from tests.chaos.arena import Arena, Step
 from tests.stated import stated
 
-__all__ = ["ARENAS", "Datasets", "arena_in", "damaged"]
-
 
 @dataclass(frozen=True)
 class Datasets:

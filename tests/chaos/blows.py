@@ -14,8 +14,6 @@ from pipeline.records import read_record
 from tests.chaos.arena import Arena
 from tests.chaos.running import Run, seconds_of
 
-__all__ = ["BLOWS", "Blow", "Struck"]
-
 PATIENCE = "0.3"
 """Minutes in the rounds where a worker is stopped."""
 

@@ -15,8 +15,6 @@ from tests.chaos.arenas import damaged
 from tests.chaos.blows import Blow, Struck
 from tests.chaos.running import Run
 
-__all__ = ["Ended", "play"]
-
 _EARLY = 0.08
 """Share of the blows that come while the run still starts."""
 _ANEW = 0.03

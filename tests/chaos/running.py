@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-__all__ = ["Run", "alive", "seconds_of"]
-
 _HUNG_AFTER = 3600.0
 """Seconds after which a run is taken to hang; where nothing is compiled yet, the first one takes long."""
 

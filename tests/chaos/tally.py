@@ -6,8 +6,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-__all__ = ["Tally"]
-
 _ENDINGS = ("struck", "missed", "late", "wrong")
 
 

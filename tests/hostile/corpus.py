@@ -16,8 +16,6 @@ from stages.exemplars.settings import ReadLimits
 from tests.hostile.good import write_good
 from tests.hostile.mutate import mutate
 
-__all__ = ["LIMITS", "Outcome", "outcomes"]
-
 LIMITS = ReadLimits(cpu_seconds=20, memory_mb=1000)
 
 PYTHONS_OWN = (

@@ -9,8 +9,6 @@ import numpy as np
 
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, png, textured_dae, textured_glb, write_obj
 
-__all__ = ["write_good"]
-
 BOXES = {"base": box((4, 1, 4)), "roof": box((2, 0.5, 2), (0.5, 1, 0.5))}
 
 

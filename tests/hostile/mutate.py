@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-__all__ = ["MUTATIONS", "mutate"]
-
 LONGEST = 1_000_000
 """Bytes of a hostile file: what makes one expensive is to be in it, and not its length."""
 TOKEN = re.compile(rb'[^\s<>{}\[\],:"]+')

@@ -12,8 +12,6 @@ from pipeline.registry import find_stages
 from pipeline.run import RunResult, run_stage
 from pipeline.slices import WHOLE, Slice
 
-__all__ = ["STAGES", "load", "turn"]
-
 PACKAGE = "tests.pipeline.mill_stages"
 STAGES = find_stages(PACKAGE)
 

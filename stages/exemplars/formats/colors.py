@@ -8,17 +8,6 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = [
-    "IMAGES",
-    "color_bytes",
-    "decode_image",
-    "face_paint",
-    "linear_from_srgb",
-    "sample_texture",
-    "srgb_from_linear",
-    "unit_colors",
-]
-
 IMAGES = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TGA", "TIFF", "DDS", "PPM")
 """The formats that are looked for, whatever a file is called: of others Pillow starts programs (EPS) or runs long."""
 

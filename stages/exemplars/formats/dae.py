@@ -22,8 +22,6 @@ from stages.exemplars.formats.polygons import triangulate
 from stages.exemplars.formats.scene import GREY, SENSELESS, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["read_dae"]
-
 _DEEPEST = 200
 _MOST_NODES = 200_000
 """Nodes that are walked at most. Nodes that place others doubly double at each level, without a part in them."""

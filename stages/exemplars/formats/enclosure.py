@@ -10,8 +10,6 @@ from urllib.parse import unquote
 
 from pipeline.errors import ConfigError
 
-__all__ = ["Enclosure", "Outside"]
-
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 _LONGEST = 4096
 """Characters that the name of a file has at most, on Linux."""

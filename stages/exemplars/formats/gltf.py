@@ -26,8 +26,6 @@ from stages.exemplars.formats.gltf_file import COMPRESSED, GltfFile
 from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["read_gltf"]
-
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 

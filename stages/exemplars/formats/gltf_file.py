@@ -13,8 +13,6 @@ from pipeline.errors import ConfigError
 from stages.exemplars.formats.enclosure import Enclosure
 from stages.exemplars.formats.scene import Malformed
 
-__all__ = ["COMPRESSED", "GltfFile"]
-
 COMPRESSED = "export it again without compression"
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

@@ -11,8 +11,6 @@ from xml.parsers import expat
 
 from pipeline.errors import ConfigError
 
-__all__ = ["check_markup"]
-
 _DEEPEST = 250
 
 

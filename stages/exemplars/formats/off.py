@@ -12,8 +12,6 @@ from stages.exemplars.formats.polygons import triangulate
 from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface
 from stages.shape.arrays import ByteArray
 
-__all__ = ["read_off"]
-
 
 def read_off(path: Path) -> Scene:
     """The one surface of an ASCII `.off` file. Raises ConfigError for a file that is cut off or malformed."""

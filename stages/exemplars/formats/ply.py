@@ -18,8 +18,6 @@ from stages.exemplars.formats.polygons import triangulate
 from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface
 from stages.shape.arrays import ByteArray, FloatArray
 
-__all__ = ["read_ply", "read_ply_points"]
-
 _TYPES = {
     "char": "i1",
     "uchar": "u1",

@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["triangulate"]
-
 
 def triangulate(vertices: FloatArray, corners: np.ndarray, counts: np.ndarray) -> tuple[IntArray, IntArray]:
     """Triangles of polygons, concave ones too, in the order of the polygons.

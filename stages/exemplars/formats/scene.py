@@ -10,19 +10,6 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = [
-    "GREY",
-    "SENSELESS",
-    "Malformed",
-    "Placement",
-    "Scene",
-    "Surface",
-    "UniqueNames",
-    "plain_name",
-    "plain_text",
-    "type_label",
-]
-
 SENSELESS = "is not there, or says what cannot be"
 """What becomes of an element in a message, where only Python knows more."""
 

@@ -13,8 +13,6 @@ from pipeline.errors import ConfigError
 from stages.exemplars.formats.scene import GREY, Malformed, Placement, Scene, Surface
 from stages.shape.arrays import FloatArray
 
-__all__ = ["read_stl"]
-
 _HEAD, _TRIANGLE = 84, 50  # bytes
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 

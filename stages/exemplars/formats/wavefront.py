@@ -20,8 +20,6 @@ from stages.exemplars.formats.polygons import triangulate
 from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface, type_label
 from stages.shape.arrays import ByteArray
 
-__all__ = ["read_wavefront"]
-
 _MAP_OPTIONS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
 
 

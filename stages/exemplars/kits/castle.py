@@ -12,8 +12,6 @@ from stages.exemplars.kits.layout import Layout
 from stages.exemplars.kits.polygon import arch, chamfered, mirrored, rectangle, regular
 from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, revolved, stacked
 
-__all__ = ["shapes"]
-
 PITCH = 5.0
 BITE = 0.03
 """How deep a part reaches into the part that it is joined to."""

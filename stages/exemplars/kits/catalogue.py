@@ -9,8 +9,6 @@ from pipeline.places import write_file
 from stages.exemplars.kits import castle, facade, playground, space_base, temple
 from stages.exemplars.kits.layout import Layout, glb_bytes
 
-__all__ = ["KITS", "MESHES", "write_kits"]
-
 KITS: Mapping[str, Callable[[], dict[str, Layout]]] = {
     "castle": castle.shapes,
     "playground": playground.shapes,

@@ -10,8 +10,6 @@ import numpy as np
 from stages.exemplars.kits.layout import Layout
 from stages.exemplars.kits.solid import Color, Face, Point, Solid
 
-__all__ = ["shapes"]
-
 BAYS, STOREYS = 5, 3
 BAY, STOREY = 1.2, 1.5
 MARGIN, PLINTH, CORNICE = 0.45, 0.77, 0.525

@@ -15,8 +15,6 @@ from stages.shape.arrays import FloatArray
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["Layout", "glb_bytes"]
-
 
 @dataclass
 class Layout:

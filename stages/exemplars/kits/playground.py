@@ -15,8 +15,6 @@ from stages.exemplars.kits.layout import Layout
 from stages.exemplars.kits.polygon import arch, mirrored, rectangle, regular
 from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, revolved, stacked, swept
 
-__all__ = ["shapes"]
-
 PITCH = 4.0
 APOTHEM = 1.0
 """Of a deck, from its middle to a gate."""

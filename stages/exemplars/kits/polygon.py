@@ -8,8 +8,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["arch", "chamfered", "grown", "mirrored", "rectangle", "regular", "triangulate"]
-
 FLAT = 1e-9
 """Areas below this are taken for nothing, so that the last bits of a sine never choose a diagonal."""
 

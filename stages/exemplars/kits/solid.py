@@ -14,11 +14,6 @@ import numpy as np
 from stages.exemplars.kits.polygon import grown, rectangle, regular, triangulate
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = [
-    "Color", "Face", "Point", "Solid", "bar", "box", "extruded", "joined", "loft", "revolved", "rotation", "stacked",
-    "swept",
-]  # fmt: skip
-
 Color = tuple[int, int, int]
 """sRGB, 0 to 255."""
 

@@ -14,8 +14,6 @@ from stages.exemplars.kits.polygon import arch, chamfered, rectangle, regular
 from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, loft, revolved, stacked
 from stages.shape.arrays import FloatArray
 
-__all__ = ["shapes"]
-
 PITCH = 6.0
 APOTHEM = 1.3
 """Of a hub, from its middle to a port."""

@@ -14,8 +14,6 @@ from stages.exemplars.kits.polygon import arch, chamfered, mirrored, rectangle, 
 from stages.exemplars.kits.solid import Color, Solid, box, extruded, joined, loft, revolved, stacked
 from stages.shape.arrays import FloatArray
 
-__all__ = ["shapes"]
-
 PITCH = 3.0
 BITE = 0.03
 """How deep a part reaches into the part that it is joined to."""

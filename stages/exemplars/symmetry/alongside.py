@@ -15,8 +15,6 @@ from stages.exemplars.symmetry.welding import welded
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle
 
-__all__ = ["Row", "chunks_along", "cut_across", "row_of"]
-
 FEWEST = 3
 """So many copies make a row."""
 SPANS = 2.0

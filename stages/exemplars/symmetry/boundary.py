@@ -9,8 +9,6 @@ from stages.exemplars.symmetry.cells import cell_index, cell_of, grown
 from stages.exemplars.symmetry.welding import sides_by_edge, welded
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["SAME_ANGLE", "boundary_lines", "sides_that_go_on"]
-
 SAME_ANGLE = 5e-3
 """Radians up to which directions are one."""
 ACROSS = 2e-3

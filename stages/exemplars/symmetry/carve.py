@@ -15,8 +15,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Soup", "carve", "connected_soups", "joined", "middles_in"]
-
 BLOCK = 4
 """Triangles are looked at that come near blocks of so many cells along each axis in which there is something to cut."""
 NEAR = 1e-3

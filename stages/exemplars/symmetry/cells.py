@@ -7,8 +7,6 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray
 
-__all__ = ["BITS", "cell_index", "cell_keys", "cell_of", "grown", "neighbours_of", "pack", "unpack"]
-
 BITS = 21
 """Bits of a key that say where a cell lies along an axis."""
 

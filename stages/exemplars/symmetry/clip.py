@@ -8,8 +8,6 @@ import numpy as np
 from stages.exemplars.symmetry.cells import grown
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["cut_triangles", "fragments"]
-
 MOST_CORNERS = 12
 """A triangle cut by six planes has at most nine corners."""
 SPECK = 1e-9

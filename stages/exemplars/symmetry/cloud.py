@@ -13,8 +13,6 @@ from stages.exemplars.symmetry.patches import planar_patches
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SHIFT, SurfaceGrid
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-__all__ = ["Cloud", "ScannedGrid", "cloud_grid", "points_for", "radius_for"]
-
 FEWEST_POINTS = 500
 FARTHEST = 1e30
 """Numbers beyond this are as good as infinite: their squares leave the range of floats."""

@@ -11,8 +11,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["carries_corners", "corner_cells", "parted_at"]
-
 BAND = 3.0
 """Cells around a site that tell its sides apart: all that is r-symmetric around it, but for what rounding takes."""
 REACH = 1.5

@@ -11,8 +11,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert
 
-__all__ = ["ENDS", "START", "Derivation", "Place", "grid_poses", "row_seams"]
-
 START = -1
 """The site of the start symbol: the whole shape."""
 ENDS = ("rest", "cell", "end")

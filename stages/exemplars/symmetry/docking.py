@@ -13,8 +13,6 @@ from stages.exemplars.symmetry.places import among, items_in
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["DockingSite", "OperationKind", "docking_sites", "operation_kind", "regions_of", "slippable_motions"]
-
 SAME_SET = 0.02
 """Share of a docker by which another may reach beyond it and count as inside: borders of cells do not move with it."""
 SLIPPERY = 1e-4

@@ -8,8 +8,6 @@ from stages.exemplars.symmetry.carve import Soup
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert
 
-__all__ = ["DUST", "equal_soups"]
-
 DUST = 1e-3
 """Share of their surface by which pieces that are equal may differ: slivers where borders of cells meet old seams."""
 INSIDE = 0.8

@@ -9,8 +9,6 @@ import numpy as np
 from stages.exemplars.symmetry.welding import sides_by_edge, welded
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["CREASE", "CornerFrames", "corner_frames", "creases", "frames_of_lines"]
-
 CREASE = 0.4
 """Radians between the normals at an edge from which on it is a feature line."""
 STRAIGHT = 0.2

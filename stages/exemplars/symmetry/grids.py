@@ -16,8 +16,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle, transform_points
 
-__all__ = ["Grid", "Row", "crossing", "cut_grid", "rows_of"]
-
 ROOM = 2
 """Cells by which a docker of a row must lie inside the next."""
 LEAST = 2e-3

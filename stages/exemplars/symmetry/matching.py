@@ -11,16 +11,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert
 
-__all__ = [
-    "cells_within",
-    "eroded",
-    "eroded_twice",
-    "matched_items",
-    "mutual",
-    "r_symmetric_cells",
-    "symmetric_cells",
-]
-
 TINY = 1e-9
 HOLE = 50
 """Cells of a scan that may be missing in one place: about those within the radius of a point."""

@@ -10,8 +10,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, rotation_angle
 
-__all__ = ["candidate_motions"]
-
 MATES = 24
 """Each frame is aligned with so many of its kind, the nearest."""
 FRAMES = 16_000

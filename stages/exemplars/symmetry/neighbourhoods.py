@@ -9,8 +9,6 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["Neighbourhoods", "contacts", "glance", "neighbourhoods"]
-
 LEAST_NEIGHBOURS, MOST_NEIGHBOURS = 12, 32
 """Points around a point that say how the surface lies there, itself among them."""
 SMOOTH = 5.0

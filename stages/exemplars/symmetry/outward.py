@@ -7,8 +7,6 @@ import numpy as np
 from stages.exemplars.symmetry.neighbourhoods import contacts
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["outward"]
-
 ALIKE = 0.7
 """Cosine of the angle of two patches from which on what meets at them is no crease."""
 

@@ -16,8 +16,6 @@ from stages.exemplars.symmetry.welding import welded
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 
-__all__ = ["about_size", "by_sections", "by_symmetry", "search_size"]
-
 LEFT_OUT = 1e-5
 """Share of the surface from which on it is told that it is left out."""
 STRAINED = 0.02

@@ -11,8 +11,6 @@ from stages.exemplars.symmetry.neighbourhoods import Neighbourhoods, contacts
 from stages.exemplars.symmetry.outward import outward
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["Patches", "planar_patches"]
-
 TILT = 0.4
 """Radians that normals of neighbourhoods may differ from that of a patch: they are those of few points, with noise."""
 SPREAD = 3.0

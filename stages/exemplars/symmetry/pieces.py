@@ -15,8 +15,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid, surface_grid
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["RADIUS", "Piece", "repeated_pieces"]
-
 RADIUS = 0.016
 """Radius of similarity, as a share of the longest side of the model's box (symmetry §5)."""
 TRIED = 10

@@ -11,8 +11,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Chosen", "among", "items_in", "items_moved_into", "keys_at"]
-
 
 @dataclass(frozen=True, eq=False)
 class Chosen:

@@ -16,8 +16,6 @@ from stages.exemplars.symmetry.surface import with_area
 from stages.exemplars.symmetry.welding import welded
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["NEAR", "Cuts", "parallel_cuts"]
-
 # Lengths are shares of the longest side of the model's box.
 NEAR = 1.5e-3
 """Points of sections closer than this are one."""

@@ -18,8 +18,6 @@ from stages.exemplars.symmetry.terminals import Cuts, Terminal
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 
-__all__ = ["Production", "productions", "seams_of"]
-
 SETS = 10
 """Independent sets of sites that are sampled for a docker (symmetry §3.4.2)."""
 ROOM = 2

@@ -17,8 +17,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, rotation_angle, transform_points
 
-__all__ = ["PART", "Repetition", "repetitions"]
-
 MOTIONS = 40
 """So many motions are looked at, of a grid of many cells fewer."""
 WORK = 16_000_000

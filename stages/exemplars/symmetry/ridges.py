@@ -12,8 +12,6 @@ from stages.exemplars.symmetry.features import CREASE, CornerFrames, frames_of_l
 from stages.exemplars.symmetry.places import among
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["ridge_frames"]
-
 MOST_PATCHES = 6
 """Where more patches meet there is no corner but clutter."""
 FLATTEST = 0.15

@@ -14,8 +14,6 @@ from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert
 
-__all__ = ["Seam", "cut_out", "seam_of", "stands", "widened"]
-
 BAND = 3.0
 """Cells around a site that are cut as the first of its class is: the others lie up to 2.5 cells from it once moved."""
 STANDS = 0.999

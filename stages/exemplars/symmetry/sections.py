@@ -10,8 +10,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.cells import OWN, cell_hash
 
-__all__ = ["Section", "alike", "section"]
-
 TURNED = 0.3
 """Normals that are farther apart than this are of different sides."""
 ROUNDING = 1e-9

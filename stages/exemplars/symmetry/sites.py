@@ -24,8 +24,6 @@ from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, SurfaceGrid
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, rotation_angle, transform_points
 
-__all__ = ["SLIPPERY", "Docker", "beside", "dockers_of"]
-
 SLIPPERY = 3
 """A site that slips in so many ways lies on a plane or a sphere, where a docker could stand anywhere."""
 BEYOND = 1.0

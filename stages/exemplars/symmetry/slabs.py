@@ -14,8 +14,6 @@ from stages.exemplars.symmetry.planes import NEAR, Cuts, parallel_cuts
 from stages.exemplars.symmetry.surface import CELLS_A_RADIUS, with_area
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["slab_pieces"]
-
 MOST = 500
 """Families are cut with as long as there are no more slabs than this."""
 SAME = 0.06

@@ -12,8 +12,6 @@ from stages.exemplars.symmetry.cells import neighbours_of, pack, unpack
 from stages.exemplars.symmetry.clip import fragments
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["CELLS_A_RADIUS", "SHIFT", "SurfaceGrid", "surface_grid", "with_area"]
-
 CELLS_A_RADIUS = 4
 """Cells have a quarter of the radius of similarity (symmetry §4)."""
 SAME_PLACE = 1e-2

@@ -15,8 +15,6 @@ from stages.exemplars.symmetry.sites import Docker
 from stages.exemplars.symmetry.surface import SurfaceGrid
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
 
-__all__ = ["Cuts", "Terminal", "alone"]
-
 OUTSIDE, INSIDE, CUT = 0, 1, 2
 """Where a triangle lies: outside a docker, in it, or on both sides of its seam."""
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["Sides", "WeldedSurface", "sides_by_edge", "welded"]
-
 MIX = -7046029254386353131
 """An odd number whose bits are about half ones: what is multiplied by it differs in its high bits (golden ratio)."""
 

@@ -11,8 +11,6 @@ from stages.programs.curves.curve import Axis
 from stages.programs.curves.poses import mirroring, rotation, translation
 from stages.shape.arrays import FloatArray
 
-__all__ = ["copies", "evenly", "linear", "radial", "symmetric"]
-
 Moved = TypeVar("Moved", bound="Movable")
 
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["Cap", "fan", "polygon_cap"]
-
 
 @dataclass(frozen=True, eq=False)
 class Cap:

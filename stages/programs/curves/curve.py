@@ -13,8 +13,6 @@ from stages.programs.curves.frames import rail_axes
 from stages.programs.curves.vectors import unit
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["Axis", "Curve", "Stations", "axis_index"]
-
 Axis = Literal["x", "y", "z"]
 
 CORNER = np.cos(np.radians(30.0))

@@ -10,8 +10,6 @@ from stages.programs.curves.curve import Axis, Curve, axis_index
 from stages.programs.curves.frames import rail_axes
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Deformation", "bend", "follow", "taper", "twist"]
-
 Deformation = Callable[[FloatArray], FloatArray]
 """From vertices (v, 3) to their new places (v, 3)."""
 

@@ -8,8 +8,6 @@ from stages.programs.curves.mesh import QuadMesh
 from stages.programs.curves.vectors import cross, dots
 from stages.shape.arrays import IntArray
 
-__all__ = ["mesh_faults"]
-
 
 def mesh_faults(mesh: QuadMesh) -> list[str]:
     """Every way in which a mesh is not closed, oriented outwards and two-manifold, one sentence each; none is good.

@@ -7,8 +7,6 @@ import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["rail_axes"]
-
 
 def rail_axes(
     points: FloatArray, tangents: FloatArray, positions: FloatArray, closed: bool, up: npt.ArrayLike | None

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["all_seen", "carry", "cut", "ease", "halve_turns", "measure", "place_rings"]
-
 
 @numba.njit(cache=True)
 def measure(points, closed):

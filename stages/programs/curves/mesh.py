@@ -11,8 +11,6 @@ import numpy as np
 from stages.programs.curves.vectors import cross, dots
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["QuadMesh"]
-
 
 @dataclass(frozen=True, eq=False)
 class QuadMesh:

@@ -11,8 +11,6 @@ from stages.programs.curves.mesh import QuadMesh
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 
-__all__ = ["Part", "joined"]
-
 
 @dataclass(frozen=True, eq=False)
 class Part:

@@ -10,8 +10,6 @@ import numpy.typing as npt
 from stages.programs.curves.curve import Axis, Curve, axis_index
 from stages.shape.arrays import FloatArray
 
-__all__ = ["arc", "bezier", "chain", "helix", "line", "polyline", "spiral"]
-
 
 def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
     """Straight pieces through points (n, 3), or (n, 2) in the plane z = 0; a sweep mitres the corners."""

@@ -8,8 +8,6 @@ import numpy.typing as npt
 from stages.programs.curves.curve import Axis, axis_index
 from stages.shape.arrays import FloatArray
 
-__all__ = ["attach", "frame", "mirroring", "rotation", "scaling", "stretch", "translation"]
-
 
 def translation(x: float, y: float, z: float) -> FloatArray:
     """Moves by (x, y, z)."""

@@ -12,8 +12,6 @@ from stages.programs.curves.caps import Cap, polygon_cap
 from stages.programs.curves.curve import Axis, Curve, axis_index
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Profile", "circle", "polygon", "rectangle", "rounded_rectangle", "square_circle", "superellipse"]
-
 
 @dataclass(frozen=True, eq=False)
 class Profile:

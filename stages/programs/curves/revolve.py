@@ -12,8 +12,6 @@ from stages.programs.curves.mesh import QuadMesh
 from stages.programs.curves.skin import skin
 from stages.shape.arrays import FloatArray
 
-__all__ = ["hollow", "revolve"]
-
 
 def revolve(outline: Curve, angle: float = 360.0, count: int = 24) -> QuadMesh:
     """The solid that an outline in the plane z = 0 (x the radius, y the height) makes around the y axis.

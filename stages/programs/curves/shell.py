@@ -11,8 +11,6 @@ from stages.programs.curves.mesh import QuadMesh
 from stages.programs.curves.vectors import cross, dots
 from stages.shape.arrays import IntArray
 
-__all__ = ["solidify"]
-
 
 def solidify(
     grid: npt.ArrayLike, thickness: float | npt.ArrayLike, offset: float = 0.0, closed: bool = False

@@ -10,8 +10,6 @@ from stages.programs.curves.caps import Cap, fan
 from stages.programs.curves.mesh import QuadMesh
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["skin"]
-
 
 def skin(rings: FloatArray, cap: Cap, closed: bool = False) -> QuadMesh:
     """The closed mesh over rings of points, float64 (r, k, 3).

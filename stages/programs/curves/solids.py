@@ -14,8 +14,6 @@ from stages.programs.curves.profile import Profile
 from stages.programs.curves.skin import skin
 from stages.shape.arrays import FloatArray
 
-__all__ = ["box", "cylinder", "ellipsoid", "extrude", "rounded_box"]
-
 BOX_QUADS = np.array(
     [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]], dtype=np.int32
 )

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Style"]
-
 Scale = float | tuple[float, float]
 """One scale for both axes of the profile, or one for x and one for y."""
 

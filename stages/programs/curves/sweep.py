@@ -17,8 +17,6 @@ from stages.programs.curves.skin import skin
 from stages.programs.curves.style import Style
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Caps", "loft", "loft_rings", "sweep"]
-
 Caps = Literal["flat", "round"]
 """How a sweep ends: cut off, or with a dome as deep as half the profile's shorter side."""
 

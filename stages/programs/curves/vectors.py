@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["cross", "dots", "unit"]
-
 
 def dots(a: FloatArray, b: FloatArray) -> FloatArray:
     """Dot product of each row of `a` (n, 3) with the same row of `b` (n, 3), float64 (n,)."""

@@ -19,8 +19,6 @@ from stages.programs.curves import (
 )
 from stages.programs.library.cabinet_dimensions import CabinetDimensions, block
 
-__all__ = ["base_parts", "case_parts", "shelf_parts", "top_parts"]
-
 OAK, SHADE, DARK = (205, 172, 128), (184, 150, 106), (84, 66, 54)
 
 SUNK = 0.004

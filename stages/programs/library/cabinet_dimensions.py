@@ -8,8 +8,6 @@ from functools import cached_property
 from stages.programs.curves import QuadMesh, box
 from stages.programs.schema import Values
 
-__all__ = ["CabinetDimensions", "Opening", "block"]
-
 FRONT = 0.03
 """Thickness of doors and drawer fronts."""
 

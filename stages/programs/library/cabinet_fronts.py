@@ -22,8 +22,6 @@ from stages.programs.curves import (
 from stages.programs.library.cabinet_dimensions import FRONT, CabinetDimensions, Opening, block
 from stages.shape.arrays import FloatArray
 
-__all__ = ["front_parts"]
-
 PAINT, GLASS, STEEL, OAK = (226, 221, 208), (186, 206, 214), (78, 80, 84), (184, 150, 106)
 
 GAP = 0.002

@@ -15,8 +15,6 @@ from stages.programs.program import Constraint, Program
 from stages.programs.rules import Rule
 from stages.programs.schema import Values
 
-__all__ = ["PROGRAM", "build"]
-
 
 def build(values: Values) -> Sequence[Part]:
     """The parts of the chair at `values`."""

@@ -9,8 +9,6 @@ from stages.programs.library.chair_dimensions import LEATHER, WOOD, ChairDimensi
 from stages.programs.library.rails import cubic, eased
 from stages.shape.arrays import FloatArray
 
-__all__ = ["arm_parts"]
-
 UP = np.array([0.0, 1.0, 0.0])
 
 

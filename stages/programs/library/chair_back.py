@@ -19,8 +19,6 @@ from stages.programs.library.chair_dimensions import FABRIC, SEAT, WOOD, ChairDi
 from stages.programs.library.rails import eased
 from stages.shape.arrays import FloatArray
 
-__all__ = ["back_parts"]
-
 ACROSS = np.linspace(-1.0, 1.0, 9)
 """Relative distances from the middle at which a rail has rings."""
 

@@ -23,8 +23,6 @@ from stages.programs.library.chair_dimensions import METAL, WOOD, ChairDimension
 from stages.programs.library.rails import cubic, eased
 from stages.shape.arrays import FloatArray
 
-__all__ = ["base_parts"]
-
 RINGS = 9
 """Rings of a leg."""
 

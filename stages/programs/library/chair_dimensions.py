@@ -12,8 +12,6 @@ from stages.programs.curves import Profile, QuadMesh, loft_rings, square_circle
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["FABRIC", "LEATHER", "METAL", "SEAT", "WOOD", "ChairDimensions", "post", "section"]
-
 WOOD, SEAT, METAL = (151, 104, 66), (176, 128, 84), (92, 96, 102)
 FABRIC, LEATHER = (64, 104, 122), (118, 66, 50)
 """The colours of what is turned or sawn, of the seat board, of a swivel base, of upholstery and of arm pads."""

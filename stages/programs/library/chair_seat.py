@@ -8,8 +8,6 @@ from stages.programs.curves import Part, QuadMesh, loft_rings
 from stages.programs.library.chair_dimensions import FABRIC, SEAT, ChairDimensions
 from stages.shape.arrays import FloatArray
 
-__all__ = ["seat_parts"]
-
 BOARD = ((0.985, 0.0), (0.997, 0.12), (1.0, 0.3), (1.0, 0.7), (0.997, 0.88), (0.985, 1.0))
 FLAT = ((0.97, -0.1), (1.0, 0.15), (1.0, 0.8), (0.98, 0.95), (0.95, 1.0))
 PUFFED = ((0.92, -0.05), (0.98, 0.12), (1.0, 0.35), (0.99, 0.6), (0.94, 0.8), (0.8, 0.93), (0.5, 1.0), (0.0, 1.02))

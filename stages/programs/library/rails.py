@@ -7,8 +7,6 @@ import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["cubic", "eased"]
-
 ROUNDS, PATIENCE = 400, 40
 """So many times points are moved at most; from the second of them on all are, not only those beside a tight bend."""
 

@@ -11,8 +11,6 @@ from stages.programs.program import Constraint, Program
 from stages.programs.rules import Rule
 from stages.programs.schema import Values
 
-__all__ = ["PROGRAM", "build"]
-
 
 def build(values: Values) -> list[Part]:
     """The parts of the table at `values`."""

@@ -10,8 +10,6 @@ from stages.programs.curves import Profile, QuadMesh, loft_rings, rectangle
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["METAL", "OAK", "WALNUT", "TableDimensions", "upright"]
-
 OAK, WALNUT, METAL = (201, 164, 118), (122, 85, 58), (74, 77, 82)
 
 CORNER = 9

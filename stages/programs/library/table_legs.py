@@ -8,8 +8,6 @@ from stages.programs.curves import Part, Profile, QuadMesh, loft_rings, rounded_
 from stages.programs.library.table_dimensions import WALNUT, TableDimensions, upright
 from stages.shape.arrays import FloatArray
 
-__all__ = ["leg_parts", "leg_width"]
-
 RINGS = 9
 """Rings of a leg."""
 

@@ -9,8 +9,6 @@ from stages.programs.library.table_dimensions import METAL, WALNUT, TableDimensi
 from stages.programs.library.table_legs import leg_width
 from stages.shape.arrays import FloatArray
 
-__all__ = ["pedestal_parts"]
-
 SPOKE = 10
 """Pieces of a leg of the tent."""
 

@@ -10,8 +10,6 @@ from stages.programs.library.vessel import CrossSection, Wall
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["handles"]
-
 STEPS, AROUND = 16, 12
 """Segments of a handle's curve and points of its profile."""
 

@@ -11,8 +11,6 @@ import numpy.typing as npt
 from stages.programs.curves import QuadMesh, loft_rings
 from stages.shape.arrays import FloatArray
 
-__all__ = ["CrossSection", "Wall"]
-
 EIGHTH = 6
 """Segments of an eighth of a ring, from the middle of a side to a corner."""
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pipeline.places import Places
 from stages.shape.collection.packaged import Packaged
 
-__all__ = ["Audit"]
-
 
 def _nothing(_: Packaged) -> Iterator[str]:
     return iter(())

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from stages.shape.collection.language import Source
 
-__all__ = ["Classes", "PartClass"]
-
 
 @dataclass(frozen=True)
 class PartClass:

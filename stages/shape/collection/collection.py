@@ -13,8 +13,6 @@ from stages.shape.collection.declared import language_of
 from stages.shape.sample import Sample, read_samples
 from stages.shape.shape import Shape, upright
 
-__all__ = ["Collection", "add_members"]
-
 
 class Collection:
     """What the shard of a task reads of the collection. Shapes are upright, y up: the coordinates of a dataset."""

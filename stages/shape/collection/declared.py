@@ -14,8 +14,6 @@ from stages.shape.collection.language import Language
 from stages.shape.collection.members import Members
 from stages.shape.collection.producer import Producer
 
-__all__ = ["audits", "language_of", "languages", "member_modules", "members", "producers"]
-
 Declared = TypeVar("Declared")
 
 

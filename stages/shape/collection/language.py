@@ -12,8 +12,6 @@ from stages.shape.arrays import IntArray
 from stages.shape.sample import Sample
 from stages.shape.shape import Shape
 
-__all__ = ["Anew", "Language", "Source", "Speaker"]
-
 Anew = Callable[[Mapping[str, Any], IntArray], Shape]
 """The shape of a record and its contacts, int32 (m, 2)."""
 

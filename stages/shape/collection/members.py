@@ -11,8 +11,6 @@ from pipeline.stage import Plan
 from stages.shape.arrays import ByteArray
 from stages.shape.views.camera import Camera
 
-__all__ = ["TEXT", "Column", "Field", "Member", "Members", "Row"]
-
 TEXT = "txt"
 """The member that every sample has: its text. Of a shape graph a stage adds it; else the sample brings it."""
 

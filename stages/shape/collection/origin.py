@@ -9,8 +9,6 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["Credit", "Origin", "unstated"]
-
 
 class Credit(StrictModel):
     """Whose a file is. What is not said here is asked for by name in the report and in the card."""

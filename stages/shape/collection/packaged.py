@@ -15,8 +15,6 @@ from stages.shape.geometry.bounds import shape_bounds
 from stages.shape.geometry.casting import Casting
 from stages.shape.shape import Shape
 
-__all__ = ["Packaged"]
-
 
 @dataclass(frozen=True)
 class Packaged:

@@ -7,8 +7,6 @@ import numpy as np
 from pipeline.shards import array_bytes, bytes_array
 from stages.shape.arrays import IntArray
 
-__all__ = ["CONTACTS", "JOINTS", "pair_bytes", "pairs_of"]
-
 CONTACTS = "contacts.npy"
 """The pairs of parts that touch."""
 JOINTS = "joints.npy"

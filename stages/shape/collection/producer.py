@@ -11,8 +11,6 @@ from pipeline.stage import Plan
 from stages.shape.collection.members import Field
 from stages.shape.collection.origin import Origin
 
-__all__ = ["Producer"]
-
 
 def _nothing_to_add(_: Plan) -> Sequence[str]:
     return ()

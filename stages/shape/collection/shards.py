@@ -10,16 +10,6 @@ from pipeline.stage import Plan, Shard
 from stages.shape.collection.declared import language_of, producers
 from stages.shape.splits import SPLITS
 
-__all__ = [
-    "MEMBERS",
-    "PRODUCERS",
-    "check_producers",
-    "collection_shards",
-    "made_shards",
-    "planned_producer",
-    "sample_count",
-]
-
 PRODUCERS = "*/producer.py"
 """What a stage that reads samples names among its inputs: every stage that makes them."""
 MEMBERS = "*/members.py"

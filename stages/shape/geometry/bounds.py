@@ -8,8 +8,6 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.shape import Shape
 
-__all__ = ["shape_bounds"]
-
 
 def shape_bounds(shape: Shape) -> FloatArray:
     """Lowest and highest corner of the box around all parts, float64 (2, 3)."""

@@ -11,8 +11,6 @@ from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.shape import Shape
 
-__all__ = ["Casting"]
-
 
 class Casting:
     """A shape as rays see it. Open3D counts in 32-bit numbers, so it is cast about the shape's middle."""

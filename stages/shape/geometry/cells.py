@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["OWN", "cell_hash"]
-
 OWN = 13
 """The turn of `cell_hash` that is the cell of the point itself."""
 _PRIMES = (73856093, 19349663, 83492791)

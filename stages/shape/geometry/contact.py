@@ -15,8 +15,6 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import relative_poses, transform_points
 from stages.shape.kit import ContactKind, PartMesh
 
-__all__ = ["ContactTest", "overlapping_boxes", "world_boxes"]
-
 POINT_SHARE = 0.05
 """A contact shorter than this share of the smaller part's diagonal is a point."""
 LINE_SHARE = 0.01

@@ -10,8 +10,6 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Docking, Kit, PartType
 
-__all__ = ["DockingTable", "symmetric_images"]
-
 SAME_IMAGE = 0.01
 """Images of a docking closer than this share of the tolerance are written once."""
 

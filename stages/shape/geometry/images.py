@@ -7,8 +7,6 @@ import numpy as np
 
 from stages.shape.geometry.cells import OWN, cell_hash
 
-__all__ = ["distinct_images", "nearest_image"]
-
 
 @numba.njit(cache=True)
 def _gap(one, other):

@@ -11,8 +11,6 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import PartMesh
 
-__all__ = ["PenetrationTest", "depth_bound"]
-
 SPACING = 0.04
 """Distance of the probes on a part's surface, as a share of its diagonal."""
 RAYS = np.array(

@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["invert", "pose_vectors", "relative_poses", "rigid_fit", "rotation_angle", "rounded", "transform_points"]
-
 DECIMALS = 12
 """So many of the numbers of a record are kept."""
 

@@ -12,8 +12,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["build_tree", "contact_patches", "first_contact", "near_pairs", "points_on_surface"]
-
 LEAF = 4
 
 Tree = tuple[FloatArray, FloatArray, np.ndarray]

@@ -13,8 +13,6 @@ import numpy.typing as npt
 
 from stages.shape.arrays import IntArray, TypeArray
 
-__all__ = ["canonical_order", "docking_digest", "graph_digest"]
-
 Indices = npt.NDArray[np.int64]
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["histogram_metric"]
-
 
 def histogram_metric(first: Any, second: Any) -> Any:
     """E of histograms of types, (..., types) each, arrays of numpy or of torch that broadcast: (...), from 0 to 1.

@@ -22,8 +22,6 @@ from itertools import combinations
 
 from stages.shape.kit import Grammar, Multiset, Strictness
 
-__all__ = ["SLOT_LEVELS", "STRICTNESS", "admits", "admits_more"]
-
 STRICTNESS: tuple[Strictness, ...] = ("multiset", "count_and_set", "count_and_pairs", "count_and_types")
 """The levels, the strictest first."""
 SLOT_LEVELS: tuple[Strictness, ...] = ("slot_pairs", "slot_fillings", "slots")

@@ -12,8 +12,6 @@ from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Kit, PartType
 
-__all__ = ["SAME_UP", "Pattern", "observed_patterns", "seen_once"]
-
 SAME_UP = 0.02
 """Ways up that differ by less, as unit vectors, are one."""
 

@@ -10,8 +10,6 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-__all__ = ["refine"]
-
 
 class _Partition(NamedTuple):
     """Nodes in cells, all int64 (n,): the `order` of the nodes, cell by cell; the `position` of each node in it; by

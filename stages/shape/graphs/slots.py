@@ -27,8 +27,6 @@ from stages.shape.geometry.pose import invert
 from stages.shape.graphs.patterns import SAME_UP, Pattern, observed_patterns
 from stages.shape.kit import Assembly, Kit, Strictness
 
-__all__ = ["SlotGrammar"]
-
 OVERLAP = 0.3
 """Share of the smaller box from which on two places are one slot."""
 IMAGES = 8192

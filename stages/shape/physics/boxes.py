@@ -11,8 +11,6 @@ import numpy as np
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.physics.polygons import cut, polygon_area
 
-__all__ = ["box_contacts", "box_corners", "boxes_within", "overlap_volumes", "recognise_boxes", "separations"]
-
 SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 EDGES = np.array([[a, b] for a in range(8) for b in range(a + 1, 8) if np.abs(SIGNS[a] - SIGNS[b]).sum() == 2])
 SQUARE = 1e-5

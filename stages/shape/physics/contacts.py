@@ -14,8 +14,6 @@ from stages.shape.geometry.pose import relative_poses
 from stages.shape.kit import PartMesh
 from stages.shape.physics.solids import Placed, Solids
 
-__all__ = ["Patches", "Touch"]
-
 STEP = 1e-6
 """Poses are asked about on a grid of this share of the smaller part's diagonal, so that answers can be kept."""
 KEPT = 100_000

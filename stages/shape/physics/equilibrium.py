@@ -17,8 +17,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.contacts import Patches
 
-__all__ = ["Limits", "load_limits"]
-
 DIRECTIONS = 8
 """Sides of the friction pyramid of a joint."""
 GROUND_DIRECTIONS = 24

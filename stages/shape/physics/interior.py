@@ -15,8 +15,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["solve_interior"]
-
 ROUNDS = 100
 EXACT = 1e-5
 """Largest residual of any equation at the end; forces and loads are to be of the order of 1."""

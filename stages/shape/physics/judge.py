@@ -19,8 +19,6 @@ from stages.shape.physics.stability import Stability, components, stability, sta
 from stages.shape.physics.structure import ground_share, mirror_score
 from stages.shape.shape import Shape
 
-__all__ = ["Judge", "Validity", "judge_of", "judge_shape", "physical_fields", "unmet"]
-
 ROUNDING = 1e-4
 """Degrees by which a shape that just stands may seem to be beyond tipping."""
 

@@ -8,8 +8,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.polygons import convex_hull, cut
 
-__all__ = ["COLUMNS", "facing_polygons", "flat_hulls", "overlap", "touching_edges"]
-
 OPPOSED = 0.98
 """Faces press on each other if their normals are opposed within about 11 degrees (cosine)."""
 COLUMNS = 24

@@ -7,8 +7,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["convex_hull", "cut", "inside_margin", "polygon_area"]
-
 THIN = 1e-7
 
 

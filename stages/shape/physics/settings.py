@@ -8,8 +8,6 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 
-__all__ = ["PhysicsConfig", "Requirements"]
-
 
 class PhysicsConfig(StrictModel):
     """The model of statics: how near is touching, what joints bear, how hard the shape is pushed."""

@@ -17,8 +17,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.polygons import convex_hull, inside_margin
 
-__all__ = ["FALL", "Body", "come_to_rest", "tilt_to_fall"]
-
 FALL = 0.025
 """Change of the height of the centre of mass, as a share of it, by which a component has fallen: that of the programs'
 authors, whose figures are published; their text says 0.1."""

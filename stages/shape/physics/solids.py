@@ -13,8 +13,6 @@ from stages.shape.kit import Assembly, PartMesh
 from stages.shape.physics.boxes import box_corners, recognise_boxes
 from stages.shape.physics.polygons import convex_hull
 
-__all__ = ["Placed", "Solids"]
-
 
 class Solids:
     """What is known of each mesh by itself, in its own coordinates.

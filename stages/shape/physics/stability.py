@@ -21,8 +21,6 @@ from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.physics.solids import Placed
 from stages.shape.physics.tableau import TIE
 
-__all__ = ["Stability", "components", "stability", "standing_points", "tipping_angle"]
-
 ARM = 0.25
 """Lever arm of the twists, as a share of the diagonal: a twist of factor 1 is the part's weight at this arm."""
 PUSHES = 8

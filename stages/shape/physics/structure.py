@@ -9,8 +9,6 @@ from stages.shape.physics.contacts import Patches
 from stages.shape.physics.polygons import convex_hull
 from stages.shape.physics.solids import Placed
 
-__all__ = ["ground_share", "mirror_score"]
-
 ALIKE = 0.02
 """Parts are mirror images where centroids and extents differ by at most this share of the shape's diagonal."""
 

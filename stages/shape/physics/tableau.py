@@ -8,8 +8,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["TIE", "grow_loads"]
-
 FEASIBLE = 1e-7
 """What may be left over of an equation that holds."""
 TIE = 1e-6

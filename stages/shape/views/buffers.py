@@ -13,8 +13,6 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 
-__all__ = ["Backend", "Buffers", "Visible", "drawn_by", "render_buffers", "visible_triangles"]
-
 Backend = Literal["raster", "egl"]
 """`raster`: our own, whole numbers in compiled code; `egl`: OpenGL on EGL, rasterised by Mesa's llvmpipe."""
 

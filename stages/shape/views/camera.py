@@ -13,8 +13,6 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Camera", "View", "eye_rotation"]
-
 CLOSEST = 1.05
 """Nearest allowed eye, in radii of the bounding sphere: the whole shape stays in front of the eye."""
 

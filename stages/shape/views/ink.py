@@ -10,8 +10,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.views.strokes import BOUNDARY, CONTOUR, CREASE, OUTLINE, Strokes
 
-__all__ = ["ink_strokes"]
-
 CROWD_CELL = 4.0
 """Side of the cells, in pixels of the image, in which the length of lines is summed to see how crowded they are."""
 

@@ -6,8 +6,6 @@ from stages.shape.arrays import FloatArray
 from stages.shape.views.camera import View
 from stages.shape.views.scene import Scene
 
-__all__ = ["layered_moves"]
-
 LAYER_STEP = 5e-5
 """How far each layer is set back, in radii of the shape: far above rounding, far below a pixel."""
 

@@ -12,8 +12,6 @@ from stages.shape.views.buffers import Backend, render_buffers
 from stages.shape.views.camera import Camera, View
 from stages.shape.views.scene import Scene
 
-__all__ = ["KeyLight", "eye_positions", "ground_seen", "key_light", "openness", "to_world"]
-
 SHADOW_MAP = 1024
 """Side of the shadow map in pixels."""
 GOLDEN_ANGLE = 2.399963229728653

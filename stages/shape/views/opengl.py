@@ -24,8 +24,6 @@ from stages.shape.views.camera import View
 from stages.shape.views.layers import layered_moves
 from stages.shape.views.scene import MeshSet, Scene
 
-__all__ = ["OpenGLRenderer", "load_pyrender"]
-
 KEPT_MESH_SETS = 8
 """Mesh sets that stay uploaded; the one used longest ago goes first."""
 

@@ -8,8 +8,6 @@ from stages.shape.arrays import ByteArray
 from stages.shape.shape import Shape
 from stages.shape.views.palette import label_colors
 
-__all__ = ["part_paint"]
-
 ALIKE = 12
 """Levels by which colours of one blob differ at most."""
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from stages.shape.arrays import ByteArray, FloatArray
 
-__all__ = ["label_colors", "linear_to_srgb", "srgb_to_linear"]
-
 GOLDEN_TURN = 0.3819660112501051
 LIGHTNESS = (0.76, 0.84, 0.66)
 CHROMA = (0.088, 0.072, 0.100)

@@ -8,8 +8,6 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import picture_png
 
-__all__ = ["shape_png"]
-
 ABOVE = Camera(azimuth=-40.0, elevation=25.0)
 
 

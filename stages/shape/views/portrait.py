@@ -14,8 +14,6 @@ from stages.shape.views.light import KeyLight, eye_positions, ground_seen, key_l
 from stages.shape.views.palette import label_colors, linear_to_srgb, srgb_to_linear
 from stages.shape.views.scene import Scene
 
-__all__ = ["PAPER", "points_portrait", "portrait"]
-
 PAPER = (250, 248, 244)
 """Background, sRGB: a warm near-white."""
 INK = (38, 32, 36)

@@ -15,8 +15,6 @@ from stages.shape.views.buffers import Backend, drawn_by, render_buffers
 from stages.shape.views.camera import Camera
 from stages.shape.views.scene import mesh_scene
 
-__all__ = ["BACKENDS", "check_backend", "probe", "probe_in_subprocess"]
-
 BACKENDS: tuple[Backend, ...] = get_args(Backend)
 
 SECONDS = 120.0

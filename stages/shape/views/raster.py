@@ -20,8 +20,6 @@ from stages.shape.views.layers import layered_moves
 from stages.shape.views.scene import Scene
 from stages.shape.views.screen import project_triangles
 
-__all__ = ["RasterRenderer", "raster"]
-
 GRID_BITS = 16
 """Corners are snapped to this power of a half of a pixel, or to less where they lie far outside of the picture."""
 COORDINATE_BITS = 29

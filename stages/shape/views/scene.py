@@ -13,8 +13,6 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 
-__all__ = ["MeshSet", "Scene", "mesh_scene", "scene_of"]
-
 WELD = 2e-6
 """Vertices closer than this share of half their mesh's longest side are one vertex where faces are asked for those
 beside them."""

@@ -16,8 +16,6 @@ from stages.shape.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from stages.shape.views.camera import View
 from stages.shape.views.scene import Scene
 
-__all__ = ["clip_at", "eye_depth", "project_triangles", "screen_normals", "screen_triangles", "surface_buffers"]
-
 
 def screen_triangles(scene: Scene, view: View, width: int, height: int) -> FloatArray:
     """The corners of all triangles on the screen, float64 (t, 3, 3)."""

@@ -13,8 +13,6 @@ import numpy as np
 from stages.shape.arrays import ByteArray
 from stages.shape.views.portrait import PAPER
 
-__all__ = ["Cell", "Section", "contact_sheet", "picture_png"]
-
 TITLE_INK = (32, 30, 34)
 CAPTION_INK = (122, 116, 112)
 RULE = (226, 221, 213)

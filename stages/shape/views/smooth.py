@@ -13,8 +13,6 @@ import numpy as np
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
 from stages.shape.views.buffers import Visible
 
-__all__ = ["SHARP", "corner_normals", "smooth_normals"]
-
 SHARP = 35.0
 """Faces around a vertex that turn by more, in degrees, keep an edge between them."""
 

@@ -27,8 +27,6 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.views.buffers import Visible
 from stages.shape.views.screen import clip_at, eye_depth
 
-__all__ = ["BOUNDARY", "CONTOUR", "CREASE", "OUTLINE", "Strokes", "find_strokes"]
-
 CREASE, BOUNDARY, CONTOUR, OUTLINE = 1, 2, 3, 4
 """Kinds of strokes, the weightier ones with the higher numbers; an outline is a contour against the background."""
 

@@ -15,8 +15,6 @@ from pipeline.errors import Rejected
 from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Box, Part, PartHierarchy
 from stages.shapeassembly.extraction.read_grass import GrassFile, read_grass
 
-__all__ = ["grass_read_apart", "read_apart"]
-
 CPU_SECONDS = 120
 MEMORY_MB = 4000
 

@@ -11,8 +11,6 @@ from stages.shapeassembly.extraction.boxes import angle_between, around, box_cor
 from stages.shapeassembly.extraction.hierarchy import Box, Part
 from stages.shapeassembly.extraction.rules import Rules
 
-__all__ = ["ALIGNED_DEGREES", "arrange_parts", "frame_parts", "leaf_corners"]
-
 ALIGNED_DEGREES = 5.0
 """A part turned by less against its parent is aligned with it (shapeassembly §5.1)."""
 

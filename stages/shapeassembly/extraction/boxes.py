@@ -9,20 +9,6 @@ import numpy as np
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shapeassembly.extraction.hierarchy import Box
 
-__all__ = [
-    "angle_between",
-    "around",
-    "box_corners",
-    "gap",
-    "inside",
-    "mirrored",
-    "nearest_axes",
-    "place_in",
-    "point_at",
-    "same_box",
-    "surface_distance",
-]
-
 UNIT_CORNERS = np.array(list(product((0.0, 1.0), repeat=3)))
 
 _ROTATIONS = np.array(

@@ -11,8 +11,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import box_corners, gap, inside, place_in, point_at
 from stages.shapeassembly.extraction.hierarchy import Box
 
-__all__ = ["Contact", "bottom_or_top", "contact_of"]
-
 BAND = 0.05
 """Share of the height of a bounding box within which a part reaches its bottom or its top."""
 

@@ -21,8 +21,6 @@ from stages.shapeassembly.interpreter import execute
 from stages.shapeassembly.printer import rounded
 from stages.shapeassembly.program import Program
 
-__all__ = ["Extraction", "extract"]
-
 USUAL_DIAGONALS = (1.0, 4.0)
 """Of the bounding boxes of PartNet's shapes, which lie about the unit sphere: a shape of such size keeps it."""
 

@@ -18,8 +18,6 @@ from stages.shapeassembly.extraction.read_grass import GrassFile
 from stages.shapeassembly.extraction.read_partnet import read_partnet
 from stages.shapeassembly.extraction.read_structurenet import read_structurenet
 
-__all__ = ["HierarchyKind", "HierarchySource"]
-
 HierarchyKind = Literal["structurenet", "partnet", "grass", "glb"]
 
 _PATTERNS = {"structurenet": "*.json", "partnet": "result_after_merging.json", "glb": "*.glb"}

@@ -21,8 +21,6 @@ from stages.shapeassembly.extraction.joints import (
 from stages.shapeassembly.extraction.layout import BBOX, Layout
 from stages.shapeassembly.program import Squeeze
 
-__all__ = ["Placer", "Placing", "ground"]
-
 WELL_PLACED = 0.01
 """Cost up to which a tilted part takes its place in canonical order; others wait for what they may be attached to."""
 

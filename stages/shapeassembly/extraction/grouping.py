@@ -16,8 +16,6 @@ from stages.shapeassembly.extraction.hierarchy import Part
 from stages.shapeassembly.extraction.layout import Layout, lay_out
 from stages.shapeassembly.extraction.symmetry import BOTTOM, TOP, Body, Group, reflections, translations
 
-__all__ = ["Symmetry", "form_groups"]
-
 REFLECTION_AXES = (0, 2, 1)
 """Left and right first, then front and back, then bottom and top."""
 

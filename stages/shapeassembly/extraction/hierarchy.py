@@ -10,8 +10,6 @@ import numpy as np
 from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
 
-__all__ = ["MAX_DEPTH", "MAX_PARTS", "UNREADABLE", "Box", "Part", "PartHierarchy", "bounded", "box_of_rows"]
-
 UNREADABLE = "unreadable hierarchy"
 """The reason with which readers refuse a file."""
 

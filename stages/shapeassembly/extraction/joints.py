@@ -13,8 +13,6 @@ from stages.shapeassembly.extraction.layout import BBOX, REACHES, Layout
 from stages.shapeassembly.program import BBOX as BBOX_NAME
 from stages.shapeassembly.program import Attach, Face, Point, Squeeze
 
-__all__ = ["BACK", "BOTTOM", "LEFT", "TOP", "Joint", "Standing", "attach", "attach_contact", "part_name", "squeeze"]
-
 Joint = Attach | Squeeze
 
 Standing = Mapping[int, Box]

@@ -12,8 +12,6 @@ from stages.shapeassembly.extraction.boxes import angle_between, place_in
 from stages.shapeassembly.extraction.contacts import Contact, bottom_or_top, contact_of
 from stages.shapeassembly.extraction.hierarchy import Box, Part
 
-__all__ = ["BBOX", "Layout", "lay_out", "localised"]
-
 BBOX = -1
 """The bounding box, where parts are meant by their index."""
 

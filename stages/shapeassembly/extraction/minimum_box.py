@@ -8,8 +8,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import around
 from stages.shapeassembly.extraction.hierarchy import Box
 
-__all__ = ["minimum_box"]
-
 MOST_SIDES = 100
 """Sides of the convex hull on which a side of the box may lie, the largest first: a rounded part has thousands."""
 

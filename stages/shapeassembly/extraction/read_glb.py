@@ -14,8 +14,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded
 from stages.shapeassembly.extraction.minimum_box import minimum_box
 
-__all__ = ["read_glb"]
-
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 _NUMBER = re.compile(r"[.~_]\d+$")

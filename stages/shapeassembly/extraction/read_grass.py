@@ -12,8 +12,6 @@ from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Part, PartHierarchy, bounded, box_of_rows
 
-__all__ = ["GrassFile", "read_grass"]
-
 
 @dataclass(frozen=True)
 class GrassFile:

@@ -13,8 +13,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded
 from stages.shapeassembly.extraction.minimum_box import minimum_box
 
-__all__ = ["read_partnet"]
-
 
 def read_partnet(path: Path) -> PartHierarchy:
     """The hierarchy of the PartNet file `path`, named by its folder; a part's box is the smallest around its meshes.

@@ -11,8 +11,6 @@ import numpy as np
 from pipeline.errors import Rejected
 from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded, box_of_rows
 
-__all__ = ["read_structurenet"]
-
 
 def read_structurenet(path: Path) -> PartHierarchy:
     """The hierarchy in the StructureNet file `path`; a box is centre, size, x axis, y axis.

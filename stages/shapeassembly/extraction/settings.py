@@ -12,8 +12,6 @@ from stages.shape.collection.origin import Credit
 from stages.shapeassembly.extraction.files import HierarchyKind, HierarchySource
 from stages.shapeassembly.extraction.rules import RULES, Rules
 
-__all__ = ["EVERY_STEP", "Category", "Cleaning", "Gates", "HierarchyFiles", "NamedFiles"]
-
 Category = Literal["any", "chair", "table", "storage"]
 
 

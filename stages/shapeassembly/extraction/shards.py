@@ -15,8 +15,6 @@ from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles
 from stages.shapeassembly.printer import print_program
 
-__all__ = ["Made", "extraction_shards", "read_made", "run_extraction"]
-
 HIERARCHIES_A_SHARD = 1000
 """About a minute of work."""
 

@@ -11,8 +11,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import UNIT_CORNERS, box_corners, inside
 from stages.shapeassembly.extraction.hierarchy import Box, Part
 
-__all__ = ["shorten_parts"]
-
 _KEPT = 0.05
 """A part is never cut to less than this share of its length: a part hidden in another is left as it is."""
 

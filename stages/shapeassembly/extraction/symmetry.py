@@ -12,8 +12,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import mirrored, same_box
 
-__all__ = ["BOTTOM", "TOP", "Body", "Group", "reflections", "translations"]
-
 BOTTOM, TOP = -1, -2
 """The ends of the bounding box, among indices of parts."""
 

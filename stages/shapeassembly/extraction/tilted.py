@@ -30,8 +30,6 @@ from stages.shapeassembly.printer import rounded
 from stages.shapeassembly.program import BBOX as BBOX_NAME
 from stages.shapeassembly.program import Block, Cuboid, Program
 
-__all__ = ["cuboid_of", "tilted_placer"]
-
 MOST_ATTACHMENTS = 3
 """A part that is held at three points is held."""
 

@@ -11,8 +11,6 @@ from stages.shapeassembly.extraction.boxes import around, box_corners, gap, surf
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.interpreter import Execution
 
-__all__ = ["boxes_of", "f_score", "is_rooted", "surface_points"]
-
 ROOTED_SHARE = 0.02
 """Parts further apart than this share of the shape's diagonal are not connected (shapeassembly App. E)."""
 

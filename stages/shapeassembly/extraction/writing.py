@@ -20,8 +20,6 @@ from stages.shapeassembly.extraction.tilted import cuboid_of, tilted_placer
 from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.program import AXES, BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
 
-__all__ = ["Groups", "Order", "write_program"]
-
 MOST_CHILDREN = 100
 """Parts of one node before groups are formed: all pairs of them are looked at, and a program declares ten at most."""
 

@@ -17,8 +17,6 @@ from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.graphs.patterns import SAME_UP
 from stages.shape.kit import Kit, PartType
 
-__all__ = ["Candidates", "find_candidates"]
-
 
 class Candidates(NamedTuple):
     """Stances, those of one label beside each other, and candidates, those of a stance and a label beside each other.

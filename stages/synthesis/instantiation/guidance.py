@@ -17,8 +17,6 @@ from stages.strings.decoder import Decoded
 from stages.synthesis.instantiation.motions import compose
 from stages.variations.kernels.poses import squared_distance
 
-__all__ = ["NO_GUIDE", "Guide", "carry_frames", "drop_frames", "guide_of", "prefer"]
-
 REACH = 2.0
 """A place has the nearest category if that is at most so many pose tolerances away."""
 UNLIKELY = -1e3

@@ -23,8 +23,6 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import FORBIDDEN, NONE
 from stages.variations.kernels.tables import kit_tables
 
-__all__ = ["Instantiation", "Instantiator"]
-
 FEWEST = 64
 """There is always room for graphs of so many nodes."""
 VALUES_A_NODE = 256

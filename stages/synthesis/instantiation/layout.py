@@ -12,20 +12,6 @@ import numpy as np
 
 from stages.shape.arrays import IntArray
 
-__all__ = [
-    "FAILS",
-    "PLACED",
-    "STANDARD",
-    "TRAIL",
-    "TRIES",
-    "VALUES",
-    "Graph",
-    "Method",
-    "Solving",
-    "graph_tables",
-    "solving",
-]
-
 VALUES, PLACED, TRAIL, TRIES, FAILS = range(5)
 """Places in `Solving.counts`: numbers of values, parts that stand, entries of the trail, parts that were put somewhere,
 and dead ends."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numba
 
-__all__ = ["compose", "seen_from"]
-
 
 @numba.njit(cache=True)
 def compose(rotation, translation, then_rotation, then_translation, out_rotation, out_translation):

@@ -16,8 +16,6 @@ from stages.synthesis.instantiation.motions import compose
 from stages.variations.kernels.lookup import mix
 from stages.variations.kernels.poses import same_rotation, squared_distance
 
-__all__ = ["LONGEST", "Reach", "can_reach", "new_reach"]
-
 LONGEST = 24
 """Longer chains are taken to reach anything."""
 MOST = 6000

@@ -12,8 +12,6 @@ from stages.synthesis.instantiation.reach import LONGEST, can_reach
 from stages.variations.kernels.layout import MISSING, NONE
 from stages.variations.kernels.lookup import ask, ask_python, hash_key, quantise
 
-__all__ = ["BUDGET", "IMPOSSIBLE", "NO_ROOM", "SOLVED", "solve"]
-
 SOLVED, IMPOSSIBLE, BUDGET, NO_ROOM = 0, 1, 2, 3
 """How it ended; IMPOSSIBLE: every way has been tried."""
 FINE, CONFLICT = 4, 5

@@ -15,8 +15,6 @@ from stages.shape.arrays import FloatArray
 from stages.training.boxes import TURN, WIDTH
 from stages.training.pooling import pooled
 
-__all__ = ["END", "FLAGS", "KINDS", "MOST_BOXES", "NUMBERS", "SHOWN", "Batch", "Cuboids", "batch_of", "batches"]
-
 MOST_BOXES = 32
 """Cuboids of a shape, mirror images counted once."""
 

@@ -19,8 +19,6 @@ from stages.training.boxes import CENTRE, SIZE, numbers_of_box
 from stages.training.cuboid_rnn.batches import MOST_BOXES, Cuboids
 from stages.training.program_vae.corpus import category_programs
 
-__all__ = ["mirrored", "prepare_corpus", "read_corpus", "rows_of"]
-
 ALIKE = 0.02
 """Cuboids whose numbers differ by at most so much from a mirror image are one."""
 

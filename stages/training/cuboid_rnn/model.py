@@ -11,8 +11,6 @@ from torch.nn.functional import softplus
 from stages.training.cuboid_rnn.batches import FLAGS, KINDS, NUMBERS, SHOWN
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
 
-__all__ = ["CuboidRnn", "density"]
-
 NARROWEST = 0.01
 """Least standard deviation of a Gaussian: numbers that recur would make it endlessly narrow."""
 

@@ -8,8 +8,6 @@ from pydantic import Field
 
 from stages.training.entry import KitModelEntry, Source
 
-__all__ = ["CuboidRnnEntry"]
-
 
 class CuboidRnnEntry(KitModelEntry):
     """A recurrent network of the cuboids that ShapeAssembly programs make: a baseline that knows neither parts of parts

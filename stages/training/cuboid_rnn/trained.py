@@ -19,8 +19,6 @@ from stages.training.cuboid_rnn.corpus import mirrored
 from stages.training.cuboid_rnn.model import CuboidRnn
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
 
-__all__ = ["TrainedCuboidRnn", "load_cuboid_rnn"]
-
 AT_ONCE = 128
 
 

@@ -19,8 +19,6 @@ from stages.training.cuboid_rnn.settings import CuboidRnnEntry
 from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 
-__all__ = ["CuboidRnnLearner", "entry", "learner", "new_model", "prepare"]
-
 
 def prepare(task: Task) -> Outcome:
     """The shapes of a category, as sequences of cuboids."""

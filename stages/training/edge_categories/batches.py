@@ -17,8 +17,6 @@ from stages.strings.decoder import decode
 from stages.strings.tokens import number_value
 from stages.training.pooling import pooled
 
-__all__ = ["COLUMNS", "PAD", "Batch", "CategoryTables", "Strings", "batch_of", "batches", "read_string"]
-
 PAD = 0
 """The code of what stands behind a string; the code of a part is its label's number plus one."""
 COLUMNS = ("code", "here", "there")

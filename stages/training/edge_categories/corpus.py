@@ -20,8 +20,6 @@ from stages.strings.encoder import NotConnectedError
 from stages.strings.kit_strings import KitStrings
 from stages.training.edge_categories.batches import CategoryTables, Strings, read_string
 
-__all__ = ["described_space", "prepare_corpus", "read_corpus"]
-
 CYCLES = 16
 """Cycle numbers that are told apart; the greater ones are read as the last of these."""
 

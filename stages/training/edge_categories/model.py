@@ -10,8 +10,6 @@ from stages.training.edge_categories.batches import Batch, CategoryTables
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
 from stages.training.transformer import Block
 
-__all__ = ["Classifier", "EdgeCategoriesModel", "Reader", "Walker", "make_model", "masked"]
-
 
 class EdgeCategoriesModel(nn.Module):
     """What all models of edge categories do."""

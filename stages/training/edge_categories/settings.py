@@ -8,8 +8,6 @@ from pydantic import Field
 
 from stages.training.entry import KitModelEntry, Source
 
-__all__ = ["EdgeCategoriesEntry"]
-
 
 class EdgeCategoriesEntry(KitModelEntry):
     """A model of edge categories (strings §6). Sizes are not published: these train in minutes on one core."""

@@ -22,8 +22,6 @@ from stages.training.edge_categories.corpus import described_space
 from stages.training.edge_categories.model import EdgeCategoriesModel, Walker, make_model, masked
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
 
-__all__ = ["Ballot", "Steps", "TrainedEdgeCategories", "load_edge_categories"]
-
 AT_ONCE = 64
 """Strings that are judged side by side."""
 OWN_SHARE = 0.05

@@ -19,8 +19,6 @@ from stages.training.edge_categories.settings import EdgeCategoriesEntry
 from stages.training.learner import sample_digests
 from stages.training.loop import device_of
 
-__all__ = ["EdgeCategoriesLearner", "entry", "learner", "new_model", "prepare"]
-
 
 def prepare(task: Task) -> Outcome:
     """The strings of a kit's shapes with their categories."""

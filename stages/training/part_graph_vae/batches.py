@@ -15,8 +15,6 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.boxes import WIDTH
 from stages.training.pooling import pooled
 
-__all__ = ["MOST_CHILDREN", "Batch", "Graphs", "Level", "Node", "batch_of", "batches"]
-
 MOST_CHILDREN = 12
 """Parts of a node. With ten, as StructureNet has, some storages and tables would be missing."""
 

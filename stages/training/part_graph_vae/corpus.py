@@ -19,8 +19,6 @@ from stages.training.boxes import WIDTH, numbers_of_box
 from stages.training.part_graph_vae.batches import MOST_CHILDREN, Graphs, Node
 from stages.training.program_vae.corpus import category_programs
 
-__all__ = ["nodes_of", "prepare_corpus", "read_corpus"]
-
 
 def prepare_corpus(task: Task) -> Outcome:
     """Files of the shard: `.<split>.safetensors`, the `Graphs` of train and val; `.json`, how many there are.

@@ -19,8 +19,6 @@ from stages.training.part_graph_vae.batches import MOST_CHILDREN, Level
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 from stages.training.standing import Standing
 
-__all__ = ["PartGraphVae", "Parts"]
-
 
 @dataclass(frozen=True)
 class Parts:

@@ -8,8 +8,6 @@ from pydantic import Field
 
 from stages.training.entry import KitModelEntry, Source
 
-__all__ = ["PartGraphVaeEntry"]
-
 
 class PartGraphVaeEntry(KitModelEntry):
     """A VAE of the part graphs that ShapeAssembly programs make: a baseline that knows parts of parts and what touches,

@@ -21,8 +21,6 @@ from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 from stages.training.program_vae.draft import MOST_DEPTH
 from stages.training.standing import Points
 
-__all__ = ["TrainedPartGraphVae", "load_part_graph_vae"]
-
 AT_ONCE = 256
 
 

@@ -21,8 +21,6 @@ from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 from stages.training.standing import drawn
 
-__all__ = ["PartGraphVaeLearner", "entry", "learner", "new_model", "prepare"]
-
 
 def prepare(task: Task) -> Outcome:
     """The shapes of a category, as graphs of parts."""

@@ -15,8 +15,6 @@ from stages.training.pooling import pooled
 from stages.training.program_lm.grammar import SEEN
 from stages.training.program_vae.lines import START
 
-__all__ = ["Batch", "Texts", "Written", "batches"]
-
 
 @dataclass(frozen=True)
 class Written:

@@ -18,8 +18,6 @@ from stages.training.program_lm.grammar import Text
 from stages.training.program_lm.tokens import Word, middles, words_of
 from stages.training.program_vae.corpus import category_programs
 
-__all__ = ["Corpus", "prepare_corpus", "read_corpus", "written"]
-
 Corpus = tuple[dict[str, Any], FloatArray, dict[str, Texts]]
 
 

@@ -18,8 +18,6 @@ from stages.training.program_lm.tokens import FIELDS, Field, first_word, words_o
 from stages.training.program_vae.draft import MOST_DEPTH, MOST_LINES, Choice, Draft, Numbers, joints_of
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, STOP, TRANSLATE
 
-__all__ = ["SEEN", "Text"]
-
 SEEN = 9
 """Sizes that are seen beside a word: of the box, of the cuboid that the line is about, and of that it is brought to."""
 

@@ -16,8 +16,6 @@ from stages.training.program_vae.draft import MOST_DEPTH
 from stages.training.program_vae.lines import SLOTS
 from stages.training.transformer import Block
 
-__all__ = ["Cache", "ProgramLm"]
-
 Cache = list[tuple[Tensor, Tensor]]
 """Keys and values of each block, float (n, most, width) each."""
 

@@ -8,8 +8,6 @@ from pydantic import Field
 
 from stages.training.entry import KitModelEntry, Source
 
-__all__ = ["ProgramLmEntry"]
-
 
 class ProgramLmEntry(KitModelEntry):
     """A transformer that writes ShapeAssembly programs token by token. Its kits are the names of

@@ -18,8 +18,6 @@ from stages.shapeassembly.program import AXES, BBOX, FACES, Attach, Block, Cuboi
 from stages.training.program_vae.draft import MOST_COPIES
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOTS, SQUEEZE, START, STOP, TRANSLATE
 
-__all__ = ["FIELDS", "NUMBERS", "STEPS", "WORDS", "Field", "Word", "words_of", "words_of_fields"]
-
 
 class Field(IntEnum):
     """What a word says."""

@@ -16,8 +16,6 @@ from stages.training.program_lm.model import ProgramLm
 from stages.training.program_lm.settings import ProgramLmEntry
 from stages.training.program_lm.writing import Drawing, write_texts
 
-__all__ = ["TrainedProgramLm", "load_program_lm"]
-
 
 @dataclass(frozen=True)
 class TrainedProgramLm:

@@ -21,8 +21,6 @@ from stages.training.program_lm.model import ProgramLm
 from stages.training.program_lm.settings import ProgramLmEntry
 from stages.training.program_lm.tokens import STEPS, WORDS
 
-__all__ = ["ProgramLmLearner", "entry", "learner", "new_model", "prepare"]
-
 FIRST_NUMBER = WORDS - STEPS - 1
 
 

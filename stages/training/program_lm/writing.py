@@ -16,8 +16,6 @@ from stages.training.program_lm.model import ProgramLm
 from stages.training.program_lm.tokens import NUMBERS, Field
 from stages.training.program_vae.lines import START
 
-__all__ = ["Drawing", "write_texts"]
-
 AT_ONCE = 64
 """Programs that are written side by side."""
 TRIES = 4

@@ -14,8 +14,6 @@ from torch import Tensor
 from stages.training.pooling import pooled
 from stages.training.program_vae.lines import COMMAND, CUBOID, DIMS, SLOTS, START, WIDTH, NodeLines
 
-__all__ = ["Level", "Programs", "batch_of", "batches"]
-
 
 @dataclass(frozen=True)
 class Programs:

@@ -21,8 +21,6 @@ from stages.training.program_vae.batches import Programs
 from stages.training.program_vae.lines import NodeLines, node_lines
 from stages.training.program_vae.settings import Without
 
-__all__ = ["category_programs", "prepare_corpus", "read_corpus", "told_without"]
-
 
 def prepare_corpus(task: Task) -> Outcome:
     """Files of the shard: `.<split>.safetensors`, the `Programs` of train and val; `.json`, how many there are.

@@ -36,8 +36,6 @@ from stages.shapeassembly.program import (
 )
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOTS, SQUEEZE, STOP, TRANSLATE
 
-__all__ = ["MOST_COPIES", "MOST_DEPTH", "MOST_LINES", "Choice", "Draft", "Joint", "Numbers", "Written", "joints_of"]
-
 MOST_DEPTH = 4
 """Levels of a program; the real ones have three."""
 

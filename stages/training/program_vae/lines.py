@@ -12,30 +12,6 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.errors import ProgramError
 from stages.shapeassembly.program import AXES, BBOX, FACES, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
 
-__all__ = [
-    "ALIGNED",
-    "ATTACH",
-    "AXIS",
-    "COMMAND",
-    "COPIES",
-    "COPIES_UNIT",
-    "CUBOID",
-    "DIMS",
-    "FACE",
-    "INDICES",
-    "POINTS",
-    "REFLECT",
-    "SLOTS",
-    "SQUEEZE",
-    "START",
-    "STOP",
-    "TRANSLATE",
-    "UV",
-    "WIDTH",
-    "NodeLines",
-    "node_lines",
-]
-
 START, STOP, CUBOID, ATTACH, SQUEEZE, TRANSLATE, REFLECT = range(7)
 Rows = npt.NDArray[np.float32]
 

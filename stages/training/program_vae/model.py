@@ -17,8 +17,6 @@ from stages.training.program_vae.lines import SLOTS, WIDTH
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.standing import Standing
 
-__all__ = ["LineDecoder", "ProgramVae", "sizes_of"]
-
 COMMANDS = 7
 
 

@@ -17,8 +17,6 @@ from stages.shapeassembly.parameters import SMALLEST
 from stages.shapeassembly.program import Attach, Point, Squeeze
 from stages.training.program_vae.draft import Choice, Draft, Numbers
 
-__all__ = ["APART", "add_line", "gap"]
-
 APART = 0.01
 """How far a cuboid may stand from where it is attached, as a share of the diagonal of the bounding box: half of what
 connects parts (shapeassembly App. E)."""

@@ -8,8 +8,6 @@ from pydantic import Field
 
 from stages.training.entry import KitModelEntry, Source
 
-__all__ = ["ProgramVaeEntry", "Without"]
-
 Without = Literal["nothing", "hierarchy", "macros", "order", "align"]
 """What of the language programs are without (shapeassembly §7.1.1)."""
 

@@ -19,8 +19,6 @@ from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.program_vae.writing import write_programs
 from stages.training.standing import Points
 
-__all__ = ["TrainedProgramVae", "load_program_vae"]
-
 AT_ONCE = 128
 
 

@@ -37,8 +37,6 @@ from stages.training.program_vae.model import ProgramVae, sizes_of
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.standing import drawn
 
-__all__ = ["ProgramVaeLearner", "entry", "learner", "new_model", "prepare"]
-
 
 def prepare(task: Task) -> Outcome:
     """The programs of a category, as numbers."""

@@ -37,8 +37,6 @@ from stages.training.program_vae.model import ProgramVae
 from stages.training.program_vae.reaching import add_line
 from stages.training.standing import Points
 
-__all__ = ["write_programs"]
-
 TRIES = 4
 """Lines of each command that are tried where one breaks a rule."""
 

@@ -15,8 +15,6 @@ from stages.training.recovery.files import write_recovery
 from stages.training.recovery.reading import InputError, read_inputs
 from stages.training.recovery.recover import SHIPPED, find_models, recover_input
 
-__all__ = ["main"]
-
 
 def main(arguments: list[str]) -> int:
     """Recover all inputs. Returns the exit code: 0, 1 where some were none, 2 for a mistake in what was asked."""

@@ -16,8 +16,6 @@ from torch.nn.functional import cross_entropy
 from stages.programs.parameters import Parameter
 from stages.training.recovery.settings import RecoveryEntry
 
-__all__ = ["Answers", "regressed"]
-
 
 def regressed(entry: RecoveryEntry, parameters: Sequence[Parameter]) -> list[bool]:
     """Which parameters are regressed: the continuous ones, if any."""

@@ -13,8 +13,6 @@ from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import SIDE
 
-__all__ = ["inked", "seen_clouds", "seen_drawings", "stored"]
-
 STEPS = 65_534
 """Steps of the side of a box that stored clouds are rounded to."""
 MOST_NOISE = 0.015

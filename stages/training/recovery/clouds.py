@@ -9,8 +9,6 @@ import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Frame", "frame_of", "taken"]
-
 
 @dataclass(frozen=True)
 class Frame:

@@ -11,8 +11,6 @@ from stages.shape.views.scene import scene_of
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.settings import SketchesConfig, SketchView
 
-__all__ = ["INK", "SIDE", "drawn", "fitted"]
-
 SIDE = 224
 """Pixels of a side."""
 MARGIN = 8

@@ -18,8 +18,6 @@ from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.training.recovery.reading import Input
 from stages.training.recovery.recover import Recovered
 
-__all__ = ["recovery_picture", "write_recovery"]
-
 CELL = 400
 SHOWN = 4096
 """Points of a cloud that a picture shows at most."""

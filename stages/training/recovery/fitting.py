@@ -21,8 +21,6 @@ from stages.training.recovery.refinement import Refined, refine
 from stages.training.recovery.targets import CloudTarget, DrawingTarget, Target, cloud_target, drawing_target
 from stages.training.recovery.trained import TrainedRecovery
 
-__all__ = ["Fit", "Look", "Up", "best_fit", "first_look"]
-
 Up = Literal["x", "y", "z", ""]
 
 WELL = 1.5

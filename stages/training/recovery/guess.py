@@ -11,8 +11,6 @@ from stages.programs.program import Program
 from stages.programs.schema import Values
 from stages.shape.arrays import FloatArray
 
-__all__ = ["Guess", "base_guess", "guess_of"]
-
 LEAST_CHANCE = 1e-4
 """No value is less likely to the network than this: it may be wrong."""
 

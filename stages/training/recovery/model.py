@@ -17,8 +17,6 @@ from stages.training.recovery.drawings import SIDE
 from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
 from stages.training.recovery.settings import RecoveryEntry
 
-__all__ = ["RecoveryNet", "halved"]
-
 SLOPE = 0.2
 
 

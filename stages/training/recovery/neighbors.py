@@ -15,8 +15,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-__all__ = ["edge_maximum", "nearest_neighbors"]
-
 CELL_POINTS = 2
 """Points in a cell of the grid that the neighbours of points in space are looked for in."""
 

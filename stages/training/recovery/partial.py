@@ -20,8 +20,6 @@ from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.surface import sampled_points, shape_points
 
-__all__ = ["PartialTarget", "partial_target"]
-
 COMPARED, LOOKED_AT = 1024, 2048
 """Points of each side that look for the nearest of the other, and among which it is looked for."""
 PLANES = 64

@@ -15,8 +15,6 @@ from pipeline.bounded import Escaped, in_child
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray
 from stages.training.recovery.drawings import fitted
 
-__all__ = ["Input", "InputError", "checked_cloud", "ink_of", "read_inputs"]
-
 CLOUDS = (".npy", ".txt", ".xyz", ".csv", ".ply", ".obj", ".glb", ".gltf", ".stl", ".off")
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
 PICTURES = ("PNG", "JPEG", "BMP", "WEBP", "TIFF")

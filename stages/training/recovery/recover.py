@@ -23,8 +23,6 @@ from stages.training.recovery.refinement import Refined, refine
 from stages.training.recovery.strays import strays_of
 from stages.training.recovery.trained import KIND, TrainedRecovery, load_recovery
 
-__all__ = ["SHIPPED", "Models", "Recovered", "find_models", "recover", "recover_input"]
-
 SHIPPED = Path(__file__).parents[3] / "datasets/exemplars/models"
 """Models that come with Shapemill; `ship.py` puts them there."""
 

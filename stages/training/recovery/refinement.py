@@ -20,8 +20,6 @@ from stages.training.recovery.guess import Guess
 from stages.training.recovery.shapes import valid_values
 from stages.training.recovery.targets import Target
 
-__all__ = ["Refined", "refine"]
-
 EVOLUTION = 60
 """Shapes in which several discrete parameters are changed at once, before each alone is looked at again."""
 OTHERWISE, FITTED = 2, 6

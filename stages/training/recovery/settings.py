@@ -8,8 +8,6 @@ from pydantic import Field
 
 from stages.training.entry import ModelEntry, Subject
 
-__all__ = ["RecoveryEntry"]
-
 Size = Annotated[int, Field(ge=1, le=4096)]
 
 

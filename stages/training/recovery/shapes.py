@@ -21,8 +21,6 @@ from stages.programs.repair import repaired
 from stages.programs.sampling import cells
 from stages.programs.schema import Values
 
-__all__ = ["TEST", "TRAIN", "VAL", "RandomShape", "random_shapes", "valid_values"]
-
 TRAIN: Interval = (0.0, 0.8)
 VAL: Interval = (0.8, 0.9)
 TEST: Interval = (0.9, 1.0)

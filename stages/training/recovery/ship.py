@@ -15,8 +15,6 @@ from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_c
 from stages.training.recovery.recover import SHIPPED
 from stages.training.recovery.trained import KIND, in_bytes, load_recovery
 
-__all__ = ["MOST", "main", "slim_bytes"]
-
 MOST = 4_000_000
 """Bytes of a model that comes with a clone."""
 MOST_OF_BYTES = 2

@@ -7,8 +7,6 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
 
-__all__ = ["strays_of"]
-
 NEIGHBORS = 4
 LONELY = 2.0
 """A point stands alone whose neighbors are so many times farther than theirs are from them,"""

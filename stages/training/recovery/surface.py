@@ -10,8 +10,6 @@ from stages.points.area_sampling import sample_surface
 from stages.programs.curves.part import Part, joined
 from stages.shape.arrays import FloatArray, IntArray
 
-__all__ = ["chamfer_distance", "even_points", "sampled_points", "shape_points"]
-
 PLASTIC = 1.32471795724474602596
 """Multiples of its inverse powers fill a square evenly (Roberts 2018)."""
 

@@ -19,8 +19,6 @@ from stages.training.recovery.clouds import Frame, frame_of
 from stages.training.recovery.drawings import SIDE, drawn
 from stages.training.recovery.surface import sampled_points, shape_points
 
-__all__ = ["CloudTarget", "DrawingTarget", "Target", "cloud_target", "drawing_target"]
-
 COMPARED = 1024
 """Points of each side that look for the nearest of the other."""
 LOOKED_AT = 2048

@@ -23,8 +23,6 @@ from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.training import described_parameters
 
-__all__ = ["KIND", "TrainedRecovery", "in_bytes", "load_recovery"]
-
 KIND = "recovery"
 """What weights say of their kind."""
 

@@ -31,8 +31,6 @@ from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.shapes import TRAIN, VAL, random_shapes, valid_values
 from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
 
-__all__ = ["RecoveryLearner", "described_parameters", "entry", "learner", "prepare"]
-
 JUDGED = 64
 """Validation shapes whose recovery is measured."""
 MEASURED = 2048

@@ -13,8 +13,6 @@ from torch import Tensor
 
 from stages.training.pooling import pooled
 
-__all__ = ["Batch", "Strings", "batches", "open_until"]
-
 
 @dataclass(frozen=True)
 class Strings:

@@ -21,8 +21,6 @@ from stages.strings.tokens import number_value, split_tokens
 from stages.training.string_vae.batches import Strings
 from stages.training.string_vae.vocabulary import END, Vocabulary
 
-__all__ = ["prepare_corpus", "read_corpus"]
-
 Masks = npt.NDArray[np.bool_]
 
 

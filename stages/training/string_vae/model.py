@@ -9,8 +9,6 @@ from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import END
 from stages.training.transformer import Block
 
-__all__ = ["CycleEnds", "Decoder", "DecoderState", "StringVae", "shifted"]
-
 DecoderState = list[Tensor]
 
 

@@ -15,8 +15,6 @@ import numpy as np
 
 from stages.training.string_vae.trained import Points, TrainedStringVae
 
-__all__ = ["TEMPERATURE", "WAYS", "Found", "gaussian_points", "linear_points", "path_points", "perturb", "sample"]
-
 LARGEST = 0.25
 """Largest offset of a perturbation in each dimension (strings §5.2)."""
 LARGEST_BETWEEN = 0.1

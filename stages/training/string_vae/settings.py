@@ -8,8 +8,6 @@ from pydantic import Field
 
 from stages.training.entry import KitModelEntry
 
-__all__ = ["StringVaeEntry"]
-
 
 class StringVaeEntry(KitModelEntry):
     """A string VAE (strings §5). Sizes are not published: these train in minutes on one core."""

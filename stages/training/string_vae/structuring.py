@@ -14,16 +14,6 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from stages.shape.graphs.histograms import histogram_metric
 
-__all__ = [
-    "PathFigures",
-    "interpolation",
-    "naive_graph",
-    "nearest_points",
-    "nearest_strings",
-    "path_figures",
-    "search_graph",
-]
-
 NEAREST_POINTS = 4
 """Neighbours of a node in the search graph besides its equals: "between 3 and 5" (strings §5.3)."""
 NEAREST_STRINGS = 3

@@ -22,8 +22,6 @@ from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import END, Vocabulary
 from stages.training.string_vae.writing import Draft, write_codes
 
-__all__ = ["Points", "TrainedStringVae", "load_string_vae"]
-
 Points = npt.NDArray[np.float32]
 """Points of a latent space, float32 (n, latent)."""
 

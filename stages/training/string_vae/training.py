@@ -21,8 +21,6 @@ from stages.training.string_vae.model import StringVae, shifted
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import Vocabulary
 
-__all__ = ["StringVaeLearner", "entry", "learner", "new_model", "prepare"]
-
 ANNEAL_STEEPNESS = 12.0
 """The weight of the divergence goes from 0.25 % to 99.75 % of its value along its S."""
 

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import StringError, number_text, number_value, split_tokens
 
-__all__ = ["END", "Vocabulary"]
-
 END = 0
 """The token that ends a string, and, as what stands before it, begins one."""
 

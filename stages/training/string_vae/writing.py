@@ -14,8 +14,6 @@ from stages.strings.rules import Rules
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.vocabulary import END
 
-__all__ = ["Draft", "write_codes"]
-
 AT_ONCE = 256
 """Strings that are written side by side."""
 TRIES = 8

@@ -17,8 +17,6 @@ from stages.variations.constraint import Constraint, Labels, Mend, Test
 from stages.variations.resizing import Resizer, heights_of, spans_of
 from stages.variations.substitution.ground import GroundTest
 
-__all__ = ["CONSTRAINT"]
-
 LOW, HIGH = 0, 1
 """What stays of the place where two parts meet: its lower end where one is made lower, for both may stand on the
 ground, its upper end where one is made taller."""

@@ -15,8 +15,6 @@ from stages.variations.constraint import Constraint, Labels, Mend, Test
 from stages.variations.resizing import Resizer, spans_of
 from stages.variations.substitution.ground import GroundTest
 
-__all__ = ["CONSTRAINT"]
-
 
 def _test(kit: Kit, labels: Labels) -> Test:
     del labels

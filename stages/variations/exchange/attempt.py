@@ -13,8 +13,6 @@ from stages.variations.kernels.checks import connect
 from stages.variations.kernels.graph_key import graph_key
 from stages.variations.kernels.layout import PIECE, UNITS, Outcome
 
-__all__ = ["attempt", "complete", "cut_piece"]
-
 SMALL, NEARLY_ALL = 0.2, 0.8
 """A piece with a share of parts between these is a large cut, one that can change a shape as a whole."""
 RECUTS = 4

@@ -7,8 +7,6 @@ import numpy as np
 from stages.shape.geometry.pose import rigid_fit
 from stages.variations.kernels.layout import BOUNDARY, UPRIGHT, KitTables, Outcome, ShapeTables, Workspace
 
-__all__ = ["match_centroids"]
-
 STEPS = 2000
 """Partial matches looked at before a boundary counts as not matched."""
 

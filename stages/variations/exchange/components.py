@@ -11,8 +11,6 @@ from stages.variations.kernels.lookup import random_below
 from stages.variations.kernels.membership import admitted
 from stages.variations.kernels.poses import squared_distance, transform
 
-__all__ = ["choose_components", "find_components"]
-
 FEW = 6
 """Of so many components that touch the boundary every choice is tried; of more, random ones."""
 KEPT = 0.7

@@ -8,8 +8,6 @@ from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert
 from stages.variations.kernels.layout import EDGES, PARTS, Workspace
 
-__all__ = ["correct_orientations"]
-
 
 def correct_orientations(dockings: DockingTable, ws: Workspace) -> bool:
     """Turn parts of the variant in `ws` so that each of its edges is an observed docking; False where one cannot be.

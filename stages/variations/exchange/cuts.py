@@ -8,8 +8,6 @@ import numpy as np
 from stages.variations.kernels.layout import BOUNDARY, GROWN, JOINTS, PIECE, Outcome
 from stages.variations.kernels.lookup import random_below
 
-__all__ = ["connected", "cut", "put_boundary"]
-
 OF_A_PART = 0.75
 """How likely planes stand along the axes of one of the parts; else they stand in any direction."""
 HALF_SPACE, BOX = 0, 2

@@ -9,8 +9,6 @@ from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, TRY, UNKNOW
 from stages.variations.kernels.poses import looks_same, rotate, squared_distance, transform
 from stages.variations.kernels.variant import inherit_edges, place_boxes
 
-__all__ = ["join"]
-
 
 @numba.njit(cache=True)
 def join(rng, kit, a, b, ws, smallest, largest):

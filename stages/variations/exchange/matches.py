@@ -9,8 +9,6 @@ from stages.variations.kernels.layout import BOUNDARY, PARTS, UPRIGHT, Outcome
 from stages.variations.kernels.lookup import random_below
 from stages.variations.kernels.poses import looks_same, part_at, rotate, transform
 
-__all__ = ["lies_in", "match_poses"]
-
 
 @numba.njit(cache=True)
 def _motion_between(rotation, translation, symmetry, onto_rotation, onto_translation, motion):

@@ -10,8 +10,6 @@ from stages.variations.kernels.layout import PIECE, Outcome
 from stages.variations.kernels.lookup import random_below
 from stages.variations.kernels.poses import looks_same, part_at, transform
 
-__all__ = ["shift"]
-
 
 @numba.njit(cache=True)
 def shift(rng, kit, a, ws):

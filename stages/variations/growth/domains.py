@@ -11,8 +11,6 @@ from stages.variations.kernels.layout import FORBIDDEN, NONE, UPRIGHT
 from stages.variations.kernels.lookup import mix
 from stages.variations.kernels.poses import looks_same, squared_distance
 
-__all__ = ["CONFLICT", "FINE", "NO_ROOM", "narrow", "place", "propagate", "strike", "undo"]
-
 FINE, CONFLICT, NO_ROOM = 0, 1, 2
 """How a step ended."""
 LIGHT = 32

@@ -13,8 +13,6 @@ from stages.variations.kernels.layout import EDGES, PARTS, TRY
 from stages.variations.kernels.lookup import random_below
 from stages.variations.kernels.variant import place_boxes
 
-__all__ = ["grow", "take_over"]
-
 CONFLICTS_ALLOWED = 120
 """After so many conflicts a shape is given up."""
 JUMP_EVERY, JUMP_MOST = 8, 16

@@ -16,8 +16,6 @@ from stages.variations.growth.patterns import pattern_tables
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import PARTS, UNKNOWNS, KitTables, Outcome, Workspace
 
-__all__ = ["Grower"]
-
 LONGEST = 2.5
 """How much longer, beside its other side, a field may be than the exemplar at most."""
 WIDEST = 4.0

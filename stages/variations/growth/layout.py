@@ -11,25 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = [
-    "CANDIDATES",
-    "CONFLICTS",
-    "DECISIONS",
-    "EVENTS",
-    "FREE",
-    "GROWN_PARTS",
-    "MEMBERS",
-    "NODES",
-    "SPOTS",
-    "TRAIL",
-    "WORK",
-    "Contacts",
-    "Field",
-    "Growing",
-    "PatternTables",
-    "growing",
-]
-
 SPOTS, NODES, FREE, GROWN_PARTS, CANDIDATES, MEMBERS, TRAIL, EVENTS, WORK, DECISIONS, CONFLICTS = range(11)
 """Places in `Growing.counts`: numbers of spots, nodes, parts, candidates, members of candidates, entries of the trail,
 spots that wait to be struck from domains, work in contacts asked for, decisions and conflicts; FREE is the first free

@@ -10,8 +10,6 @@ from stages.shape.graphs.patterns import Pattern
 from stages.shape.kit import Kit
 from stages.variations.growth.layout import PatternTables
 
-__all__ = ["pattern_tables"]
-
 
 def pattern_tables(kit: Kit, patterns: Sequence[Pattern]) -> PatternTables:
     """Patterns, ordered by type, for the kernels."""

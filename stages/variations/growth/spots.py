@@ -10,8 +10,6 @@ from stages.variations.kernels.layout import FORBIDDEN, MISSING, NONE
 from stages.variations.kernels.lookup import ask, ask_python, hash_key, mix, quantise
 from stages.variations.kernels.poses import same_rotation, squared_distance
 
-__all__ = ["FORBIDS", "add_node", "add_spot", "boxes_meet", "find_node", "find_spot", "relation"]
-
 FORBIDS = -1
 """In place of a node's count: the part forbids the spot."""
 FULL = -2

@@ -18,8 +18,6 @@ from stages.variations.kernels.layout import FORBIDDEN, LABELS, MISSING, NONE, A
 from stages.variations.kernels.lookup import ask_around, hash_key, quantise
 from stages.variations.kernels.tables import QUANTUM
 
-__all__ = ["ContactAnswers"]
-
 BORDERLINE = 1.06
 """Two parts closer than this many contact tolerances, yet not in contact, are too close to be called apart."""
 

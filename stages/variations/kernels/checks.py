@@ -10,8 +10,6 @@ from stages.variations.kernels.lookup import ask, hash_key, quantise
 from stages.variations.kernels.membership import admitted, neighbourhood_key, recalled
 from stages.variations.kernels.variant import set_edge
 
-__all__ = ["connect", "find_contacts", "validate"]
-
 
 @numba.njit(cache=True, inline="always")
 def _boxes_apart(boxes, i, j, slack):

@@ -14,8 +14,6 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-__all__ = ["Dockings", "Groups", "Joints", "Target", "cover", "locate", "rigid_pieces"]
-
 
 class Groups(NamedTuple):
     """The symmetry groups of part types.

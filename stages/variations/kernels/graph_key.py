@@ -8,8 +8,6 @@ import numpy as np
 from stages.variations.kernels.layout import EDGES, PARTS
 from stages.variations.kernels.lookup import mix
 
-__all__ = ["graph_key"]
-
 
 @numba.njit(cache=True)
 def graph_key(label_of, ws, with_labels):

@@ -11,34 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = [
-    "BOUNDARY",
-    "CHOICES",
-    "EDGES",
-    "FORBIDDEN",
-    "GROWN",
-    "JOINTS",
-    "LABELS",
-    "MEANINGS",
-    "MISSING",
-    "NONE",
-    "NOTHING",
-    "PARTS",
-    "PIECE",
-    "PLANES",
-    "REPLACED",
-    "TRY",
-    "UNITS",
-    "UNKNOWNS",
-    "UPRIGHT",
-    "Answers",
-    "KitTables",
-    "Outcome",
-    "Rules",
-    "ShapeTables",
-    "Workspace",
-]
-
 
 class Rules(NamedTuple):
     """Which neighbourhoods the grammar admits, by rule: what a loose grammar admits is too much to be listed.

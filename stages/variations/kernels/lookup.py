@@ -12,8 +12,6 @@ from numba.extending import intrinsic
 
 from stages.variations.kernels.layout import MISSING
 
-__all__ = ["ask", "ask_around", "ask_python", "hash_key", "mix", "quantise", "random_below"]
-
 
 @numba.njit(cache=True)
 def quantise(first_rotation, first_translation, rotation, translation, reach, quantum, out):

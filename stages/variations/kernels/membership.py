@@ -11,8 +11,6 @@ import numpy as np
 from stages.variations.kernels.layout import MISSING
 from stages.variations.kernels.lookup import ask, mix
 
-__all__ = ["admitted", "neighbourhood_key", "recalled"]
-
 
 @numba.njit(cache=True, inline="always")
 def neighbourhood_key(kit, part_type):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["looks_same", "part_at", "rotate", "same_rotation", "squared_distance", "transform"]
-
 
 @numba.njit(cache=True)
 def same_rotation(symmetries, first, last, rotation, other, slack):

@@ -9,8 +9,6 @@ from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit import Assembly, Grammar, Kit
 from stages.variations.kernels.layout import KitTables, Rules, ShapeTables, Workspace
 
-__all__ = ["QUANTUM", "kit_tables", "multiset_weights", "shape_tables", "workspace"]
-
 QUANTUM = 1 / 64
 """Step of the poses by which contact answers are looked up, as a share of the contact tolerance."""
 

@@ -6,8 +6,6 @@ import numba
 
 from stages.variations.kernels.layout import EDGES, TRY
 
-__all__ = ["inherit_edges", "place_boxes", "set_edge"]
-
 
 @numba.njit(cache=True)
 def inherit_edges(starts, ends, labels, index, ws):

@@ -13,8 +13,6 @@ from stages.variations.archive import Archive, Place
 from stages.variations.features import MIXED
 from stages.variations.kernels.layout import ShapeTables
 
-__all__ = ["Parent", "Parents"]
-
 RIVALS = 6
 """Of so many variants of the largest family the most crowded makes room for another."""
 

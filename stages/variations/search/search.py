@@ -46,8 +46,6 @@ from stages.variations.substitution.held import HoldTest
 from stages.variations.substitution.substitute import substitute
 from stages.variations.substructures.replacer import Replacer
 
-__all__ = ["SPARE", "Search", "Variant"]
-
 SPARE = 4
 """A search ends at so many times the variants that it looks for, if few of them add to the archive."""
 

@@ -18,8 +18,6 @@ from stages.variations.kernels.layout import GROWN, JOINTS, MEANINGS, NOTHING, P
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.settings import SearchConfig
 
-__all__ = ["BATCH", "CHOICES", "CUTS", "GROWTH", "PLAIN", "RARE", "Choice", "Steering"]
-
 CUTS = ((GROWN, False), (PLANES, False), (PLANES, True), (JOINTS, False), (UNITS, False))
 """Ways of cutting, and whether the piece must be large."""
 PLAIN, RARE, FAMILY, CROSSED = range(4)

@@ -7,8 +7,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Kit
 
-__all__ = ["GroundTest"]
-
 
 class GroundTest:
     """Tells shapes in which a part hangs in the air that always stood on the ground in the exemplars, as a short leg

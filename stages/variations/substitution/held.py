@@ -13,8 +13,6 @@ import numpy as np
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.kit import Assembly, Kit
 
-__all__ = ["HoldTest"]
-
 NEAR = 0.6
 """A contact is at a side where its centre is so far out from the middle of the box, as a share of the way to the side;
 and surely at the one across which the boxes of both parts have least in common."""

@@ -10,8 +10,6 @@ import numpy.typing as npt
 from stages.shape.arrays import TypeArray
 from stages.shape.kit import Assembly
 
-__all__ = ["Exchanged", "draw_pieces"]
-
 ALL_GROUPS = 0.75
 """How likely all groups of the chosen parts are exchanged together: four legs, which only the seat joins."""
 

@@ -28,8 +28,6 @@ from stages.variations.kernels.variant import inherit_edges, place_boxes
 from stages.variations.search.parents import Parent
 from stages.variations.substitution.pieces import Exchanged, draw_pieces
 
-__all__ = ["Docked", "find_motion", "put_together", "substitute"]
-
 AS_IT_STOOD = 0.5
 """How likely the piece is turned as little as may be; else as one of the dockings at the place turns it."""
 SAME_PLACE = 0.1

@@ -17,8 +17,6 @@ from stages.shape.geometry.pose import pose_vectors
 from stages.shape.kit import Kit
 from stages.variations.substructures.embedding import Side, motions_onto
 
-__all__ = ["blend", "boundary_moves", "is_oriented_alike"]
-
 MOST_TURN = np.radians(45.0)
 """Greatest difference of the angles between two consecutive cut edges, and between one and the vertical."""
 LEVEL = 0.1

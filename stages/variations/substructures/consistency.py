@@ -13,8 +13,6 @@ import numpy as np
 from stages.variations.kernels.lookup import random_below
 from stages.variations.kernels.membership import admitted
 
-__all__ = ["make_consistent"]
-
 CHANGES = 24
 """So often a choice is changed at most until the grammar admits it."""
 

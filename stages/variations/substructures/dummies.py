@@ -14,8 +14,6 @@ import numpy as np
 from stages.variations.substructures.keys import grown
 from stages.variations.substructures.symmetry import DEFECTS, ROWS
 
-__all__ = ["is_alike", "pass_over"]
-
 
 @numba.njit(cache=True)
 def is_alike(graph, d, e):

@@ -18,8 +18,6 @@ from stages.variations.kernels.layout import UPRIGHT
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.replacement import piece_of
 
-__all__ = ["Embedding", "Side", "embed", "motions_onto", "pieces"]
-
 
 @dataclass(frozen=True)
 class Side:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["grown", "holds", "with_key"]
-
 
 @numba.njit(cache=True)
 def grown(array, needed):

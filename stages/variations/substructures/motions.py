@@ -23,8 +23,6 @@ from stages.variations.substructures.moves import Moves
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.symmetry import pair_hash
 
-__all__ = ["MOST_MOVES", "MOST_WORK", "find_moves"]
-
 MOST_MOVES = 1 << 13
 """Replacements along motions that are listed between two shapes at most: what bounds memory."""
 MOST_WORK = 1 << 24

@@ -17,8 +17,6 @@ from stages.shape.arrays import FloatArray
 from stages.variations.substitution.substitute import Docked
 from stages.variations.substructures.ordered import OrderedGraph
 
-__all__ = ["Move", "Moves"]
-
 COMPOSED = 16
 """Compositions that are drawn along a motion for each region that it leaves over, if there are so many."""
 

@@ -26,8 +26,6 @@ from stages.variations.substructures.symmetry import (
     side_by_side,
 )
 
-__all__ = ["DUMMY_WORK", "MOST_WAITING", "Operations", "find_operations"]
-
 DUMMY_WORK = 5_500_000
 """Darts that are looked at for symmetries with dummy edges, which are for sparse outliers, about a third of a second:
 in dense graphs the rest is left, those with most dummy edges first."""

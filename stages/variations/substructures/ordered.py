@@ -11,8 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["OrderedGraph", "ordered_graph"]
-
 
 class OrderedGraph(NamedTuple):
     """A simple graph with typed nodes and a cyclic order of the darts of each.

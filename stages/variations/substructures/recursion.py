@@ -9,8 +9,6 @@ import numpy as np
 from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.replacement import Replacement, piece_of
 
-__all__ = ["cut_again", "cut_farther", "growth_of"]
-
 
 def growth_of(graph: OrderedGraph, boundary: np.ndarray) -> int:
     """How many parts more there are each time that a recursive rule is carried out, fewer where it is negative; 0 where

@@ -7,8 +7,6 @@ import numpy as np
 
 from stages.variations.substructures.symmetry import MATCHED, ROWS, WORK, agree
 
-__all__ = ["cut_off", "find_regions", "region_of"]
-
 LEADER, FIRST, LAST, LIVE = range(4)
 """Columns of `lines`."""
 FROM, AFTER, REACHED = range(3)

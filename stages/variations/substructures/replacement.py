@@ -10,8 +10,6 @@ import numpy as np
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
 from stages.variations.substructures.regions import cut_off
 
-__all__ = ["Replacement", "piece_of", "replace_piece"]
-
 
 @dataclass(frozen=True)
 class Replacement:

@@ -35,8 +35,6 @@ from stages.variations.substructures.result_key import moved_key, result_key
 from stages.variations.substructures.sites import contact_graph, docking_graph
 from stages.variations.substructures.stretching import stretch_onto
 
-__all__ = ["Replacer"]
-
 FIRST_WORK, DEEPER = 1 << 19, 16
 """Parts that are laid upon others when two shapes are first drawn, at most; and how many times as many when they are
 drawn again and nothing is left: motions under which most coincides come first."""

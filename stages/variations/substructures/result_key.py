@@ -8,8 +8,6 @@ import numpy as np
 
 from stages.variations.kernels.lookup import mix
 
-__all__ = ["moved_key", "result_key"]
-
 GOLDEN, ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
 ODD_TYPE = np.uint64(0x51ED270B)
 

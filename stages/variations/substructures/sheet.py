@@ -24,8 +24,6 @@ from stages.shape.views.scene import Scene, scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.variations.facing import vertical_turn
 
-__all__ = ["Replacement", "known_shapes", "replacement_of", "replacements_sheet"]
-
 SHOWN = 12
 CELL = 300
 CAMERAS = tuple(Camera(azimuth=azimuth, elevation=25.0) for azimuth in (-40.0, 50.0, 140.0, 230.0))

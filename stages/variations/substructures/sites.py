@@ -15,8 +15,6 @@ from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
 
-__all__ = ["contact_graph", "cyclic_order", "docking_graph"]
-
 SAME = 1e-3
 """Directions that differ by less (as a share of a radian, or of a spread) are the same."""
 

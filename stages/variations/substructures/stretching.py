@@ -16,8 +16,6 @@ from stages.shape.stretch import STRETCHED_DEPTH
 from stages.variations.substructures.blending import boundary_moves
 from stages.variations.substructures.embedding import Side
 
-__all__ = ["stretch_onto"]
-
 STIFFNESS = 1e-6
 """What turning away from the mean of the boundary's motions costs, as a share of how far the boundary is spread: enough
 to tell what the boundary leaves open."""

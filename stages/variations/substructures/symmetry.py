@@ -14,23 +14,6 @@ import numpy as np
 from stages.variations.kernels.lookup import mix
 from stages.variations.substructures.ordered import OrderedGraph
 
-__all__ = [
-    "CONFLICTS",
-    "DEFECTS",
-    "MATCHED",
-    "MOST_DEFECTS",
-    "ROWS",
-    "WORK",
-    "Overlay",
-    "agree",
-    "go_on",
-    "lay_over",
-    "lift",
-    "overlay",
-    "pair_hash",
-    "side_by_side",
-]
-
 CONFLICTS, DEFECTS, MATCHED, ROWS, WORK = range(5)
 """Places in `counts`: parts that were met again in another place; pairs of parts that a dummy edge would match; matched
 parts; rows of the boundary; darts looked at, which nobody sets back."""

@@ -14,8 +14,6 @@ from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.kit import Kit
 from tests.stages.shape.geometry.bodies import Body, box, placed
 
-__all__ = ["CUBE", "SLAB", "block_config", "block_kit", "model", "raw_part", "ring"]
-
 CUBE = box()
 SLAB = box(1, 1, 2)
 

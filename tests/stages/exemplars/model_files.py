@@ -9,18 +9,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = [
-    "BOX_FACES",
-    "Glb",
-    "box",
-    "png",
-    "signed_volume",
-    "textured_dae",
-    "textured_glb",
-    "world_triangles",
-    "write_obj",
-]
-
 BOX_FACES = np.array(
     [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7],
     dtype=np.int32,

@@ -10,8 +10,6 @@ from stages.proportions.warp import Lattice, lattice_of
 from stages.shape.kit import Assembly, Kit
 from tests.stages.variations.toy import Placed, box, kit_of, pose
 
-__all__ = ["MESHES", "STOOL", "kit", "lattice", "whole"]
-
 FRAME = trimesh.util.concatenate(
     [box(0.1, 1.0, 0.1).apply_translation((x, 0.5, 0.0)) for x in (0.05, 0.95)]
     + [box(0.8, 0.1, 0.1).apply_translation((0.5, 0.75, 0.0))]

@@ -9,8 +9,6 @@ import pytest
 
 from stages.shapeassembly.sources import program_texts
 
-__all__ = ["CATEGORIES", "SHARED", "needs_shared", "shared_texts"]
-
 SHARED = Path(__file__).resolve().parents[3].parent / "shared" / "shapeassembly"
 CATEGORIES = {"chair": 3835, "table": 6536, "storage": 1551}
 needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="no programs beside the project")

@@ -18,8 +18,6 @@ from stages.shapeassembly.program import (
     Translate,
 )
 
-__all__ = ["programs"]
-
 SHARES = st.integers(0, 1000).map(lambda number: number / 1000)
 SIZES = st.integers(20, 100).map(lambda number: number / 100)
 

@@ -17,8 +17,6 @@ from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.training import new_model
 from stages.training.string_vae.vocabulary import Vocabulary
 
-__all__ = ["publish_model"]
-
 MOST = 40
 
 

@@ -29,8 +29,6 @@ from stages.training.stage import STAGE
 from tests.stages.shape.collection.absent import named_inputs
 from tests.stages.strings.graphs import arrays
 
-__all__ = ["ALPHABET", "SPLITS", "STAGES", "config", "grammar", "graphs", "kit", "strings", "train"]
-
 LABELS = ("joint", "leaf", "link")
 ALPHABET: Alphabet = make_alphabet(LABELS)
 SPLITS = {"toys-train-000000": "train", "toys-train-000001": "train", "toys-val-000000": "val"}

@@ -13,8 +13,6 @@ from stages.programs.files import shape_glb
 from stages.programs.program import find_program
 from stages.programs.schema import Values
 
-__all__ = ["CHAIRS", "write_chairs"]
-
 SIZE = {"scale x": 1.0, "scale y": 1.0, "scale z": 1.1, "seat_pos": 0.6, "seat_shape": 0.4}
 SPINDLES = {"is_top_rail": True, "is_vertical_rail": True, "vr_count": 4}
 COMB = SPINDLES | {"vr_count": 6, "vr_scale_x": 0.5, "tr_shape_1": 0.0, "back_frame_top_y_offset_pct": 0.4}

@@ -10,8 +10,6 @@ from pipeline.config import StrictModel
 from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
-__all__ = ["STAGE", "BreadConfig"]
-
 
 class BreadConfig(StrictModel):
     """How the bread is baked."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["main"]
-
 
 def main(arguments: list[str]) -> int:
     """Print the arguments."""

@@ -16,8 +16,6 @@ from pipeline.errors import Rejected, ShardFailed
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
-__all__ = ["STAGE", "FlourConfig"]
-
 Trouble = Literal["dies", "dies once", "fails", "fails once", "refuses", "no space", "big", "sleeps", "stops once"]
 
 

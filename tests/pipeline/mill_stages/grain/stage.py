@@ -9,8 +9,6 @@ from pipeline.config import StrictModel
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
-__all__ = ["STAGE", "GrainConfig"]
-
 
 class GrainConfig(StrictModel):
     """How much is harvested."""

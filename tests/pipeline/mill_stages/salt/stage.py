@@ -7,8 +7,6 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
-__all__ = ["STAGE", "SaltConfig"]
-
 
 class SaltConfig(StrictModel):
     """How much salt."""

@@ -39,8 +39,6 @@ from stages.programs.curves import (
     twist,
 )
 
-__all__ = ["BLOCKS", "DESIGN", "STAR", "wavy_grid"]
-
 STAR = Profile.of([(np.cos(k * np.pi / 5) * r, np.sin(k * np.pi / 5) * r) for k, r in enumerate([1.0, 0.4] * 5)])
 ELL = Profile.of([(0, 0), (1, 0), (1, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)])
 DESIGN: Curve = bezier([(0.2, 0), (0.6, 0.2), (0.4, 0.8), (0.1, 0.8), (0.05, 0.9), (0.15, 1.0), (0.2, 1.1)], 10)

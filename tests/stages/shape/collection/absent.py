@@ -9,8 +9,6 @@ from pipeline.config import StrictModel
 from pipeline.stage import Outcome, Stage
 from stages.shape.collection.declared import members, producers
 
-__all__ = ["ABSENT_SECTIONS", "ABSENT_STAGES", "named_inputs"]
-
 
 class NothingConfig(StrictModel):
     """Nothing to set."""

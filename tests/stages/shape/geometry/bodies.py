@@ -7,8 +7,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import PartType
 
-__all__ = ["Body", "box", "fcl_gap", "hull", "joined", "part", "placed", "prism", "random_rotation", "sheet", "sphere"]
-
 Body = tuple[FloatArray, IntArray]
 
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

@@ -13,8 +13,6 @@ from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
 from tests.stages.shape.geometry.bodies import SIDES, Body, box
 
-__all__ = ["DRY", "arch", "judged", "solid", "standing_on", "studded", "tower", "turned"]
-
 DRY = PhysicsConfig(joints="dry", connected=1e-5, touching=1e-6, push=0.0)
 """Masonry in exact coordinates, under gravity alone."""
 

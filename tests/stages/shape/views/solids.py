@@ -12,8 +12,6 @@ from stages.shape.kit import Assembly, Grammar, Kit, PartType
 from stages.shape.shape import kit_shape
 from stages.shape.views.scene import Scene, scene_of
 
-__all__ = ["BOX_EDGES", "box", "boxes_scene", "cylinder", "exemplar_scene", "kit_of", "part_type", "posed"]
-
 EXEMPLARS = Path(__file__).resolve().parents[4].parent / "shared" / "exemplars"
 
 BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

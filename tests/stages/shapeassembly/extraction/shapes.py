@@ -8,8 +8,6 @@ import numpy as np
 
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
 
-__all__ = ["box", "hierarchy", "leaf", "node", "table", "turned"]
-
 Three = tuple[float, float, float]
 
 

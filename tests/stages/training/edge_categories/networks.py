@@ -35,11 +35,6 @@ from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES,
 from tests.stages.variations.toy import Placed, box, pose, with_arrow
 from tests.stages.variations.toy import kit_of as toy_kit
 
-__all__ = [
-    "CYCLES", "STAGES", "config", "entry", "header", "kit", "labelled", "learner", "network", "random_model", "space",
-    "train_networks", "trained_model", "writer",
-]  # fmt: skip
-
 CYCLES = 4
 SPLITS = {"nets-train-000000": "train", "nets-train-000001": "train", "nets-val-000000": "val"}
 SHAPES = 6

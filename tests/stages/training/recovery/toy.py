@@ -19,8 +19,6 @@ from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
 from tests.stages.training.toy import STAGES
 
-__all__ = ["PROGRAM", "SMALL", "config", "train"]
-
 PROGRAM = "tests.stages.programs.stool"
 
 SMALL: Mapping[str, Any] = {

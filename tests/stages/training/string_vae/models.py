@@ -18,8 +18,6 @@ from stages.training.string_vae.training import StringVaeLearner, new_model
 from stages.training.string_vae.vocabulary import END, Vocabulary
 from tests.stages.training import toy
 
-__all__ = ["MOST", "VOCABULARY", "entry", "random_vae", "toy_strings", "trained_vae"]
-
 VOCABULARY = Vocabulary(toy.ALPHABET, 2)
 MOST = 60
 

@@ -17,8 +17,6 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Assembly, Kit
 
-__all__ = ["Replaced", "replacements"]
-
 CLOSE = 1e-4
 UPRIGHT = 0.999
 
