@@ -9,7 +9,7 @@ from eval.clusters import clusters_of, mean_shift
 from stages.strings.categories import CategorySpace
 from tests.stages.strings.test_kit_strings import kit_of
 from tests.stages.training.edge_categories.networks import network, space
-from tests.stages.variations.toy import pose
+from tests.toy_kits.chains_and_rings import pose
 
 
 def test_poses_that_differ_by_a_symmetry_are_one_cluster_and_noise_is_in_it() -> None:

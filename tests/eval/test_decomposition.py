@@ -10,7 +10,7 @@ import pytest
 from eval.decomposition import decomposition_table, merged, rand_index, returned
 from stages.exemplars.read import read_model
 from stages.shape.shape import Shape, kit_shape
-from tests.stages.variations.toy import box, kit_of, pose
+from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
 MESHES = {"slab": box(2.0, 1.0, 2.0), "post": box(0.5, 1.0, 0.5)}
 PILE = [("slab", pose(0, 0, 0)), ("post", pose(-0.5, 1, 0)), ("post", pose(0.5, 1, 0)), ("slab", pose(0, 2, 0))]

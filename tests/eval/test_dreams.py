@@ -6,7 +6,7 @@ import pytest
 
 from eval.dreams import COLUMNS, Dream, dream_row
 from stages.shape.kit import Kit
-from tests.stages.variations.toy import CHAIN, chain, kit_of
+from tests.toy_kits.chains_and_rings import CHAIN, chain, kit_of
 
 LENGTHS = (3, 5, 7)
 

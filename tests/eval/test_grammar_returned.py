@@ -12,7 +12,7 @@ from eval.exchanges import known_exchanges
 from eval.grammar_returned import grammar_returned, grammar_table
 from stages.shape.kit import Kit
 from tests.stages.exemplars.symmetry.planted import mesh, wall
-from tests.stages.variations.toy import box, kit_of, pose
+from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
 
 def prism(*outline: tuple[float, float], height: float) -> Any:

@@ -16,7 +16,7 @@ from stages.synthesis.instantiation.guidance import guide_of
 from stages.synthesis.instantiation.instantiate import Instantiator
 from stages.synthesis.instantiation.layout import STANDARD
 from stages.variations.kernels.answers import ContactAnswers
-from tests.stages.variations.toy import ROAD, kit_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from stages.training.string_vae.trained import TrainedStringVae
 from stages.training.string_vae.training import new_model
 from stages.training.string_vae.vocabulary import Vocabulary
 from stages.variations.kernels.answers import ContactAnswers
-from tests.stages.variations.toy import ROAD, kit_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 MOST = 40
 

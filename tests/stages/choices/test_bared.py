@@ -13,7 +13,7 @@ from stages.choices.probe import Finds
 from stages.choices.sight import Setting
 from stages.exemplars.settings import ContactConfig
 from stages.shape.kit import Assembly, Kit
-from tests.stages.variations.toy import Placed, box, kit_of, pose
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
 HALL = {
     "floor": box(1, 0.1, 1),

@@ -24,8 +24,8 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
 from stages.shape.kit import ContactKind
 from stages.variations.kernels.answers import ContactAnswers
-from tests.stages.variations.tables import ROUND, SQUARE, THICK, THIN, table
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, config_of, kit_of, models_of, pose, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, config_of, kit_of, models_of, pose, ring
+from tests.toy_kits.tables import ROUND, SQUARE, THICK, THIN, table
 
 ROOT = Path(__file__).resolve().parents[3]
 TRIES = 300

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from stages.choices.config_text import config_text, proportions_section, variations_section
-from tests.stages.variations.toy import ROAD, config_of, models_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, config_of, models_of, ring
 
 
 @pytest.mark.parametrize(("copied", "carcass"), [(0.9, ("side", "4")), (1.0, ())])

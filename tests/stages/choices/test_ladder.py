@@ -11,7 +11,7 @@ from stages.choices.ladder import GRAMMARS, Rails, Rung, climb
 from stages.choices.probe import Finds
 from stages.choices.sight import Setting, Sight
 from stages.exemplars.identify import identify_parts
-from tests.stages.variations.toy import CHAIN, chain, config_of, models_of
+from tests.toy_kits.chains_and_rings import CHAIN, chain, config_of, models_of
 
 
 @pytest.mark.parametrize(

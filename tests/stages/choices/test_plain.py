@@ -9,7 +9,7 @@ from stages.choices.plain import is_closed_box, plain_shares
 from stages.choices.proportioned import in_proportions
 from stages.shape.shape import Shape, kit_shape
 from tests.stages.proportions.stools import kit as stools
-from tests.stages.variations.toy import Placed, box, kit_of, pose
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
 PANELS = {
     "lid": box(2, 0.1, 1),

@@ -9,7 +9,7 @@ import pytest
 
 from stages.choices.probe import Probe
 from stages.variations.kernels.answers import ContactAnswers
-from tests.stages.variations.toy import ROAD, kit_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 
 @pytest.mark.parametrize(("evenly", "grown"), [(False, 0), (True, 4)])

@@ -19,7 +19,7 @@ from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ReadLimits
 from stages.shape.kit import Kit
-from tests.stages.variations.toy import CHAIN, Placed, chain, models_of
+from tests.toy_kits.chains_and_rings import CHAIN, Placed, chain, models_of
 
 LUMP: list[Placed] = chain(2)[1:2]
 

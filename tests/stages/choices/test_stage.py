@@ -14,8 +14,8 @@ from stages.choices.inspect import main
 from stages.shape.sample import read_samples
 from tests.mill import mill
 from tests.stages.variations.test_stage import write_model
-from tests.stages.variations.toy import ROAD, ring
 from tests.stated import stated
+from tests.toy_kits.chains_and_rings import ROAD, ring
 
 pytestmark = pytest.mark.slow
 

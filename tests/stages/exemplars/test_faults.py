@@ -14,7 +14,7 @@ from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
-from tests.stages.variations.toy import ROAD, kit_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Docking, Kit
-from tests.stages.variations.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
-from tests.stages.variations.toy import pose
+from tests.toy_kits.chains_and_rings import pose
+from tests.toy_kits.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from stages.exemplars.model import Model
 from stages.exemplars.settings import HubConfig
 from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit_files import load_kit, write_kit
-from tests.stages.variations.toy import CHAIN, Placed, box, chain, config_of, models_of, pose
+from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, config_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
 

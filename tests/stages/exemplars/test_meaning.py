@@ -20,8 +20,8 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import describe_kit
 from stages.shape.sample import Sample
 from stages.shape.shape import kit_shape
-from tests.stages.variations.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
-from tests.stages.variations.toy import models_of, pose
+from tests.toy_kits.chains_and_rings import models_of, pose
+from tests.toy_kits.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ from pipeline.errors import ConfigError
 from stages.exemplars.meanings import meant
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
-from tests.stages.variations.tables import ROUND, SQUARE, THICK, THIN, table, table_kit
-from tests.stages.variations.toy import config_of
+from tests.toy_kits.chains_and_rings import config_of
+from tests.toy_kits.tables import ROUND, SQUARE, THICK, THIN, table, table_kit
 
 MEANINGS = {"top": ("p0",), "leg": ("p[1-4]",)}
 

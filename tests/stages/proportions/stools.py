@@ -8,7 +8,7 @@ import trimesh
 
 from stages.proportions.warp import Lattice, lattice_of
 from stages.shape.kit import Assembly, Kit
-from tests.stages.variations.toy import Placed, box, kit_of, pose
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
 FRAME = trimesh.util.concatenate(
     [box(0.1, 1.0, 0.1).apply_translation((x, 0.5, 0.0)) for x in (0.05, 0.95)]

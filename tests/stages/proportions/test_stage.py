@@ -11,8 +11,8 @@ import yaml
 from stages.shape.sample import Sample, read_samples
 from tests.mill import mill
 from tests.stages.proportions.stools import MESHES, STOOL
-from tests.stages.variations.toy import write_model
 from tests.stated import stated
+from tests.toy_kits.chains_and_rings import write_model
 
 STAGES = ("choices", "exemplars", "proportions")
 

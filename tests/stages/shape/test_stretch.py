@@ -19,7 +19,7 @@ from stages.shape.kit_files import write_kit
 from stages.shape.sample import Sample, read_samples, write_sample
 from stages.shape.shape import kit_shape, upright
 from stages.shape.stretch import moved_by, split
-from tests.stages.variations.toy import box, kit_of, pose
+from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
 
 @pytest.fixture(scope="module")

@@ -22,9 +22,9 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import Edges
 from stages.strings.tokens import split_tokens
 from tests.stages.strings.test_kit_strings import cubes, kit_of, shuffled
-from tests.stages.variations.chairs import write_chairs
-from tests.stages.variations.toy import Placed, box, pose, with_arrow
-from tests.stages.variations.toy import kit_of as toy_kit
+from tests.toy_kits.chains_and_rings import Placed, box, pose, with_arrow
+from tests.toy_kits.chains_and_rings import kit_of as toy_kit
+from tests.toy_kits.program_chairs import write_chairs
 
 EDGES: tuple[Edges, ...] = ("all", "faces", "tree")
 

@@ -24,7 +24,7 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.stages.strings.test_kit_strings import kit_of, pairs
-from tests.stages.variations.chairs import write_chairs
+from tests.toy_kits.program_chairs import write_chairs
 
 EDGES: tuple[Edges, ...] = ("all", "faces", "tree")
 

@@ -18,8 +18,8 @@ from stages.shape.kit import Assembly, Kit
 from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded
 from stages.strings.kit_strings import KitStrings
-from tests.stages.variations.toy import Placed, box, pose, with_arrow
-from tests.stages.variations.toy import kit_of as toy_kit
+from tests.toy_kits.chains_and_rings import Placed, box, pose, with_arrow
+from tests.toy_kits.chains_and_rings import kit_of as toy_kit
 
 EXEMPLARS = Path(__file__).resolve().parents[3] / "datasets" / "exemplars"
 KITS = ("castle", "playground", "cubes")

@@ -16,7 +16,7 @@ from stages.training.string_vae.sampling import Found, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.synthesis.learnt import publish_model
-from tests.stages.variations.toy import ROAD, kit_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 LOOSE = STANDARD._replace(whole=False)
 

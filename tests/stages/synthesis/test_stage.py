@@ -24,8 +24,8 @@ from stages.strings.rules import make_rules, patterns_of
 from tests.mill import mill
 from tests.pipeline.conftest import made
 from tests.stages.synthesis.learnt import publish_model
-from tests.stages.variations.toy import CHAIN, chain, write_model
 from tests.stated import stated
+from tests.toy_kits.chains_and_rings import CHAIN, chain, write_model
 
 pytestmark = pytest.mark.slow
 

@@ -12,7 +12,7 @@ from stages.exemplars.settings import HubConfig
 from stages.shape.kit import Kit
 from stages.variations.advice import what_keeps
 from stages.variations.backdrop import NO_BACKDROP
-from tests.stages.variations.toy import CHAIN, Placed, box, chain, config_of, kit_of, models_of, pose
+from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, config_of, kit_of, models_of, pose
 
 BLOCKS = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
 ROW = [("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]

@@ -21,7 +21,7 @@ from stages.strings.grammar import check
 from stages.strings.tokens import StringError
 from stages.variations.backdrop import Backdrop
 from stages.variations.kernels.answers import ContactAnswers
-from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, models_of, pose
+from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, kit_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
 PLATE: Placed = ("plate", pose(1, -0.55, 0))

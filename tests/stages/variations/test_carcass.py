@@ -7,7 +7,7 @@ import pytest
 from pipeline.errors import ConfigError
 from stages.exemplars.settings import HubConfig
 from stages.variations.carcass import carcass, carcass_test, spanning_hubs
-from tests.stages.variations.toy import CHAIN, Placed, box, chain, kit_of, pose
+from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, kit_of, pose
 
 MESHES = {"top": box(4.0, 0.2, 2.0), "leg": box(0.2, 2.0, 0.2), "shelf": box(3.2, 0.2, 1.5)}
 

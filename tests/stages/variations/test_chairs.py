@@ -25,7 +25,7 @@ from stages.strings.grammar import check
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.chairs import write_chairs
+from tests.toy_kits.program_chairs import write_chairs
 
 pytestmark = pytest.mark.slow
 

@@ -16,7 +16,7 @@ from stages.shape.arrays import FloatArray
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, Exemplar, Grammar, Kit, PartType
 from stages.variations.copied import Copied, CopyTest
-from tests.stages.variations.toy import box
+from tests.toy_kits.chains_and_rings import box
 
 TURNS = np.array(
     [

@@ -10,7 +10,7 @@ import pytest
 
 from stages.shape.kit import Kit, Strictness
 from stages.variations.dullness import dullness, mutual_distance
-from tests.stages.variations.toy import CHAIN, chain, kit_of
+from tests.toy_kits.chains_and_rings import CHAIN, chain, kit_of
 
 LIVELY = {"variants": 200, "copied": 0.6, "distance": 0.2, "apart": 0.3}
 

@@ -10,7 +10,7 @@ from trimesh.transformations import rotation_matrix, translation_matrix
 
 from stages.shape.kit import Assembly, Kit
 from stages.variations.facing import Facing
-from tests.stages.variations.toy import box, kit_of, pose
+from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
 MESHES = {"seat": box(2.0, 0.2, 2.0), "leg": box(0.2, 1.0, 0.2), "back": box(1.6, 1.5, 0.1)}
 LEGS = [("leg", pose(x, -0.6, z)) for x in (-0.9, 0.9) for z in (-0.9, 0.9)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from stages.variations.meeting import meeting, meeting_words
 from tests.stages.variations.search.test_search import search
-from tests.stages.variations.toy import CHAIN, box, chain, kit_of, pose, with_arrow
+from tests.toy_kits.chains_and_rings import CHAIN, box, chain, kit_of, pose, with_arrow
 
 
 def test_a_kit_of_one_exemplar_has_none_to_meet() -> None:

@@ -13,7 +13,7 @@ from stages.variations.kernels.layout import EDGES, PARTS
 from stages.variations.search.search import SPARE, SUBASSEMBLY, Search
 from stages.variations.settings import NoveltyConfig, SearchConfig
 from tests.stages.variations.search.test_search import search
-from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, pose, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, pose, ring
 
 
 def value(features: np.ndarray, axis: str) -> float:

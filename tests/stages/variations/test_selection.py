@@ -9,7 +9,7 @@ from stages.variations.measures import growth, pool_measures
 from stages.variations.selection import farthest_first, select, selection_space
 from stages.variations.settings import NoveltyConfig, SelectionConfig
 from tests.stages.variations.search.test_search import search
-from tests.stages.variations.toy import ROAD, kit_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 
 def test_farthest_first_on_a_line() -> None:

@@ -11,7 +11,7 @@ from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.variations.shared_surface import TOLERANCE, PackedShapes
 from tests.stages.variations.search.test_search import search
-from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, pose, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, pose, ring
 
 
 def surface(kit: Kit, name: str) -> float:

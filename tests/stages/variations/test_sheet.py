@@ -10,7 +10,7 @@ from PIL import Image
 from stages.shape.sample import Sample
 from stages.variations.sheet import kit_variants_sheet
 from tests.stages.variations.search.test_search import search
-from tests.stages.variations.toy import ROAD, kit_of, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 
 def test_a_sheet_has_rows_for_the_exemplars_the_first_chosen_and_some_of_the_rest() -> None:

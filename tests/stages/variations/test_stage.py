@@ -19,8 +19,8 @@ from stages.shape.sample import read_samples
 from stages.shape.splits import SPLITS, share_out
 from stages.variations.shared_surface import PackedShapes
 from tests.mill import mill
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, pose, ring, write_model
 from tests.stated import stated
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, chain, pose, ring, write_model
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ import pytest
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.patterns import Pattern, observed_patterns, seen_once
 from stages.shape.kit import Kit
-from tests.stages.variations.toy import CHAIN, box, chain, kit_of
+from tests.toy_kits.chains_and_rings import CHAIN, box, chain, kit_of
 
 PLAIN = {"cap": box(0.5, 1.0, 1.0), "link": box(1.0, 0.2, 0.6)}
 

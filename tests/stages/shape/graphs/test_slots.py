@@ -18,7 +18,7 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.search.test_search import SHIPPED, shipped_kit
-from tests.stages.variations.toy import Placed, box, kit_of, pose, with_arrow
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose, with_arrow
 
 BLOCKS = {"middle": with_arrow(box(1, 1, 1)), "red": box(1, 0.8, 0.8), "blue": box(1, 0.6, 0.7)}
 

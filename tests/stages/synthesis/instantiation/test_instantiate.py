@@ -24,7 +24,7 @@ from stages.synthesis.instantiation import instantiate
 from stages.synthesis.instantiation.instantiate import Instantiation, Instantiator
 from stages.synthesis.instantiation.layout import STANDARD, Method
 from stages.variations.kernels.answers import ContactAnswers
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring
 
 
 @pytest.fixture(scope="module")

@@ -32,8 +32,8 @@ from stages.training.loop import Trainee, train
 from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
-from tests.stages.variations.toy import Placed, box, pose, with_arrow
-from tests.stages.variations.toy import kit_of as toy_kit
+from tests.toy_kits.chains_and_rings import Placed, box, pose, with_arrow
+from tests.toy_kits.chains_and_rings import kit_of as toy_kit
 
 CYCLES = 4
 SPLITS = {"nets-train-000000": "train", "nets-train-000001": "train", "nets-val-000000": "val"}

@@ -34,7 +34,7 @@ from tests.stages.training.edge_categories.networks import (
     trained_model,
     writer,
 )
-from tests.stages.variations.chairs import write_chairs
+from tests.toy_kits.program_chairs import write_chairs
 
 READERS = ("lstm", "walker")
 

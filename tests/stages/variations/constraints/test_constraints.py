@@ -17,7 +17,7 @@ from stages.shape.stretch import moved_by
 from stages.variations.constraint import made_mend, made_test, unknown_in
 from stages.variations.resizing import heights_of, spans_of
 from tests.stages.variations.substructures.test_replacing import replaced
-from tests.stages.variations.toy import Placed, box, kit_of, pose
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 
 ROOT = Path(__file__).resolve().parents[4]
 

@@ -8,7 +8,7 @@ from stages.variations.exchange.correction import correct_orientations
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.toy import ROAD, kit_of, pose, ring
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, pose, ring
 
 
 def loaded() -> Search:

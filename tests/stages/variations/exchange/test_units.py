@@ -14,7 +14,7 @@ from stages.variations.kernels.layout import BOUNDARY, PLANES, UNITS, Outcome
 from stages.variations.search.search import Search, Variant
 from stages.variations.search.steering import Choice
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, chain, kit_of, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, chain, kit_of, ring
 
 
 def line_of(kit: Kit) -> Search:

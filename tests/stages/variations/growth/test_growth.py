@@ -16,7 +16,7 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.search.test_search import SHIPPED, shipped_kit
-from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, ring
 
 
 def grown(kit: Kit, tries: int = 20_000, wanted: int = 10**9, **settings: object) -> tuple[Search, list[Variant]]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.layout import FORBIDDEN, LABELS
-from tests.stages.variations.toy import box, kit_of, pose, with_arrow
+from tests.toy_kits.chains_and_rings import box, kit_of, pose, with_arrow
 
 MESHES = {"plate": with_arrow(box(10.0, 0.2, 10.0)), "stud": with_arrow(box(0.5, 0.2, 0.3))}
 

@@ -16,7 +16,7 @@ from stages.variations.kernels.lookup import ask, hash_key, quantise
 from stages.variations.kernels.tables import shape_tables
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, pose, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, pose, ring
 
 
 @pytest.fixture(scope="module")

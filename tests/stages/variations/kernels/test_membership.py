@@ -16,7 +16,7 @@ from stages.shape.kit import Grammar, Kit, Multiset
 from stages.variations.kernels.membership import admitted
 from stages.variations.kernels.tables import kit_tables
 from tests.stages.variations.search.test_search import SHIPPED, shipped_kit
-from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, ring
 
 
 @cache

@@ -18,7 +18,7 @@ from stages.shape.kit import Kit
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.toy import CHAIN, ROAD, box, chain, kit_of, ring, with_arrow
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, box, chain, kit_of, ring, with_arrow
 
 SHIPPED = sorted(
     {shape.parent for shape in Path("datasets/exemplars").glob("*/*.glb")} - {Path("datasets/exemplars/facade")}

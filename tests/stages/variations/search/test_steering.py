@@ -12,7 +12,7 @@ from stages.variations.kernels.layout import NOTHING
 from stages.variations.search.search import Search
 from stages.variations.search.steering import CHOICES, PLAIN, RARE
 from stages.variations.settings import NoveltyConfig, SearchConfig
-from tests.stages.variations.toy import CHAIN, chain, kit_of
+from tests.toy_kits.chains_and_rings import CHAIN, chain, kit_of
 
 
 def line_of(exemplars: int, **novelty: float) -> Search:

@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.shape.kit import Assembly, Kit
 from stages.variations.substitution.held import HoldTest
-from tests.stages.variations.toy import box, kit_of, pose
+from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
 BOARDS = {"upright": box(0.1, 2.0, 1.0), "shelf": box(1.9, 0.1, 0.9), "top": box(2.1, 0.1, 1.1)}
 

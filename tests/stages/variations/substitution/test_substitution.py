@@ -15,7 +15,7 @@ from stages.variations.kernels.layout import MEANINGS
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import draw_pieces
-from tests.stages.variations.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
+from tests.toy_kits.tables import ROUND, SHORT, SQUARE, THICK, THIN, table, table_kit
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from stages.variations.substructures.blending import blend, is_oriented_alike
 from stages.variations.substructures.embedding import Side
 from stages.variations.substructures.ordered import ordered_graph
 from stages.variations.substructures.sites import docking_graph
-from tests.stages.variations.toy import Placed, box, kit_of, pose, with_arrow
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose, with_arrow
 
 GATE = {
     "floor": with_arrow(box(10.0, 0.2, 3.0)),

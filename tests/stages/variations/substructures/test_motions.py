@@ -18,7 +18,7 @@ from stages.variations.substructures.ordered import OrderedGraph
 from stages.variations.substructures.result_key import moved_key
 from stages.variations.substructures.sites import contact_graph, docking_graph
 from tests.stages.variations.substructures.laid import Replaced, replacements
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
 
 TILES = {"plain": box(1.0, 0.2, 1.0), "arrow": with_arrow(box(1.0, 0.2, 1.0)), "bar": with_arrow(box(2.0, 0.2, 1.0))}
 

@@ -12,7 +12,7 @@ from stages.shape.kit import Kit
 from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
-from tests.stages.variations.toy import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
 
 
 def replaced(kit: Kit, tries: int, **settings: object) -> tuple[Search, list[Variant]]:

@@ -14,7 +14,7 @@ from stages.shape.sample import Sample
 from stages.variations.facing import vertical_turn
 from stages.variations.substructures.sheet import Replacement, known_shapes, replacement_of, replacements_sheet
 from tests.stages.variations.substructures.test_replacing import replaced
-from tests.stages.variations.toy import CHAIN, ROAD, chain, kit_of, ring
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, ring
 
 
 def samples_of(kit: Kit, turned: float = 0.0) -> list[Sample]:

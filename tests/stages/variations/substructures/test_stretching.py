@@ -18,7 +18,7 @@ from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from stages.variations.stretched import contact_fault
-from tests.stages.variations.toy import Placed, box, kit_of, pose, with_arrow
+from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose, with_arrow
 
 GATE = {
     "floor": with_arrow(box(12.0, 0.2, 3.0)),

@@ -7,7 +7,7 @@ import trimesh
 from stages.exemplars.build import build_kit
 from stages.exemplars.model import Model
 from stages.shape.kit import Kit
-from tests.stages.variations.toy import Placed, box, config_of, models_of, pose
+from tests.toy_kits.chains_and_rings import Placed, box, config_of, models_of, pose
 
 SQUARE, ROUND, SHORT = box(0.2, 1.0, 0.2), trimesh.creation.cylinder(0.12, 1.0, sections=8), box(0.2, 0.5, 0.2)
 ROUND.apply_transform(trimesh.transformations.rotation_matrix(1.5707963267948966, [1, 0, 0]))

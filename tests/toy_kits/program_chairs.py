@@ -1,6 +1,6 @@
 """Ten chairs of the program that share seat and size and differ in legs, back, arms and cushion, as labelled GLBs.
 
-python -m tests.stages.variations.chairs FOLDER
+python -m tests.toy_kits.program_chairs FOLDER
 """
 
 from __future__ import annotations
