@@ -23,10 +23,10 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.grammars.language import drawing_name, grammar_shards, input_grammars
 from stages.grammars.origins import mesh_origins
 from stages.grammars.settings import GrammarConfig, GrammarsConfig
+from stages.shape.collection.assignment import SPLITS, assign_splits, shard_sizes, shards_of_split
 from stages.shape.collection.origin import unstated
-from stages.shape.collection.shards import made_shards
+from stages.shape.collection.shards import planned_collection
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
 
 BYTES_A_GRAMMAR = 20_000_000
 BYTES_A_SAMPLE = 4_000
@@ -46,7 +46,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
     summary = plan.summary("grammars", drawing.name)
     if summary is None:
         return [*shards, drawing]
-    collection = made_shards(plan, summary["shards"], (f"grammars/{drawing.name}",))
+    collection = planned_collection(plan, summary["shards"], (f"grammars/{drawing.name}",))
     return [*shards, drawing, *collection]
 
 
@@ -110,7 +110,7 @@ def run_drawing(task: Task) -> Outcome:
     groups: dict[str, list[int]] = {}
     for index, row in enumerate(rows):
         groups.setdefault(row["graph"], []).append(index)
-    split_of = share_out(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
+    split_of = assign_splits(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
     order = task.rng("order").permutation(len(rows))
     shards: dict[str, int] = {}
     for split, name in enumerate(SPLITS):

@@ -21,8 +21,8 @@ from stages.programs.program import Program, find_program, program_module
 from stages.programs.sampling import NoMoreShapes, Sampler, cells, structure_digest
 from stages.programs.settings import ProgramsConfig
 from stages.programs.sweep import listed_shapes, plan_sweep
+from stages.shape.collection.assignment import SPLITS
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS
 
 BYTES_A_SAMPLE = 8192
 TRIED = 8

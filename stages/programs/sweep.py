@@ -21,7 +21,7 @@ from stages.programs.draws import Interval, draw
 from stages.programs.program import Program, find_program
 from stages.programs.settings import SweepConfig
 from stages.shape.arrays import FloatArray
-from stages.shape.splits import SPLITS
+from stages.shape.collection.assignment import SPLITS
 
 MOST_LISTED = 4096
 """Shapes of a program are listed if its parameters have no more combinations."""

@@ -22,13 +22,13 @@ from stages.proportions.faults import warp_fault
 from stages.proportions.settings import MOST, ProportionsConfig, ProportionSplitConfig
 from stages.proportions.text import proportion_text, read_proportions
 from stages.proportions.warp import lattice_of, warped
+from stages.shape.collection.assignment import SPLITS, assign_splits, shard_sizes, shards_of_split
 from stages.shape.collection.origin import unstated
-from stages.shape.collection.shards import made_shards
+from stages.shape.collection.shards import planned_collection
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS, shard_sizes, shards_of_split, share_out
 from stages.variations.instead import chosen_instead
 from stages.variations.settings import CHOSEN_INSTEAD_STABLE, VariationsConfig
 
@@ -58,7 +58,7 @@ def plan(plan: Plan) -> list[Shard]:
     summary = plan.summary("proportions", choice.name)
     if summary is None:
         return [*lanes, choice]
-    return [*lanes, choice, *made_shards(plan, summary["shards"], (f"proportions/{choice.name}",))]
+    return [*lanes, choice, *planned_collection(plan, summary["shards"], (f"proportions/{choice.name}",))]
 
 
 def _wanted(plan: Plan) -> ProportionsConfig:
@@ -157,7 +157,9 @@ def run_choice(task: Task) -> Outcome:
             "no exemplar holds together in other proportions, or none differs enough; set proportions.spread or "
             "proportions.apart smaller, or require less, or vary the layout: variations.per_kit"
         )
-    split_of = share_out([[row] for row in range(len(rows))], config.splits.val, config.splits.test, task.rng("splits"))
+    split_of = assign_splits(
+        [[row] for row in range(len(rows))], config.splits.val, config.splits.test, task.rng("splits")
+    )
     order = task.rng("order").permutation(len(rows))
     shards: dict[str, int] = {}
     for split, title in enumerate(SPLITS):

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.errors import ShardFailed
-from stages.shape.splits import SPLITS, share_out
+from stages.shape.collection.assignment import SPLITS, assign_splits
 from stages.shapeassembly.settings import ProgramFiles, ShapeAssemblyConfig
 from stages.shapeassembly.sources import listed_names
 
@@ -34,7 +34,7 @@ def splits_of(
         else:
             groups.setdefault(row["graph"], []).append(len(free))
             free.append(index)
-    split_of[free] = share_out(list(groups.values()), config.splits.val, config.splits.test, rng)
+    split_of[free] = assign_splits(list(groups.values()), config.splits.val, config.splits.test, rng)
     for kit, names in listed.items():
         there = {PurePosixPath(row["file"]).stem for row in rows if row["kit"] == kit}
         if there and names and not there & set(names):

@@ -18,11 +18,11 @@ from pipeline.config import Config
 from pipeline.errors import ShardFailed
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.shape.collection.assignment import SPLITS, shard_sizes, shards_of_split
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import unstated
-from stages.shape.collection.shards import made_shards
+from stages.shape.collection.shards import planned_collection
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS, shard_sizes, shards_of_split
 from stages.shapeassembly.accept import accepted_rows
 from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
 from stages.shapeassembly.language import Programs, assignment_name
@@ -52,7 +52,7 @@ def planned_shards(plan: Plan) -> list[Shard]:
     summary = plan.summary("shapeassembly", assignment.name)
     if summary is None:
         return [*extraction, assignment]
-    collection = made_shards(plan, summary["shards"], (f"shapeassembly/{assignment.name}",))
+    collection = planned_collection(plan, summary["shards"], (f"shapeassembly/{assignment.name}",))
     return [*extraction, assignment, *collection]
 
 

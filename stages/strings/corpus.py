@@ -10,8 +10,8 @@ from typing import Any, BinaryIO
 from pipeline.errors import ShardFailed
 from pipeline.shards import read_shard
 from pipeline.stage import Outcome, Task
+from stages.shape.collection.assignment import SPLITS
 from stages.shape.kit_input import input_kits
-from stages.shape.splits import SPLITS
 from stages.strings.alphabet import make_alphabet
 from stages.strings.members import CORPUS
 from stages.strings.settings import MEANINGS, Edges, StringsConfig

@@ -11,8 +11,8 @@ from typing import Any
 from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
+from stages.shape.collection.assignment import SPLITS, assign_splits, shards_of_split
 from stages.shape.sample import read_samples, write_sample
-from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.synthesis.rounds import Dreaming, read_pool
 from stages.synthesis.settings import DreamSplitConfig, SynthesisConfig
 
@@ -72,7 +72,7 @@ def run_assignment(task: Task) -> Outcome:
         raise ConfigError(
             "no model of synthesis.sources has dreamt a shape; the rejects say what became of its strings"
         )
-    split_of = share_out([[row] for row in range(len(rows))], splits.val, splits.test, task.rng("splits"))
+    split_of = assign_splits([[row] for row in range(len(rows))], splits.val, splits.test, task.rng("splits"))
     order = task.rng("order").permutation(len(rows))
     shards: dict[str, list[tuple[int, list[str]]]] = {}
     placed: list[dict[str, Any]] = []

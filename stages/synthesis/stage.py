@@ -13,7 +13,7 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.splits import shard_sizes
+from stages.shape.collection.assignment import shard_sizes
 from stages.synthesis.collection import assignment_shard, planned_collection, run_assignment, run_collection
 from stages.synthesis.lane import run_lane
 from stages.synthesis.rounds import dreaming, run_pool

@@ -12,11 +12,11 @@ from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.shards import made_shards
+from stages.shape.collection.assignment import SPLITS, assign_splits, shards_of_split
+from stages.shape.collection.shards import planned_collection
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS, shards_of_split, share_out
 from stages.variations.ancestry import Ancestry, read_ancestry
 from stages.variations.backdrop import Backdrop, backdrop_of
 from stages.variations.dullness import dullness
@@ -47,7 +47,7 @@ def collection_shards_of(plan: Plan, assignment: Shard) -> list[Shard]:
     if summary is None:
         return []
     lanes = tuple(each for each in assignment.inputs if not each.endswith("-pool"))
-    return made_shards(plan, summary["shards"], (*lanes, f"variations/{assignment.name}"))
+    return planned_collection(plan, summary["shards"], (*lanes, f"variations/{assignment.name}"))
 
 
 def run_assignment(task: Task) -> Outcome:
@@ -121,7 +121,7 @@ def _by_graph(task: Task, kits: list[str], pools: list[PoolIndex]) -> list[Chose
         for row, variant in enumerate(chosen.tolist(), start=first):
             groups.setdefault((number, bytes(pool.digests[variant, 0])), []).append(row)
         taken.append(chosen)
-    split_of = share_out(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
+    split_of = assign_splits(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
     ends = np.cumsum([len(each) for each in taken])[:-1]
     found = []
     for name, pool, own, splits in zip(kits, pools, taken, np.split(split_of, ends), strict=True):

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from stages.shape.splits import SPLITS
+from stages.shape.collection.assignment import SPLITS
 
 LET_GO = -1
 REGIONS = (16, 8, 4, 2, 1)

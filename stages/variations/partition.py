@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.stage import Task
+from stages.shape.collection.assignment import SPLITS
 from stages.shape.kit import Kit
-from stages.shape.splits import SPLITS
 from stages.variations.ancestry import Ancestry
 from stages.variations.backdrop import backdrop_of
 from stages.variations.families import LET_GO, Near, cut_families
 from stages.variations.pool import PoolIndex
 from stages.variations.selection import select
-from stages.variations.settings import SplitConfig, VariationsConfig
+from stages.variations.settings import VariantSplitConfig, VariationsConfig
 from stages.variations.shared_surface import PackedShapes
 
 COMPARED = 64
@@ -37,7 +37,7 @@ class Chosen:
     nearness: dict[str, dict[str, float]]
 
 
-def wanted_sizes(count: int, splits: SplitConfig) -> dict[str, int]:
+def wanted_sizes(count: int, splits: VariantSplitConfig) -> dict[str, int]:
     """How many of `count` samples each split is to get."""
     val, test = round(splits.val * count), round(splits.test * count)
     return {"train": count - val - test, "val": val, "test": test}

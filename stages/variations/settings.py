@@ -184,7 +184,7 @@ class SelectionConfig(StrictModel):
     )
 
 
-class SplitConfig(StrictModel):
+class VariantSplitConfig(StrictModel):
     """How the samples are shared out."""
 
     by: Literal["family", "graph"] = Field(
@@ -280,4 +280,6 @@ class VariationsConfig(StrictModel):
         default_factory=VariantRequirements,
         description="What every variant must be physically, its backdrop included; others are refused and counted.",
     )
-    splits: SplitConfig = Field(default_factory=SplitConfig, description="How the samples are shared out.")
+    splits: VariantSplitConfig = Field(
+        default_factory=VariantSplitConfig, description="How the samples are shared out."
+    )

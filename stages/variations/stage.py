@@ -12,7 +12,7 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.splits import shard_sizes
+from stages.shape.collection.assignment import shard_sizes
 from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
 from stages.variations.constraint import unknown_in
 from stages.variations.instead import chosen_instead

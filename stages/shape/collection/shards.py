@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Plan, Shard
+from stages.shape.collection.assignment import SPLITS
 from stages.shape.collection.declared import language_of, producers
-from stages.shape.splits import SPLITS
 
 PRODUCERS = "*/producer.py"
 """What a stage that reads samples names among its inputs: every stage that makes them."""
@@ -36,7 +36,7 @@ def collection_shards(plan: Plan, *also: str) -> list[Shard]:
     return shards
 
 
-def made_shards(plan: Plan, counts: Mapping[str, int], inputs: tuple[str, ...]) -> list[Shard]:
+def planned_collection(plan: Plan, counts: Mapping[str, int], inputs: tuple[str, ...]) -> list[Shard]:
     """What a producer plans once it is known how many shards each split has: the shards of the collection,
     `<dataset>-<split>-<index>`, made from `inputs`; their params are `job`, `split` and `number`."""
     return [

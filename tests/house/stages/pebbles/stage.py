@@ -7,8 +7,8 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.shape.collection.assignment import SPLITS
 from stages.shape.sample import Sample, write_sample
-from stages.shape.splits import SPLITS
 
 
 class PebblesConfig(StrictModel):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 SPLITS = ("train", "val", "test")
 
 
-def share_out(
+def assign_splits(
     groups: Sequence[Sequence[int]], val: float, test: float, rng: np.random.Generator
 ) -> npt.NDArray[np.int64]:
     """The split of each row, int64 (n,), counted as in SPLITS. `groups` has every row once: whole groups go to val and
