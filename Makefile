@@ -69,13 +69,13 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW) $(LASTS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset choices exemplars variations proportions programs grammars writing shapeassembly synthesis
+.PHONY: dataset autoconfig exemplars variations proportions programs grammars writing shapeassembly synthesis
 .PHONY: validity abstraction strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
-choices: setup  ## Choose what the config leaves at auto: up axis, contacts, grammar, hubs
+autoconfig: setup  ## Choose what the config leaves at auto: up axis, contacts, grammar, hubs
 	$(RUN)
-exemplars: choices  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
+exemplars: autoconfig  ## Read the exemplar meshes: parts, types, contacts, tiling grammar
 	$(RUN)
 variations: exemplars  ## Make new shapes from the exemplars' parts
 	$(RUN)

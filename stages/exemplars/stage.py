@@ -22,7 +22,7 @@ def plan(plan: Plan) -> list[Shard]:
         Shard(
             kit.name,
             {"kit": kit.name, "digests": [file_digest(shape.path) for shape in kit.shapes]},
-            (f"choices/{kit.name}",) if kit.left_open() else (),
+            (f"autoconfig/{kit.name}",) if kit.left_open() else (),
         )
         for kit in plan.config.section(ExemplarsConfig).kits
     ]
@@ -39,7 +39,7 @@ def run_shard(task: Task) -> Outcome:
     config = next(kit for kit in section.kits if kit.name == task.shard.params["kit"])
     chosen: dict[str, Any] = {"chosen": {}, "why": {}}
     if config.left_open():
-        chosen = json.loads(task.input("choices", f"{config.name}.json").read_bytes())
+        chosen = json.loads(task.input("autoconfig", f"{config.name}.json").read_bytes())
         config = config.decide(chosen["chosen"])
         config = config.model_copy(update={"parts": chosen["chosen"].get("parts", config.parts)})
     models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
@@ -90,7 +90,7 @@ STAGE = Stage(
     module=__name__,
     stays=True,
     config=ExemplarsConfig,
-    inputs=("choices",),
+    inputs=("autoconfig",),
     plan=plan,
     run_shard=run_shard,
     estimate_bytes=lambda plan: BYTES_A_KIT * len(plan.config.section(ExemplarsConfig).kits),

@@ -3,7 +3,7 @@
 python -m tests.bench.exemplars [--out FOLDER] [--minutes 10] [--template] MODEL...
 
 A MODEL is a file, some files of one kit with spaces between them, as in MESH="a.glb b.glb", or a folder of models.
-Each goes through inspect, then through choices, exemplars, variations and proportions, with one worker, as users do.
+Each goes through inspect, then through autoconfig, exemplars, variations and proportions, with one worker, as users do.
 Prints a row of a Markdown table for each, as soon as it has ended, and leaves in a folder of FOLDER for each the
 config, what inspect drew, and a sheet of the most different variants, which somebody has to look at: no figure tells a
 good shape.
@@ -27,14 +27,14 @@ from typing import Any
 
 from pipeline.places import Places
 from pipeline.records import read_record
-from stages.choices.config_text import dataset_name
+from stages.autoconfig.config_text import dataset_name
 
 HEADER = (
     "| model | parts / types | up, tolerance, kinds, grammar, hubs | forecast | chosen of pool | histograms | E "
     "| copied | mixed | inspect, CPU s | making, CPU s | MB |\n"
     "|---|---:|---|---|---|---:|---:|---:|---:|---:|---:|---:|"
 )
-STAGES = ("choices", "exemplars", "variations", "proportions")
+STAGES = ("autoconfig", "exemplars", "variations", "proportions")
 TEMPLATE = """\
 name: {name}
 seed: 1
@@ -94,7 +94,7 @@ def measured(models: Sequence[Path], folder: Path, minutes: float, template: boo
         config.parent.mkdir(parents=True, exist_ok=True)
         config.write_text(TEMPLATE.format(name=config.stem, shapes=json.dumps([str(each) for each in models])))
     made, ends = _made(config, folder, minutes)
-    chosen, foreseen = seen["choices"]["chosen"], seen["forecast"]
+    chosen, foreseen = seen["autoconfig"]["chosen"], seen["forecast"]
     decided = {key: each for key, each in chosen.items() if key != "disconnected" and not key.startswith("require.")}
     parts = sum(len(each["parts"]) for each in seen.get("models", [seen]))
     row = [

@@ -17,8 +17,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from pipeline.places import write_file
-from stages.choices.probe import type_counts
-from stages.choices.sheet import SHOWN, forecast_sheet
+from stages.autoconfig.probe import type_counts
+from stages.autoconfig.sheet import SHOWN, forecast_sheet
 from stages.exemplars.build import build_kit, read_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile

@@ -23,8 +23,8 @@ from joblib import Parallel, delayed
 from pipeline.config import load_config
 from pipeline.places import write_file
 from pipeline.registry import find_stages
-from stages.choices.probe import type_counts
-from stages.choices.sheet import SHOWN, forecast_sheet
+from stages.autoconfig.probe import type_counts
+from stages.autoconfig.sheet import SHOWN, forecast_sheet
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig

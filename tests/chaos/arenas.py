@@ -32,7 +32,7 @@ _CASTLE = {
     "shapes": ["datasets/exemplars/castle/keep.glb", "datasets/exemplars/castle/ward.glb"],
 }
 _OPEN = {key: value for key, value in stated(_CASTLE).items() if key not in ("grammar", "up")}
-"""Stage `choices` is left two keys."""
+"""Stage `autoconfig` is left two keys."""
 
 _SAMPLES = ("validity", "points", "sketches", "package")
 
@@ -54,9 +54,9 @@ ARENAS: dict[str, Datasets] = {
     "kits": Datasets(
         {
             "castles": (
-                ("choices", "exemplars", "variations", "abstraction", "strings", *_SAMPLES),
+                ("autoconfig", "exemplars", "variations", "abstraction", "strings", *_SAMPLES),
                 {
-                    "choices": {"tries": 100},
+                    "autoconfig": {"max_tries": 100},
                     "exemplars": {"kits": [_OPEN]},
                     "variations": {"per_kit": 12, "splits": {"shards": 2}},
                     "abstraction": {"programs": True},

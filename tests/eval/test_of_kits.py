@@ -41,7 +41,7 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     variations = {"per_kit": 6, "splits": {"shards": 1}, "search": {"duplicates": "graph", "tries": 100, "rounds": 3}}
     config = {"name": "small", "seed": 3, "exemplars": {"kits": kits}, "variations": variations}
     (folder / "small.yaml").write_text(yaml.safe_dump(config))
-    for stage in ("choices", "exemplars", "variations", "strings"):
+    for stage in ("autoconfig", "exemplars", "variations", "strings"):
         code, said = mill("run", stage, "--config", folder / "small.yaml", "--out", folder, "--workers", 1)
         assert code == 0, said
     return load_subject(folder / "small.yaml", folder)

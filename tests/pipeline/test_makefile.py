@@ -63,7 +63,7 @@ def nasty(folder: Path) -> str:
 def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
     runs = calls("dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
     assert [run[3] for run in runs] == [
-        "choices", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
+        "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
         "synthesis",
         "validity", "abstraction", "strings", "points", "sketches", "package",
     ]  # fmt: skip
@@ -75,7 +75,7 @@ def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for
     first, *runs = calls("train", "MODEL=masked-castle", "CONFIG=c.yaml")
     assert first == ["-m", "stages.training", "--config", "c.yaml", "--only", "masked-castle"]
     assert [run[3] for run in runs] == [
-        "choices", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
+        "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
         "synthesis",
         "strings", "training",
     ]  # fmt: skip

@@ -15,7 +15,7 @@ from pipeline.errors import ConfigError
 from pipeline.places import Places
 from pipeline.run import run_stage
 from pipeline.status import status_lines
-from stages.choices.stage import STAGE as CHOICES
+from stages.autoconfig.stage import STAGE as AUTOCONFIG
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
@@ -25,7 +25,7 @@ from stages.variations.settings import VariationsConfig
 from tests.stages.exemplars.model_files import box, write_obj
 from tests.stated import stated
 
-STAGES = {"choices": CHOICES, "exemplars": STAGE}
+STAGES = {"autoconfig": AUTOCONFIG, "exemplars": STAGE}
 
 pytestmark = pytest.mark.slow
 

@@ -14,7 +14,7 @@ from tests.stages.proportions.stools import MESHES, STOOL
 from tests.stated import stated
 from tests.toy_kits.chains_and_rings import write_model
 
-STAGES = ("choices", "exemplars", "proportions")
+STAGES = ("autoconfig", "exemplars", "proportions")
 
 
 def write_config(folder: Path, **section: object) -> Path:
@@ -66,7 +66,7 @@ def test_a_dataset_of_stools_goes_the_whole_way_and_is_the_same_with_two_workers
 
 def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
     config = write_config(tmp_path, apart=0.4)
-    code, said = mill("run", "choices", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    code, said = mill("run", "autoconfig", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code == 0, said
     mill("run", "exemplars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     code, said = mill("run", "proportions", "--config", config, "--out", tmp_path / "out", "--workers", 1)

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 
 SOURCE = {"dataset": "learnt", "model": "tiny", "kit": "chain", "samples": 8, "way": "prior", "temperature": 1.0}
 """A model that has learnt one string: where training strings stand there is but a point."""
-STAGES = ("choices", "exemplars", "variations", "programs", "shapeassembly", "synthesis")
+STAGES = ("autoconfig", "exemplars", "variations", "programs", "shapeassembly", "synthesis")
 SERVED = ("validity", "strings", "points", "sketches", "package")
 
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stages.choices.choose import REQUIREMENTS, Choices, choose, most_copied, must_stand
-from stages.choices.forecast import forecast
-from stages.choices.probe import Finds, Probe
-from stages.choices.prospect import look_at
-from stages.choices.sight import Setting, Sight, contact_tolerance
-from stages.choices.up import upward
+from stages.autoconfig.choose import REQUIREMENTS, Choices, choose, most_copied, must_stand
+from stages.autoconfig.forecast import forecast
+from stages.autoconfig.probe import Finds, Probe
+from stages.autoconfig.prospect import look_at
+from stages.autoconfig.sight import Setting, Sight, contact_tolerance
+from stages.autoconfig.up import upward
 from stages.exemplars.build import build_kit
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
@@ -236,7 +236,7 @@ class TestForecast:
     def test_layouts_that_look_broken_are_no_dataset_and_it_is_said_what_they_lack(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("stages.choices.forecast.bared", lambda *_: ("link", "cap", "ring"))
+        monkeypatch.setattr("stages.autoconfig.forecast.bared", lambda *_: ("link", "cap", "ring"))
         kit = self.kit([chain(13), chain(15)], CHAIN)
         found = forecast(kit, ContactAnswers(kit), 2000)
         assert found.is_poor

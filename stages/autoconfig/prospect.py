@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from stages.choices.choose import REQUIREMENTS, Choices, choose, found_words
-from stages.choices.forecast import Forecast, forecast
-from stages.choices.proportioned import Proportioned, instead_of_layouts
-from stages.choices.reading import Reading, cut_if_nothing_comes
-from stages.choices.sheet import SHOWN
+from stages.autoconfig.choose import REQUIREMENTS, Choices, choose, found_words
+from stages.autoconfig.forecast import Forecast, forecast
+from stages.autoconfig.proportioned import Proportioned, instead_of_layouts
+from stages.autoconfig.reading import Reading, cut_if_nothing_comes
+from stages.autoconfig.sheet import SHOWN
 from stages.exemplars.build import Observation
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
@@ -81,7 +81,7 @@ class Prospect:
             }
         if self.proportioned is not None:
             expected["proportions"] = {"holds": round(self.proportioned.holds, 4), "stable": self.proportioned.stable}
-        return {"choices": made, "forecast": expected, "cpu_seconds": round(self.seconds, 1)}
+        return {"autoconfig": made, "forecast": expected, "cpu_seconds": round(self.seconds, 1)}
 
     def lines(self) -> list[tuple[str, str]]:
         """Title and text of each thing that was chosen and foreseen."""

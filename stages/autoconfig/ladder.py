@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from stages.choices.bared import bared
-from stages.choices.probe import HUB, Finds, Probe
-from stages.choices.sight import Setting, Sight
+from stages.autoconfig.bared import bared
+from stages.autoconfig.probe import HUB, Finds, Probe
+from stages.autoconfig.sight import Setting, Sight
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
 from stages.variations.copied import CopyTest

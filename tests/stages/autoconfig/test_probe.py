@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from stages.choices.probe import Probe
+from stages.autoconfig.probe import Probe
 from stages.variations.kernels.answers import ContactAnswers
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from stages.choices.inspect import main
+from stages.autoconfig.inspect import main
 from stages.shape.sample import read_samples
 from tests.mill import mill
 from tests.stages.variations.test_stage import write_model
@@ -42,22 +42,22 @@ def record(folder: Path, stage: str, shard: str, out: str = "out") -> dict[str, 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A kit of rings that leaves all open, beside one that leaves nothing."""
-    folder = tmp_path_factory.mktemp("choices")
+    folder = tmp_path_factory.mktemp("autoconfig")
     shapes = [[(name, Z_UP @ at) for name, at in ring(*size)] for size in ((1, 1), (2, 3))]
     paths = [write_model(folder / f"ring{k}.glb", ROAD, shape) for k, shape in enumerate(shapes)]
     kits = [{"name": "open", "shapes": paths}, stated({"name": "stated", "shapes": paths})]
-    config = {"name": "toy", "seed": 5, "choices": {"tries": 200}, "exemplars": {"kits": kits}}
+    config = {"name": "toy", "seed": 5, "autoconfig": {"max_tries": 200}, "exemplars": {"kits": kits}}
     (folder / "toy.yaml").write_text(yaml.safe_dump(config))
-    return folder, run(folder, ("choices", "exemplars"))
+    return folder, run(folder, ("autoconfig", "exemplars"))
 
 
 def test_only_a_kit_that_leaves_something_open_is_probed(made: tuple[Path, str]) -> None:
-    records = made[0] / "out" / ".work" / "toy" / "choices" / "records"
+    records = made[0] / "out" / ".work" / "toy" / "autoconfig" / "records"
     assert [path.name for path in records.iterdir()] == ["open.json"]
 
 
 def test_the_kit_is_built_as_was_chosen_and_the_record_says_why(made: tuple[Path, str]) -> None:
-    chosen = record(made[0], "choices", "open")["summary"]
+    chosen = record(made[0], "autoconfig", "open")["summary"]
     built = record(made[0], "exemplars", "open")["summary"]
     assert chosen["chosen"]["up"] == "z"
     assert (built["chosen"], built["why"]) == (chosen["chosen"], chosen["why"])
@@ -76,9 +76,9 @@ def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_p
     variations = {"per_kit": 24, "search": {"tries": 2000}, "splits": {"by": "graph", "shards": 1}}
     config = {"name": "toy", "exemplars": {"kits": [kit]}, "variations": variations}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
-    run(tmp_path, ("choices", "exemplars", "variations"))
+    run(tmp_path, ("autoconfig", "exemplars", "variations"))
     unasked = {"require.stable": False, "require.carcass": []}
-    chosen = record(tmp_path, "choices", "open")["summary"]["chosen"]
+    chosen = record(tmp_path, "autoconfig", "open")["summary"]["chosen"]
     assert chosen == {"disconnected": "error", "require.copied": 0.9, **unasked}
     samples = [
         sample
@@ -96,12 +96,12 @@ def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretel
     paths = [str(made[0] / f"ring{k}.glb") for k in (0, 1)]
     config = {
         "name": "toy",
-        "choices": {"tries": 200},
+        "autoconfig": {"max_tries": 200},
         "exemplars": {"kits": [{"name": "rings", "shapes": paths}]},
         "variations": {"per_kit": 12, "splits": {"by": "graph", "val": 0.25, "shards": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
-    said = run(tmp_path, ("choices", "exemplars", "variations", "proportions"))
+    said = run(tmp_path, ("autoconfig", "exemplars", "variations", "proportions"))
     assert "rings: instead: proportions: 100% of what is drawn holds together; of other layouts about 16" in said
     work = tmp_path / "out" / ".work" / "toy"
     assert not list((work / "variations").glob("toy-*.tar"))
@@ -111,12 +111,12 @@ def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretel
     capsys.readouterr()
     assert main([*paths, "--json", "--tries", "200"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["choices"]["chosen"] == record(tmp_path, "choices", "rings")["summary"]["chosen"]
-    assert found["choices"]["chosen"]["proportions.require.stable"] is True
+    assert found["autoconfig"]["chosen"] == record(tmp_path, "autoconfig", "rings")["summary"]["chosen"]
+    assert found["autoconfig"]["chosen"]["proportions.require.stable"] is True
     config["variations"] |= {"instead": "nothing"}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
-    run(tmp_path, ("choices",))
-    assert "instead" not in record(tmp_path, "choices", "rings")["summary"]["chosen"]
+    run(tmp_path, ("autoconfig",))
+    assert "instead" not in record(tmp_path, "autoconfig", "rings")["summary"]["chosen"]
 
 
 def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
@@ -128,12 +128,12 @@ def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path)
     assert written["variations"] == {"per_kit": 0}
     written["proportions"] |= {"per_kit": 8}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
-    run(tmp_path, ("choices", "exemplars", "proportions"))
+    run(tmp_path, ("autoconfig", "exemplars", "proportions"))
     work = tmp_path / "out" / ".work" / "toy"
-    assert not list((work / "choices").glob("*.json"))
+    assert not list((work / "autoconfig").glob("*.json"))
     assert list((work / "proportions").glob("toy-train-*.tar"))
     del written["proportions"]
     written["variations"] = {"per_kit": 8, "search": {"duplicates": "graph", "tries": 400, "patience": 800}}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
-    run(tmp_path, ("choices", "exemplars", "variations"))
+    run(tmp_path, ("autoconfig", "exemplars", "variations"))
     assert list((work / "variations").glob("toy-train-*.tar"))

@@ -14,11 +14,11 @@ from pydantic import ValidationError
 
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
-from stages.choices.choose import REQUIREMENTS
-from stages.choices.config_text import config_text, dataset_name, proportions_section, variations_section
-from stages.choices.prospect import Prospect, look_at
-from stages.choices.settings import ChoicesConfig
-from stages.choices.sheet import forecast_sheet
+from stages.autoconfig.choose import REQUIREMENTS
+from stages.autoconfig.config_text import config_text, dataset_name, proportions_section, variations_section
+from stages.autoconfig.prospect import Prospect, look_at
+from stages.autoconfig.settings import AutoconfigConfig
+from stages.autoconfig.sheet import forecast_sheet
 from stages.exemplars.inspect import inspection, inspection_lines
 from stages.exemplars.parse import FORMATS
 from stages.exemplars.portrait import kit_sheet
@@ -171,7 +171,9 @@ def _parser() -> argparse.ArgumentParser:
     for key in ReadLimits.model_fields:
         option = f"--most-{key.replace('_', '-')}"
         parser.add_argument(option, type=int, metavar="MOST", help=f"as exemplars.limits.{key} in a config")
-    parser.add_argument("--tries", type=int, default=ChoicesConfig().tries, help="as choices.tries in a config")
+    parser.add_argument(
+        "--tries", type=int, default=AutoconfigConfig().max_tries, help="as autoconfig.max_tries in a config"
+    )
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER", help=f"where config and pictures go; {FOLDER}, with --json nowhere"
     )

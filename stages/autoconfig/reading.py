@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pipeline.errors import ConfigError
-from stages.choices.choose import Choices, choose
-from stages.choices.forecast import forecast
+from stages.autoconfig.choose import Choices, choose
+from stages.autoconfig.forecast import forecast
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import Identified, identify_parts
 from stages.exemplars.model import Model

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from stages.choices.bared import bared
-from stages.choices.ladder import FEW, is_dull
-from stages.choices.probe import Finds, Probe
+from stages.autoconfig.bared import bared
+from stages.autoconfig.ladder import FEW, is_dull
+from stages.autoconfig.probe import Finds, Probe
 from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.shape.kit import Kit
 from stages.variations.advice import another_model, what_keeps

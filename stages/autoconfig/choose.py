@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from stages.choices.ladder import GRAMMARS, GRAPHS, KINDS, STAY, TELLING, Rails, Rung, climb, is_dull, peeled
-from stages.choices.probe import Finds
-from stages.choices.sight import Setting, Sight, contact_tolerance
-from stages.choices.up import upward
+from stages.autoconfig.ladder import GRAMMARS, GRAPHS, KINDS, STAY, TELLING, Rails, Rung, climb, is_dull, peeled
+from stages.autoconfig.probe import Finds
+from stages.autoconfig.sight import Setting, Sight, contact_tolerance
+from stages.autoconfig.up import upward
 from stages.exemplars.hubs import chosen_hubs
 from stages.exemplars.identify import Identified
 from stages.exemplars.model import Model

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from stages.choices.bared import bared
-from stages.choices.ladder import Rung
-from stages.choices.probe import Finds
-from stages.choices.sight import Setting
+from stages.autoconfig.bared import bared
+from stages.autoconfig.ladder import Rung
+from stages.autoconfig.probe import Finds
+from stages.autoconfig.sight import Setting
 from stages.exemplars.settings import ContactConfig
 from stages.shape.kit import Assembly, Kit
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.choices.plain import is_closed_box, plain_shares
-from stages.choices.proportioned import in_proportions
+from stages.autoconfig.plain import is_closed_box, plain_shares
+from stages.autoconfig.proportioned import in_proportions
 from stages.shape.shape import Shape, kit_shape
 from tests.stages.proportions.stools import kit as stools
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from pipeline.errors import ConfigError
-from stages.choices import reading
-from stages.choices.choose import Choices
-from stages.choices.probe import Finds
-from stages.choices.reading import Reading, cut_if_nothing_comes
+from stages.autoconfig import reading
+from stages.autoconfig.choose import Choices
+from stages.autoconfig.probe import Finds
+from stages.autoconfig.reading import Reading, cut_if_nothing_comes
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ReadLimits

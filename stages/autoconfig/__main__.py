@@ -1,6 +1,6 @@
 """A table of many models, each looked at by itself: what is chosen for it, and what it will give.
 
-python -m stages.choices MODEL...
+python -m stages.autoconfig MODEL...
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pipeline.errors import ConfigError
-from stages.choices.config_text import dataset_name
-from stages.choices.prospect import Prospect, look_at
-from stages.choices.settings import ChoicesConfig
+from stages.autoconfig.config_text import dataset_name
+from stages.autoconfig.prospect import Prospect, look_at
+from stages.autoconfig.settings import AutoconfigConfig
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import KitConfig
 
@@ -23,9 +23,11 @@ HEADER = ("model", "parts", "types", "up", "tolerance", "kinds", "grammar", "hub
 
 def main() -> None:
     """Print a Markdown table, a row for each model as soon as it is looked at."""
-    parser = argparse.ArgumentParser(prog="python -m stages.choices", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m stages.autoconfig", description=__doc__.splitlines()[0])
     parser.add_argument("models", nargs="+", type=Path, metavar="MODEL")
-    parser.add_argument("--tries", type=int, default=ChoicesConfig().tries, help="as choices.tries in a config")
+    parser.add_argument(
+        "--tries", type=int, default=AutoconfigConfig().max_tries, help="as autoconfig.max_tries in a config"
+    )
     asked = parser.parse_args()
     print(f"| {' | '.join(HEADER)} |\n|{'---|' * len(HEADER)}", flush=True)
     for path in asked.models:

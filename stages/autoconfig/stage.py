@@ -10,7 +10,7 @@ from pipeline.config import Config
 from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.choices.settings import ChoicesConfig
+from stages.autoconfig.settings import AutoconfigConfig
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
 from stages.variations.instead import comes_instead
 from stages.variations.settings import CHOSEN_CARCASS, VariationsConfig
@@ -41,13 +41,13 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Read the models and decide."""
-    from stages.choices.proportioned import instead_of_layouts
-    from stages.choices.prospect import foreseen
-    from stages.choices.reading import read_and_choose
+    from stages.autoconfig.proportioned import instead_of_layouts
+    from stages.autoconfig.prospect import foreseen
+    from stages.autoconfig.reading import read_and_choose
     from stages.variations.kernels.answers import ContactAnswers
 
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
-    limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(ChoicesConfig).tries
+    limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(AutoconfigConfig).max_tries
     reading = read_and_choose(config, limits, tries, task.shard.params["require"])
     choices = reading.choices
     if task.shard.params["instead"] and not choices.enough:
@@ -65,8 +65,8 @@ def run_shard(task: Task) -> Outcome:
 def report(plan: Plan) -> Sequence[str]:
     """A line for each key that was chosen."""
     lines = []
-    for name in plan.shards("choices"):
-        made = plan.summary("choices", name)
+    for name in plan.shards("autoconfig"):
+        made = plan.summary("autoconfig", name)
         if made is not None:
             lines += [f"{name}: {key}: {_shown(each)}: {made['why'][key]}" for key, each in made["chosen"].items()]
     return lines
@@ -81,9 +81,9 @@ def _open_kits(config: Config) -> list[KitConfig]:
 
 
 STAGE = Stage(
-    name="choices",
+    name="autoconfig",
     module=__name__,
-    config=ChoicesConfig,
+    config=AutoconfigConfig,
     inputs=(),
     sections=("exemplars", "variations"),
     plan=plan,

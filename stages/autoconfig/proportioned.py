@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.randomness import decision_rng
-from stages.choices.choose import REQUIREMENTS, Choices
-from stages.choices.config_text import MOST
-from stages.choices.forecast import LOOK, Forecast, rounded
-from stages.choices.plain import is_closed_box
-from stages.choices.reading import Reading
+from stages.autoconfig.choose import REQUIREMENTS, Choices
+from stages.autoconfig.config_text import MOST
+from stages.autoconfig.forecast import LOOK, Forecast, rounded
+from stages.autoconfig.plain import is_closed_box
+from stages.autoconfig.reading import Reading
 from stages.exemplars.build import Observation
 from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault

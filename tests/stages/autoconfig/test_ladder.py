@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from stages.choices import ladder
-from stages.choices.ladder import GRAMMARS, Rails, Rung, climb
-from stages.choices.probe import Finds
-from stages.choices.sight import Setting, Sight
+from stages.autoconfig import ladder
+from stages.autoconfig.ladder import GRAMMARS, Rails, Rung, climb
+from stages.autoconfig.probe import Finds
+from stages.autoconfig.sight import Setting, Sight
 from stages.exemplars.identify import identify_parts
 from tests.toy_kits.chains_and_rings import CHAIN, chain, config_of, models_of
 

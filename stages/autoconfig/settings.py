@@ -7,10 +7,10 @@ from pydantic import Field
 from pipeline.config import StrictModel
 
 
-class ChoicesConfig(StrictModel):
+class AutoconfigConfig(StrictModel):
     """How keys of kits that are `auto` are chosen."""
 
-    tries: int = Field(
+    max_tries: int = Field(
         2500,
         ge=100,
         le=1_000_000,
