@@ -69,7 +69,7 @@ RUN      = @$(PYTHON) -m pipeline run $@ $(HOW) $(LASTS)
 
 # The way of the data ------------------------------------------------------------------------------------------------
 
-.PHONY: dataset autoconfig exemplars variations proportions programs grammars writing shapeassembly synthesis
+.PHONY: dataset autoconfig exemplars variations proportions programs grammars program_sampling shapeassembly string_sampling
 .PHONY: validity abstraction strings points sketches package
 dataset: package  ## Make the dataset of CONFIG in OUT: every stage, in order, from where it stands
 
@@ -85,21 +85,21 @@ programs: setup  ## Make new shapes from a program's parameters
 	$(RUN)
 grammars: setup  ## Find the shape grammar of a mesh in one piece, and make new shapes by its rules and grids
 	$(RUN)
-writing: setup  ## Let trained models write ShapeAssembly programs
+program_sampling: setup  ## Let trained models write ShapeAssembly programs
 	$(RUN)
-shapeassembly: writing  ## Make shapes from ShapeAssembly programs, or from part hierarchies
+shapeassembly: program_sampling  ## Make shapes from ShapeAssembly programs, or from part hierarchies
 	$(RUN)
-synthesis: exemplars  ## Make new shapes from what trained models write
+string_sampling: exemplars  ## Make new shapes from what trained models write
 	$(RUN)
-validity: variations proportions programs grammars shapeassembly synthesis  ## Judge each shape: is it rooted, does it stand?
+validity: variations proportions programs grammars shapeassembly string_sampling  ## Judge each shape: is it rooted, does it stand?
 	$(RUN)
-abstraction: variations proportions programs grammars shapeassembly synthesis  ## Find a ShapeAssembly program of each shape, if asked for
+abstraction: variations proportions programs grammars shapeassembly string_sampling  ## Find a ShapeAssembly program of each shape, if asked for
 	$(RUN)
-strings: variations proportions programs grammars shapeassembly synthesis  ## Write each shape as strings, and the text corpus
+strings: variations proportions programs grammars shapeassembly string_sampling  ## Write each shape as strings, and the text corpus
 	$(RUN)
-points: variations proportions programs grammars shapeassembly synthesis  ## Turn each shape into a labelled point cloud
+points: variations proportions programs grammars shapeassembly string_sampling  ## Turn each shape into a labelled point cloud
 	$(RUN)
-sketches: variations proportions programs grammars shapeassembly synthesis  ## Draw each shape as lines
+sketches: variations proportions programs grammars shapeassembly string_sampling  ## Draw each shape as lines
 	$(RUN)
 package: validity abstraction strings points sketches  ## Put the dataset's folder together: shards, index, card, checksums
 	$(RUN)

@@ -20,9 +20,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
-from eval.evaluation import Answer, Evaluation
-from eval.registry import find_tables
-from eval.subject import Subject, load_subject
+from eval.engine.dataset_run import Subject, load_subject
+from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.registry import find_tables
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
@@ -103,7 +103,7 @@ def _print_of_files(name: str, asked: argparse.Namespace) -> int:
 
 
 def _make_one(subject: Subject, name: str, asked: argparse.Namespace) -> int:
-    from eval.report import Made, report_html
+    from eval.engine.report import Made, report_html
 
     evaluation = find_tables()[name]
     missing = evaluation.missing(subject)
@@ -122,7 +122,7 @@ def _make_one(subject: Subject, name: str, asked: argparse.Namespace) -> int:
 
 def _make_all(subject: Subject, tables: Mapping[str, Evaluation], asked: argparse.Namespace) -> int:
     """Make every table that has what it needs, one after another; a failure is told and takes no other with it."""
-    from eval.report import Made, report_html
+    from eval.engine.report import Made, report_html
 
     made: list[Made] = []
     unmade: dict[str, str] = {}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.evaluation import Answer, Curve, Evaluation, Strip
-from eval.needs import EDGE_CATEGORIES, KITS
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.requirements import EDGE_CATEGORIES, KITS
 from stages.training.checkpoint import weights_of_kind
 
 DRAWS = 3
@@ -18,12 +18,19 @@ SHOWN = 3
 def _answer(subject: Subject, asked: Namespace) -> Answer:
     from itertools import islice
 
-    from eval.ambiguity import ambiguity, ambiguity_table
-    from eval.categories import categories_table, category_models, clusters_table, judge, made_shapes, read_back
-    from eval.clusters import clusters_of
-    from eval.instantiation import instantiator_of
-    from eval.models import training_curve
-    from eval.pictures import shape_picture
+    from eval.engine.models import training_curve
+    from eval.engine.pictures import shape_picture
+    from eval.generated.edge_categories import (
+        categories_table,
+        category_models,
+        clusters_table,
+        judge,
+        made_shapes,
+        read_back,
+    )
+    from eval.generated.instantiation import instantiator_of
+    from eval.generated.pose_clusters import clusters_of
+    from eval.strings.ambiguity import ambiguity, ambiguity_table
     from pipeline.randomness import decision_rng
     from stages.exemplars.language import made_kits
     from stages.shape.shape import kit_shape

@@ -5,17 +5,17 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 
-from eval.evaluation import Answer, Evaluation, Strip
-from eval.needs import FINISHED, KITS
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation, Strip
+from eval.engine.requirements import FINISHED, KITS
 from stages.strings.settings import Edges
 
 EDGES: tuple[Edges, ...] = ("all", "tree")
 
 
 def _answer(subject: Subject, _: Namespace) -> Answer:
-    from eval.compression import Stored, compression_row, compression_table, round_trip
-    from eval.pictures import shape_picture
+    from eval.engine.pictures import shape_picture
+    from eval.strings.compression import Stored, compression_row, compression_table, round_trip
     from pipeline.shards import read_shard
     from stages.exemplars.language import LANGUAGE, made_kits
     from stages.shape.collection.pairs import CONTACTS, pairs_of

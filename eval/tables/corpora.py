@@ -5,17 +5,17 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import get_args
 
-from eval.evaluation import Answer, Evaluation
-from eval.needs import KITS
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.requirements import KITS
 
 MOST = 100
 """So many variants of a kit are measured at most."""
 
 
 def _answer(subject: Subject, _: Namespace) -> Answer:
-    from eval.corpora import corpora_table, corpus_row
-    from eval.growth import read_finds
+    from eval.strings.corpora import corpora_table, corpus_row
+    from eval.strings.growth import read_finds
     from pipeline.randomness import decision_rng
     from stages.exemplars.language import made_kits
     from stages.strings.settings import Edges

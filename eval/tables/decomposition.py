@@ -7,8 +7,8 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from eval.evaluation import Answer, Evaluation, Need
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation, Need
 from pipeline.errors import ConfigError
 
 CUTS = ("symmetry", "sections", "components")
@@ -24,9 +24,9 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 
 
 def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
-    from eval.decomposition import decomposition_table
-    from eval.grammar_returned import grammar_table
-    from eval.shapes import model_kits
+    from eval.engine.shapes import model_kits
+    from eval.grammars.decomposition import decomposition_table
+    from eval.grammars.grammar_recall import grammar_table
     from stages.shape.shape import kit_shape
 
     for path in paths:

@@ -5,20 +5,20 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from eval.evaluation import Answer, Curve, Evaluation, Strip
-from eval.needs import KITS, SEARCH
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.requirements import KITS, SEARCH
 from stages.shape.kit import Kit
 
 if TYPE_CHECKING:
-    from eval.growth import Grown
+    from eval.strings.growth import Grown
 
 GENERATIONS = 5
 """So many generations of each kit are drawn at most."""
 
 
 def _answer(subject: Subject, _: Namespace) -> Answer:
-    from eval.growth import generation_table, grown, growth_table
+    from eval.strings.growth import generation_table, grown, growth_table
     from stages.exemplars.language import made_kits
     from stages.strings.settings import StringsConfig
 
@@ -38,7 +38,7 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
 
 def _strip(kit: Kit, found: Grown) -> Strip:
     """An input, and the first find of each generation."""
-    from eval.pictures import shape_picture
+    from eval.engine.pictures import shape_picture
     from stages.shape.shape import kit_shape, upright
 
     exemplar = kit.exemplars[0]

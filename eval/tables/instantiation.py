@@ -7,10 +7,10 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import get_args
 
-from eval.evaluation import Answer, Evaluation, Strip
-from eval.needs import CORPUS, KITS
-from eval.subject import Subject
-from stages.synthesis.settings import Way
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation, Strip
+from eval.engine.requirements import CORPUS, KITS
+from stages.string_sampling.settings import Way
 
 SHOWN = 4
 """Pictures of what each model dreamt."""
@@ -19,7 +19,8 @@ WARMING = 8
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.instantiation import (
+    from eval.engine.pictures import shape_picture
+    from eval.generated.instantiation import (
         DRAWS,
         METHODS,
         Attempt,
@@ -32,14 +33,13 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         methods_table,
         outcome_table,
     )
-    from eval.pictures import shape_picture
-    from eval.strings import string_vaes
+    from eval.strings.string_vaes import string_vaes
     from stages.exemplars.language import made_kits
     from stages.shape.graphs.canonical import graph_digest
     from stages.shape.shape import kit_shape
+    from stages.string_sampling.mending import mended
     from stages.strings.alphabet import make_alphabet
     from stages.strings.decoder import decode
-    from stages.synthesis.mending import mended
     from stages.training.string_vae.sampling import sample
 
     outcomes: list[tuple[str, Sequence[Attempt]]] = []
@@ -101,7 +101,7 @@ def _seconds(subject: Subject) -> float:
 
 def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--instantiated", type=int, default=100, help="graphs of each kit and each model")
-    parser.add_argument("--way", choices=get_args(Way), default="gaussian", help="as in synthesis.sources")
+    parser.add_argument("--way", choices=get_args(Way), default="gaussian", help="as in string_sampling.sources")
     parser.add_argument("--mends", type=int, default=24, help="as in synthesis")
     parser.add_argument("--parts", type=int, default=4000, help="parts put down at most for a graph")
 

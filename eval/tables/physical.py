@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eval.evaluation import Answer, Curve, Evaluation, Strip
-from eval.needs import FINISHED
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.requirements import FINISHED
 from pipeline.errors import ConfigError
 from stages.shape.shape import Shape
 
 if TYPE_CHECKING:
-    from eval.physical import Judged
+    from eval.dataset.physical_validity import Judged
 
 MOST = 200
 SHOWN = 6
@@ -30,8 +30,8 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.physical import PUBLISHED, judged_by_name, physical_table
-    from eval.shapes import dataset_shapes
+    from eval.dataset.physical_validity import PUBLISHED, judged_by_name, physical_table
+    from eval.engine.shapes import dataset_shapes
     from stages.shape.physics.settings import PhysicsConfig
 
     config = subject.config.section(PhysicsConfig)
@@ -41,8 +41,8 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 
 
 def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
-    from eval.physical import PUBLISHED, judged_by_name, physical_table
-    from eval.shapes import box_shapes, model_shapes
+    from eval.dataset.physical_validity import PUBLISHED, judged_by_name, physical_table
+    from eval.engine.shapes import box_shapes, model_shapes
     from stages.shape.physics.settings import PhysicsConfig
 
     def shapes() -> Iterator[tuple[str, Shape]]:
@@ -68,7 +68,7 @@ def _margins(judged: Mapping[str, Judged]) -> Curve:
 
 
 def _weakest(judged: Mapping[str, Judged]) -> list[tuple[str, bytes]]:
-    from eval.pictures import shape_picture
+    from eval.engine.pictures import shape_picture
 
     ranked = sorted(
         (validity.margin, name, place) for name, each in judged.items() for place, validity in enumerate(each.rigid)

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from eval.evaluation import Answer, Evaluation, Strip
-from eval.needs import CURVE_PROGRAM
-from eval.parts import Part, in_parts
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation, Strip
+from eval.engine.requirements import CURVE_PROGRAM
+from eval.engine.results_cache import Part, in_parts
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ LOOKED_AT = 8
 
 def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
     """One for each program and kind of input."""
-    from eval.recovery import usable_models
+    from eval.recovery.accuracy import usable_models
     from stages.programs.program import program_module
     from stages.training.recovery.recover import SHIPPED
 
@@ -36,7 +36,7 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
 
 
 def _of_model(model: TrainedRecovery, asked: Namespace, seed: int) -> Answer:
-    from eval.recovery import (
+    from eval.recovery.accuracy import (
         Found,
         accuracy_chart,
         alike,

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.evaluation import Answer, Evaluation
-from eval.needs import RECOVERY
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.requirements import RECOVERY
 from stages.training.checkpoint import weights_of_kind
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.recovery import baselines_table, held_out, methods, tried
+    from eval.recovery.accuracy import baselines_table, held_out, methods, tried
     from pipeline.randomness import decision_rng
     from stages.training.recovery.trained import load_recovery
 

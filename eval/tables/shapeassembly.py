@@ -9,19 +9,19 @@ from functools import lru_cache, partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from eval.evaluation import Answer, Curve, Evaluation, Strip
-from eval.models import Trained, training_curve
-from eval.needs import PROGRAM_WRITERS, PROGRAMS
-from eval.parts import Part, in_parts
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.models import Trained, training_curve
+from eval.engine.requirements import PROGRAM_WRITERS, PROGRAMS
+from eval.engine.results_cache import Part, in_parts
 from stages.shapeassembly.settings import NUCLEUS
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from eval.program_reference import Reference
-    from eval.table import Table
+    from eval.engine.table import Table
+    from eval.programs.reference import Reference
     from stages.shapeassembly.extraction.hierarchy import Box
     from stages.shapeassembly.program import Program
 
@@ -31,8 +31,8 @@ SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part
 
 def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
     """One for each model, and one for the shapes of val of each category; what a category's share is read once."""
-    from eval.program_models import program_models, program_shards
-    from eval.program_reference import read_reference
+    from eval.programs.models import program_models, program_shards
+    from eval.programs.reference import read_reference
     from stages.training.recovery.recover import SHIPPED
 
     reads = [*program_shards(subject, "train"), *program_shards(subject, "val")]
@@ -49,9 +49,9 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
 def _of_model(
     subject: Subject, asked: Namespace, trained: Trained[Any], reference: Callable[[str], Reference]
 ) -> Answer:
-    from eval.program_models import told_without
-    from eval.program_tables import quality_table, smoothness_table
-    from eval.programs import smoothness
+    from eval.programs.models import told_without
+    from eval.programs.quality import smoothness
+    from eval.programs.tables import quality_table, smoothness_table
     from pipeline.randomness import decision_rng
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
     from stages.training.program_vae.trained import TrainedProgramVae
@@ -72,7 +72,7 @@ def _of_model(
 
 
 def _of_val(subject: Subject, asked: Namespace, category: str, reference: Callable[[str], Reference]) -> Answer:
-    from eval.programs import boxes_of_programs
+    from eval.programs.quality import boxes_of_programs
 
     programs = reference(category).val[: asked.samples]
     row = Written(f"{category}, val", boxes_of_programs(programs), programs, of_val=True)
@@ -84,9 +84,9 @@ def _tables(
 ) -> list[Table]:
     """The tables of shapes; silent: which models write nothing, and why; novel: whether structures that train has not
     are counted."""
-    from eval.program_tables import editability_table, quality_table, variability_table
-    from eval.programs import clouds_of, novelty, physics_of, variability
-    from eval.realism import POINTS, Realism, realism
+    from eval.programs.quality import clouds_of, novelty, physics_of, variability
+    from eval.programs.tables import editability_table, quality_table, variability_table
+    from eval.programs.two_sample_test import POINTS, Realism, realism
 
     seen: dict[str, Realism] = {}
     for row in rows:
@@ -122,8 +122,8 @@ class Written:
 def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> tuple[list[Written], dict[str, str]]:
     """What a model writes; and, of one of whole programs, what it writes where nothing is rejected. Beside it why one
     that writes next to nothing is silent, by name."""
-    from eval.program_models import PROGRAM_KINDS, told_without
-    from eval.programs import boxes_of_programs, unrejected
+    from eval.programs.models import PROGRAM_KINDS, told_without
+    from eval.programs.quality import boxes_of_programs, unrejected
     from stages.training.program_vae.trained import TrainedProgramVae
 
     rows: list[Written] = []
@@ -151,8 +151,8 @@ def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) 
 
 
 def _pictures(samples: Sequence[Sequence[Box]]) -> list[tuple[str, bytes]]:
-    from eval.pictures import shape_picture
-    from eval.programs import shape_of_boxes
+    from eval.engine.pictures import shape_picture
+    from eval.programs.quality import shape_of_boxes
 
     return [("", shape_picture(shape_of_boxes(boxes))) for boxes in samples]
 

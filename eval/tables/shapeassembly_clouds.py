@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.evaluation import Answer, Evaluation, Need
-from eval.needs import PROGRAMS
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation, Need
+from eval.engine.requirements import PROGRAMS
 from stages.training.checkpoint import weights_of_kind
 
 KINDS = ("program_vae", "part_graph_vae")
@@ -22,12 +22,12 @@ def _spaces(subject: Subject) -> str:
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.pictures import cloud_portrait
-    from eval.program_clouds import Rebuilt, clouds_table, described, reconstructions, trained_encoder
-    from eval.program_figures import drawn, sheet_of
-    from eval.program_models import program_models, read_by_all, told_without
-    from eval.programs import boxes_of_programs, clouds_of
-    from eval.realism import POINTS
+    from eval.engine.pictures import cloud_portrait
+    from eval.programs.cloud_reconstruction import Rebuilt, clouds_table, described, reconstructions, trained_encoder
+    from eval.programs.figures import drawn, sheet_of
+    from eval.programs.models import program_models, read_by_all, told_without
+    from eval.programs.quality import boxes_of_programs, clouds_of
+    from eval.programs.two_sample_test import POINTS
     from pipeline.randomness import decision_rng
     from stages.shapeassembly.interpreter import execute_all
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.evaluation import Answer, Evaluation, Sheet
-from eval.needs import PROGRAM_WRITERS, PROGRAMS
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation, Sheet
+from eval.engine.requirements import PROGRAM_WRITERS, PROGRAMS
 from stages.training.checkpoint import weights_of_kind
 
 CURVES = ("chair", "table")
@@ -17,10 +17,10 @@ SECONDS = {"program_vae": 90.0, "program_lm": 60.0, "cuboid_rnn": 20.0, "part_gr
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.part_surfaces import curve_parts, surfaces_sheet, trained_surfaces
-    from eval.program_figures import beside_sheet, edits_sheet, journey_sheet, neighbours, neighbours_table
-    from eval.program_models import PROGRAM_KINDS, category_programs, program_models, read_by_all, told_without
-    from eval.programs import boxes_of_programs, clouds_of
+    from eval.programs.figures import beside_sheet, edits_sheet, journey_sheet, neighbours, neighbours_table
+    from eval.programs.models import PROGRAM_KINDS, category_programs, program_models, read_by_all, told_without
+    from eval.programs.part_surfaces import curve_parts, surfaces_sheet, trained_surfaces
+    from eval.programs.quality import boxes_of_programs, clouds_of
     from pipeline.randomness import decision_rng
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
     from stages.training.program_vae.trained import TrainedProgramVae

@@ -6,9 +6,9 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from eval.evaluation import Answer, Evaluation
-from eval.needs import EXEMPLARS, FINISHED
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.requirements import EXEMPLARS, FINISHED
 from stages.shape.arrays import FloatArray
 
 MOST = 24
@@ -18,8 +18,8 @@ RADIUS = 0.016
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.shapes import dataset_shapes
-    from eval.similarity import similarity_row, similarity_table, triangles_of
+    from eval.engine.shapes import dataset_shapes
+    from eval.grammars.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.randomness import decision_rng
 
     shapes: dict[str, list[FloatArray]] = {}
@@ -35,7 +35,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 
 def _exemplars(subject: Subject) -> dict[str, list[FloatArray]]:
     """The triangles of the exemplars of each kit, and of the mesh of each grammar."""
-    from eval.similarity import triangles_of
+    from eval.grammars.similarity import triangles_of
     from stages.exemplars.language import made_kits
     from stages.grammars.files import made_grammars
     from stages.shape.shape import kit_shape
@@ -50,8 +50,8 @@ def _exemplars(subject: Subject) -> dict[str, list[FloatArray]]:
 
 
 def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
-    from eval.shapes import model_shapes
-    from eval.similarity import similarity_row, similarity_table, triangles_of
+    from eval.engine.shapes import model_shapes
+    from eval.grammars.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.errors import ConfigError
     from pipeline.randomness import decision_rng
 

@@ -8,22 +8,22 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from eval.evaluation import Answer, Curve, Evaluation, Strip
-from eval.needs import CORPUS, STRING_VAE
-from eval.subject import Subject
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.requirements import CORPUS, STRING_VAE
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
-    from eval.models import Trained
-    from eval.strings import Reconstruction, Sampling
+    from eval.engine.models import Trained
+    from eval.strings.string_vaes import Reconstruction, Sampling
     from stages.training.string_vae.structuring import PathFigures
     from stages.training.string_vae.trained import TrainedStringVae
 
 
 def _answer(subject: Subject, asked: Namespace) -> Answer:
-    from eval.models import training_curve
-    from eval.side_by_side import side_by_side
-    from eval.strings import reconstruction_table, sampling_table, string_vaes, structure_table
+    from eval.engine.models import training_curve
+    from eval.engine.parallel_map import side_by_side
+    from eval.strings.string_vaes import reconstruction_table, sampling_table, string_vaes, structure_table
 
     rebuilt, sampled, joined, lines = [], [], [], {}
     strips: list[Strip] = []
@@ -54,12 +54,12 @@ class _Seen:
 
 
 def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]) -> _Seen:
-    from eval.instantiation import instantiator_of
-    from eval.journeys import journey_strips
-    from eval.strings import corpus_strings, model_rng, reconstruction, sampling, shape_graphs, structure
+    from eval.generated.instantiation import instantiator_of
+    from eval.strings.latent_interpolation import journey_strips
+    from eval.strings.string_vaes import corpus_strings, model_rng, reconstruction, sampling, shape_graphs, structure
     from stages.exemplars.language import made_kits
+    from stages.string_sampling.instantiation.layout import STANDARD
     from stages.strings.settings import StringsConfig
-    from stages.synthesis.instantiation.layout import STANDARD
     from stages.training.string_vae.sampling import WAYS
 
     model, seed, kits = trained.model, subject.config.seed, made_kits(subject.places)

@@ -1,7 +1,8 @@
 """Stage `shapeassembly`: ShapeAssembly programs in; those that pass, as the shards `<dataset>-<split>-<index>.tar`.
 
 Its first shards extract programs from part hierarchies, if there are any. Then one reads all programs, those of stage
-`writing` among them, refuses what is no program, and gives each of the others its split and shard. A sample carries no
+`program_sampling` among them, refuses what is no program, and gives each of the others its split and shard.
+A sample carries no
 meshes: its text is the canonical program, and `stages.shapeassembly.shape.shape_of_text` executes it.
 """
 
@@ -46,7 +47,8 @@ def planned_shards(plan: Plan) -> list[Shard]:
     digests = [source_digest(each.path) for each in config.programs]
     made = [("shapeassembly", shard.name) for shard in extraction]
     inputs = tuple(
-        f"{stage}/{shard}" for stage, shard in (*made, *(("writing", name) for name in plan.shards("writing")))
+        f"{stage}/{shard}"
+        for stage, shard in (*made, *(("program_sampling", name) for name in plan.shards("program_sampling")))
     )
     assignment = Shard(assignment_name(plan.config.name), {"job": "assignment", "digests": digests}, inputs)
     summary = plan.summary("shapeassembly", assignment.name)
@@ -170,7 +172,7 @@ STAGE = Stage(
     name="shapeassembly",
     module=__name__,
     config=ShapeAssemblyConfig,
-    inputs=("writing",),
+    inputs=("program_sampling",),
     plan=planned_shards,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from eval.shapes import BOX_FACES, box_shape
+from eval.engine.shapes import BOX_FACES, box_shape
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.boxes import box_corners
 from stages.shape.physics.judge import Judge

@@ -97,11 +97,11 @@ ARENAS: dict[str, Datasets] = {
                 },
             ),
             "dreamt": (
-                ("exemplars", "synthesis", "validity"),
+                ("exemplars", "string_sampling", "validity"),
                 {
                     "exemplars": {"kits": [stated(_CASTLE)]},
                     "variations": {"per_kit": 0},
-                    "synthesis": {
+                    "string_sampling": {
                         "sources": [{"dataset": "learnt", "model": "tiny", "kit": "castle", "samples": 4}],
                         "draws": 8,
                         "lanes": 2,
@@ -111,7 +111,7 @@ ARENAS: dict[str, Datasets] = {
                 },
             ),
         },
-        [{"dreamt": {"synthesis": {"draws": 7}}}],
+        [{"dreamt": {"string_sampling": {"draws": 7}}}],
     ),
     "scribes": Datasets(
         {
@@ -123,9 +123,9 @@ ARENAS: dict[str, Datasets] = {
                 },
             ),
             "written": (
-                ("writing", "shapeassembly", "validity"),
+                ("program_sampling", "shapeassembly", "validity"),
                 {
-                    "writing": {"programs_per_shard": 4},
+                    "program_sampling": {"programs_per_shard": 4},
                     "shapeassembly": {
                         "written": [
                             {"name": "stool", "dataset": "read", "model": "tiny", "kit": "furniture", "samples": 12}
@@ -136,7 +136,7 @@ ARENAS: dict[str, Datasets] = {
                 },
             ),
         },
-        [{"written": {"writing": {"programs_per_shard": 5}}}],
+        [{"written": {"program_sampling": {"programs_per_shard": 5}}}],
     ),
     "texts": Datasets(
         {"texts": (("shapeassembly", "validity"), {"shapeassembly": _PROGRAMS})},

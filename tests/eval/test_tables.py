@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from eval.__main__ import main
-from eval.evaluation import Evaluation
-from eval.needs import FINISHED, KITS, STRING_VAE
-from eval.registry import find_tables
-from eval.subject import Subject, load_subject
-from eval.table import Published, Table
+from eval.engine.dataset_run import Subject, load_subject
+from eval.engine.evaluation import Evaluation
+from eval.engine.registry import find_tables
+from eval.engine.requirements import FINISHED, KITS, STRING_VAE
+from eval.engine.table import Published, Table
 
 ROOT = Path(__file__).resolve().parents[2]
 DEFAULT, CHAIRS = ROOT / "configs" / "default.yaml", ROOT / "configs" / "chairs.yaml"
@@ -116,7 +116,7 @@ def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -
     house = tmp_path / "house" / "eval" / "tables"
     house.mkdir(parents=True)
     text = (
-        "from eval.evaluation import Answer, Evaluation, Need, Sheet\nfrom eval.table import Table\n"
+        "from eval.engine.evaluation import Answer, Evaluation, Need, Sheet\nfrom eval.engine.table import Table\n"
         "def answer(subject, asked):\n    {}\n"
         "TABLE = Evaluation('Is it?', (Need('nothing', lambda _: ''),), lambda _: 1.0, answer)\n"
     )

@@ -180,7 +180,7 @@ def test_of_the_mill_only_what_makes_bytes_counts() -> None:
         # package writes a digest of all code into the manifest, training one of a model's into its weights
         own = {"pipeline.code"} if name in ("package", "training") else set()
         # files of strangers are read in a child process, by these or by what they are made with
-        reads = ("autoconfig", "exemplars", "grammars", "shapeassembly", "writing", "abstraction", "training")
+        reads = ("autoconfig", "exemplars", "grammars", "shapeassembly", "program_sampling", "abstraction", "training")
         own |= {"pipeline.bounded", "pipeline.endings"} if name in reads else set()
         assert mill == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"} | own, name
 

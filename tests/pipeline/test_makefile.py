@@ -63,8 +63,9 @@ def nasty(folder: Path) -> str:
 def test_dataset_runs_each_stage_once_after_what_it_reads() -> None:
     runs = calls("dataset", "CONFIG=c.yaml", "OUT=/data", "WORKERS=3", "SEED=7")
     assert [run[3] for run in runs] == [
-        "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
-        "synthesis",
+        "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "program_sampling",
+"shapeassembly",
+        "string_sampling",
         "validity", "abstraction", "strings", "points", "sketches", "package",
     ]  # fmt: skip
     asked = ["--config", "c.yaml", "--out", "/data", "--seed", "7", "--workers", "3"]
@@ -75,8 +76,9 @@ def test_train_runs_what_its_samples_come_from_then_the_model_that_was_asked_for
     first, *runs = calls("train", "MODEL=masked-castle", "CONFIG=c.yaml")
     assert first == ["-m", "stages.training", "--config", "c.yaml", "--only", "masked-castle"]
     assert [run[3] for run in runs] == [
-        "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "writing", "shapeassembly",
-        "synthesis",
+        "autoconfig", "exemplars", "variations", "proportions", "programs", "grammars", "program_sampling",
+"shapeassembly",
+        "string_sampling",
         "strings", "training",
     ]  # fmt: skip
     assert all(run[4:6] == ["--config", "c.yaml"] for run in runs)

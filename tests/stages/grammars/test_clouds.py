@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.cloud_similarity import MATCHED, cloud_similarity
+from eval.grammars.cloud_similarity import MATCHED, cloud_similarity
 from pipeline.errors import ConfigError
 from stages.exemplars.read import read_model
 from stages.exemplars.symmetry.cloud import Cloud

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.similarity import r_similarity, triangles_of
+from eval.grammars.similarity import r_similarity, triangles_of
 from stages.exemplars.symmetry.derivations import START, Derivation
 from stages.grammars.collisions import Collisions
 from stages.grammars.derivation import (

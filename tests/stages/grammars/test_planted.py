@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eval.similarity import r_similarity, triangles_of
+from eval.grammars.similarity import r_similarity, triangles_of
 from stages.grammars.collisions import Collisions
 from stages.grammars.derivation import derivation_text, pieces_of, shape_of_text, surface_digest
 from stages.grammars.drawing import Collided, random_counts, random_derivation

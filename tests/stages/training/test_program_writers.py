@@ -94,7 +94,7 @@ def dreamt(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
     source = {"name": "stool", "dataset": "toy", "model": model, "kit": "furniture", "samples": 12}
     sections = {
         "shapeassembly": {"written": [source], "overflow": 100, "splits": {"shards": 1}},
-        "writing": {"programs_per_shard": 5},
+        "program_sampling": {"programs_per_shard": 5},
     }
     config = folder / "dreamt.yaml"
     config.write_text(yaml.safe_dump({"name": "dreamt", "seed": 5, **sections}))
@@ -102,11 +102,13 @@ def dreamt(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
     for workers in asked:
         made = folder / f"out{workers}"
         shutil.copytree(out / "toy-models", made / "toy-models")
-        for stage in ("writing", "shapeassembly"):
+        for stage in ("program_sampling", "shapeassembly"):
             code, printed = mill("run", stage, "--config", config, "--out", made, "--workers", workers)
             assert code == 0, printed
         work = made / ".work/dreamt"
-        written = [json.loads(line) for path in sorted((work / "writing").glob("*.jsonl")) for line in path.open()]
+        written = [
+            json.loads(line) for path in sorted((work / "program_sampling").glob("*.jsonl")) for line in path.open()
+        ]
         assert [row["name"] for row in written] == [f"toy-models/{model}-furniture-0/{n:06d}" for n in range(12)]
         texts = {row["name"]: row["text"] for row in written}
         samples = [each for path in sorted((work / "shapeassembly").glob("*.tar")) for each in read_samples(path)]

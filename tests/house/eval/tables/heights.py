@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from eval.evaluation import Answer, Evaluation
-from eval.needs import FINISHED
-from eval.shapes import split_shapes
-from eval.subject import Subject
-from eval.table import Table
+from eval.engine.dataset_run import Subject
+from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.requirements import FINISHED
+from eval.engine.shapes import split_shapes
+from eval.engine.table import Table
 from stages.shape.geometry.bounds import shape_bounds
 
 

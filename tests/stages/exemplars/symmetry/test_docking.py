@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from eval.similarity import r_similarity
+from eval.grammars.similarity import r_similarity
 from stages.exemplars.symmetry.carve import Soup
 from stages.exemplars.symmetry.docking import DockingSite, docking_sites, slippable_motions
 from stages.exemplars.symmetry.matching import eroded, matched_items, mutual, r_symmetric_cells, symmetric_cells

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eval.similarity import r_similarity
+from eval.grammars.similarity import r_similarity
 from stages.exemplars.symmetry.derivations import START, Derivation, grid_poses
 from stages.exemplars.symmetry.grids import Grid, crossing, cut_grid, rows_of
 from stages.exemplars.symmetry.motions import candidate_motions

@@ -154,7 +154,12 @@ def test_a_row_of_the_index_finds_its_sample(made: tuple[Path, tuple[str, ...]])
 def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
     code, printed = mill("run", "exemplars", *config_of(tmp_path, {}))
     assert code == 2
-    ways = ("programs.program", "shapeassembly.programs, hierarchies or written", "synthesis.sources", "exemplars.kits")
+    ways = (
+        "programs.program",
+        "shapeassembly.programs, hierarchies or written",
+        "string_sampling.sources",
+        "exemplars.kits",
+    )
     assert "a dataset needs one of " in printed
     assert all(way in printed for way in ways)
     assert "this has none" in printed

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from eval.physical import judge_all, stays_up
-from eval.shapes import box_shapes, model_shapes
+from eval.dataset.physical_validity import judge_all, stays_up
+from eval.engine.shapes import box_shapes, model_shapes
 from stages.shape.physics.judge import Validity
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shapeassembly.shape import shape_of_text

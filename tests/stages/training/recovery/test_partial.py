@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eval.spoilt import SPOILS
+from eval.recovery.robustness import SPOILS
 from stages.programs.program import find_program
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of

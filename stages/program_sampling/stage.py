@@ -1,0 +1,118 @@
+"""Stage `program_sampling`: trained models in; the programs, which stage `shapeassembly` reads like others.
+
+A shard is some of the programs of one model, `.jsonl`, one a line: what they are called, and their text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipeline.config import Config
+from pipeline.errors import ConfigError, Rejected, ShardFailed
+from pipeline.places import file_digest
+from pipeline.shards import json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Stage, Task
+from stages.program_sampling.settings import WritingConfig
+from stages.shapeassembly.printer import print_program
+from stages.shapeassembly.settings import ShapeAssemblyConfig, WrittenPrograms
+
+BYTES_A_PROGRAM = 3_000
+
+
+def plan(plan: Plan) -> list[Shard]:
+    """The shards of every model, in the order of the config. Raises ConfigError where one is not there."""
+    most = plan.config.section(WritingConfig).programs_per_shard
+    shards: list[Shard] = []
+    for source in plan.config.section(ShapeAssemblyConfig).written:
+        digest = file_digest(_weights(plan, source))
+        for first in range(0, source.samples, most):
+            params = {
+                "kind": source.name,
+                "folder": source.folder,
+                "digest": digest,
+                "kit": source.kit,
+                "temperature": source.temperature,
+                "nucleus": source.nucleus,
+                "first": first,
+                "samples": min(most, source.samples - first),
+            }
+            shards.append(Shard(f"{plan.config.name}-written-{len(shards):06d}", params))
+    return shards
+
+
+def _weights(plan: Plan, source: WrittenPrograms) -> Path:
+    path = plan.published(f"{source.folder}/weights.safetensors")
+    if not path.is_file():
+        raise ConfigError(
+            f"{plan.config.path}: shapeassembly.written[{source.name}]: there is no {path}; make train with the config "
+            f"of {source.dataset} and MODEL={source.model} first"
+        )
+    return path
+
+
+def run_shard(task: Task) -> Outcome:
+    """Programs that a model writes; those that it begins and gives up are refused.
+
+    Raises Rejected for weights that are none of a model of programs of this kit, and for a model that gives up nearly
+    all; ShardFailed for weights that are others than when the run began.
+    """
+    from stages.training.checkpoint import CheckpointError
+    from stages.training.program_writers import load_program_writer
+
+    params = task.shard.params
+    path = task.published(f"{params['folder']}/weights.safetensors")
+    if file_digest(path) != params["digest"]:
+        raise ShardFailed(f"{path} has changed since the run began")
+    try:
+        model = load_program_writer(path, {"kit": params["kit"]}, params["nucleus"])
+        programs, drawn = model.sample(params["samples"], task.rng("points"), params["temperature"])
+    except (CheckpointError, ValueError) as error:
+        raise Rejected(f"{path}: {error}") from error
+    if drawn > len(programs):
+        task.reject(params["folder"], "given up while it was written", count=drawn - len(programs))
+    with task.output(f"{task.shard.name}.jsonl") as stream:
+        for number, program in enumerate(programs, params["first"]):
+            name = f"{params['folder']}/{number:06d}"
+            stream.write(json_bytes({"kind": params["kind"], "name": name, "text": print_program(program)}))
+    return Outcome(0, {"programs": len(programs), "drawn": drawn})
+
+
+def report(plan: Plan) -> Sequence[str]:
+    """How many programs each model has begun for those that it wrote."""
+    lines = []
+    for source in plan.config.section(ShapeAssemblyConfig).written:
+        found = [
+            plan.summary("program_sampling", shard.name)
+            for shard in STAGE.plan(plan)
+            if shard.params["kind"] == source.name
+        ]
+        done = [each for each in found if each is not None]
+        if done:
+            written, drawn = (sum(each[name] for each in done) for name in ("programs", "drawn"))
+            lines.append(f"{source.folder}: {written:,} programs of {drawn:,} begun")
+    return lines
+
+
+def estimate_bytes(plan: Plan) -> int:
+    """Of all programs."""
+    return BYTES_A_PROGRAM * sum(each.samples for each in plan.config.section(ShapeAssemblyConfig).written)
+
+
+def trial(config: Config) -> WritingConfig:
+    """The few programs that stage `shapeassembly` asks for in its own."""
+    return config.section(WritingConfig)
+
+
+STAGE = Stage(
+    name="program_sampling",
+    module=__name__,
+    config=WritingConfig,
+    inputs=(),
+    plan=plan,
+    run_shard=run_shard,
+    estimate_bytes=estimate_bytes,
+    report=report,
+    sections=("shapeassembly",),
+    trial=trial,
+)

@@ -1,0 +1,133 @@
+"""A trained model as a source of shapes: found by its name, brought into the mill with what it must not repeat."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.errors import ConfigError, Rejected, ShardFailed
+from pipeline.places import file_digest
+from pipeline.shards import array_bytes, json_bytes
+from pipeline.stage import Outcome, Plan, Shard, Task
+from stages.shape.graphs.canonical import graph_digest
+from stages.shape.kit import Kit
+from stages.shape.kit_input import input_kit
+from stages.string_sampling.settings import SourceConfig
+from stages.strings.alphabet import make_alphabet
+from stages.strings.decoder import decode
+from stages.strings.rules import make_rules, patterns_of
+from stages.strings.settings import Edges
+
+if TYPE_CHECKING:
+    from stages.training.string_vae.trained import TrainedStringVae
+
+
+@dataclass(frozen=True)
+class Source:
+    """A model with what it has learnt from. strings: those of training that it can read; known: graphs of training,
+    digests of their strings' graphs; edges: which contacts its strings tell of; weights: their sha256."""
+
+    model: TrainedStringVae
+    strings: list[str]
+    known: frozenset[bytes]
+    edges: Edges
+    weights: str
+
+    @property
+    def whole(self) -> bool:
+        """Whether its strings tell of all contacts."""
+        return self.edges == "all"
+
+
+def source_shard(plan: Plan, number: int, source: SourceConfig) -> Shard:
+    """The shard that brings a model into the mill. Raises ConfigError where it is not there, with what makes it."""
+    name = f"{source.model}-{source.kit}-{source.seed}"
+    files = {
+        "weights": f"{source.dataset}-models/{name}/weights.safetensors",
+        "corpus": f"{source.dataset}-corpus/{source.kit}-train.txt",
+        "vocabulary": f"{source.dataset}-corpus/vocabulary.json",
+    }
+    digests = {}
+    for what, file in files.items():
+        path = plan.published(file)
+        if not path.is_file():
+            mend = f"make train with its config and MODEL={source.model}" if what == "weights" else "make strings there"
+            raise ConfigError(
+                f"{plan.config.path}: string_sampling.sources.{number}: there is no {path}: dataset"
+                f" {source.dataset} has no "
+                f"{what} of {name if what == 'weights' else source.kit}; {mend} first"
+            )
+        digests[what] = file_digest(path)
+    params = {"job": "source", "kit": source.kit, "files": files, "digests": digests}
+    return Shard(f"s{number:02}-source", params, (f"exemplars/{source.kit}",))
+
+
+def run_source(task: Task) -> Outcome:
+    """Files of the shard: `.weights.safetensors`; `.strings.txt`, the training strings that the model can read;
+    `.json`, which contacts these tell of; and `.known.npy`, uint8 (k, 32), digests of their graphs, each once,
+    ascending.
+
+    Raises Rejected for weights that are not of this kit, or not to be read.
+    """
+    from stages.training.checkpoint import CheckpointError
+    from stages.training.string_vae.trained import load_string_vae
+
+    params, name = task.shard.params, task.shard.name
+    contents: dict[str, bytes] = {}
+    for what, file in params["files"].items():
+        path = task.published(file)
+        if file_digest(path) != params["digests"][what]:
+            raise ShardFailed(f"{path} has changed since the run began")
+        contents[what] = path.read_bytes()
+    with task.output(f"{name}.weights.safetensors") as stream:
+        stream.write(contents["weights"])
+    kit = input_kit(task, params["kit"])
+    try:
+        model = load_string_vae(task.published(params["files"]["weights"]), _expected(kit))
+    except CheckpointError as error:
+        raise Rejected(str(error)) from error
+    _check_grammar(kit, model.header["patterns"])
+    alphabet = make_alphabet(kit.labels)
+    strings = [each for each in contents["corpus"].decode().splitlines() if model.is_valid(each)]
+    known: set[bytes] = set()
+    for done, each in enumerate(strings):
+        decoded = decode(each, alphabet)
+        known.add(bytes.fromhex(graph_digest(decoded.types, decoded.edges)))
+        task.progress(done + 1, len(strings))
+    with task.output(f"{name}.strings.txt") as stream:
+        stream.write("".join(f"{each}\n" for each in strings).encode())
+    with task.output(f"{name}.known.npy") as stream:
+        stream.write(array_bytes(np.frombuffer(b"".join(sorted(known)), dtype=np.uint8).reshape(-1, 32)))
+    edges = json.loads(contents["vocabulary"])[kit.name]["edges"]
+    with task.output(f"{name}.json") as stream:
+        stream.write(json_bytes({"edges": edges}))
+    return Outcome(0, {"strings": len(strings), "graphs": len(known), "weights": params["digests"]["weights"]})
+
+
+def read_source(task: Task, shard: str, kit: Kit) -> Source:
+    """What `run_source` wrote in `shard`, one of the inputs."""
+    from stages.training.string_vae.trained import load_string_vae
+
+    path: Path = task.input("string_sampling", f"{shard}.weights.safetensors")
+    model = load_string_vae(path, _expected(kit))
+    strings = task.input("string_sampling", f"{shard}.strings.txt").read_text().splitlines()
+    known = np.load(task.input("string_sampling", f"{shard}.known.npy"), allow_pickle=False)
+    digests = frozenset(bytes(each) for each in known)
+    edges = json.loads(task.input("string_sampling", f"{shard}.json").read_bytes())["edges"]
+    return Source(model, strings, digests, edges, file_digest(path))
+
+
+def _expected(kit: Kit) -> dict[str, Any]:
+    return {"kit": kit.name, "names": list(kit.labels)}
+
+
+def _check_grammar(kit: Kit, patterns: Mapping[str, Any]) -> None:
+    """Raises Rejected for a model whose strings follow another grammar than that of the kit."""
+    own = patterns_of(make_rules(kit.grammar, len(kit.labels), 0, bool(patterns["partial"])))
+    if own != {key: patterns[key] for key in own}:
+        raise Rejected(f"the model has learnt another grammar than kit {kit.name} has here: give it the same exemplars")

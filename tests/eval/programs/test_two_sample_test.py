@@ -1,0 +1,49 @@
+"""Realism: the Fréchet distance against its closed form, features of the network that ships, and a judge's verdicts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import sqrtm
+
+from eval.programs.two_sample_test import features_of, fooled, frechet_distance
+
+
+def test_the_frechet_distance_is_that_of_two_normal_distributions() -> None:
+    rng = np.random.default_rng(0)
+    first, second = rng.standard_normal((60, 5)), 1.5 * rng.standard_normal((80, 5)) + 0.3
+    covariances = [np.cov(each, rowvar=False) for each in (first, second)]
+    means = first.mean(axis=0) - second.mean(axis=0)
+    root = np.real(sqrtm(covariances[0] @ covariances[1]))
+    expected = means @ means + np.trace(covariances[0] + covariances[1] - 2 * root)
+    assert frechet_distance(first, second) == pytest.approx(expected, rel=1e-9)
+    assert frechet_distance(first, first) == pytest.approx(0, abs=1e-9)
+
+
+def test_the_frechet_distance_needs_no_more_samples_than_features() -> None:
+    rng = np.random.default_rng(1)
+    first = rng.standard_normal((10, 40))
+    assert frechet_distance(first, first + 1.0) == pytest.approx(40.0)
+
+
+def test_features_do_not_depend_on_place_and_size() -> None:
+    rng = np.random.default_rng(2)
+    boxes = rng.uniform(-1, 1, (3, 1500, 3)) * [[[1.0, 1.0, 1.0]], [[1.0, 0.1, 1.0]], [[0.1, 1.0, 0.1]]]
+    found, moved = features_of(boxes), features_of(4.0 * boxes + 2.0)
+    assert found is not None
+    assert moved is not None
+    assert np.allclose(found, moved, atol=1e-3)
+    assert np.linalg.norm(found[0] - found[1]) > 10 * np.linalg.norm(found - moved)
+    assert features_of(boxes, Path("nowhere")) is None
+
+
+def test_a_judge_tells_flat_boxes_from_cubes_and_not_cubes_from_cubes() -> None:
+    rng = np.random.default_rng(3)
+    cubes = rng.uniform(-1, 1, (120, 64, 3))
+    others = rng.uniform(-1, 1, (120, 64, 3))
+    flat = others * [1.0, 0.2, 1.0]
+    assert fooled(flat, cubes, 0) == 0
+    assert 20 < fooled(others, cubes, 0) < 80
+    assert fooled(others, cubes, 0) == fooled(others, cubes, 0)

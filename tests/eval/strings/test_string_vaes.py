@@ -1,0 +1,141 @@
+"""The figures of string VAEs, on models small enough to know."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eval.engine.models import Trained, training_curve
+from eval.strings.string_vaes import (
+    Reconstruction,
+    Sampling,
+    corpus_strings,
+    model_rng,
+    reconstruction,
+    reconstruction_table,
+    sampling,
+    sampling_table,
+    shape_graphs,
+    string_vaes,
+    structure,
+    structure_table,
+)
+from pipeline.errors import ConfigError
+from stages.training.checkpoint import checkpoint_bytes
+from stages.training.string_vae.sampling import WAYS, sample
+from stages.training.string_vae.structuring import PathFigures
+from stages.training.string_vae.trained import TrainedStringVae
+from stages.training.trained import curves_csv
+from tests.stages.training.string_vae.models import MOST, random_vae, toy_strings, trained_vae
+
+
+@pytest.mark.slow
+def test_what_was_learnt_by_heart_comes_back_and_what_was_not_does_not() -> None:
+    strings = toy_strings()
+    learnt, random = (reconstruction(model, strings) for model in (trained_vae("transformer"), random_vae("masked")))
+    assert learnt.strings == len(strings)
+    assert learnt.valid == random.valid == 100
+    assert learnt.graphs >= learnt.same > 30 > random.same
+    assert learnt.tokens > learnt.same
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_figures_of_a_way_are_shares_of_what_it_found(way: str) -> None:
+    strings = toy_strings()
+    model = random_vae("masked")
+    figures = sampling(model, way, strings, shape_graphs(model, strings), 30, np.random.default_rng(0))
+    assert figures.valid == 100
+    assert 0 < figures.found <= 100
+    assert 0 < figures.unique <= 100
+    plain = sampling(random_vae("plain"), "prior", strings, set(), 30, np.random.default_rng(0))
+    assert plain.valid < 50
+
+
+def test_strings_that_are_all_known_are_not_novel() -> None:
+    model = random_vae("masked")
+    found = sample(model, "prior", toy_strings(), 60, np.random.default_rng(7))
+    dreamt = [each.string for each in found if each.string]
+    toys = shape_graphs(model, toy_strings())
+    known, fresh = (
+        sampling(model, "prior", toy_strings(), graphs, 60, np.random.default_rng(7))
+        for graphs in (toys | shape_graphs(model, dreamt), toys)
+    )
+    assert known.novel == 0
+    assert fresh.novel > 0
+
+
+@pytest.mark.slow
+def test_search_graph_of_a_trained_model_holds_together() -> None:
+    nodes, figures = structure(trained_vae("transformer"), toy_strings(), np.random.default_rng(0))
+    assert nodes == len(toy_strings())
+    assert set(figures) == {"naive", "search graph"}
+    assert figures["search graph"].components <= figures["naive"].components
+
+
+def test_models_are_found_with_their_kit_and_seed(tmp_path: Path) -> None:
+    model = random_vae("masked")
+    for name in ("masked-space-base-0", "masked-space-base-1", "plain-toy-0"):
+        kit = "toy" if "toy" in name else "space-base"
+        (tmp_path / name).mkdir()
+        header = {**model.header, "kind": "string_vae", "kit": kit, "name": name}
+        content = checkpoint_bytes(model.module.state_dict(), header)
+        (tmp_path / name / "weights.safetensors").write_bytes(content)
+    (tmp_path / "other-toy-0").mkdir()
+    content = checkpoint_bytes(model.module.state_dict(), {"kind": "another", "kit": "toy", "name": "other-toy-0"})
+    (tmp_path / "other-toy-0" / "weights.safetensors").write_bytes(content)
+    found = [(each.name, each.kit, each.seed) for each in string_vaes(tmp_path)]
+    assert found == [("masked", "space-base", 0), ("masked", "space-base", 1), ("plain", "toy", 0)]
+
+
+def test_weights_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    (tmp_path / "masked-toy-0").mkdir()
+    (tmp_path / "masked-toy-0" / "weights.safetensors").write_bytes(b"\x80\x04 a pickle")
+    with pytest.raises(ConfigError, match=r"masked-toy-0/weights\.safetensors is a pickle.*make train"):
+        string_vaes(tmp_path)
+
+
+def test_curve_is_what_the_training_wrote(tmp_path: Path) -> None:
+    rows = [{"round": number, "step": 10 * number, "val_nats": 9.0 - number} for number in range(3)]
+    (tmp_path / "curves.csv").write_text(curves_csv(rows))
+    assert training_curve(tmp_path, "val_nats") == [(0.0, 9.0), (10.0, 8.0), (20.0, 7.0)]
+
+
+def test_strings_that_a_model_cannot_read_are_left_out(tmp_path: Path) -> None:
+    model = random_vae("masked")
+    (tmp_path / "toy-test.txt").write_text("".join(f"{each}\n" for each in [*toy_strings()[:3], "AZ", "B(B)"]))
+    assert corpus_strings(tmp_path, "toy", "test", model) == list(toy_strings()[:3])
+    assert max(map(len, toy_strings())) <= MOST
+
+
+def as_trained(model: TrainedStringVae, seed: int) -> Trained[TrainedStringVae]:
+    return Trained("masked", "toy", seed, model)
+
+
+def test_several_seeds_are_one_row_with_their_spread() -> None:
+    model = random_vae("masked")
+    found = [(as_trained(model, seed), Reconstruction(9, 90.0 + seed, 50.0, 60.0, 100.0)) for seed in range(3)]
+    (row,) = reconstruction_table(found).rows
+    assert row == ("masked-toy", 3, 9, "91.0 ± 1.0", "50.0 ± 0.0", "60.0 ± 0.0", "100.0 ± 0.0")
+    (row,) = reconstruction_table(found[:1]).rows
+    assert row == ("masked-toy", 1, 9, 90.0, 50.0, 60.0, 100.0)
+    searches = [(as_trained(model, 0), way, Sampling(5, 100.0, 80.0, 70.0, 60.0)) for way in ("path", "prior")]
+    assert [row[:4] for row in sampling_table(searches).rows] == [
+        ("masked-toy", "path", 1, 5),
+        ("masked-toy", "prior", 1, 5),
+    ]
+
+
+def test_table_of_paths_has_the_published_rows() -> None:
+    table = structure_table([(as_trained(random_vae("masked"), 0), 7, {"naive": PathFigures(2, 0.5, 1.5)})])
+    assert table.rows == (("masked-toy-0, naive", 7, 2, 0.5, 1.5),)
+    assert "| sand castle, naive (strings, Table 2) |  | 102 | 4.71 | 12.2 |" in table.markdown()
+
+
+def test_each_decision_about_each_model_has_its_own_stream() -> None:
+    model = random_vae("masked")
+    streams = [
+        model_rng(1, as_trained(model, seed), decision).random() for seed in (0, 1) for decision in ("path", "prior")
+    ]
+    assert len(set(streams)) == 4
