@@ -15,15 +15,15 @@ import open3d as o3d
 from eval.engine.table import Cell, Table
 from eval.grammars.decomposition import merged, points_of_parts, scene_of_parts
 from eval.grammars.exchanges import LARGEST, Exchange, known_exchanges
-from stages.exemplars.symmetry.places import among
-from stages.exemplars.symmetry.sites import Docker
-from stages.exemplars.symmetry.surface import SurfaceGrid
-from stages.grammars.extraction import extract
-from stages.grammars.reading import read_surface
+from stages.grammars.extraction.docked_pieces import Docker
+from stages.grammars.extraction.extract import extract
+from stages.grammars.read_surface import read_surface
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import Kit
 from stages.shape.shape import Shape, kit_shape
+from stages.symmetry.matching.cell_lookup import among
+from stages.symmetry.surface.grid import SurfaceGrid
 
 RADIUS = 0.016
 """Radius of similarity, as a share of the longest side of the box (symmetry §5)."""

@@ -9,11 +9,11 @@ from typing import Literal
 from eval.engine.evaluation import Sheet
 from eval.engine.table import Cell, Table
 from pipeline.randomness import decision_rng
-from stages.grammars.extraction import Extraction, extract
+from stages.grammars.distinct_shapes import some_shapes
+from stages.grammars.extraction.extract import Extraction, extract
 from stages.grammars.picture import dockers_row, shapes_row
-from stages.grammars.reading import read_surface
+from stages.grammars.read_surface import read_surface
 from stages.grammars.settings import GrammarConfig
-from stages.grammars.variety import some_shapes
 from stages.shape.views.sheet import Section, contact_sheet, picture_png
 
 DOCKERS = 3

@@ -26,7 +26,7 @@ from stages.exemplars.read import read_model
 from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.grammars.inspect import has_grammar, written_grammar
-from stages.grammars.reading import is_cloud
+from stages.grammars.read_surface import is_cloud
 from stages.shape.kit import ContactKind, Strictness
 from stages.variations.settings import CHOSEN_INSTEAD_STABLE
 

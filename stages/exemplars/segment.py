@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.exemplars.components import connected_faces
 from stages.exemplars.formats.scene import Placement, Scene, Surface, UniqueNames
-from stages.exemplars.symmetry.parts import by_sections, by_symmetry, search_size
+from stages.symmetry.parts import by_sections, by_symmetry, search_size
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")

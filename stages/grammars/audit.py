@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.places import Places
-from stages.grammars.derivation import derivation_text, pieces_of, read_derivation, surface_digest
+from stages.grammars.derivation_text import derivation_text, pieces_of, read_derivation, surface_digest
 from stages.grammars.files import made_grammars
 from stages.grammars.language import LANGUAGE
 from stages.shape.collection.audit import Audit

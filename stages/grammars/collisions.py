@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from stages.exemplars.symmetry.derivations import Derivation, row_seams
-from stages.grammars.derivation import Piece, Resized, pieces_of
+from stages.grammars.bounded_cache import Recent
+from stages.grammars.derivation import Derivation, row_seams
+from stages.grammars.derivation_text import Piece, Resized, pieces_of
 from stages.grammars.grammar import ShapeGrammar
-from stages.grammars.recent import Recent
-from stages.grammars.samples import TerminalSamples
+from stages.grammars.terminal_samples import TerminalSamples
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from stages.exemplars.symmetry.derivations import ENDS, Derivation
-from stages.grammars.derivation import derivation_text
+from stages.grammars.derivation import ENDS, Derivation
+from stages.grammars.derivation_text import derivation_text
 from stages.grammars.editing import options_of
-from stages.grammars.extraction import Extraction
+from stages.grammars.extraction.extract import Extraction
 from stages.grammars.grammar import GridRule, site_name
 
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.exemplars.symmetry.carve import Soup
-from stages.exemplars.symmetry.docking import OperationKind, operation_kind
-from stages.exemplars.symmetry.matching import matched_items
-from stages.exemplars.symmetry.places import items_in
-from stages.exemplars.symmetry.seams import cut_out
-from stages.grammars.extraction import Extraction
+from stages.grammars.extraction.extract import Extraction
+from stages.grammars.extraction.seams import cut_out
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, transform_points
+from stages.symmetry.matching.cell_lookup import items_in
+from stages.symmetry.matching.docking_sites import OperationKind, operation_kind
+from stages.symmetry.matching.r_symmetry import matched_items
+from stages.symmetry.surface.soup import Soup
 
 SAMPLE = 200
 """Items of a docker that are looked at to see whether another one is like it."""

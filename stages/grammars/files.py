@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.places import Places
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
-from stages.exemplars.symmetry.derivations import ENDS, Derivation, Place
+from stages.grammars.derivation import ENDS, Derivation, Place
 from stages.grammars.grammar import GridRule, Rule, ShapeGrammar
 from stages.shape.kit import PartMesh
 

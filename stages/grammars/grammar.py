@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from stages.exemplars.symmetry.derivations import START, Place
+from stages.grammars.derivation import START, Place
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 

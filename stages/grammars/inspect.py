@@ -12,15 +12,15 @@ from pipeline.errors import ConfigError
 from pipeline.places import write_file
 from stages.exemplars.model import Model
 from stages.exemplars.settings import ReadLimits
-from stages.exemplars.symmetry.cloud import Cloud, points_for, radius_for
-from stages.exemplars.symmetry.parts import about_size
-from stages.grammars.clouds import written_clouds
 from stages.grammars.description import describe_grammar
-from stages.grammars.extraction import Extraction, extract, mesh_of
+from stages.grammars.distinct_shapes import METHODS, some_shapes
+from stages.grammars.export_clouds import written_clouds
+from stages.grammars.extraction.extract import Extraction, extract, mesh_of
 from stages.grammars.picture import grammar_sheet, shapes_sheet
-from stages.grammars.reading import read_surface
+from stages.grammars.read_surface import read_surface
+from stages.grammars.scans.scanned_grid import Cloud, points_for, radius_for
 from stages.grammars.settings import LARGEST_RADIUS, GrammarConfig
-from stages.grammars.variety import METHODS, some_shapes
+from stages.symmetry.parts import about_size
 
 SHOWN = 12
 """So many shapes by each method are drawn to see what will come."""
@@ -33,7 +33,7 @@ LARGEST = 400_000
 
 READY = "ready for `make dataset CONFIG=` this file"
 READY_CLOUD = """of a point cloud. `python -m pipeline run grammars --config` this file makes its
-# shapes, and `python -m stages.grammars.clouds` writes them as PLY; what comes after it looks at surfaces"""
+# shapes, and `python -m stages.grammars.export_clouds` writes them as PLY; what comes after it looks at surfaces"""
 CONFIG = """\
 # Written by `make inspect`; {ready}. Every key is in configs/README.md.
 # {said}.

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
-from stages.grammars.derivation import exemplar_shape, shape_of_text
+from stages.grammars.derivation_text import exemplar_shape, shape_of_text
 from stages.grammars.files import load_grammar, made_grammars
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.settings import GrammarsConfig

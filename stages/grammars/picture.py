@@ -9,11 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from stages.exemplars.symmetry.carve import Soup, carve
-from stages.exemplars.symmetry.welding import welded
-from stages.grammars.derivation import Piece, Resized, exemplar_shape, lone_shape, pieces_of
+from stages.grammars.derivation_text import Piece, Resized, exemplar_shape, lone_shape, pieces_of
 from stages.grammars.editing import Option, edited, options_of
-from stages.grammars.extraction import Extraction
+from stages.grammars.extraction.extract import Extraction
 from stages.grammars.grammar import GridRule, ShapeGrammar, site_name
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.geometry.pose import transform_points
@@ -24,6 +22,8 @@ from stages.shape.views.palette import label_colors
 from stages.shape.views.portrait import points_portrait, portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
+from stages.symmetry.surface.soup import Soup, carve
+from stages.symmetry.surface.welding import welded
 
 CELL = 200
 COLUMNS = 4

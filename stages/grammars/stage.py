@@ -3,7 +3,7 @@
 
 Its first shards extract a grammar each: `<name>.json`, `<name>.tar`, `<name>.png`. Then one draws the shapes of all of
 them, refuses what collides or was drawn before, and gives each of the others its split and shard. A sample carries no
-meshes: its text is its derivation, and `stages.grammars.derivation.shape_of_text` makes the shape.
+meshes: its text is its derivation, and `stages.grammars.derivation_text.shape_of_text` makes the shape.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ def run_extraction(task: Task) -> Outcome:
     """Read a mesh or a cloud, find its grammar, write it. Raises ShardFailed for one in which nothing can be
     exchanged."""
     from stages.grammars.description import describe_grammar
-    from stages.grammars.extraction import extract
+    from stages.grammars.extraction.extract import extract
     from stages.grammars.files import write_grammar
     from stages.grammars.picture import grammar_sheet
-    from stages.grammars.reading import read_surface
+    from stages.grammars.read_surface import read_surface
 
     names = grammar_shards(task.config)
     config = task.config.section(GrammarsConfig).models[names.index(task.shard.name)]
@@ -99,7 +99,7 @@ def run_drawing(task: Task) -> Outcome:
     Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises ShardFailed
     where there are no shapes.
     """
-    from stages.grammars.variety import few
+    from stages.grammars.distinct_shapes import few
 
     config = task.config.section(GrammarsConfig)
     rows: list[dict[str, Any]] = []
@@ -128,7 +128,7 @@ def run_drawing(task: Task) -> Outcome:
 
 def _drawn(task: Task, config: GrammarConfig, first: int) -> list[dict[str, Any]]:
     """The shapes of one grammar as rows, `first` rows being there already."""
-    from stages.grammars.variety import Variety, wanted
+    from stages.grammars.distinct_shapes import Variety, wanted
 
     variety = Variety(
         input_grammars(task)[config.name],
@@ -169,7 +169,7 @@ def run_collection(task: Task) -> Outcome:
 
 def report(plan: Plan) -> Sequence[str]:
     """What each grammar has, how many shapes were drawn of it, why others were refused, and where there are no more."""
-    from stages.grammars.variety import few
+    from stages.grammars.distinct_shapes import few
 
     lines = []
     for name in grammar_shards(plan.config):

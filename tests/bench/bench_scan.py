@@ -10,11 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stages.exemplars.symmetry.cloud import Cloud
-from stages.grammars.extraction import Extraction, Mesh, extract
+from stages.grammars.extraction.extract import Extraction, Mesh, extract
+from stages.grammars.scans.scanned_grid import Cloud
 from tests.bench.measure import Measure
-from tests.stages.exemplars.symmetry.planted import mesh, wall
-from tests.stages.exemplars.symmetry.scanned import scanned
+from tests.stages.grammars.scanned import scanned
+from tests.stages.symmetry.planted import mesh, wall
 
 RADIUS = 0.016
 POINTS = 1_200_000

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from stages.exemplars.read import read_model
-from stages.exemplars.symmetry.welding import welded
-from stages.grammars.extraction import Mesh, extract, mesh_of
+from stages.grammars.extraction.extract import Mesh, extract, mesh_of
 from stages.shape.arrays import FloatArray
+from stages.symmetry.surface.welding import welded
 from tests.bench.measure import Measure
-from tests.stages.exemplars.symmetry.planted import wall
+from tests.stages.symmetry.planted import wall
 
 RADIUS = 0.016
 LEAST = 250_000

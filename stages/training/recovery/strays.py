@@ -23,7 +23,7 @@ def strays_of(points: FloatArray) -> BoolArray:
     """Which points (n, 3) of a cloud are outliers: by the distance to the fourth neighbor, beside that of the neighbors
     (after the local outlier factor, Breunig et al. 2000) and beside the median of all. None where fewer than one in a
     hundred are."""
-    # not `stages.exemplars.symmetry.neighbourhoods`: it holds all points against the median of all, which costs nothing
+    # not `point_neighbourhoods`: it holds all points against the median of all, which costs nothing
     # beside the planes of a million points and finds 98 % of a wall's strays, but of those of chairs, vases, tables and
     # lamps 56 to 75 % where this finds 92 to 95; this would take a fifth more of the time of such a scan
     places, where = np.unique(points, axis=0, return_inverse=True)

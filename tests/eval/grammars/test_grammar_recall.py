@@ -11,7 +11,7 @@ import trimesh
 from eval.grammars.exchanges import known_exchanges
 from eval.grammars.grammar_recall import grammar_returned, grammar_table
 from stages.shape.kit import Kit
-from tests.stages.exemplars.symmetry.planted import mesh, wall
+from tests.stages.symmetry.planted import mesh, wall
 from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from eval.__main__ import main
-from tests.stages.exemplars.symmetry.planted import mesh, wall
+from tests.stages.symmetry.planted import mesh, wall
 
 
 def test_a_row_and_a_row_of_pictures_for_each_radius(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

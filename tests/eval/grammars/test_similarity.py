@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eval.grammars.similarity import COLUMNS, Similarity, apart, r_similarity, similarity_row
-from tests.stages.exemplars.symmetry.planted import box, moved, screw, spiral_stair, wall
+from tests.stages.symmetry.planted import box, moved, screw, spiral_stair, wall
 
 RADIUS = 0.16
 

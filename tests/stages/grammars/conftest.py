@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stages.grammars.collisions import Collisions
-from stages.grammars.extraction import Extraction, Mesh, extract
+from stages.grammars.extraction.extract import Extraction, Mesh, extract
 from stages.grammars.grammar import ShapeGrammar
-from tests.stages.exemplars.symmetry.planted import mesh, wall
+from tests.stages.symmetry.planted import mesh, wall
 
 
 @pytest.fixture(scope="session")

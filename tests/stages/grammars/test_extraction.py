@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.grammars.extraction import Mesh, extract
+from stages.grammars.extraction.extract import Mesh, extract
 from stages.shape.arrays import IntArray
-from tests.stages.exemplars.symmetry.planted import mesh, wall
+from tests.stages.symmetry.planted import mesh, wall
 
 
 def facing(corners: np.ndarray) -> IntArray:

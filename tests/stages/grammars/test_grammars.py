@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from eval.grammars.similarity import r_similarity, triangles_of
-from stages.exemplars.symmetry.derivations import START, Derivation
 from stages.grammars.collisions import Collisions
-from stages.grammars.derivation import (
+from stages.grammars.derivation import START, Derivation
+from stages.grammars.derivation_text import (
     DerivationError,
     Piece,
     Resized,
@@ -22,12 +22,12 @@ from stages.grammars.derivation import (
     surface_digest,
 )
 from stages.grammars.description import describe_grammar
-from stages.grammars.drawing import random_derivation
 from stages.grammars.editing import edited, options_of
-from stages.grammars.extraction import Extraction
+from stages.grammars.extraction.extract import Extraction
 from stages.grammars.files import load_grammar, write_grammar
 from stages.grammars.grammar import ShapeGrammar
-from tests.stages.exemplars.symmetry.planted import area, wall
+from stages.grammars.random_derivations import random_derivation
+from tests.stages.symmetry.planted import area, wall
 
 
 def original(grammar: ShapeGrammar, start: int) -> Derivation:

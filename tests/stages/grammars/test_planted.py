@@ -7,12 +7,12 @@ import pytest
 
 from eval.grammars.similarity import r_similarity, triangles_of
 from stages.grammars.collisions import Collisions
-from stages.grammars.derivation import derivation_text, pieces_of, shape_of_text, surface_digest
-from stages.grammars.drawing import Collided, random_counts, random_derivation
-from stages.grammars.extraction import Extraction, Mesh, extract
+from stages.grammars.derivation_text import derivation_text, pieces_of, shape_of_text, surface_digest
+from stages.grammars.extraction.extract import Extraction, Mesh, extract
 from stages.grammars.grammar import ShapeGrammar
+from stages.grammars.random_derivations import Collided, random_counts, random_derivation
 from stages.shape.arrays import FloatArray
-from tests.stages.exemplars.symmetry.planted import (
+from tests.stages.symmetry.planted import (
     blind_corners,
     mesh,
     prongs_and_bridge,

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.mill import mill
-from tests.stages.exemplars.symmetry.planted import mesh, wall
+from tests.stages.symmetry.planted import mesh, wall
 
 CONFIG = """\
 name: walls

@@ -1,0 +1,96 @@
+"""Meshes and point clouds from files, each read in a process of its own, which may take so much and no more."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from pipeline.bounded import Escaped, in_child
+from pipeline.errors import ConfigError
+from stages.exemplars.formats.enclosure import Enclosure
+from stages.exemplars.formats.ply import read_ply_points
+from stages.exemplars.formats.scene import GREY
+from stages.exemplars.read import read_model
+from stages.exemplars.settings import ReadLimits
+from stages.grammars.extraction.extract import Mesh, mesh_of
+from stages.grammars.scans.scanned_grid import Cloud
+
+TABLES = {".xyz": None, ".xyzn": "normals", ".xyzrgb": "colours"}
+"""Clouds as text, a point a line: x, y, z, and what else, colours from 0 to 1 (as Open3D writes them)."""
+MESH = b""
+"""What the child says of a PLY file with faces."""
+
+
+def read_surface(path: Path, limits: ReadLimits | None = None) -> tuple[Mesh | Cloud, Literal["y", "z"] | None]:
+    """The surface in a model file, all of it one mesh, or in a cloud; and the axis that the file says points up.
+
+    Raises ConfigError as `read_model` and `read_cloud` do.
+    """
+    cloud = read_cloud(path, limits)
+    if cloud is not None:
+        return cloud, None
+    model = read_model(path, "components", limits)
+    return mesh_of(model), model.up
+
+
+def is_cloud(path: Path, limits: ReadLimits | None = None) -> bool:
+    """Whether a file is a point cloud. Raises ConfigError as `read_cloud` does."""
+    return path.suffix.lower() in TABLES or read_cloud(path, limits) is not None
+
+
+def read_cloud(path: Path, limits: ReadLimits | None = None) -> Cloud | None:
+    """The cloud in a PLY file without faces, or a table of numbers; None for any other file.
+
+    Raises ConfigError for a file that cannot be read as such. Which clouds are scans of a surface, `cloud_grid` says.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in (*TABLES, ".ply") or not path.is_file():
+        return None
+    limits = limits or ReadLimits()
+    try:
+        content = in_child(
+            lambda: _packed(path), cpu_seconds=limits.cpu_seconds, memory_mb=limits.memory_mb, refusal=ConfigError
+        )
+    except Escaped as error:
+        raise ConfigError(
+            f"{path}: cannot be read: {error}; thin the cloud out, or raise exemplars.limits in the config"
+        ) from None
+    if content == MESH:
+        return None
+    with np.load(io.BytesIO(content), allow_pickle=False) as stored:
+        normals = stored["normals"]
+        return Cloud(stored["points"], stored["colors"], normals if len(normals) else None)
+
+
+def _packed(path: Path) -> bytes:
+    """A cloud as an npz file of plain arrays; MESH where there are faces."""
+    if path.suffix.lower() == ".ply":
+        read = read_ply_points(path, Enclosure(path))
+        if read is None:
+            return MESH
+    else:
+        read = _table(path)
+    points, normals, colors = read
+    if colors is None:
+        colors = np.tile(np.array(GREY, np.uint8), (len(points), 1))
+    stream = io.BytesIO()
+    np.savez(stream, points=points, colors=colors, normals=np.empty((0, 3)) if normals is None else normals)
+    return stream.getvalue()
+
+
+def _table(path: Path) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """Points, normals and colours of a text file, a point a line."""
+    more = TABLES[path.suffix.lower()]
+    try:
+        rows = np.loadtxt(path, ndmin=2)
+    except ValueError as error:
+        raise ConfigError(f"{path}: no table of numbers ({error}); export it again") from None
+    if rows.shape[1] < (6 if more else 3):
+        raise ConfigError(f"{path}: {rows.shape[1]} numbers a line; a point has {'6' if more else '3'} at least")
+    points, last = np.ascontiguousarray(rows[:, :3]), rows[:, 3:6]
+    if more == "colours":
+        return points, None, np.rint(np.clip(last, 0, 1) * 255).astype(np.uint8)
+    return points, last if more == "normals" else None, None

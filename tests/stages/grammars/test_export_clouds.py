@@ -1,0 +1,138 @@
+"""The grammar of a scan of a wall is that of the wall; each neighbourhood of its shapes is one of the scan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eval.grammars.cloud_similarity import MATCHED, cloud_similarity
+from pipeline.errors import ConfigError
+from stages.exemplars.read import read_model
+from stages.grammars.description import describe_grammar
+from stages.grammars.export_clouds import cloud_of_text, main, ply_bytes
+from stages.grammars.extraction.extract import Extraction, extract
+from stages.grammars.files import write_grammar
+from stages.grammars.read_surface import is_cloud, read_cloud, read_surface
+from stages.grammars.scans.scanned_grid import Cloud
+from stages.shape.arrays import FloatArray
+from tests.stages.grammars.test_planted import extraction
+from tests.stages.grammars.test_scanned_grid import CELL, SHARE, cloud_of
+from tests.stages.symmetry.planted import wall
+
+
+@pytest.fixture(scope="module")
+def cloud() -> Cloud:
+    return cloud_of(wall(4), count=50_000)
+
+
+@pytest.fixture(scope="module")
+def found(cloud: Cloud) -> Extraction:
+    return extract(cloud, "scan", SHARE, "z", np.random.default_rng(0))
+
+
+class TestGrammar:
+    def test_sites_dockers_rules_and_grids_are_those_of_the_mesh(self, found: Extraction) -> None:
+        exact = extraction(wall(4), SHARE)
+        for each in (found, exact):
+            assert [docker.site for docker in each.dockers] == [0] * 8
+            assert [grid.counts for grid in each.grammar.grids] == [(3,), (3,)]
+        assert len(found.grammar.rules) == len(exact.grammar.rules)
+
+    def test_every_terminal_is_made_of_whole_splats(self, found: Extraction) -> None:
+        for mesh in found.grammar.meshes:
+            corners = mesh.vertices[mesh.faces]
+            sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+            assert np.allclose(sides, sides[:, :1], rtol=1e-3)
+
+    def test_a_grid_as_the_exemplar_has_it_gives_all_of_its_points_back(self, found: Extraction) -> None:
+        back = cloud_of_text(found.grammar, "G0[3]").points
+        assert len(back) == pytest.approx(len(found.grid.corners), rel=0.02)
+        assert np.allclose(np.ptp(back, axis=0), np.ptp(found.grid.corners.mean(axis=1), axis=0), atol=CELL)
+
+
+class TestSimilar:
+    @pytest.mark.parametrize("text", ["G0[1]", "G0[6]", "G1[4]"])
+    def test_every_neighbourhood_of_a_shape_is_one_of_the_scan(
+        self, cloud: Cloud, found: Extraction, text: str
+    ) -> None:
+        shape = cloud_of_text(found.grammar, text).points
+        assert np.ptp(shape[:, 0]) == pytest.approx(5.2 + int(text[3]) - 3, abs=CELL)
+        assert (similarity(cloud.points, shape) >= MATCHED).all()
+
+    def test_a_step_that_no_scan_has_is_found(self, cloud: Cloud) -> None:
+        stepped = cloud.points.copy()
+        stepped[stepped[:, 0] > 2.6, 1] += 3 * CELL
+        here = np.abs(stepped[:, 0] - 2.6) < CELL
+        assert (similarity(cloud.points, stepped, here) < MATCHED).mean() > 0.9
+
+
+def similarity(exemplar: FloatArray, shape: FloatArray, only: np.ndarray | None = None) -> FloatArray:
+    """Of 24 probes, of some points alone."""
+    rng = np.random.default_rng(0)
+    return cloud_similarity(exemplar, shape, 4 * CELL, 0.75 * CELL, 2, 24, rng, only)
+
+
+class TestFiles:
+    def test_a_ply_without_faces_is_a_cloud_with_its_normals_and_colours(self, tmp_path: Path, cloud: Cloud) -> None:
+        normals = np.tile([0.0, 1.0, 0.0], (len(cloud.points), 1))
+        path = tmp_path / "scan.ply"
+        path.write_bytes(ply_bytes(Cloud(cloud.points, cloud.colors, normals)))
+        read = read_cloud(path)
+        assert read is not None
+        assert read.normals is not None
+        assert (read.points == cloud.points).all()
+        assert (read.normals == normals).all()
+        assert (read.colors == cloud.colors).all()
+
+    @pytest.mark.parametrize(("suffix", "columns"), [("xyz", 3), ("xyzn", 6), ("xyzrgb", 6)])
+    def test_a_table_is_a_cloud(self, tmp_path: Path, suffix: str, columns: int) -> None:
+        rows = np.random.default_rng(0).random((40, columns)).round(4)
+        path = tmp_path / f"scan.{suffix}"
+        np.savetxt(path, rows)
+        read = read_cloud(path)
+        assert read is not None
+        assert (read.points == rows[:, :3]).all()
+        assert (read.normals is not None) == (suffix == "xyzn")
+        assert is_cloud(path)
+
+    def test_a_mesh_is_none(self) -> None:
+        assert not is_cloud(Path("datasets/exemplars/facade/townhouse.glb"))
+
+    @pytest.mark.parametrize(
+        ("name", "content", "why"),
+        [
+            ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty int x\nend_header\n1\n2\n", "no property y"),
+            ("b.ply", b"ply\nformat ascii 1.0\nelement vertex 9\nproperty int x\nend_header\n1\n", "cut off"),
+            ("c.xyz", b"1 2 3\nfour 5 6\n", "no table of numbers"),
+            ("d.xyzn", b"1 2 3\n4 5 6\n", "3 numbers a line"),
+        ],
+        ids=["lacking", "cut off", "words", "narrow"],
+    )  # fmt: skip
+    def test_what_is_no_cloud_is_refused(self, tmp_path: Path, name: str, content: bytes, why: str) -> None:
+        path = tmp_path / name
+        path.write_bytes(content)
+        with pytest.raises(ConfigError, match=why):
+            read_surface(path)
+
+    def test_a_cloud_has_no_parts(self, tmp_path: Path, cloud: Cloud) -> None:
+        path = tmp_path / "scan.ply"
+        path.write_bytes(ply_bytes(Cloud(cloud.points, cloud.colors, cloud.points)))
+        with pytest.raises(ConfigError, match="if it is a point cloud, which has no parts, make a grammar of it"):
+            read_model(path)
+
+
+def test_the_command_writes_shapes_as_clouds(
+    tmp_path: Path, found: Extraction, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, arrays = tmp_path / "scan.json", tmp_path / "scan.tar"
+    with text.open("wb") as json, arrays.open("wb") as tar:
+        write_grammar(describe_grammar(found), found.grammar, json, tar)
+    assert main([str(text), "G0[2]", "--out", str(tmp_path)]) == 0
+    read = read_cloud(tmp_path / "scan-0.ply")
+    assert read is not None
+    assert np.allclose(read.points, cloud_of_text(found.grammar, "G0[2]").points)
+    assert main([str(text), "G0[2"]) == 2
+    assert main([str(tmp_path / "none.json"), "G0[2]"]) == 2
+    assert "there is no file" in capsys.readouterr().err
