@@ -112,7 +112,7 @@ train: setup  ## Train the models of CONFIG, on the dataset's samples where they
 recover: setup  ## Find the parameters of PROGRAM, or of the likeliest program, whose shape is like INPUT
 	@[ -n "$$INPUT" ] || { echo 'make recover needs INPUT=scan.ply or INPUT=drawing.png' >&2; exit 2; }
 	@OMP_WAIT_POLICY=PASSIVE \
-	$(PYTHON) -m stages.training.recovery --out "$$OUT" --program "$$PROGRAM" --up "$$UP" $(SEEDED) -- "$$INPUT"
+	$(PYTHON) -m stages.recovery --out "$$OUT" --program "$$PROGRAM" --up "$$UP" $(SEEDED) -- "$$INPUT"
 
 # Looking at it ------------------------------------------------------------------------------------------------------
 

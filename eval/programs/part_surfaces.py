@@ -21,7 +21,7 @@ from stages.shapeassembly.extraction.boxes import box_corners, nearest_axes
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.minimum_box import minimum_box
 from stages.shapeassembly.extraction.validity import surface_points
-from stages.training.recovery.shapes import TRAIN, random_shapes
+from stages.training.recovery.shapes import TRAIN_INTERVAL, random_shapes
 from stages.training.recovery.surface import even_points
 from stages.training.standing import drawn as drawn_points
 
@@ -59,7 +59,7 @@ def places_of(boxes: Sequence[Box]) -> FloatArray:
 def curve_parts(program: str, shapes: int, rng: np.random.Generator) -> PartClouds:
     """The parts of random shapes of a curve program: the surfaces that cuboids stand for."""
     points, places = [], []
-    for shape in islice(random_shapes(find_program(program), TRAIN, rng), shapes):
+    for shape in islice(random_shapes(find_program(program), TRAIN_INTERVAL, rng), shapes):
         meshes = [part.mesh for part in shape.parts]
         boxes = [nearest_axes(minimum_box(mesh.vertices, WORTH_TURNING), np.eye(3)) for mesh in meshes]
         for mesh, box in zip(meshes, boxes, strict=True):

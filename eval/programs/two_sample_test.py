@@ -12,9 +12,9 @@ from torch import Tensor, nn
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from eval.engine.table import Cell
+from stages.recovery.recover import PRETRAINED_FOLDER, find_models
 from stages.shape.arrays import FloatArray
-from stages.training.recovery.clouds import frame_of, taken
-from stages.training.recovery.recover import SHIPPED, find_models
+from stages.training.recovery.clouds import frame_of, subsample
 
 FEATURES = ("chair", "points")
 """The frozen network whose features are compared is the encoder of the recovery model of this program and input that
@@ -44,7 +44,7 @@ def realism(samples: FloatArray, real: FloatArray, features: FloatArray | None, 
     return Realism(fooled(samples[:, ::4], real[:, ::4], seed), distance)
 
 
-def features_of(clouds: FloatArray, folder: Path = SHIPPED) -> FloatArray | None:
+def features_of(clouds: FloatArray, folder: Path = PRETRAINED_FOLDER) -> FloatArray | None:
     """Features float64 (n, d) of clouds (n, k, 3), y up, any place and size; None where no network ships.
 
     d: the widths of the encoder's embedding, its maximum and its mean.
@@ -56,7 +56,7 @@ def features_of(clouds: FloatArray, folder: Path = SHIPPED) -> FloatArray | None
     found = []
     with torch.no_grad():
         for cloud in clouds:
-            points = taken(cloud, network.entry.points, rng)
+            points = subsample(cloud, network.entry.points, rng)
             seen = torch.from_numpy(frame_of(points).normalized(points)[None]).float()
             found.append(network.module.encoder(seen)[0].double().numpy())
     return np.stack(found)

@@ -17,13 +17,13 @@ from pipeline.errors import ConfigError
 from stages.programs.movement import STEP, moved
 from stages.programs.program import Program
 from stages.programs.schema import Values
+from stages.recovery.reading import RecoveryInput
+from stages.recovery.recover import PRETRAINED_FOLDER, RecoveryModels, RecoveryResult, find_models, recover_input
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.training.recovery.clouds import frame_of
-from stages.training.recovery.drawings import drawn
-from stages.training.recovery.reading import Input
-from stages.training.recovery.recover import SHIPPED, Models, Recovered, find_models, recover_input
-from stages.training.recovery.shapes import TEST, TRAIN, RandomShape, random_shapes
-from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
+from stages.training.recovery.drawings import draw_fitted
+from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, RandomShape, random_shapes
+from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
 from stages.training.recovery.trained import TrainedRecovery
 
 MEASURED = 10_000
@@ -56,7 +56,7 @@ PUBLISHED = (
 )
 
 
-Method = Callable[[Input], Recovered]
+Method = Callable[[RecoveryInput], RecoveryResult]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Found:
 
     label: str
     program: Program
-    results: tuple[Recovered, ...]
+    results: tuple[RecoveryResult, ...]
     distances: FloatArray
     exact: BoolArray
     near: BoolArray
@@ -78,39 +78,39 @@ class Found:
 def published_chamfer(first: FloatArray, second: FloatArray) -> float:
     """The mean squared distance to the nearest, the mean of both ways, of clouds (n, 3) that are each brought into the
     unit sphere around the middle of its box: as the published code measures."""
-    return chamfer_distance(_in_sphere(first), _in_sphere(second)) / 2.0
+    return squared_chamfer_distance(_in_sphere(first), _in_sphere(second)) / 2.0
 
 
 def held_out(
     model: TrainedRecovery, count: int, rng: np.random.Generator
-) -> Iterator[tuple[str, list[RandomShape], list[Input]]]:
+) -> Iterator[tuple[str, list[RandomShape], list[RecoveryInput]]]:
     """`count` shapes that no model has learnt from, as clouds; or as drawings from the views that the model has learnt,
     in turns, and once more from those that it has not."""
-    shapes = list(islice(random_shapes(model.program, TEST, rng), count))
+    shapes = list(islice(random_shapes(model.program, TEST_INTERVAL, rng), count))
     names = [f"{number:03}" for number in range(count)]
     if model.entry.input == "points":
-        clouds = [sampled_points(each.parts, GIVEN, rng) for each in shapes]
-        yield "points", shapes, [Input(name, points=each) for name, each in zip(names, clouds, strict=True)]
+        clouds = [sample_points(each.parts, GIVEN, rng) for each in shapes]
+        yield "points", shapes, [RecoveryInput(name, points=each) for name, each in zip(names, clouds, strict=True)]
         return
     learnt = [each for each in model.sketches.views if not model.entry.views or each.name in model.entry.views]
     novel = [each for each in model.sketches.views if each not in learnt]
     for angle, views in (("trained angles", learnt), ("novel angle", novel)):
         if views:
             inks = [
-                drawn(model.program, each.parts, views[place % len(views)], model.sketches, rng)
+                draw_fitted(model.program, each.parts, views[place % len(views)], model.sketches, rng)
                 for place, each in enumerate(shapes)
             ]
             yield (
                 f"sketch, {angle}",
                 shapes,
-                [Input(name, ink=each) for name, each in zip(names, inks, strict=True)],
+                [RecoveryInput(name, ink=each) for name, each in zip(names, inks, strict=True)],
             )
 
 
-def usable_models(folder: Path, programs: Collection[str]) -> Models:
+def usable_models(folder: Path, programs: Collection[str]) -> RecoveryModels:
     """The recovery models in a folder of published models, and of those that come with Shapemill where it has none; of
     `programs`, if any are named. Raises ConfigError where that leaves none."""
-    models, wrong = find_models(folder, SHIPPED)
+    models, wrong = find_models(folder, PRETRAINED_FOLDER)
     asked = {key: model for key, model in models.items() if not programs or model.program.name in programs}
     if not asked:
         told = f"no recovery model of {', '.join(programs)}" if programs else "; ".join(wrong)
@@ -123,7 +123,7 @@ def methods(model: TrainedRecovery, budget: int, seed: int) -> dict[str, Method]
     program, kind = model.program, model.entry.input
     key = (model.header["program"], kind)
 
-    def recovered(models: Models, shapes: int) -> Method:
+    def recovered(models: RecoveryModels, shapes: int) -> Method:
         return lambda given: recover_input(given, key[0], models, "y", shapes, seed, turned=False)
 
     found = {
@@ -138,7 +138,7 @@ def methods(model: TrainedRecovery, budget: int, seed: int) -> dict[str, Method]
 
 
 def tried(
-    label: str, program: Program, method: Method, shapes: Sequence[RandomShape], inputs: Sequence[Input]
+    label: str, program: Program, method: Method, shapes: Sequence[RandomShape], inputs: Sequence[RecoveryInput]
 ) -> Found:
     """What a method makes of inputs, against the shapes that they are of."""
     counts = np.array([len(each.values) for each in program.parameters])
@@ -150,7 +150,7 @@ def tried(
         values = results[-1].values
         seconds += time.process_time() - began
         clouds = [
-            sampled_points(parts, MEASURED, np.random.default_rng(side))
+            sample_points(parts, MEASURED, np.random.default_rng(side))
             for side, parts in enumerate((shape.parts, program.parts(values)))
         ]
         distances.append(published_chamfer(*clouds))
@@ -163,7 +163,7 @@ def tried(
 
 def floor(program: Program, shapes: Sequence[RandomShape]) -> FloatArray:
     """How far true shapes are from themselves, by chance, float64 (n,)."""
-    pairs = ([sampled_points(each.parts, MEASURED, np.random.default_rng(side)) for side in (0, 1)] for each in shapes)
+    pairs = ([sample_points(each.parts, MEASURED, np.random.default_rng(side)) for side in (0, 1)] for each in shapes)
     return np.array([published_chamfer(*pair) for pair in pairs])
 
 
@@ -302,16 +302,18 @@ def _nearest(program: Program, rng: np.random.Generator) -> Method:
 
     @cache
     def known() -> list[tuple[Values, FloatArray]]:
-        made = islice(random_shapes(program, TRAIN, rng), NEIGHBORS)
+        made = islice(random_shapes(program, TRAIN_INTERVAL, rng), NEIGHBORS)
         pairs = ((each.values, shape_points(each.parts, GLIMPSE)) for each in made)
         return [(values, frame_of(points).normalized(points)) for values, points in pairs]
 
-    def method(given: Input) -> Recovered:
+    def method(given: RecoveryInput) -> RecoveryResult:
         assert given.points is not None
         points = frame_of(given.points).normalized(given.points[:GLIMPSE])
-        distances = [chamfer_distance(points, each) for _, each in known()]
+        distances = [squared_chamfer_distance(points, each) for _, each in known()]
         values, _ = known()[int(np.argmin(distances))]
-        return Recovered(program, values, min(distances), min(distances), 0.0, None, None, None, "y", NEIGHBORS, ())
+        return RecoveryResult(
+            program, values, min(distances), min(distances), 0.0, None, None, None, "y", NEIGHBORS, ()
+        )
 
     return method
 

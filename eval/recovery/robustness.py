@@ -11,13 +11,13 @@ import numpy as np
 from eval.engine.table import Cell, Table
 from eval.recovery.accuracy import MEASURED, Found, published_chamfer
 from pipeline.errors import ConfigError
+from stages.recovery.reading import InputError, RecoveryInput, read_inputs
+from stages.recovery.recover import RecoveryModels, RecoveryResult, recover_input
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.training.recovery.clouds import frame_of, taken
-from stages.training.recovery.drawings import drawn
-from stages.training.recovery.reading import Input, InputError, read_inputs
-from stages.training.recovery.recover import Models, Recovered, recover_input
+from stages.training.recovery.clouds import frame_of, subsample
+from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.shapes import RandomShape
-from stages.training.recovery.surface import sampled_points
+from stages.training.recovery.surface import sample_points
 from stages.training.recovery.trained import TrainedRecovery
 
 WAYS = ("network", "network, refined")
@@ -49,7 +49,7 @@ def _uneven(points: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def _few(points: FloatArray, rng: np.random.Generator) -> FloatArray:
-    return taken(points, 300, rng)
+    return subsample(points, 300, rng)
 
 
 def _thick(ink: BoolArray, _: np.random.Generator) -> BoolArray:
@@ -79,11 +79,11 @@ def _wobbly(ink: BoolArray, rng: np.random.Generator) -> BoolArray:
     return moved
 
 
-Spoil = Callable[[Input, np.random.Generator], Input]
+Spoil = Callable[[RecoveryInput, np.random.Generator], RecoveryInput]
 
 
 def _of_cloud(change: Callable[[FloatArray, np.random.Generator], FloatArray]) -> Spoil:
-    def spoil(given: Input, rng: np.random.Generator) -> Input:
+    def spoil(given: RecoveryInput, rng: np.random.Generator) -> RecoveryInput:
         assert given.points is not None
         return replace(given, points=change(given.points, rng))
 
@@ -91,7 +91,7 @@ def _of_cloud(change: Callable[[FloatArray, np.random.Generator], FloatArray]) -
 
 
 def _of_drawing(change: Callable[[BoolArray, np.random.Generator], BoolArray]) -> Spoil:
-    def spoil(given: Input, rng: np.random.Generator) -> Input:
+    def spoil(given: RecoveryInput, rng: np.random.Generator) -> RecoveryInput:
         assert given.ink is not None
         return replace(given, ink=change(given.ink, rng))
 
@@ -128,8 +128,8 @@ def ways_to_spoil(kind: str) -> tuple[str, ...]:
 
 
 def spoilt_inputs(
-    model: TrainedRecovery, how: str, shapes: Sequence[RandomShape], inputs: Sequence[Input], seed: int
-) -> list[Input]:
+    model: TrainedRecovery, how: str, shapes: Sequence[RandomShape], inputs: Sequence[RecoveryInput], seed: int
+) -> list[RecoveryInput]:
     """All inputs, which are of `shapes`, spoilt in one of the ways of their kind; or drawn from another side than the
     model has learnt."""
     kind = model.entry.input
@@ -140,7 +140,7 @@ def spoilt_inputs(
     side = 1.0 if model.program.elevation > 0 else -1.0
     view = model.sketches.views[0].model_copy(update={"azimuth": azimuth, "elevation": side * elevation})
     rng = np.random.default_rng(seed)
-    inks = [drawn(model.program, each.parts, view, model.sketches, rng) for each in shapes]
+    inks = [draw_fitted(model.program, each.parts, view, model.sketches, rng) for each in shapes]
     return [replace(given, ink=ink) for given, ink in zip(inputs, inks, strict=True)]
 
 
@@ -166,7 +166,7 @@ def spoilt_table(found: Sequence[Found]) -> Table:
     return Table("Recovery of spoilt inputs", ("input", "shapes", "chamfer", "median", "partial"), rows, notes)
 
 
-def foreign_inputs(folder: Path, kind: str) -> list[Input]:
+def foreign_inputs(folder: Path, kind: str) -> list[RecoveryInput]:
     """The inputs of a kind in a folder, or a file. Raises ConfigError for one that cannot be read, or for none."""
     found = []
     for given in read_inputs(folder):
@@ -178,12 +178,12 @@ def foreign_inputs(folder: Path, kind: str) -> list[Input]:
 
 
 def foreign_rows(
-    model: TrainedRecovery, inputs: Sequence[Input], budget: int, seed: int
-) -> list[tuple[str, list[float], list[Recovered]]]:
+    model: TrainedRecovery, inputs: Sequence[RecoveryInput], budget: int, seed: int
+) -> list[tuple[str, list[float], list[RecoveryResult]]]:
     """For the base shape, the network and its refinement: the distance of each cloud from the shape that comes out,
     and what came out."""
     program, name = model.program, model.header["program"]
-    known: Models = {(name, model.entry.input): model}
+    known: RecoveryModels = {(name, model.entry.input): model}
     rows = []
     for way, models, shapes in (("base shape", {}, 1), (WAYS[0], known, 1), (WAYS[1], known, budget)):
         distances, results = [], []
@@ -193,14 +193,14 @@ def foreign_rows(
             if given.points is None or found.placement is None:
                 distances.append(found.distance)
                 continue
-            made = sampled_points(program.parts(found.values), MEASURED, np.random.default_rng(0))
+            made = sample_points(program.parts(found.values), MEASURED, np.random.default_rng(0))
             placed = made @ found.placement[:3, :3].T + found.placement[:3, 3]
             distances.append(published_chamfer(given.points, placed))
         rows.append((way, distances, results))
     return rows
 
 
-def foreign_table(rows: Sequence[tuple[str, Sequence[float], Sequence[Recovered]]]) -> Table:
+def foreign_table(rows: Sequence[tuple[str, Sequence[float], Sequence[RecoveryResult]]]) -> Table:
     """One row a method and folder; `rows`: a label and what `foreign_rows` found for it."""
     cells: list[tuple[Cell, ...]] = []
     for label, distances, results in rows:

@@ -26,9 +26,9 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
     """One for each program and kind of input."""
     from eval.recovery.accuracy import usable_models
     from stages.programs.program import program_module
-    from stages.training.recovery.recover import SHIPPED
+    from stages.recovery.recover import PRETRAINED_FOLDER
 
-    reads = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(SHIPPED, "recovery")]
+    reads = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(PRETRAINED_FOLDER, "recovery")]
     for (program, kind), model in sorted(usable_models(subject.models, asked.programs).items()):
         make = partial(_of_model, model, asked, subject.config.seed)
         options = ("shapes", "refined", "budget")
@@ -48,8 +48,8 @@ def _of_model(model: TrainedRecovery, asked: Namespace, seed: int) -> Answer:
         tried,
     )
     from pipeline.randomness import decision_rng
+    from stages.recovery.files import recovery_picture
     from stages.shape.views.sheet import picture_png
-    from stages.training.recovery.files import recovery_picture
 
     rows: list[Found] = []
     strips, shares = [], {}

@@ -15,8 +15,8 @@ from eval.engine.results_cache import Part, in_parts
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
-    from stages.training.recovery.reading import Input
-    from stages.training.recovery.recover import Recovered
+    from stages.recovery.reading import RecoveryInput
+    from stages.recovery.recover import RecoveryResult
     from stages.training.recovery.trained import TrainedRecovery
 
 SHOWN = 8
@@ -28,9 +28,9 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
     from eval.recovery.accuracy import usable_models
     from eval.recovery.robustness import foreign_inputs, ways_to_spoil
     from stages.programs.program import program_module
-    from stages.training.recovery.recover import SHIPPED
+    from stages.recovery.recover import PRETRAINED_FOLDER
 
-    weights = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(SHIPPED, "recovery")]
+    weights = [*weights_of_kind(subject.models, "recovery"), *weights_of_kind(PRETRAINED_FOLDER, "recovery")]
     models, seed = usable_models(subject.models, asked.programs), subject.config.seed
     brought = {(folder, kind): foreign_inputs(folder, kind) for folder in asked.foreign for _, kind in models}
     for (program, kind), model in sorted(models.items()):
@@ -59,7 +59,9 @@ def _of_spoilt(model: TrainedRecovery, how: str, asked: Namespace, seed: int) ->
     return Answer([spoilt_table(found)], strips=[_strip(label, given, found[-1].results)])
 
 
-def _of_folder(model: TrainedRecovery, folder: str, inputs: Sequence[Input], asked: Namespace, seed: int) -> Answer:
+def _of_folder(
+    model: TrainedRecovery, folder: str, inputs: Sequence[RecoveryInput], asked: Namespace, seed: int
+) -> Answer:
     from eval.recovery.robustness import foreign_rows, foreign_table
 
     label, found = f"{model.program.name}, {folder}", foreign_rows(model, inputs, asked.tries, seed)
@@ -67,9 +69,9 @@ def _of_folder(model: TrainedRecovery, folder: str, inputs: Sequence[Input], ask
     return Answer([table], strips=[_strip(label, inputs, found[-1][2])])
 
 
-def _strip(label: str, inputs: Sequence[Input], results: Sequence[Recovered]) -> Strip:
+def _strip(label: str, inputs: Sequence[RecoveryInput], results: Sequence[RecoveryResult]) -> Strip:
+    from stages.recovery.files import recovery_picture
     from stages.shape.views.sheet import picture_png
-    from stages.training.recovery.files import recovery_picture
 
     pairs = list(zip(inputs, results, strict=True))[:SHOWN]
     pictures = [(given.name, picture_png(recovery_picture(given, result))) for given, result in pairs]

@@ -33,10 +33,10 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
     """One for each model, and one for the shapes of val of each category; what a category's share is read once."""
     from eval.programs.models import program_models, program_shards
     from eval.programs.reference import read_reference
-    from stages.training.recovery.recover import SHIPPED
+    from stages.recovery.recover import PRETRAINED_FOLDER
 
     reads = [*program_shards(subject, "train"), *program_shards(subject, "val")]
-    reads += weights_of_kind(SHIPPED, "recovery")  # one of them is the network whose features are compared
+    reads += weights_of_kind(PRETRAINED_FOLDER, "recovery")  # one of them is the network whose features are compared
     reference = lru_cache(1)(partial(read_reference, subject, judged=asked.judged))
     for category, models in groupby(program_models(subject, asked.nucleus), key=lambda each: each.kit):
         for each in models:

@@ -21,7 +21,7 @@ def bench() -> Iterator[Measure]:
 
     from stages.programs.program import find_program
     from stages.training.recovery.settings import RecoveryEntry
-    from stages.training.recovery.training import new_model
+    from stages.training.recovery.training import new_network
     from tests.bench.published_dgcnn import PublishedDGCNN
 
     torch.set_num_threads(1)
@@ -31,7 +31,7 @@ def bench() -> Iterator[Measure]:
     rng = np.random.default_rng(0)
     targets = torch.from_numpy(np.stack([rng.integers(0, count, BATCH) for count in classes], axis=1))
     entry = RecoveryEntry(name="bench", points=POINTS)
-    ours, peer = new_model(entry, chair, 0), PublishedDGCNN(classes)
+    ours, peer = new_network(entry, chair, 0), PublishedDGCNN(classes)
     optimizers = {id(net): torch.optim.Adam(net.parameters()) for net in (ours, peer)}
 
     def step(net: nn.Module, clouds: Tensor) -> int:
@@ -58,9 +58,9 @@ def bench() -> Iterator[Measure]:
 
 def _recoveries() -> float:
     """Clouds a second that the model which ships recovers."""
-    from stages.training.recovery.recover import SHIPPED, find_models, recover
+    from stages.recovery.recover import PRETRAINED_FOLDER, find_models, recover
 
-    models, _ = find_models(SHIPPED)
+    models, _ = find_models(PRETRAINED_FOLDER)
     cloud = _clouds(2048)[0]
 
     def once() -> int:

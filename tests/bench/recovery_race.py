@@ -20,12 +20,12 @@ from torch import Tensor, nn
 
 from stages.programs.program import Program, find_program
 from stages.shape.arrays import FloatArray
-from stages.training.recovery.augmentation import stored
+from stages.training.recovery.augmentation import quantized_cloud
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.settings import RecoveryEntry
-from stages.training.recovery.shapes import TRAIN, VAL, random_shapes, valid_values
-from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
-from stages.training.recovery.training import RecoveryLearner, new_model
+from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
+from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
+from stages.training.recovery.training import RecoveryLearner, new_network
 from tests.bench.published_dgcnn import PublishedDGCNN
 
 POINTS, BATCH, RATE = 2300, 33, 1e-2
@@ -43,7 +43,7 @@ def main() -> None:
     asked = parser.parse_args()
     torch.set_num_threads(1)
     chair = find_program("chair")
-    learnt, judged = (_clouds(chair, *each) for each in ((TRAIN, asked.shapes), (VAL, JUDGED)))
+    learnt, judged = (_clouds(chair, *each) for each in ((TRAIN_INTERVAL, asked.shapes), (VALIDATION_INTERVAL, JUDGED)))
     print("| network | CPU s | clouds | nats | right | Chamfer |\n|---|---|---|---|---|---|")
     for name, racer in (("ours", _ours(chair, learnt)), ("DGCNN as published", _published(chair, learnt))):
         module, step, read = racer
@@ -71,7 +71,7 @@ Clouds = tuple[FloatArray, np.ndarray, list[dict[str, object]]]
 def _clouds(program: Program, interval: tuple[float, float], count: int) -> Clouds:
     rng = np.random.default_rng(0)
     shapes = list(islice(random_shapes(program, interval, rng), count))
-    clouds = [sampled_points(each.parts, POINTS, rng) for each in shapes]
+    clouds = [sample_points(each.parts, POINTS, rng) for each in shapes]
     framed = np.array([frame_of(each).normalized(each) for each in clouds])
     return framed, np.array([each.classes for each in shapes]), [dict(each.values) for each in shapes]
 
@@ -79,8 +79,8 @@ def _clouds(program: Program, interval: tuple[float, float], count: int) -> Clou
 def _ours(program: Program, learnt: Clouds) -> Racer:
     entry = RecoveryEntry(name="race")
     clouds, classes, _ = learnt
-    inputs = np.array([stored(each[: 2 * entry.points]) for each in clouds])
-    module = new_model(entry, program, 0)
+    inputs = np.array([quantized_cloud(each[: 2 * entry.points]) for each in clouds])
+    module = new_network(entry, program, 0)
     learner = RecoveryLearner(module, {}, entry, program, {"inputs": inputs, "classes": classes}, {}, ())
     optimizer = torch.optim.Adam(module.parameters(), lr=entry.learning_rate)
     batches: Iterator[tuple[Tensor, Tensor]] = learner.batches(np.random.default_rng(0))
@@ -135,9 +135,9 @@ def _judged(program: Program, read: Callable[[FloatArray], Tensor], judged: Clou
     visible = truth < torch.tensor([len(each.values) for each in program.parameters])
     distances = []
     for chosen, each in zip(best.tolist(), values, strict=True):
-        found = valid_values(program, program.schema.from_classes(chosen))
+        found = nearest_valid_values(program, program.schema.from_classes(chosen))
         pair = (shape_points(program.parts(shown), MEASURED) for shown in (found, each))
-        distances.append(chamfer_distance(*(frame_of(points).normalized(points) for points in pair)))
+        distances.append(squared_chamfer_distance(*(frame_of(points).normalized(points) for points in pair)))
     return float(nats), float((best == truth)[visible].float().mean()), float(np.mean(distances))
 
 

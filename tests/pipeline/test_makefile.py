@@ -96,7 +96,7 @@ def test_train_makes_no_samples_for_models_that_make_their_own_shapes() -> None:
 def test_recover_looks_at_the_input_that_was_given() -> None:
     (run,) = calls("recover", "PROGRAM=chair", "INPUT=-odd name.ply", "OUT=/data")
     assert run[1:] == [
-        "stages.training.recovery", "--out", "/data", "--program", "chair", "--up", "", "--", "-odd name.ply",
+        "stages.recovery", "--out", "/data", "--program", "chair", "--up", "", "--", "-odd name.ply",
     ]  # fmt: skip
     assert make("recover").returncode != 0
 

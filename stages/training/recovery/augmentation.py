@@ -11,9 +11,9 @@ from torch.nn.functional import max_pool2d
 
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of
-from stages.training.recovery.drawings import SIDE
+from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS
 
-STEPS = 65_534
+QUANTIZATION_STEPS = 65_534
 """Steps of the side of a box that stored clouds are rounded to."""
 MOST_NOISE = 0.015
 """Largest standard deviation of noise, in sides of the box around a shape."""
@@ -25,13 +25,13 @@ LEAST_INK = 0.9
 """What is left of a thin drawing."""
 
 
-def stored(cloud: FloatArray) -> npt.NDArray[np.int16]:
+def quantized_cloud(cloud: FloatArray) -> npt.NDArray[np.int16]:
     """A cloud (n, 3) in its frame, int16."""
-    return np.rint(frame_of(cloud).normalized(cloud) * STEPS).astype(np.int16)
+    return np.rint(frame_of(cloud).normalized(cloud) * QUANTIZATION_STEPS).astype(np.int16)
 
 
-def seen_clouds(clouds: Tensor, points: int, share: float, noise: Generator) -> Tensor:
-    """Clouds float (n, points, 3) in their frames, of points by chance of `stored` ones int16 (n, m, 3). A `share` is
+def augment_clouds(clouds: Tensor, points: int, share: float, noise: Generator) -> Tensor:
+    """Clouds float (n, points, 3) in their frames, at_random: `quantized_cloud` ones int16 (n, m, 3). A `share` is
     as a bad scanner would see it: with noise, denser on one side, or without one side; at least one of them. Where
     fewer points are left, they come again."""
     n, m, _ = clouds.shape
@@ -42,7 +42,7 @@ def seen_clouds(clouds: Tensor, points: int, share: float, noise: Generator) -> 
 
     spoilt = chance(n, 1) < share
     kinds = torch.randint(1, 8, (n, 1), generator=noise, device=device) * spoilt
-    found = clouds.float() / STEPS
+    found = clouds.float() / QUANTIZATION_STEPS
     rough = MOST_NOISE * chance(n, 1, 1) * ((kinds & 1) > 0)[..., None]
     found = found + rough * torch.randn(found.shape, generator=noise, device=device)
     direction = torch.randn((n, 1, 3), generator=noise, device=device)
@@ -62,23 +62,26 @@ def seen_clouds(clouds: Tensor, points: int, share: float, noise: Generator) -> 
     return (found - (low + high) / 2.0) / torch.where(size > 0.0, size, 1.0)
 
 
-def inked(bits: Tensor) -> Tensor:
+def unpack_drawings(bits: Tensor) -> Tensor:
     """Drawings float (n, 1, SIDE, SIDE), ink 1 on 0, of their bits uint8 (n, bytes)."""
     places = torch.arange(7, -1, -1, dtype=torch.uint8, device=bits.device)
     ink = (bits[..., None] >> places) & 1
-    return ink.view(len(bits), 1, SIDE, SIDE).float()
+    return ink.view(len(bits), 1, DRAWING_SIDE_PIXELS, DRAWING_SIDE_PIXELS).float()
 
 
-def seen_drawings(bits: Tensor, share: float, rng: np.random.Generator, noise: Generator) -> Tensor:
+def augment_drawings(bits: Tensor, share: float, rng: np.random.Generator, noise: Generator) -> Tensor:
     """Drawings float (n, 1, SIDE, SIDE) of bits uint8 (n, bytes). Of a `share` half are mirrored, and half have thick
     lines, half thin ones."""
-    drawings = inked(bits)
+    drawings = unpack_drawings(bits)
     mirrored, morphology = rng.random((2, len(bits)))
     (rows,) = np.nonzero(mirrored < 0.5 * share)
     drawings[rows] = drawings[rows].flip(-1)
     (rows,) = np.nonzero(morphology < 0.5 * share)
     drawings[rows] = max_pool2d(drawings[rows], 3, 1, 1)
     (rows,) = np.nonzero((morphology >= 0.5 * share) & (morphology < share))
-    kept = torch.rand((len(rows), 1, SIDE, SIDE), generator=noise, device=bits.device) < LEAST_INK
+    kept = (
+        torch.rand((len(rows), 1, DRAWING_SIDE_PIXELS, DRAWING_SIDE_PIXELS), generator=noise, device=bits.device)
+        < LEAST_INK
+    )
     drawings[rows] = drawings[rows] * kept
     return drawings

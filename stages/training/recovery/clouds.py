@@ -37,7 +37,7 @@ def frame_of(points: FloatArray) -> Frame:
     return Frame((low + high) / 2.0, float((high - low).max()) or 1.0)
 
 
-def taken(points: FloatArray, n: int, rng: np.random.Generator) -> FloatArray:
+def subsample(points: FloatArray, n: int, rng: np.random.Generator) -> FloatArray:
     """`n` of some points (m, 3) at random, none twice before all are taken."""
     whole, rest = divmod(n, len(points))
     chosen: list[npt.NDArray[np.int64]] = [np.arange(len(points))] * whole

@@ -11,7 +11,7 @@ from stages.shape.views.scene import scene_of
 from stages.sketches.draw import draw_sketch, jittered_camera
 from stages.sketches.settings import SketchesConfig, SketchView
 
-SIDE = 224
+DRAWING_SIDE_PIXELS = 224
 """Pixels of a side."""
 MARGIN = 8
 """Pixels that are left free around the ink."""
@@ -19,14 +19,14 @@ INK = 128
 """A pixel of a dark drawing on white below this is ink."""
 
 
-def fitted(ink: BoolArray) -> BoolArray:
+def fit_to_square(ink: BoolArray) -> BoolArray:
     """Ink (h, w) of any size in the middle of a square (SIDE, SIDE), as large as the margin allows: a pixel there is
     ink where any is that it covers, and lines of small drawings stay whole. Raises ValueError without ink."""
     rows, columns = np.nonzero(ink)
     if not len(rows):
         raise ValueError("a drawing without a line")
     height, width = np.ptp(rows) + 1, np.ptp(columns) + 1
-    scale = (SIDE - 2 * MARGIN) / max(height, width)
+    scale = (DRAWING_SIDE_PIXELS - 2 * MARGIN) / max(height, width)
     if scale > 1.0:
         # each pixel of a small drawing is a square of the large one
         grown = int(np.ceil(scale))
@@ -35,13 +35,13 @@ def fitted(ink: BoolArray) -> BoolArray:
         scale /= grown
     else:
         rows, columns = rows - rows.min(), columns - columns.min()
-    down, across = (SIDE - scale * ink_size for ink_size in (rows.max() + 1, columns.max() + 1))
-    square = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    down, across = (DRAWING_SIDE_PIXELS - scale * ink_size for ink_size in (rows.max() + 1, columns.max() + 1))
+    square = np.zeros((DRAWING_SIDE_PIXELS, DRAWING_SIDE_PIXELS), dtype=np.bool_)
     square[(rows * scale + down / 2).astype(int), (columns * scale + across / 2).astype(int)] = True
     return square
 
 
-def drawn(
+def draw_fitted(
     program: Program, parts: tuple[Part, ...], view: SketchView, config: SketchesConfig, rng: np.random.Generator
 ) -> BoolArray:
     """A shape as stage `sketches` draws it, fitted."""
@@ -49,4 +49,4 @@ def drawn(
     camera = jittered_camera(view, rng)
     drawing: ByteArray
     drawing, _ = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, config.backend)
-    return fitted(drawing < INK)
+    return fit_to_square(drawing < INK)

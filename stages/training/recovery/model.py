@@ -12,9 +12,9 @@ from torch.nn.functional import leaky_relu, max_pool2d
 from torch.nn.utils import convert_conv2d_weight_memory_format
 
 from stages.programs.parameters import Parameter
-from stages.training.recovery.answers import regressed
-from stages.training.recovery.drawings import SIDE
+from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS
 from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
+from stages.training.recovery.outputs import regressed
 from stages.training.recovery.settings import RecoveryEntry
 
 SLOPE = 0.2
@@ -109,10 +109,10 @@ class Vgg(nn.Module):
         for place, (before, after) in enumerate(pairwise((self.PATCH**2, *entry.channels))):
             layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after), nn.ReLU()]
             if place % 2:
-                layers.append(Halved())
+                layers.append(HalveResolution())
         # twice as fast with so few features
         self.layers = convert_conv2d_weight_memory_format(nn.Sequential(*layers), torch.channels_last)
-        side = SIDE // self.PATCH // 2 ** (len(entry.channels) // 2)
+        side = DRAWING_SIDE_PIXELS // self.PATCH // 2 ** (len(entry.channels) // 2)
         self.embedding = nn.Linear(entry.channels[-1] * side * side, 2 * entry.embedding)
 
     def forward(self, drawings: Tensor) -> Tensor:
@@ -121,17 +121,17 @@ class Vgg(nn.Module):
         return embedded
 
 
-class Halved(nn.Module):
+class HalveResolution(nn.Module):
     """Of each four pixels the greatest, (n, features, h, w) to (n, features, h / 2, w / 2) rounded down."""
 
     def forward(self, features: Tensor) -> Tensor:
         if features.device.type == "cpu":
             return max_pool2d(features, 2)
-        return halved(features)
+        return halve_resolution(features)
 
 
-def halved(features: Tensor) -> Tensor:
-    """What `Halved` says, for a GPU, where the gradient of `max_pool2d` is added up in any order."""
+def halve_resolution(features: Tensor) -> Tensor:
+    """What `HalveResolution` says, for a GPU, where the gradient of `max_pool2d` is added up in any order."""
     even = features[..., : features.shape[-2] // 2 * 2, : features.shape[-1] // 2 * 2]
     rows = torch.maximum(even[..., ::2, :], even[..., 1::2, :])
     return torch.maximum(rows[..., ::2], rows[..., 1::2])

@@ -21,9 +21,9 @@ from stages.programs.repair import repaired
 from stages.programs.sampling import cells
 from stages.programs.schema import Values
 
-TRAIN: Interval = (0.0, 0.8)
-VAL: Interval = (0.8, 0.9)
-TEST: Interval = (0.9, 1.0)
+TRAIN_INTERVAL: Interval = (0.0, 0.8)
+VALIDATION_INTERVAL: Interval = (0.8, 0.9)
+TEST_INTERVAL: Interval = (0.9, 1.0)
 
 AT_ONCE = 64
 """Draws at a time, of which the first that is valid is taken."""
@@ -70,7 +70,7 @@ def random_shapes(program: Program, interval: Interval, rng: np.random.Generator
                 break
 
 
-def valid_values(program: Program, values: Values) -> dict[str, Value]:
+def nearest_valid_values(program: Program, values: Values) -> dict[str, Value]:
     """The nearest values that keep the program's constraints, or, where there are none, its base."""
     found = repaired(program, values)
     return program.schema.settled(program.schema.base)[0] if found is None else found

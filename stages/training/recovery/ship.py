@@ -11,11 +11,11 @@ import sys
 from pathlib import Path
 
 from pipeline.places import write_file
+from stages.recovery.recover import PRETRAINED_FOLDER
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
-from stages.training.recovery.recover import SHIPPED
-from stages.training.recovery.trained import KIND, in_bytes, load_recovery
+from stages.training.recovery.trained import RECOVERY_KIND, load_recovery, quantized_to_bytes
 
-MOST = 4_000_000
+MAX_SHIPPED_BYTES = 4_000_000
 """Bytes of a model that comes with a clone."""
 MOST_OF_BYTES = 2
 """So many tensors may become bytes, which are coarser than halves."""
@@ -28,15 +28,17 @@ def slim_bytes(path: Path) -> bytes:
     Raises CheckpointError for weights that are not of a recovery model that can be used now, or too large still.
     """
     load_recovery(path)
-    tensors, header = load_checkpoint(path, {"kind": KIND})
+    tensors, header = load_checkpoint(path, {"kind": RECOVERY_KIND})
     slim = {name: each.half() if each.is_floating_point() else each for name, each in tensors.items()}
     content = checkpoint_bytes(slim, header)
     for name in sorted(slim, key=lambda each: -slim[each].numel())[:MOST_OF_BYTES]:
-        if len(content) > MOST:
-            slim |= in_bytes(name, tensors[name])
+        if len(content) > MAX_SHIPPED_BYTES:
+            slim |= quantized_to_bytes(name, tensors[name])
             content = checkpoint_bytes(slim, header)
-    if len(content) > MOST:
-        raise CheckpointError(f"{path} takes {len(content):,} bytes at least, more than {MOST:,}: train a smaller one")
+    if len(content) > MAX_SHIPPED_BYTES:
+        raise CheckpointError(
+            f"{path} takes {len(content):,} bytes at least, more than {MAX_SHIPPED_BYTES:,}: train a smaller one"
+        )
     return content
 
 
@@ -50,7 +52,7 @@ def main(arguments: list[str]) -> int:
             weights = slim_bytes(folder / "weights.safetensors")
             card = (folder / "README.md").read_bytes()
             for name, content in (("weights.safetensors", weights), ("README.md", card)):
-                print(write_file(SHIPPED / folder.name.rpartition("-")[0] / name, content))
+                print(write_file(PRETRAINED_FOLDER / folder.name.rpartition("-")[0] / name, content))
     except (CheckpointError, OSError) as error:
         print(error, file=sys.stderr)
         return 2

@@ -37,13 +37,13 @@ def shape_points(parts: Sequence[Part], n: int) -> FloatArray:
     return even_points(mesh.vertices, mesh.triangles, n)
 
 
-def sampled_points(parts: Sequence[Part], n: int, rng: np.random.Generator) -> FloatArray:
+def sample_points(parts: Sequence[Part], n: int, rng: np.random.Generator) -> FloatArray:
     """`n` points on all parts of a shape together by chance, float64 (n, 3)."""
     mesh = joined(parts).mesh
     return sample_surface(mesh.vertices, mesh.triangles, n, rng)[0]
 
 
-def chamfer_distance(first: FloatArray, second: FloatArray) -> float:
+def squared_chamfer_distance(first: FloatArray, second: FloatArray) -> float:
     """The mean squared distance from each point of a cloud (n, 3) to the nearest of the other (m, 3), and the same the
     other way, added (geocode §4.2)."""
     from scipy.spatial import cKDTree

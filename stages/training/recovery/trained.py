@@ -16,14 +16,14 @@ from stages.programs.program import Program, find_program
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.sketches.settings import SketchesConfig
 from stages.training.checkpoint import CheckpointError, load_checkpoint
-from stages.training.recovery.answers import Answers
-from stages.training.recovery.clouds import frame_of, taken
-from stages.training.recovery.guess import Guess, guess_of
+from stages.training.recovery.clouds import frame_of, subsample
+from stages.training.recovery.estimate import ParameterEstimate, estimate_from_probabilities
 from stages.training.recovery.model import RecoveryNet
+from stages.training.recovery.outputs import ParameterOutputs
 from stages.training.recovery.settings import RecoveryEntry
-from stages.training.recovery.training import described_parameters
+from stages.training.recovery.training import parameter_descriptions
 
-KIND = "recovery"
+RECOVERY_KIND = "recovery"
 """What weights say of their kind."""
 
 STEP = ".step"
@@ -42,7 +42,7 @@ class TrainedRecovery:
     header: Mapping[str, Any]
 
     @property
-    def usual(self) -> float:
+    def typical_distance(self) -> float:
         """How far validation shapes come back at most, all but one in twenty: mean squared distance both ways, in
         sides of their boxes."""
         return float(self.header["figures"]["val_chamfer_high"])
@@ -52,21 +52,24 @@ class TrainedRecovery:
         """How the drawings that it has learnt from were drawn."""
         return SketchesConfig.model_validate_json(json.dumps(self.header["sketches"]))
 
-    def guess_cloud(self, points: FloatArray, rng: np.random.Generator) -> Guess:
+    def estimate_from_cloud(self, points: FloatArray, rng: np.random.Generator) -> ParameterEstimate:
         """Of a cloud (n, 3) of any number of points, y up, anywhere and of any size."""
-        looks = [taken(points, self.entry.points, rng) for _ in range(LOOKS)]
+        looks = [subsample(points, self.entry.points, rng) for _ in range(LOOKS)]
         return self._guess(torch.from_numpy(np.array([frame_of(each).normalized(each) for each in looks])).float())
 
-    def guess_drawing(self, ink: BoolArray) -> Guess:
+    def estimate_from_drawing(self, ink: BoolArray) -> ParameterEstimate:
         """Of fitted ink (SIDE, SIDE)."""
         return self._guess(torch.from_numpy(ink[None, None].astype(np.float32)))
 
     @torch.no_grad()
-    def _guess(self, inputs: Tensor) -> Guess:
+    def _guess(self, inputs: Tensor) -> ParameterEstimate:
         device = next(self.module.parameters()).device
-        outputs, answers = self.module(inputs.to(device)), Answers.of(self.entry, self.program.parameters).to(device)
-        chances = answers.chances(outputs).mean(dim=0).double().cpu().numpy()
-        return guess_of(self.program, chances)
+        outputs, answers = (
+            self.module(inputs.to(device)),
+            ParameterOutputs.of(self.entry, self.program.parameters).to(device),
+        )
+        chances = answers.probabilities(outputs).mean(dim=0).double().cpu().numpy()
+        return estimate_from_probabilities(self.program, chances)
 
 
 def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedRecovery:
@@ -75,9 +78,9 @@ def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> Trai
     Raises CheckpointError for whatever is not one, says something else of itself than `expected`, such as
     `{"program": "chair"}`, or was trained when the program had other parameters.
     """
-    tensors, header = load_checkpoint(path, {"kind": KIND, **(expected or {})})
+    tensors, header = load_checkpoint(path, {"kind": RECOVERY_KIND, **(expected or {})})
     program = find_program(header["program"])
-    if header["parameters"] != described_parameters(program):
+    if header["parameters"] != parameter_descriptions(program):
         raise CheckpointError(f"{path} is of a {program.name} with other parameters than it has now: train it anew")
     # what a network is has not changed where keys of its training have gone
     settings = {key: value for key, value in header["settings"].items() if key in RecoveryEntry.model_fields}
@@ -87,7 +90,7 @@ def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> Trai
     return TrainedRecovery(module.eval(), program, entry, header)
 
 
-def in_bytes(name: str, tensor: Tensor) -> dict[str, Tensor]:
+def quantized_to_bytes(name: str, tensor: Tensor) -> dict[str, Tensor]:
     """A tensor of weights, float (..., before, after), as int8 with the size of a step for each column."""
     step = (tensor.float().abs().amax(dim=-2, keepdim=True) / 127.0).clamp(min=1e-12)
     return {name: (tensor.float() / step).round().to(torch.int8), f"{name}{STEP}": step}

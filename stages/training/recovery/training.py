@@ -21,15 +21,15 @@ from stages.programs.program import Program, find_program
 from stages.shape.arrays import FloatArray
 from stages.sketches.settings import SketchesConfig
 from stages.training.loop import device_of
-from stages.training.recovery.answers import Answers
-from stages.training.recovery.augmentation import inked, seen_clouds, seen_drawings, stored
+from stages.training.recovery.augmentation import augment_clouds, augment_drawings, quantized_cloud, unpack_drawings
 from stages.training.recovery.clouds import frame_of
-from stages.training.recovery.drawings import drawn
-from stages.training.recovery.guess import guess_of
+from stages.training.recovery.drawings import draw_fitted
+from stages.training.recovery.estimate import estimate_from_probabilities
 from stages.training.recovery.model import RecoveryNet
+from stages.training.recovery.outputs import ParameterOutputs
 from stages.training.recovery.settings import RecoveryEntry
-from stages.training.recovery.shapes import TRAIN, VAL, random_shapes, valid_values
-from stages.training.recovery.surface import chamfer_distance, sampled_points, shape_points
+from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
+from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
 
 JUDGED = 64
 """Validation shapes whose recovery is measured."""
@@ -45,7 +45,7 @@ def prepare(task: Task) -> Outcome:
     after it.
 
     Files of the shard: `.safetensors`, with `inputs`, and `classes` int16 (n, parameters); `.json`, what they are.
-    Inputs to be judged by are clouds float32 (n, points, 3), those to learn from `stored` ones of twice as many points;
+    Inputs to be judged by are clouds float32 (n, points, 3), training: `quantized_cloud` ones of twice as many points;
     drawings are their bits uint8 (n, bytes).
     """
     from safetensors.numpy import save
@@ -58,17 +58,17 @@ def prepare(task: Task) -> Outcome:
     inputs: list[npt.NDArray[Any]] = []
     classes: list[npt.NDArray[np.int16]] = []
     texts: list[str] = []
-    shapes = random_shapes(program, VAL if split == "val" else TRAIN, task.rng(split))
+    shapes = random_shapes(program, VALIDATION_INTERVAL if split == "val" else TRAIN_INTERVAL, task.rng(split))
     for number, shape in enumerate(islice(shapes, params["shapes"])):
         rng = task.rng(split, "input", number)
         if settings["input"] == "sketch":
             view = views[number % len(views)]
-            inputs.append(np.packbits(drawn(program, shape.parts, view, config, rng)))
+            inputs.append(np.packbits(draw_fitted(program, shape.parts, view, config, rng)))
         elif split == "val":
-            cloud = sampled_points(shape.parts, settings["points"], rng)
+            cloud = sample_points(shape.parts, settings["points"], rng)
             inputs.append(frame_of(cloud).normalized(cloud).astype(np.float32))
         else:
-            inputs.append(stored(sampled_points(shape.parts, 2 * settings["points"], rng)))
+            inputs.append(quantized_cloud(sample_points(shape.parts, 2 * settings["points"], rng)))
         classes.append(shape.classes.astype(np.int16))
         texts.append(program.schema.text(shape.values))
         task.progress(number + 1, params["shapes"])
@@ -94,7 +94,7 @@ def learner(task: Task, entry: RecoveryEntry, seed: int) -> RecoveryLearner:
     described = json.loads(task.input("training", f"{data}.json").read_bytes())
     judged = task.input("training", f"{data}.safetensors")
     header = {
-        "parameters": described_parameters(program),
+        "parameters": parameter_descriptions(program),
         # of every round the same: the rounds before are read again by it
         "counts": {"train, a round": {"shapes": entry.pool}, "val": {"shapes": entry.validation}},
         "sketches": described["views"],
@@ -102,18 +102,18 @@ def learner(task: Task, entry: RecoveryEntry, seed: int) -> RecoveryLearner:
     }
     learnt = [load_file(task.input("training", f"{pool}.safetensors")) for pool in pools]
     train = {key: np.concatenate([each[key] for each in learnt]) for key in ("inputs", "classes")}
-    module = new_model(entry, program, seed).to(device_of(entry.device))
+    module = new_network(entry, program, seed).to(device_of(entry.device))
     return RecoveryLearner(module, header, entry, program, train, load_file(judged), described["texts"])
 
 
-def new_model(entry: RecoveryEntry, program: Program, seed: int) -> RecoveryNet:
+def new_network(entry: RecoveryEntry, program: Program, seed: int) -> RecoveryNet:
     """A network for a program with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         return RecoveryNet(entry, program.parameters)
 
 
-def described_parameters(program: Program) -> list[list[Any]]:
+def parameter_descriptions(program: Program) -> list[list[Any]]:
     """Name, values and number of classes of each parameter: weights are of no use where any is another."""
     return [[each.name, list(each.values), each.classes] for each in program.parameters]
 
@@ -136,9 +136,9 @@ class RecoveryLearner:
         return next(self.module.parameters()).device
 
     @cached_property
-    def answers(self) -> Answers:
+    def answers(self) -> ParameterOutputs:
         """What the outputs of the network say, on its device."""
-        return Answers.of(self.entry, self.program.parameters).to(self.device)
+        return ParameterOutputs.of(self.entry, self.program.parameters).to(self.device)
 
     def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
         """Inputs of shapes by chance, changed by chance; all there are lie on the device."""
@@ -148,26 +148,26 @@ class RecoveryLearner:
         while True:
             rows = torch.from_numpy(rng.integers(len(classes), size=self.entry.batch)).to(self.device)
             if self.entry.input == "points":
-                seen = seen_clouds(inputs[rows], self.entry.points, self.entry.noise, noise)
+                seen = augment_clouds(inputs[rows], self.entry.points, self.entry.noise, noise)
             else:
-                seen = seen_drawings(inputs[rows], self.entry.noise, rng, noise)
+                seen = augment_drawings(inputs[rows], self.entry.noise, rng, noise)
             yield seen, classes[rows]
 
     def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
         """That of all parameters together, in nats of an input."""
         inputs, classes = batch
-        return {"loss": self.answers.nats(self.module(inputs, noise), classes)}
+        return {"loss": self.answers.loss_in_nats(self.module(inputs, noise), classes)}
 
     def validate(self, noise: Generator) -> dict[str, float]:
         """On shapes that are never learnt from: nats; of the parameters that are visible, the share that is right and
         that within one class; and the mean and the 95th percentile of how far the shapes with which a search begins are
         from the true ones, squared, in sides of their boxes."""
         inputs = torch.from_numpy(self.val["inputs"]).to(self.device)
-        read = inked if self.entry.input == "sketch" else Tensor.float
+        read = unpack_drawings if self.entry.input == "sketch" else Tensor.float
         found = torch.cat([self.module(read(each)) for each in torch.split(inputs, self.entry.batch)])
         classes = torch.from_numpy(self.val["classes"].astype(np.int64)).to(self.device)
         counts = self.answers.counts
-        chances, visible = self.answers.chances(found), classes < counts
+        chances, visible = self.answers.probabilities(found), classes < counts
         best = chances.argmax(dim=-1)
         near = (best - classes).abs() <= 1
         distances = [
@@ -175,7 +175,7 @@ class RecoveryLearner:
             for each, text in zip(chances[:JUDGED].double().cpu().numpy(), self.texts, strict=False)
         ]
         return {
-            "loss": float(self.answers.nats(found, classes)),
+            "loss": float(self.answers.loss_in_nats(found, classes)),
             "right": float((best == classes)[visible].float().mean()),
             "near": float((near & (best < counts))[visible].float().mean()),
             "chamfer": float(np.mean(distances)),
@@ -184,6 +184,8 @@ class RecoveryLearner:
 
     def _distance(self, chances: FloatArray, text: str) -> float:
         schema = self.program.schema
-        recovered = valid_values(self.program, guess_of(self.program, chances).values(self.program))
+        recovered = nearest_valid_values(
+            self.program, estimate_from_probabilities(self.program, chances).values(self.program)
+        )
         clouds = (shape_points(self.program.parts(each), MEASURED) for each in (recovered, schema.values(text)))
-        return chamfer_distance(*(frame_of(each).normalized(each) for each in clouds))
+        return squared_chamfer_distance(*(frame_of(each).normalized(each) for each in clouds))

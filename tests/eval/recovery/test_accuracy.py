@@ -22,12 +22,12 @@ from eval.recovery.accuracy import (
 )
 from stages.programs.program import find_program
 from stages.programs.schema import Values
-from stages.training.recovery.reading import Input
-from stages.training.recovery.recover import Recovered
+from stages.recovery.reading import RecoveryInput
+from stages.recovery.recover import RecoveryResult
 from stages.training.recovery.settings import RecoveryEntry
-from stages.training.recovery.shapes import TEST, random_shapes
+from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
 from stages.training.recovery.trained import TrainedRecovery
-from stages.training.recovery.training import new_model
+from stages.training.recovery.training import new_network
 from tests.stages.training.recovery.toy import PROGRAM, SMALL
 
 STOOL = find_program(PROGRAM)
@@ -37,11 +37,11 @@ def model(**settings: str) -> TrainedRecovery:
     small = {**SMALL, "widths": (8, 8), "channels": (2,) * 8, "decoder": (16, 8)}
     entry = RecoveryEntry.model_validate({**small, **settings})
     header = {"program": PROGRAM, "figures": {"val_loss": 1.0, "val_chamfer_high": 0.01}}
-    return TrainedRecovery(new_model(entry, STOOL, 0).eval(), STOOL, entry, header)
+    return TrainedRecovery(new_network(entry, STOOL, 0).eval(), STOOL, entry, header)
 
 
-def result(values: Values) -> Recovered:
-    return Recovered(STOOL, values, 0.0, 0.0, 0.0, None, None, None, "y", 1, ())
+def result(values: Values) -> RecoveryResult:
+    return RecoveryResult(STOOL, values, 0.0, 0.0, 0.0, None, None, None, "y", 1, ())
 
 
 def test_published_chamfer_is_of_the_unit_sphere_and_the_mean_of_both_ways() -> None:
@@ -53,8 +53,8 @@ def test_published_chamfer_is_of_the_unit_sphere_and_the_mean_of_both_ways() -> 
 
 
 def test_who_knows_the_truth_is_right_and_who_knows_nothing_is_not() -> None:
-    shapes = list(islice(random_shapes(STOOL, TEST, np.random.default_rng(0)), 6))
-    inputs = [Input(str(number), points=np.zeros((40, 3))) for number in range(len(shapes))]
+    shapes = list(islice(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)), 6))
+    inputs = [RecoveryInput(str(number), points=np.zeros((40, 3))) for number in range(len(shapes))]
     truth = iter([each.values for each in shapes])
     knows = tried("knows", STOOL, lambda _: result(next(truth)), shapes, inputs)
     base = tried("base", STOOL, lambda _: result(STOOL.schema.base), shapes, inputs)
@@ -82,8 +82,8 @@ def test_table_has_a_row_for_each_method_and_the_published_ones_of_its_programs(
 
 
 def test_ways_to_answer_are_compared_with_the_first() -> None:
-    shapes = list(islice(random_shapes(STOOL, TEST, np.random.default_rng(0)), 5))
-    inputs = [Input(str(number), points=np.zeros((40, 3))) for number in range(len(shapes))]
+    shapes = list(islice(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)), 5))
+    inputs = [RecoveryInput(str(number), points=np.zeros((40, 3))) for number in range(len(shapes))]
     truth = iter([each.values for each in shapes])
     knows = tried("classes, points", STOOL, lambda _: result(next(truth)), shapes, inputs)
     base = tried("values, points", STOOL, lambda _: result(STOOL.schema.base), shapes, inputs)
@@ -98,8 +98,10 @@ def test_ways_to_answer_are_compared_with_the_first() -> None:
 
 
 def test_what_moves_the_surface_by_next_to_nothing_is_as_good_as_right() -> None:
-    shape = next(each for each in random_shapes(STOOL, TEST, np.random.default_rng(0)) if each.values["height"] < 0.8)
-    given = [Input("one", points=np.zeros((40, 3)))]
+    shape = next(
+        each for each in random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)) if each.values["height"] < 0.8
+    )
+    given = [RecoveryInput("one", points=np.zeros((40, 3)))]
     for off, good in ((0.0005, True), (0.05, False)):
         values = {**shape.values, "height": shape.values["height"] + off}
         found = tried("off", STOOL, lambda _, values=values: result(values), [shape], given)

@@ -21,23 +21,25 @@ from eval.recovery.robustness import (
 )
 from eval.tables.recovery_robustness import _parts
 from pipeline.errors import ConfigError
+from stages.recovery.reading import RecoveryInput
 from stages.training.recovery.clouds import frame_of
-from stages.training.recovery.reading import Input
-from stages.training.recovery.shapes import TEST, random_shapes
-from stages.training.recovery.surface import sampled_points
+from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
+from stages.training.recovery.surface import sample_points
 from tests.eval.recovery.test_accuracy import STOOL, model
 
 CHAIRS = Path(__file__).resolve().parents[2] / "configs" / "chairs.yaml"
 
 
 def cloud(n: int = 2000) -> np.ndarray:
-    shape = next(random_shapes(STOOL, TEST, np.random.default_rng(0)))
-    return sampled_points(shape.parts, n, np.random.default_rng(0))
+    shape = next(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)))
+    return sample_points(shape.parts, n, np.random.default_rng(0))
 
 
 def test_clouds_are_spoilt_as_they_are_said_to_be() -> None:
     points = cloud()
-    spoilt = {how: spoilt_inputs(model(), how, [], [Input("one", points)], 3)[0].points for how in SPOILS["points"]}
+    spoilt = {
+        how: spoilt_inputs(model(), how, [], [RecoveryInput("one", points)], 3)[0].points for how in SPOILS["points"]
+    }
     noise = (spoilt["noise of 1 %"] - points) / frame_of(points).size
     assert noise.std() == pytest.approx(0.01, rel=0.1)
     strays = ~np.isin(spoilt["5 % outliers"], points).all(axis=1)
@@ -55,7 +57,9 @@ def test_drawings_are_spoilt_as_they_are_said_to_be() -> None:
     ink = np.zeros((224, 224), np.bool_)
     ink[100, 20:200] = ink[20:200, 60] = True
     drawer = model(input="sketch")
-    spoilt = {how: spoilt_inputs(drawer, how, [], [Input("one", ink=ink)], 3)[0].ink for how in SPOILS["sketch"]}
+    spoilt = {
+        how: spoilt_inputs(drawer, how, [], [RecoveryInput("one", ink=ink)], 3)[0].ink for how in SPOILS["sketch"]
+    }
     assert 4.0 < spoilt["thick lines"].sum() / ink.sum() < 5.5
     assert (spoilt["thick lines"] & ink).sum() == ink.sum()
     assert not (spoilt["broken lines"] & ~ink).any()
@@ -65,7 +69,7 @@ def test_drawings_are_spoilt_as_they_are_said_to_be() -> None:
 
 
 def test_equal_seeds_spoil_equally() -> None:
-    given = [Input("one", cloud(350)), Input("two", cloud(400))]
+    given = [RecoveryInput("one", cloud(350)), RecoveryInput("two", cloud(400))]
     for how in ways_to_spoil("points"):
         first, second, other = (spoilt_inputs(model(), how, [], given, seed) for seed in (1, 1, 2))
         for one, again, differs in zip(first, second, other, strict=True):
@@ -75,8 +79,8 @@ def test_equal_seeds_spoil_equally() -> None:
 
 def test_tables_have_a_row_for_each_way(tmp_path: Path) -> None:
     trained = model()
-    shape = next(random_shapes(STOOL, TEST, np.random.default_rng(0)))
-    spoilt = spoilt_inputs(trained, "half missing", [shape], [Input("one", cloud())], 0)
+    shape = next(random_shapes(STOOL, TEST_INTERVAL, np.random.default_rng(0)))
+    spoilt = spoilt_inputs(trained, "half missing", [shape], [RecoveryInput("one", cloud())], 0)
     way = methods(trained, 10, 0)["network"]
     table = spoilt_table([tried("stool, half missing: network", STOOL, way, [shape], spoilt)])
     assert table.rows[0][0] == "stool, half missing: network"

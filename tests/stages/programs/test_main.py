@@ -13,8 +13,8 @@ from PIL import Image
 from stages.programs.__main__ import main
 from stages.programs.program import shape_of
 from stages.programs.sheets import CELL, reveal
+from stages.recovery.recover import RecoveryResult
 from stages.shape.views.portrait import PAPER
-from stages.training.recovery.recover import Recovered
 from tests.stages.programs.stool import PROGRAM
 
 BLOCK, STOOL = "tests.stages.programs.block", "tests.stages.programs.stool"
@@ -60,7 +60,7 @@ def test_steps_lead_from_one_shape_to_the_other(tmp_path: Path) -> None:
 def test_what_recovery_has_written_is_edited_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     low, high = ({**PROGRAM.schema.base, "height": height} for height in (0.4, 0.8))
     for name, values in (("low", low), ("high", high)):
-        found = Recovered(PROGRAM, values, 0.001, 0.1, 0.0, None, None, None, "y", 1, ())
+        found = RecoveryResult(PROGRAM, values, 0.001, 0.1, 0.0, None, None, None, "y", 1, ())
         (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **found.described()}))
     ends = [str(tmp_path / f"{name}.json") for name in ("low", "high")]
     assert main(["interpolate", STOOL, *ends, "--steps", "3", "--group", "seat", "--out", str(tmp_path / "way")]) == 0

@@ -7,18 +7,18 @@ import pytest
 import torch
 from torch import Generator
 
-from stages.training.recovery.augmentation import inked, seen_clouds, seen_drawings, stored
-from stages.training.recovery.drawings import SIDE
+from stages.training.recovery.augmentation import augment_clouds, augment_drawings, quantized_cloud, unpack_drawings
+from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS
 
 
 def clouds(n: int) -> torch.Tensor:
     """Cubes of 400 points, stored, all the same."""
     points = np.random.default_rng(1).random((400, 3)) * 7.0
-    return torch.from_numpy(np.array([stored(points)] * n))
+    return torch.from_numpy(np.array([quantized_cloud(points)] * n))
 
 
 def seen(n: int, points: int, share: float) -> torch.Tensor:
-    return seen_clouds(clouds(n), points, share, Generator().manual_seed(2))
+    return augment_clouds(clouds(n), points, share, Generator().manual_seed(2))
 
 
 def test_clouds_that_are_not_spoilt_are_points_of_the_shape_each_once() -> None:
@@ -56,23 +56,23 @@ def test_precision_of_the_network_is_none_of_the_clouds() -> None:
 
 @pytest.fixture
 def drawing() -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
-    ink = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    ink = np.zeros((DRAWING_SIDE_PIXELS, DRAWING_SIDE_PIXELS), dtype=np.bool_)
     ink[20:200, 30] = ink[40, 30:120] = True
     return ink
 
 
 def test_drawings_come_back_from_their_bits(drawing: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> None:
-    found = inked(torch.from_numpy(np.packbits(drawing)[None]))
+    found = unpack_drawings(torch.from_numpy(np.packbits(drawing)[None]))
     assert np.array_equal(found[0, 0].numpy() > 0, drawing)
 
 
 def test_drawings_are_mirrored_thick_and_thin(drawing: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> None:
     bits = torch.from_numpy(np.packbits(drawing)[None]).expand(60, -1)
     rng, noise = np.random.default_rng(4), Generator().manual_seed(4)
-    found = seen_drawings(bits, 1.0, rng, noise)
+    found = augment_drawings(bits, 1.0, rng, noise)
     ink = found.sum(dim=(1, 2, 3)) / drawing.sum()
     assert 0.3 < (ink > 2.5).float().mean() < 0.7
     assert ((ink > 2.5) | ((ink > 0.8) & (ink < 1.0))).all()
-    mirrored = found[..., SIDE // 2 + 20 :].sum(dim=(1, 2, 3)) > 0
+    mirrored = found[..., DRAWING_SIDE_PIXELS // 2 + 20 :].sum(dim=(1, 2, 3)) > 0
     assert 0.3 < mirrored.float().mean() < 0.7
-    assert torch.equal(seen_drawings(bits, 0.0, rng, noise), inked(bits))
+    assert torch.equal(augment_drawings(bits, 0.0, rng, noise), unpack_drawings(bits))

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.training.recovery.clouds import frame_of, taken
-from stages.training.recovery.surface import chamfer_distance, even_points
+from stages.training.recovery.clouds import frame_of, subsample
+from stages.training.recovery.surface import even_points, squared_chamfer_distance
 
 SQUARES = np.array([[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]], dtype=np.float64)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
@@ -22,7 +22,7 @@ def brute_chamfer(a: np.ndarray, b: np.ndarray) -> float:
 def test_chamfer_distance_is_that_of_all_pairs(seed: int, n: int, m: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(n, 3)), rng.normal(size=(m, 3))
-    assert np.isclose(chamfer_distance(a, b), brute_chamfer(a, b))
+    assert np.isclose(squared_chamfer_distance(a, b), brute_chamfer(a, b))
 
 
 def test_even_points_lie_on_the_surface_and_as_many_in_each_part_as_its_area_says() -> None:
@@ -52,6 +52,6 @@ def test_frame_is_of_any_place_and_size() -> None:
 @given(seed=st.integers(0, 2**31), n=st.integers(1, 30))
 def test_taken_takes_every_point_as_often_as_any(seed: int, n: int) -> None:
     points = np.arange(10, dtype=np.float64)[:, None] * np.ones(3)
-    counts = np.bincount(taken(points, n, np.random.default_rng(seed))[:, 0].astype(int), minlength=10)
+    counts = np.bincount(subsample(points, n, np.random.default_rng(seed))[:, 0].astype(int), minlength=10)
     assert counts.sum() == n
     assert np.ptp(counts) <= 1

@@ -1,4 +1,4 @@
-"""Recovery from the command line: `python -m stages.training.recovery INPUT`.
+"""Recovery from the command line: `python -m stages.recovery INPUT`.
 
 INPUT is a cloud, a mesh, a drawing, a folder of them, or a shard of a dataset.
 """
@@ -11,9 +11,9 @@ from pathlib import Path
 
 from pipeline.errors import ConfigError
 from stages.programs.program import find_program
-from stages.training.recovery.files import write_recovery
-from stages.training.recovery.reading import InputError, read_inputs
-from stages.training.recovery.recover import SHIPPED, find_models, recover_input
+from stages.recovery.files import write_recovery
+from stages.recovery.reading import InputError, read_inputs
+from stages.recovery.recover import PRETRAINED_FOLDER, find_models, recover_input
 
 
 def main(arguments: list[str]) -> int:
@@ -23,7 +23,7 @@ def main(arguments: list[str]) -> int:
     try:
         if asked.program:
             find_program(asked.program)
-        models, wrong = find_models(asked.out, SHIPPED)
+        models, wrong = find_models(asked.out, PRETRAINED_FOLDER)
         for text in wrong:
             print(f"left out: {text}", file=sys.stderr)
         for given in read_inputs(asked.input):
@@ -44,7 +44,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="stages.training.recovery", description=__doc__)
+    parser = argparse.ArgumentParser(prog="stages.recovery", description=__doc__)
     parser.add_argument("input", type=Path, metavar="INPUT")
     parser.add_argument("--program", default="", help="name of the program; the likeliest unless you say")
     parser.add_argument("--up", default="", choices=["", "x", "y", "z"], help="the axis of clouds that points up")

@@ -9,15 +9,15 @@ import pytest
 
 from eval.recovery.robustness import SPOILS
 from stages.programs.program import find_program
+from stages.recovery.partial_target import PartialTarget, partial_target
+from stages.recovery.reading import RecoveryInput
+from stages.recovery.recover import recover, recover_input
+from stages.recovery.targets import cloud_target
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of
-from stages.training.recovery.partial import PartialTarget, partial_target
-from stages.training.recovery.reading import Input
-from stages.training.recovery.recover import recover, recover_input
-from stages.training.recovery.shapes import TEST, random_shapes
-from stages.training.recovery.surface import sampled_points
-from stages.training.recovery.targets import cloud_target
-from tests.stages.training.recovery.test_recover import SHIPPED_MODELS, STOOL, TALL, cloud_of, off_by
+from stages.training.recovery.shapes import TEST_INTERVAL, random_shapes
+from stages.training.recovery.surface import sample_points
+from tests.stages.recovery.test_recover import SHIPPED_MODELS, STOOL, TALL, cloud_of, off_by
 
 PARTS = STOOL.parts(TALL)
 
@@ -112,8 +112,8 @@ def test_a_stick_is_no_part_of_a_stool() -> None:
 @pytest.mark.parametrize("program", ["chair", "table", "vase"])
 def test_a_network_tells_torn_clouds_from_clouds_that_are_spoilt_otherwise(program: str) -> None:
     made, rng = find_program(program), np.random.default_rng(5)
-    shape = next(random_shapes(made, TEST, rng))
-    given = Input("cloud", points=sampled_points(shape.parts, 2048, rng))
+    shape = next(random_shapes(made, TEST_INTERVAL, rng))
+    given = RecoveryInput("cloud", points=sample_points(shape.parts, 2048, rng))
     clouds = {
         "whole": given,
         **{how: spoil(given, np.random.default_rng(1)) for how, spoil in SPOILS["points"].items()},

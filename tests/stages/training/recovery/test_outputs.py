@@ -10,10 +10,10 @@ import torch
 
 from stages.programs.parameters import Parameter
 from stages.programs.program import find_program
-from stages.training.recovery.answers import Answers
+from stages.training.recovery.outputs import ParameterOutputs
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.recovery.trained import TrainedRecovery
-from stages.training.recovery.training import new_model
+from stages.training.recovery.training import new_network
 from tests.stages.training.recovery.toy import PROGRAM, SMALL
 
 STOOL = find_program(PROGRAM)
@@ -21,39 +21,39 @@ LENGTH = Parameter("length", "continuous", (0.0, 1.0, 2.0), 0.0, "all", "How lon
 LEGS = Parameter("legs", "discrete", (3, 4), 3, "all", "How many.")
 
 
-def answers(**changes: object) -> Answers:
-    return Answers.of(RecoveryEntry.model_validate({**SMALL, **changes}, strict=False), (LENGTH, LEGS))
+def answers(**changes: object) -> ParameterOutputs:
+    return ParameterOutputs.of(RecoveryEntry.model_validate({**SMALL, **changes}, strict=False), (LENGTH, LEGS))
 
 
 def test_classes_are_cross_entropies_summed_over_the_parameters() -> None:
     outputs = torch.tensor([[[0.0, 0.0, 0.0], [0.0, 0.0, -torch.inf]]] * 2)
     told = answers()
-    assert float(told.nats(outputs, torch.tensor([[2, 0], [1, 1]]))) == pytest.approx(math.log(3) + math.log(2))
-    assert told.chances(outputs)[0].sum(dim=-1).tolist() == pytest.approx([1.0, 1.0])
+    assert float(told.loss_in_nats(outputs, torch.tensor([[2, 0], [1, 1]]))) == pytest.approx(math.log(3) + math.log(2))
+    assert told.probabilities(outputs)[0].sum(dim=-1).tolist() == pytest.approx([1.0, 1.0])
 
 
 def test_what_is_regressed_is_a_place_among_the_classes() -> None:
     # 0.5 lies half of a half of the range above its middle, so a class and a half from the first
     outputs = torch.tensor([[[0.5, 9.0, 9.0], [0.0, 0.0, -torch.inf]]])
     told = answers(answers="values")
-    assert told.places(outputs)[0, 0] == 1.5
-    assert told.chances(outputs)[0, 0].tolist() == [0.0, 0.5, 0.5]
-    assert float(told.nats(outputs, torch.tensor([[0, 0]]))) == pytest.approx(1.5**2 / 2 + math.log(2))
+    assert told.positions(outputs)[0, 0] == 1.5
+    assert told.probabilities(outputs)[0, 0].tolist() == [0.0, 0.5, 0.5]
+    assert float(told.loss_in_nats(outputs, torch.tensor([[0, 0]]))) == pytest.approx(1.5**2 / 2 + math.log(2))
     beyond = torch.tensor([[[7.0, 0.0, 0.0], [0.0, 0.0, -torch.inf]]])
-    assert told.chances(beyond)[0, 0].tolist() == [0.0, 0.0, 1.0]
+    assert told.probabilities(beyond)[0, 0].tolist() == [0.0, 0.0, 1.0]
 
 
 def test_without_the_existence_label_nothing_is_learnt_of_what_is_hidden() -> None:
     outputs = torch.tensor([[[1.0, 2.0, 3.0], [0.0, 5.0, 1.0]]])
     hidden = torch.tensor([[1, 2]])
-    both, one = answers().nats(outputs, hidden), answers(existence=False).nats(outputs, hidden)
+    both, one = answers().loss_in_nats(outputs, hidden), answers(existence=False).loss_in_nats(outputs, hidden)
     assert float(both - one) == pytest.approx(-float(torch.log_softmax(outputs[0, 1], dim=0)[2]))
 
 
 def test_two_networks_share_no_weight_but_see_the_same_cloud() -> None:
     entry = RecoveryEntry.model_validate({**SMALL, "answers": "apart"}, strict=False)
-    net = new_model(entry, STOOL, 0)
-    told = Answers.of(entry, STOOL.parameters)
+    net = new_network(entry, STOOL, 0)
+    told = ParameterOutputs.of(entry, STOOL.parameters)
     outputs = net(torch.rand(4, 64, 3))
     outputs[:, told.regressed, 0].sum().backward()
     assert net.other is not None
@@ -64,8 +64,8 @@ def test_two_networks_share_no_weight_but_see_the_same_cloud() -> None:
 @pytest.mark.parametrize("answer", ["classes", "values"])
 def test_a_guess_is_the_mean_of_what_is_likely(answer: str) -> None:
     entry = RecoveryEntry.model_validate({**SMALL, "answers": answer}, strict=False)
-    trained = TrainedRecovery(new_model(entry, STOOL, 0).eval(), STOOL, entry, {})
-    guess = trained.guess_cloud(np.random.default_rng(0).random((100, 3)), np.random.default_rng(0))
+    trained = TrainedRecovery(new_network(entry, STOOL, 0).eval(), STOOL, entry, {})
+    guess = trained.estimate_from_cloud(np.random.default_rng(0).random((100, 3)), np.random.default_rng(0))
     values = guess.values(STOOL)
     continuous = [each for each in STOOL.parameters if each.kind == "continuous"]
     assert any(float(values[each.name]) not in [float(value) for value in each.values] for each in continuous)

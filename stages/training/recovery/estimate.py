@@ -16,7 +16,7 @@ LEAST_CHANCE = 1e-4
 
 
 @dataclass(frozen=True)
-class Guess:
+class ParameterEstimate:
     """What is known before anything is tried. probabilities: of the values of each parameter, float64 (values,), by
     name, were it visible; start: the values where the search begins, the likeliest if there are none."""
 
@@ -42,7 +42,7 @@ class Guess:
         return sum(_surprise(each, self.probabilities[each.name], settled[each.name]) for each in shown)
 
 
-def guess_of(program: Program, chances: FloatArray) -> Guess:
+def estimate_from_probabilities(program: Program, chances: FloatArray) -> ParameterEstimate:
     """The guess of a network that gives the classes of each parameter `chances` (parameters, most classes). Of a
     continuous parameter the search begins with the mean of its values by their probabilities: of many that are nearly
     as likely it is wrong by less than the likeliest."""
@@ -50,22 +50,22 @@ def guess_of(program: Program, chances: FloatArray) -> Guess:
     for parameter, row in zip(program.parameters, chances, strict=True):
         shown = row[: len(parameter.values)]
         probabilities[parameter.name] = shown / max(float(shown.sum()), 1e-300)
-    start = Guess(probabilities).values(program)
+    start = ParameterEstimate(probabilities).values(program)
     for parameter in program.parameters:
         if parameter.kind == "continuous":
             low, *_, high = places = np.array(parameter.values, dtype=np.float64)
             start[parameter.name] = float(np.clip(probabilities[parameter.name] @ places, low, high))
-    return Guess(probabilities, start)
+    return ParameterEstimate(probabilities, start)
 
 
-def base_guess(program: Program) -> Guess:
+def base_estimate(program: Program) -> ParameterEstimate:
     """The guess of who knows nothing but the program: its base shape, every other value as likely as any."""
     probabilities = {}
     for each in program.parameters:
         chances = np.full(len(each.values), 1.0 / (len(each.values) + 1))
         chances[each.class_of(each.base)] *= 2.0
         probabilities[each.name] = chances
-    return Guess(probabilities, program.schema.base)  # which need not be among the values of classes
+    return ParameterEstimate(probabilities, program.schema.base)  # which need not be among the values of classes
 
 
 def _surprise(parameter: Parameter, chances: FloatArray, value: Value) -> float:

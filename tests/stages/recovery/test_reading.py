@@ -12,8 +12,8 @@ import trimesh
 from PIL import Image, ImageDraw
 
 from pipeline.shards import ShardWriter, array_bytes
-from stages.training.recovery.drawings import SIDE, fitted
-from stages.training.recovery.reading import Input, InputError, checked_cloud, ink_of, read_inputs
+from stages.recovery.reading import InputError, RecoveryInput, checked_cloud, ink_from_picture, read_inputs
+from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS, fit_to_square
 
 RNG = np.random.default_rng(0)
 CLOUD = RNG.normal(size=(200, 3))
@@ -29,7 +29,7 @@ def drawing(size: int = 300) -> np.ndarray:
     return np.asarray(image)
 
 
-def only(path: Path) -> Input | InputError:
+def only(path: Path) -> RecoveryInput | InputError:
     (found,) = read_inputs(path)
     return found
 
@@ -44,7 +44,7 @@ def test_clouds_come_back_from_files(suffix: str, tmp_path: Path) -> None:
     else:
         np.savetxt(path, CLOUD, delimiter="," if suffix == ".csv" else " ")
     found = only(path)
-    assert isinstance(found, Input)
+    assert isinstance(found, RecoveryInput)
     assert found.name == "scan"
     assert found.points is not None
     assert np.allclose(found.points, CLOUD, atol=1e-6)
@@ -53,7 +53,7 @@ def test_clouds_come_back_from_files(suffix: str, tmp_path: Path) -> None:
 def test_of_a_mesh_points_of_its_surface_are_taken(tmp_path: Path) -> None:
     trimesh.creation.box((2, 2, 2)).export(tmp_path / "box.glb")
     found = only(tmp_path / "box.glb")
-    assert isinstance(found, Input)
+    assert isinstance(found, RecoveryInput)
     assert found.points is not None
     assert np.allclose(np.abs(found.points).max(axis=1), 1.0)
 
@@ -79,10 +79,10 @@ def test_what_is_no_cloud_is_told(points: np.ndarray, told: str) -> None:
 @pytest.mark.parametrize("inverted", [False, True])
 def test_drawings_of_any_size_and_polarity_are_nearly_the_same(size: int, inverted: bool) -> None:
     picture = 255 - drawing(size) if inverted else drawing(size)
-    found, expected = ink_of(picture), ink_of(drawing())
-    assert found.shape == (SIDE, SIDE)
+    found, expected = ink_from_picture(picture), ink_from_picture(drawing())
+    assert found.shape == (DRAWING_SIDE_PIXELS, DRAWING_SIDE_PIXELS)
     rows, columns = np.nonzero(found)
-    assert max(np.ptp(rows), np.ptp(columns)) >= SIDE - 2 * 8 - 3
+    assert max(np.ptp(rows), np.ptp(columns)) >= DRAWING_SIDE_PIXELS - 2 * 8 - 3
     far = 10 if size == 40 else 3  # a line of a pixel of forty is wide
     for one, other in ((found, expected), (expected, found)):
         near = np.zeros_like(other)
@@ -94,17 +94,17 @@ def test_drawings_of_any_size_and_polarity_are_nearly_the_same(size: int, invert
 def test_fitted_ink_is_in_the_middle_whatever_was_around_it() -> None:
     ink = drawing() < 128
     larger = np.pad(ink, ((10, 200), (300, 0)))
-    assert np.array_equal(fitted(ink), fitted(larger))
+    assert np.array_equal(fit_to_square(ink), fit_to_square(larger))
 
 
 def test_what_is_no_drawing_is_told(tmp_path: Path) -> None:
     photograph = RNG.integers(0, 255, (64, 64, 3)).astype(np.uint8)
     with pytest.raises(InputError, match="in colour"):
-        ink_of(photograph)
+        ink_from_picture(photograph)
     with pytest.raises(InputError, match="a photograph, or shaded"):
-        ink_of(photograph[..., 0])
+        ink_from_picture(photograph[..., 0])
     with pytest.raises(InputError, match="blank"):
-        ink_of(np.full((64, 64), 200, np.uint8))
+        ink_from_picture(np.full((64, 64), 200, np.uint8))
     Image.new("1", (20_000, 10), 1).save(tmp_path / "long.png")
     assert "20,000 × 10 pixels: a drawing has at most 8,192" in str(only(tmp_path / "long.png"))
     (tmp_path / "broken.png").write_bytes(b"no picture")
@@ -116,8 +116,8 @@ def test_transparent_drawings_lie_on_white(tmp_path: Path) -> None:
     layers[..., 3] = 255 - drawing()
     Image.fromarray(layers).save(tmp_path / "house.png")
     found = only(tmp_path / "house.png")
-    assert isinstance(found, Input)
-    assert np.array_equal(found.ink, ink_of(drawing()))
+    assert isinstance(found, RecoveryInput)
+    assert np.array_equal(found.ink, ink_from_picture(drawing()))
 
 
 def test_folder_is_read_in_order_and_one_bad_file_keeps_none_back(tmp_path: Path) -> None:
@@ -127,9 +127,9 @@ def test_folder_is_read_in_order_and_one_bad_file_keeps_none_back(tmp_path: Path
     (tmp_path / "notes.md").write_text("not an input")
     first, second, third = read_inputs(tmp_path)
     assert isinstance(first, InputError)
-    assert isinstance(second, Input)
+    assert isinstance(second, RecoveryInput)
     assert second.points is not None
-    assert isinstance(third, Input)
+    assert isinstance(third, RecoveryInput)
     assert third.ink is not None
 
 
@@ -140,7 +140,7 @@ def test_shard_gives_the_cloud_of_each_sample(tmp_path: Path) -> None:
         writer.write("chair-000001", {"txt": b"{}"})
     (tmp_path / "chairs.tar").write_bytes(stream.getvalue())
     first, second = read_inputs(tmp_path / "chairs.tar")
-    assert isinstance(first, Input)
+    assert isinstance(first, RecoveryInput)
     assert first.name == "chair-000000"
     assert isinstance(second, InputError)
 
@@ -158,7 +158,7 @@ def test_samples_whose_key_is_a_path_are_refused_and_folders_passed_over(tmp_pat
     *refused, good = read_inputs(tmp_path / "foreign.tar")
     assert len(refused) == 5
     assert all(isinstance(each, InputError) and "no file name" in str(each) for each in refused)
-    assert isinstance(good, Input)
+    assert isinstance(good, RecoveryInput)
     assert good.name == "good"
 
 

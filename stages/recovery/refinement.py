@@ -16,9 +16,9 @@ import numpy as np
 from stages.programs.parameters import Parameter, Value
 from stages.programs.program import BuildError, Program
 from stages.programs.schema import Values
-from stages.training.recovery.guess import Guess
-from stages.training.recovery.shapes import valid_values
-from stages.training.recovery.targets import Target
+from stages.recovery.targets import RecoveryTarget
+from stages.training.recovery.estimate import ParameterEstimate
+from stages.training.recovery.shapes import nearest_valid_values
 
 EVOLUTION = 60
 """Shapes in which several discrete parameters are changed at once, before each alone is looked at again."""
@@ -39,24 +39,24 @@ SMALLEST_STEP = 0.1
 
 
 @dataclass(frozen=True)
-class Refined:
+class RefinedShape:
     """values: settled and valid; distance: from the target; target: as it was aligned; tried: shapes that were made."""
 
     values: dict[str, Value]
     distance: float
-    target: Target
+    target: RecoveryTarget
     tried: int
 
 
 def refine(
     program: Program,
-    guess: Guess,
-    target: Target,
+    guess: ParameterEstimate,
+    target: RecoveryTarget,
     budget: int,
     rng: np.random.Generator,
     prior: float = 0.0,
     near: float = 0.0,
-) -> Refined:
+) -> RefinedShape:
     """The nearest shape that is found with `budget` shapes at most; never farther than that of the guess itself, as the
     target was aligned to it. prior: the share of its distance that a shape costs for each nat of surprise; near:
     what is nearer is no better, but by chance."""
@@ -72,7 +72,7 @@ def refine(
         search.between_classes()
         if search.cost >= before:
             break
-    return Refined(search.settled, search.distance, search.target, search.tried)
+    return RefinedShape(search.settled, search.distance, search.target, search.tried)
 
 
 @dataclass
@@ -81,8 +81,8 @@ class _Search:
     of it. settled: the valid values that it stands for; distance: theirs; cost: what is made less."""
 
     program: Program
-    guess: Guess
-    target: Target
+    estimate: ParameterEstimate
+    target: RecoveryTarget
     budget: int
     rng: np.random.Generator
     prior: float
@@ -96,7 +96,7 @@ class _Search:
     _known: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
-        self.settled = valid_values(self.program, self.wanted)
+        self.settled = nearest_valid_values(self.program, self.wanted)
         self._align()
 
     def by_classes(self, passes: int | None) -> None:
@@ -120,9 +120,9 @@ class _Search:
         for parameter in self._unsure_first():
             if parameter.kind == "continuous" or parameter.name not in choices:
                 continue
-            if self.guess.certainty(parameter.name) > SURE:
+            if self.estimate.certainty(parameter.name) > SURE:
                 return
-            chances = self.guess.probabilities[parameter.name]
+            chances = self.estimate.probabilities[parameter.name]
             for index in np.argsort(-chances, kind="stable")[:OTHERWISE].tolist():
                 if self.tried < self.budget and parameter.values[index] != self.settled[parameter.name]:
                     self._leap(parameter.name, parameter.values[index])
@@ -132,12 +132,12 @@ class _Search:
         discrete = [each for each in self.program.parameters if each.kind != "continuous"]
         if not discrete:
             return
-        doubt = np.array([1.02 - self.guess.certainty(each.name) for each in discrete])
+        doubt = np.array([1.02 - self.estimate.certainty(each.name) for each in discrete])
         for _ in range(shapes):
             count = int(self.rng.integers(1, min(MUTATED, len(discrete)) + 1))
             change = {}
             for place in self.rng.choice(len(discrete), count, replace=False, p=doubt / doubt.sum()).tolist():
-                chances = np.sqrt(self.guess.probabilities[discrete[place].name] + 1e-3)
+                chances = np.sqrt(self.estimate.probabilities[discrete[place].name] + 1e-3)
                 index = int(self.rng.choice(len(chances), p=chances / chances.sum()))
                 change[discrete[place].name] = discrete[place].values[index]
             self._try(change)
@@ -162,7 +162,7 @@ class _Search:
         place = parameter.class_of(self.wanted[parameter.name])
         if parameter.kind == "binary":
             return [iter(parameter.values[1 - place : 2 - place])]
-        likely = np.argsort(-self.guess.probabilities[parameter.name], kind="stable")[:2].tolist()
+        likely = np.argsort(-self.estimate.probabilities[parameter.name], kind="stable")[:2].tolist()
         others = [[parameter.values[index]] for index in likely if abs(index - place) > 1]
         return [iter(parameter.values[place + 1 :]), iter(parameter.values[:place][::-1]), *map(iter, others)]
 
@@ -194,7 +194,7 @@ class _Search:
         if self.tried >= self.budget:
             return False
         wanted = {**self.wanted, **change}
-        settled = valid_values(self.program, wanted)
+        settled = nearest_valid_values(self.program, wanted)
         text = self.program.schema.text(settled)
         if text in self._known:
             return False
@@ -225,14 +225,14 @@ class _Search:
         self._known = {self.program.schema.text(self.settled)}
 
     def _cost(self, distance: float, settled: Values) -> float:
-        surprise = self.guess.surprise(self.program, settled) if self.prior else 0.0
+        surprise = self.estimate.surprise(self.program, settled) if self.prior else 0.0
         return max(distance, self.near) * (1.0 + self.prior * surprise)
 
     def _visible(self) -> frozenset[str]:
         return self.program.schema.settled(self.settled)[1]
 
     def _unsure_first(self) -> Sequence[Parameter]:
-        return sorted(self.program.parameters, key=lambda each: self.guess.certainty(each.name))
+        return sorted(self.program.parameters, key=lambda each: self.estimate.certainty(each.name))
 
 
 def _steps(parameter: Parameter, wanted: Values, step: float) -> Iterator[Any]:

@@ -16,8 +16,8 @@ from stages.shape.views.camera import Camera
 from stages.sketches.draw import jittered_camera
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.recovery.clouds import Frame, frame_of
-from stages.training.recovery.drawings import SIDE, drawn
-from stages.training.recovery.surface import sampled_points, shape_points
+from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS, draw_fitted
+from stages.training.recovery.surface import sample_points, shape_points
 
 COMPARED = 1024
 """Points of each side that look for the nearest of the other."""
@@ -28,14 +28,14 @@ FIRST_STEP, LEAST_STEP = 16.0, 1.0
 """Degrees by which a camera is moved, halved each time."""
 
 
-class Target(Protocol):
+class RecoveryTarget(Protocol):
     """Something that shapes are compared with."""
 
-    def compared(self, parts: Sequence[Part]) -> tuple[float, Target]:
+    def compared(self, parts: Sequence[Part]) -> tuple[float, RecoveryTarget]:
         """How far a shape is from it, and the target as it was placed for that: the mean squared distance to the
         nearest, both ways, added. The unit is the longest side of the box around the target."""
 
-    def aligned(self, parts: Sequence[Part]) -> Target:
+    def aligned(self, parts: Sequence[Part]) -> RecoveryTarget:
         """The same target, placed so that it lies on a shape as well as may be."""
 
     def floor(self, parts: Sequence[Part], rng: np.random.Generator) -> float:
@@ -84,7 +84,7 @@ class CloudTarget:
 
     def floor(self, parts: Sequence[Part], rng: np.random.Generator) -> float:
         """Of as many random points: the fewer a cloud has, the farther is every shape from it."""
-        return cloud_target(sampled_points(parts, len(self.points), rng), rng).compared(parts)[0]
+        return cloud_target(sample_points(parts, len(self.points), rng), rng).compared(parts)[0]
 
     def _distance(self, surface: FloatArray, frame: Frame) -> float:
         from scipy.spatial import cKDTree
@@ -126,7 +126,7 @@ class DrawingTarget:
         return jittered_camera(self.view, np.random.default_rng(0))
 
     def compared(self, parts: Sequence[Part]) -> tuple[float, DrawingTarget]:
-        lines = drawn(self.program, tuple(parts), self.view, self.config, np.random.default_rng(0))
+        lines = draw_fitted(self.program, tuple(parts), self.view, self.config, np.random.default_rng(0))
         return float(self.far[lines].mean() + _far(lines)[self.ink].mean()), self
 
     def floor(self, parts: Sequence[Part], rng: np.random.Generator) -> float:
@@ -150,7 +150,7 @@ class DrawingTarget:
 def drawing_target(program: Program, config: SketchesConfig, ink: BoolArray) -> DrawingTarget:
     """The target of fitted ink (SIDE, SIDE). It is not aligned yet."""
     # a line is looked for, not every pixel of it
-    quick = config.model_copy(update={"supersample": 1, "size": SIDE})
+    quick = config.model_copy(update={"supersample": 1, "size": DRAWING_SIDE_PIXELS})
     return DrawingTarget(program, quick, _steady(config.views[0]), 0.0, ink, _far(ink))
 
 
@@ -169,7 +169,7 @@ def _far(ink: BoolArray) -> FloatArray:
     """How far each pixel of a square is from its ink, squared, in sides."""
     from scipy.ndimage import distance_transform_edt
 
-    far: FloatArray = (distance_transform_edt(~ink) / SIDE) ** 2
+    far: FloatArray = (distance_transform_edt(~ink) / DRAWING_SIDE_PIXELS) ** 2
     return far
 
 

@@ -7,36 +7,36 @@ import pytest
 
 from eval.recovery.robustness import SPOILS
 from stages.programs.program import find_program
+from stages.recovery.outliers import find_outliers
+from stages.recovery.reading import RecoveryInput
+from stages.recovery.recover import recover
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import frame_of
-from stages.training.recovery.reading import Input
-from stages.training.recovery.recover import recover
-from stages.training.recovery.strays import strays_of
-from stages.training.recovery.surface import sampled_points
+from stages.training.recovery.surface import sample_points
 
 CHAIR = find_program("chair")
 
 
 def cloud_of_chair(n: int, seed: int = 0) -> FloatArray:
-    return sampled_points(CHAIR.parts(CHAIR.schema.base), n, np.random.default_rng(seed))
+    return sample_points(CHAIR.parts(CHAIR.schema.base), n, np.random.default_rng(seed))
 
 
 def spoilt(how: str, cloud: FloatArray) -> FloatArray:
-    points = SPOILS["points"][how](Input("cloud", points=cloud), np.random.default_rng(1)).points
+    points = SPOILS["points"][how](RecoveryInput("cloud", points=cloud), np.random.default_rng(1)).points
     assert points is not None
     return points
 
 
 @pytest.mark.parametrize("how", ["noise of 1 %", "half missing", "uneven", "300 points"])
 def test_clouds_without_strays_stay_as_they_are(how: str) -> None:
-    assert not strays_of(cloud_of_chair(2048)).any()
-    assert strays_of(spoilt(how, cloud_of_chair(2048))).mean() < 0.03
+    assert not find_outliers(cloud_of_chair(2048)).any()
+    assert find_outliers(spoilt(how, cloud_of_chair(2048))).mean() < 0.03
 
 
 def test_strays_are_found_and_the_box_is_that_of_the_shape() -> None:
     clean = cloud_of_chair(2048)
     cloud = spoilt("5 % outliers", clean)
-    strays = strays_of(cloud)
+    strays = find_outliers(cloud)
     count = len(clean) // 20
     assert strays[-count:].mean() > 0.8
     assert strays[:-count].mean() < 0.01
@@ -47,12 +47,12 @@ def test_strays_are_found_and_the_box_is_that_of_the_shape() -> None:
 
 def test_points_at_one_place_are_one() -> None:
     cloud = cloud_of_chair(600)
-    assert not strays_of(np.concatenate([cloud, *[cloud[:50]] * 6])).any()
-    assert not strays_of(np.zeros((40, 3))).any()
+    assert not find_outliers(np.concatenate([cloud, *[cloud[:50]] * 6])).any()
+    assert not find_outliers(np.zeros((40, 3))).any()
 
 
 def test_one_is_told_how_many_were_left_out() -> None:
     cloud = spoilt("5 % outliers", cloud_of_chair(2048))
     found = recover(cloud, "chair", up="y", budget=1)
-    assert f"{int(strays_of(cloud).sum())} points of the cloud stand alone" in " ".join(found.warnings)
+    assert f"{int(find_outliers(cloud).sum())} points of the cloud stand alone" in " ".join(found.warnings)
     assert "stand alone" not in " ".join(recover(cloud_of_chair(2048), "chair", up="y", budget=1).warnings)

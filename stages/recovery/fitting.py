@@ -10,15 +10,15 @@ from typing import Literal
 import numpy as np
 
 from stages.programs.program import Program
+from stages.recovery.partial_target import PartialTarget, partial_target
+from stages.recovery.reading import RecoveryInput
+from stages.recovery.refinement import RefinedShape, refine
+from stages.recovery.targets import CloudTarget, DrawingTarget, RecoveryTarget, cloud_target, drawing_target
 from stages.shape.arrays import FloatArray
 from stages.shape.views.camera import Camera
 from stages.sketches.settings import SketchesConfig
 from stages.training.recovery.clouds import Frame, frame_of
-from stages.training.recovery.guess import Guess, base_guess
-from stages.training.recovery.partial import PartialTarget, partial_target
-from stages.training.recovery.reading import Input
-from stages.training.recovery.refinement import Refined, refine
-from stages.training.recovery.targets import CloudTarget, DrawingTarget, Target, cloud_target, drawing_target
+from stages.training.recovery.estimate import ParameterEstimate, base_estimate
 from stages.training.recovery.trained import TrainedRecovery
 
 Up = Literal["x", "y", "z", ""]
@@ -51,40 +51,40 @@ _QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True)
-class Look:
+class InitialEstimate:
     """A program, what is guessed of the input, and the input as it stands upright, turned by `rotation` (3, 3). frame:
     the box around it then; none of a drawing."""
 
     program: Program
     model: TrainedRecovery | None
-    guess: Guess
-    target: Target
+    estimate: ParameterEstimate
+    target: RecoveryTarget
     rotation: FloatArray
     up: str
     frame: Frame | None
 
 
-def first_look(
+def initial_estimate(
     program: Program,
     model: TrainedRecovery | None,
-    given: Input,
+    given: RecoveryInput,
     up: Up,
     turned: bool,
     seed: int,
-    target_of: Callable[[FloatArray, np.random.Generator], Target] = cloud_target,
-) -> Look:
+    target_of: Callable[[FloatArray, np.random.Generator], RecoveryTarget] = cloud_target,
+) -> InitialEstimate:
     """The best guess over the axes that may point up and the ways that a front may look."""
     if given.points is None:
         assert given.ink is not None
         config = SketchesConfig() if model is None else model.sketches
-        guess = base_guess(program) if model is None else model.guess_drawing(given.ink)
-        return Look(program, model, guess, drawing_target(program, config, given.ink), np.eye(3), "y", None)
+        guess = base_estimate(program) if model is None else model.estimate_from_drawing(given.ink)
+        return InitialEstimate(program, model, guess, drawing_target(program, config, given.ink), np.eye(3), "y", None)
     looks = []
     for axis, rotation in _rotations(up, 4 if turned else 1):
         cloud = given.points @ rotation.T
         rng = np.random.default_rng(seed)
-        guess = base_guess(program) if model is None else model.guess_cloud(cloud, rng)
-        look = Look(program, model, guess, target_of(cloud, rng), rotation, axis, frame_of(cloud))
+        guess = base_estimate(program) if model is None else model.estimate_from_cloud(cloud, rng)
+        look = InitialEstimate(program, model, guess, target_of(cloud, rng), rotation, axis, frame_of(cloud))
         looks.append((refine(program, guess, look.target, 1, rng).distance, look))
     return min(looks, key=lambda each: each[0])[1]
 
@@ -98,13 +98,13 @@ def _rotations(up: Up, quarters: int) -> Iterator[tuple[str, FloatArray]]:
 
 
 @dataclass(frozen=True)
-class Fit:
+class RecoveryFit:
     """What a search has found for a look. floor: how far a cloud or drawing of that shape itself is from it; base: how
     far the program's base shape is; missing: the share of the shape that a torn cloud says nothing of; tried: shapes
     that were made until it was found."""
 
-    look: Look
-    refined: Refined
+    initial: InitialEstimate
+    refined: RefinedShape
     floor: float
     base: float
     missing: float
@@ -119,13 +119,13 @@ class Fit:
         """From the program's coordinates to the box that targets are compared in, to the upright input, to the input;
         float64 (4, 4)."""
         target = self.refined.target
-        if self.look.frame is None or not isinstance(target, CloudTarget | PartialTarget):
+        if self.initial.frame is None or not isinstance(target, CloudTarget | PartialTarget):
             return None
-        outer, inner = self.look.frame, target.frame
+        outer, inner = self.initial.frame, target.frame
         scale = outer.size / inner.size
         matrix = np.eye(4)
-        matrix[:3, :3] = self.look.rotation.T * scale
-        matrix[:3, 3] = self.look.rotation.T @ (outer.centre - inner.centre * scale)
+        matrix[:3, :3] = self.initial.rotation.T * scale
+        matrix[:3, 3] = self.initial.rotation.T @ (outer.centre - inner.centre * scale)
         return matrix
 
     @property
@@ -135,7 +135,7 @@ class Fit:
         return target.camera if isinstance(target, DrawingTarget) else None
 
 
-def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: int) -> Fit:
+def best_fit(look: InitialEstimate, given: RecoveryInput, up: Up, turned: bool, budget: int, seed: int) -> RecoveryFit:
     """The nearest whole shape; or, of a torn cloud, that of which the cloud may be a part.
 
     Networks learn from torn clouds, too, and guess the whole shape. Where a cloud lies much better on a part of that
@@ -144,7 +144,7 @@ def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: 
     """
     if given.points is None or budget == 1:
         return _fit(look, budget, seed)
-    partial = cache(lambda: first_look(look.program, look.model, given, up, turned, seed, partial_target))
+    partial = cache(lambda: initial_estimate(look.program, look.model, given, up, turned, seed, partial_target))
     told = False
     if look.model is not None:
         guess = _fit(look, 1, seed)
@@ -160,18 +160,18 @@ def best_fit(look: Look, given: Input, up: Up, turned: bool, budget: int, seed: 
     return replace(torn if is_torn else whole, tried=whole.tried + torn.tried)
 
 
-def _is_part(torn: Fit, whole: Fit, share: float) -> bool:
+def _is_part(torn: RecoveryFit, whole: RecoveryFit, share: float) -> bool:
     """Whether a part that is missing leaves no more than a share of the distance."""
     return LEAST_MISSING <= torn.missing <= MOST_MISSING and torn.distance <= share * whole.distance
 
 
-def _fit(look: Look, budget: int, seed: int) -> Fit:
+def _fit(look: InitialEstimate, budget: int, seed: int) -> RecoveryFit:
     rng = np.random.default_rng(seed)
     prior = near = 0.0
     if budget > 1 and look.model is not None and isinstance(look.target, PartialTarget):
         prior, near = PRIOR, BY_CHANCE * _fit(look, 1, seed).floor
-    refined = refine(look.program, look.guess, look.target, budget, rng, prior, near)
-    base = refine(look.program, base_guess(look.program), look.target, 1, rng).distance
+    refined = refine(look.program, look.estimate, look.target, budget, rng, prior, near)
+    base = refine(look.program, base_estimate(look.program), look.target, 1, rng).distance
     parts = look.program.parts(refined.values)
     missing = refined.target.missing(parts) if isinstance(refined.target, PartialTarget) else 0.0
-    return Fit(look, refined, refined.target.floor(parts, rng), base, missing, refined.tried)
+    return RecoveryFit(look, refined, refined.target.floor(parts, rng), base, missing, refined.tried)

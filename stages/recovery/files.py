@@ -11,19 +11,19 @@ import numpy as np
 from pipeline.places import write_file
 from stages.programs.files import shape_glb
 from stages.programs.sheets import shape_picture
+from stages.recovery.reading import RecoveryInput
+from stages.recovery.recover import RecoveryResult
 from stages.shape.arrays import ByteArray
 from stages.shape.views.camera import Camera
 from stages.shape.views.portrait import points_portrait
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
-from stages.training.recovery.reading import Input
-from stages.training.recovery.recover import Recovered
 
 CELL = 400
 SHOWN = 4096
 """Points of a cloud that a picture shows at most."""
 
 
-def write_recovery(folder: Path, given: Input, found: Recovered) -> list[Path]:
+def write_recovery(folder: Path, given: RecoveryInput, found: RecoveryResult) -> list[Path]:
     """`<name>.json`, `<name>.glb` in the program's coordinates, and `<name>.png`."""
     described = json.dumps({"input": given.name, **found.described()}, indent=1, ensure_ascii=False) + "\n"
     return [
@@ -33,7 +33,7 @@ def write_recovery(folder: Path, given: Input, found: Recovered) -> list[Path]:
     ]
 
 
-def recovery_picture(given: Input, found: Recovered) -> ByteArray:
+def recovery_picture(given: RecoveryInput, found: RecoveryResult) -> ByteArray:
     """The input beside the shape that was recovered, seen alike; what speaks against it stands below."""
     program = found.program
     camera = found.camera or Camera(azimuth=35.0, elevation=program.elevation)

@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stages.recovery.refinement import refine
+from stages.recovery.targets import cloud_target
 from stages.shape.arrays import FloatArray
-from stages.training.recovery.guess import Guess, base_guess
-from stages.training.recovery.refinement import refine
-from stages.training.recovery.targets import cloud_target
-from tests.stages.training.recovery.test_recover import STOOL, TALL, cloud_of
+from stages.training.recovery.estimate import ParameterEstimate, base_estimate
+from tests.stages.recovery.test_recover import STOOL, TALL, cloud_of
 
 
-def believed() -> Guess:
+def believed() -> ParameterEstimate:
     """Sure that the height is the third value, and of two minds whether there is a rail."""
     chances: dict[str, FloatArray] = {each.name: np.ones(len(each.values)) for each in STOOL.parameters}
     height = STOOL.schema.by_name["height"]
     chances["height"] = np.eye(len(height.values))[2]
     chances["has_rail"] = np.array([0.8, 0.2])
-    return Guess({name: each / each.sum() for name, each in chances.items()})
+    return ParameterEstimate({name: each / each.sum() for name, each in chances.items()})
 
 
 def surprised(**changes: object) -> float:
@@ -44,7 +44,7 @@ def test_a_choice_surprises_by_how_much_less_likely_it_is() -> None:
 
 
 def test_a_value_that_is_held_impossible_is_only_unlikely() -> None:
-    certain = Guess({**believed().probabilities, "has_rail": np.array([1.0, 0.0])})
+    certain = ParameterEstimate({**believed().probabilities, "has_rail": np.array([1.0, 0.0])})
     settled, _ = STOOL.schema.settled(TALL)
     assert np.isfinite(certain.surprise(STOOL, settled))
 
@@ -67,4 +67,4 @@ def test_what_is_near_enough_is_not_made_nearer() -> None:
 
 
 def test_who_knows_nothing_begins_with_the_base_shape() -> None:
-    assert base_guess(STOOL).values(STOOL) == dict(STOOL.schema.base)
+    assert base_estimate(STOOL).values(STOOL) == dict(STOOL.schema.base)

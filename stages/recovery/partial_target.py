@@ -18,7 +18,7 @@ import numpy as np
 from stages.programs.curves.part import Part
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.clouds import Frame, frame_of
-from stages.training.recovery.surface import sampled_points, shape_points
+from stages.training.recovery.surface import sample_points, shape_points
 
 COMPARED, LOOKED_AT = 1024, 2048
 """Points of each side that look for the nearest of the other, and among which it is looked for."""
@@ -70,7 +70,7 @@ class PartialTarget:
         from scipy.spatial import cKDTree
 
         missing = self.missing(parts)
-        drawn = self.frame.normalized(sampled_points(parts, round(len(self.points) / (1.0 - min(missing, 0.9))), rng))
+        drawn = self.frame.normalized(sample_points(parts, round(len(self.points) / (1.0 - min(missing, 0.9))), rng))
         if missing > 0.0:
             plane = self.planes[self._judged(_Surface.of(parts), self.frame)[1]]
             drawn = drawn[drawn @ plane[:3] + plane[3] <= EDGE]

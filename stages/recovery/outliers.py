@@ -19,7 +19,7 @@ FEWEST = 0.01
 """Of a clean cloud, a smaller share stands alone by chance: it is left as it is."""
 
 
-def strays_of(points: FloatArray) -> BoolArray:
+def find_outliers(points: FloatArray) -> BoolArray:
     """Which points (n, 3) of a cloud are outliers: by the distance to the fourth neighbor, beside that of the neighbors
     (after the local outlier factor, Breunig et al. 2000) and beside the median of all. None where fewer than one in a
     hundred are."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.bounded import Escaped, in_child
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray
-from stages.training.recovery.drawings import fitted
+from stages.training.recovery.drawings import fit_to_square
 
 CLOUDS = (".npy", ".txt", ".xyz", ".csv", ".ply", ".obj", ".glb", ".gltf", ".stl", ".off")
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
@@ -40,7 +40,7 @@ class InputError(ValueError):
 
 
 @dataclass(frozen=True)
-class Input:
+class RecoveryInput:
     """Either `points` float64 (n, 3) or fitted `ink` bool (side, side), and the name that results are filed under."""
 
     name: str
@@ -48,7 +48,7 @@ class Input:
     ink: BoolArray | None = None
 
 
-def read_inputs(path: Path) -> Iterator[Input | InputError]:
+def read_inputs(path: Path) -> Iterator[RecoveryInput | InputError]:
     """All inputs of a file, a folder or a shard, in order; what is wrong with one keeps no other back.
 
     Raises InputError where there is nothing to read at all.
@@ -60,7 +60,7 @@ def read_inputs(path: Path) -> Iterator[Input | InputError]:
         stems = Counter(each.stem for each in files)
         for each in files:
             for given in read_inputs(each):
-                if isinstance(given, Input) and stems[each.stem] > 1:
+                if isinstance(given, RecoveryInput) and stems[each.stem] > 1:
                     yield replace(given, name=each.name)
                 else:
                     yield given
@@ -98,7 +98,7 @@ def checked_cloud(points: Any, name: str = "the cloud") -> FloatArray:
     return cloud
 
 
-def ink_of(picture: ByteArray, name: str = "the drawing") -> BoolArray:
+def ink_from_picture(picture: ByteArray, name: str = "the drawing") -> BoolArray:
     """The fitted ink, bool (side, side), of a drawing uint8 (h, w) or (h, w, 3), dark on light or light on dark.
 
     Raises InputError for a picture in colour, for one without lines, and for one that is no line drawing.
@@ -120,16 +120,18 @@ def ink_of(picture: ByteArray, name: str = "the drawing") -> BoolArray:
     busy = float((difference > CONTRAST).mean())
     if busy > MOST_INK:
         raise InputError(f"{name} is a photograph, or shaded: {busy:.0%} of it is no ground; give a line drawing")
-    return fitted(ink)
+    return fit_to_square(ink)
 
 
-def _of_file(path: Path) -> Input:
+def _of_file(path: Path) -> RecoveryInput:
     suffix = path.suffix.lower()
     if suffix in IMAGES:
-        return Input(path.stem, ink=ink_of(_read_apart(lambda: _picture(path, str(path)), path), str(path)))
+        return RecoveryInput(
+            path.stem, ink=ink_from_picture(_read_apart(lambda: _picture(path, str(path)), path), str(path))
+        )
     if suffix not in CLOUDS:
         raise InputError(f"{path} is neither a cloud nor a drawing; known are {', '.join(CLOUDS + IMAGES)}, .tar")
-    return Input(path.stem, points=checked_cloud(_read_apart(lambda: _points(path), path), str(path)))
+    return RecoveryInput(path.stem, points=checked_cloud(_read_apart(lambda: _points(path), path), str(path)))
 
 
 def _read_apart(read: Callable[[], Any], path: Path) -> Any:
@@ -147,7 +149,7 @@ def _read_apart(read: Callable[[], Any], path: Path) -> Any:
     return np.load(io.BytesIO(found), allow_pickle=False)
 
 
-def _of_shard(path: Path) -> Iterator[Input | InputError]:
+def _of_shard(path: Path) -> Iterator[RecoveryInput | InputError]:
     """Of each sample the cloud, or, where it has none, the first drawing."""
     import tarfile
 
@@ -161,9 +163,11 @@ def _of_shard(path: Path) -> Iterator[Input | InputError]:
                 continue
             try:
                 if "points.npy" in members:
-                    yield Input(key, points=checked_cloud(_array(members["points.npy"], name), name))
+                    yield RecoveryInput(key, points=checked_cloud(_array(members["points.npy"], name), name))
                 elif "sketch0.png" in members:
-                    yield Input(key, ink=ink_of(_picture(io.BytesIO(members["sketch0.png"]), name), name))
+                    yield RecoveryInput(
+                        key, ink=ink_from_picture(_picture(io.BytesIO(members["sketch0.png"]), name), name)
+                    )
                 else:
                     yield InputError(f"{name} has neither points.npy nor sketch0.png")
             except InputError as error:

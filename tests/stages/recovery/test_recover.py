@@ -17,21 +17,21 @@ from stages.points.area_sampling import sample_surface
 from stages.programs.curves.part import joined
 from stages.programs.program import find_program
 from stages.programs.schema import Values
+from stages.recovery.__main__ import main
+from stages.recovery.reading import InputError, RecoveryInput, read_inputs
+from stages.recovery.recover import PRETRAINED_FOLDER, find_models, recover, recover_input
+from stages.recovery.refinement import refine
+from stages.recovery.targets import cloud_target
 from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
-from stages.training.recovery.__main__ import main
-from stages.training.recovery.drawings import drawn
-from stages.training.recovery.guess import base_guess
-from stages.training.recovery.reading import Input, InputError, read_inputs
-from stages.training.recovery.recover import SHIPPED, find_models, recover, recover_input
-from stages.training.recovery.refinement import refine
+from stages.training.recovery.drawings import draw_fitted
+from stages.training.recovery.estimate import base_estimate
 from stages.training.recovery.settings import RecoveryEntry
-from stages.training.recovery.shapes import TEST, TRAIN, VAL, random_shapes
+from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, VALIDATION_INTERVAL, random_shapes
 from stages.training.recovery.ship import slim_bytes
-from stages.training.recovery.surface import chamfer_distance, shape_points
-from stages.training.recovery.targets import cloud_target
+from stages.training.recovery.surface import shape_points, squared_chamfer_distance
 from stages.training.recovery.trained import load_recovery
-from stages.training.recovery.training import described_parameters, new_model
+from stages.training.recovery.training import new_network, parameter_descriptions
 from tests.stages.training.recovery.toy import PROGRAM, SMALL, config, train
 
 STOOL = find_program(PROGRAM)
@@ -50,7 +50,7 @@ def off_by(values: Values, truth: Values) -> float:
 def test_intervals_share_no_shape() -> None:
     texts = [
         {STOOL.schema.text(each.values) for each in islice(random_shapes(STOOL, part, np.random.default_rng(0)), 60)}
-        for part in (TRAIN, VAL, TEST)
+        for part in (TRAIN_INTERVAL, VALIDATION_INTERVAL, TEST_INTERVAL)
     ]
     assert not texts[0] & texts[1]
     assert not texts[0] & texts[2]
@@ -58,17 +58,17 @@ def test_intervals_share_no_shape() -> None:
 
 
 def test_random_shapes_are_valid_and_know_what_is_hidden() -> None:
-    for each in islice(random_shapes(STOOL, TRAIN, np.random.default_rng(1)), 40):
+    for each in islice(random_shapes(STOOL, TRAIN_INTERVAL, np.random.default_rng(1)), 40):
         assert not STOOL.broken(each.values)
         assert (each.classes[3] == 6) == (not each.values["has_rail"])
 
 
 def test_search_alone_finds_a_stool() -> None:
     rng = np.random.default_rng(0)
-    found = refine(STOOL, base_guess(STOOL), cloud_target(cloud_of(TALL), rng), 300, rng)
+    found = refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), 300, rng)
     assert found.tried <= 302
     assert off_by(found.values, TALL) < 0.03
-    first = refine(STOOL, base_guess(STOOL), cloud_target(cloud_of(TALL), rng), 1, rng)
+    first = refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), 1, rng)
     assert found.distance < 0.25 * first.distance
 
 
@@ -76,7 +76,7 @@ def test_search_alone_finds_a_stool() -> None:
 def test_a_larger_budget_is_never_worse(budget: int) -> None:
     def distance(shapes: int) -> float:
         rng = np.random.default_rng(0)
-        return refine(STOOL, base_guess(STOOL), cloud_target(cloud_of(TALL), rng), shapes, rng).distance
+        return refine(STOOL, base_estimate(STOOL), cloud_target(cloud_of(TALL), rng), shapes, rng).distance
 
     assert distance(4 * budget) <= distance(budget)
 
@@ -92,7 +92,7 @@ def test_clouds_of_any_place_size_and_axis_come_back(up: str, asked: bool) -> No
     assert found.placement is not None
     there = shape_points(STOOL.parts(found.values), 2000) @ found.placement[:3, :3].T + found.placement[:3, 3]
     # the cloud is forty times as large as the stool
-    assert chamfer_distance(there, turned) < 0.004 * 40**2
+    assert squared_chamfer_distance(there, turned) < 0.004 * 40**2
     assert np.linalg.det(found.placement[:3, :3]) > 0
     assert any("no trained model" in each for each in found.warnings)
 
@@ -100,8 +100,8 @@ def test_clouds_of_any_place_size_and_axis_come_back(up: str, asked: bool) -> No
 @pytest.mark.parametrize(("azimuth", "elevation"), [(-30.0, 20.0), (8.0, 15.0), (-50.0, 50.0)])
 def test_a_drawing_says_from_where_it_is_seen(azimuth: float, elevation: float) -> None:
     view = SketchView(azimuth=azimuth, elevation=elevation)
-    ink = drawn(STOOL, tuple(STOOL.parts(TALL)), view, SketchesConfig(), np.random.default_rng(0))
-    found = recover_input(Input("stool", ink=ink), PROGRAM, {}, "y", 60, 0)
+    ink = draw_fitted(STOOL, tuple(STOOL.parts(TALL)), view, SketchesConfig(), np.random.default_rng(0))
+    found = recover_input(RecoveryInput("stool", ink=ink), PROGRAM, {}, "y", 60, 0)
     assert found.placement is None
     assert found.camera is not None
     assert found.camera.azimuth == pytest.approx(azimuth, abs=12.0)
@@ -149,7 +149,7 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
 
         model = models[PROGRAM, kind]
         rng = np.random.default_rng(0)
-        ink = drawn(STOOL, tuple(STOOL.parts(TALL)), model.sketches.views[0], model.sketches, rng)
+        ink = draw_fitted(STOOL, tuple(STOOL.parts(TALL)), model.sketches.views[0], model.sketches, rng)
         given = tmp_path / "mine.png"
         Image.fromarray(np.where(ink, 0, 255).astype(np.uint8)).save(given)
     assert main([str(given), "--program", PROGRAM, "--out", str(tmp_path), "--budget", "40"]) == 0
@@ -165,12 +165,12 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
 
 def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) -> None:
     entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
-    tensors = new_model(entry, STOOL, 0).state_dict()
+    tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {name: value for name, value in SMALL.items() if name != "name"}
     good = {
         "kind": "recovery",
         "program": PROGRAM,
-        "parameters": described_parameters(STOOL),
+        "parameters": parameter_descriptions(STOOL),
         "settings": settings,
         "figures": {"val_loss": 2.0, "val_chamfer_high": 0.1},
     }
@@ -200,13 +200,13 @@ def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) ->
 
 def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_path: Path) -> None:
     entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
-    tensors = new_model(entry, STOOL, 0).state_dict()
+    tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {name: value for name, value in SMALL.items() if name != "name"}
     for folder, loss in (("own/mill-models/a", 3.0), ("own/mill-models/b", 2.5), ("shipped/a", 1.0)):
         header = {
             "kind": "recovery",
             "program": PROGRAM,
-            "parameters": described_parameters(STOOL),
+            "parameters": parameter_descriptions(STOOL),
             "settings": settings,
             "figures": {"val_loss": loss, "val_chamfer_high": 0.1},
         }
@@ -220,7 +220,7 @@ def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_pat
     halved.write_bytes(slim_bytes(tmp_path / "shipped/a/weights.safetensors"))
     assert halved.stat().st_size < 0.7 * (tmp_path / "shipped/a/weights.safetensors").stat().st_size
     for one, other in zip(
-        load_recovery(halved).module.parameters(), new_model(entry, STOOL, 0).parameters(), strict=True
+        load_recovery(halved).module.parameters(), new_network(entry, STOOL, 0).parameters(), strict=True
     ):
         np.testing.assert_allclose(one.detach(), other.detach(), atol=1e-3)
 
@@ -229,25 +229,25 @@ def test_weights_too_large_in_halves_ship_their_largest_tensors_as_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8), "decoder": (64, 32)}, strict=False)
-    tensors = new_model(entry, STOOL, 0).state_dict()
+    tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {**{name: value for name, value in SMALL.items() if name != "name"}, "decoder": [64, 32]}
-    header = {"kind": "recovery", "program": PROGRAM, "parameters": described_parameters(STOOL), "settings": settings}
+    header = {"kind": "recovery", "program": PROGRAM, "parameters": parameter_descriptions(STOOL), "settings": settings}
     path, slim = tmp_path / "whole.safetensors", tmp_path / "slim.safetensors"
     path.write_bytes(checkpoint_bytes(tensors, header))
     halves = len(slim_bytes(path))
-    monkeypatch.setattr("stages.training.recovery.ship.MOST", halves - 1000)
+    monkeypatch.setattr("stages.training.recovery.ship.MAX_SHIPPED_BYTES", halves - 1000)
     slim.write_bytes(slim_bytes(path))
     assert slim.stat().st_size <= halves - 1000
     clouds = torch.rand(8, 64, 3, generator=torch.Generator().manual_seed(0))
     one, other = (load_recovery(each).module(clouds) for each in (path, slim))
     there = torch.isfinite(one)
     assert float((one - other)[there].detach().abs().max()) < 0.02 * float(one[there].detach().abs().max())
-    monkeypatch.setattr("stages.training.recovery.ship.MOST", 1000)
+    monkeypatch.setattr("stages.training.recovery.ship.MAX_SHIPPED_BYTES", 1000)
     with pytest.raises(CheckpointError, match="train a smaller one"):
         slim_bytes(path)
 
 
-SHIPPED_MODELS, REFUSED = find_models(SHIPPED)
+SHIPPED_MODELS, REFUSED = find_models(PRETRAINED_FOLDER)
 
 
 def test_what_ships_can_be_used_as_the_programs_are_now() -> None:
@@ -260,13 +260,13 @@ def test_what_ships_can_be_used_as_the_programs_are_now() -> None:
 def test_models_that_ship_see_more_than_the_base_shape(program: str, kind: str) -> None:
     model = SHIPPED_MODELS[program, kind]
     made = find_program(program)
-    shapes = list(islice(random_shapes(made, TEST, np.random.default_rng(11)), 2))
+    shapes = list(islice(random_shapes(made, TEST_INTERVAL, np.random.default_rng(11)), 2))
     distances = []
     for shape in shapes:
         if kind == "points":
             source = shape_points(shape.parts, 2000)
         else:
-            ink = drawn(made, shape.parts, model.sketches.views[0], model.sketches, np.random.default_rng(0))
+            ink = draw_fitted(made, shape.parts, model.sketches.views[0], model.sketches, np.random.default_rng(0))
             source = np.where(ink, 0, 255).astype(np.uint8)
         found = recover(source, program, SHIPPED_MODELS, up="y", budget=20)
         distances.append((found.distance, found.base_distance))
@@ -292,10 +292,10 @@ def test_what_readers_cannot_read_keeps_no_other_file_back(tmp_path: Path) -> No
     np.save(tmp_path / "good.npy", np.random.default_rng(0).random((100, 3)))
     np.savetxt(tmp_path / "good.xyz", np.random.default_rng(0).random((100, 3)))
     given = list(read_inputs(tmp_path))
-    assert [each.name for each in given if isinstance(each, Input)] == ["good.npy", "good.xyz"]
+    assert [each.name for each in given if isinstance(each, RecoveryInput)] == ["good.npy", "good.xyz"]
     assert len([each for each in given if isinstance(each, InputError)]) == 2
 
 
 def test_base_guess_begins_at_the_base_shape() -> None:
     lamp = find_program("ceiling_lamp")
-    assert base_guess(lamp).values(lamp) == lamp.schema.base
+    assert base_estimate(lamp).values(lamp) == lamp.schema.base

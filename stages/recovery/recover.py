@@ -13,17 +13,17 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.programs.parameters import Value
 from stages.programs.program import Program, find_program, program_names
+from stages.recovery.fitting import RecoveryFit, Up, best_fit, initial_estimate
+from stages.recovery.outliers import find_outliers
+from stages.recovery.reading import RecoveryInput, checked_cloud, ink_from_picture
+from stages.recovery.refinement import RefinedShape, refine
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.views.camera import Camera
 from stages.training.checkpoint import CheckpointError, weights_of_kind
-from stages.training.recovery.fitting import Fit, Up, best_fit, first_look
-from stages.training.recovery.guess import Guess
-from stages.training.recovery.reading import Input, checked_cloud, ink_of
-from stages.training.recovery.refinement import Refined, refine
-from stages.training.recovery.strays import strays_of
-from stages.training.recovery.trained import KIND, TrainedRecovery, load_recovery
+from stages.training.recovery.estimate import ParameterEstimate
+from stages.training.recovery.trained import RECOVERY_KIND, TrainedRecovery, load_recovery
 
-SHIPPED = Path(__file__).parents[3] / "datasets/exemplars/models"
+PRETRAINED_FOLDER = Path(__file__).parents[2] / "datasets/exemplars/models"
 """Models that come with Shapemill; `ship.py` puts them there."""
 
 UNLIKE = {"points": 0.004, "sketch": 0.001}
@@ -31,15 +31,15 @@ UNLIKE = {"points": 0.004, "sketch": 0.001}
 drawing are everywhere, so that no other lines are far from them."""
 NO_BETTER = 0.9
 """A recovery that is not nearer than this share of the base shape's distance says nothing of the input."""
-GLANCE = 40
+PROGRAM_TRIAL_SHAPES = 40
 """Shapes that a program is given to show that it is the likeliest."""
 
-Models = Mapping[tuple[str, str], TrainedRecovery]
+RecoveryModels = Mapping[tuple[str, str], TrainedRecovery]
 """Trained models by program and kind of input, `points` or `sketch`."""
 
 
 @dataclass(frozen=True)
-class Recovered:
+class RecoveryResult:
     """program and values: what makes the shape. distance: mean squared distance between input and shape, both ways
     added, in longest sides of the box around the input (of a drawing: around its ink). base_distance: that of the
     program's base shape. missing: the share of the shape's surface that a torn cloud says nothing of, and which its
@@ -84,11 +84,11 @@ class Recovered:
 def recover(
     source: FloatArray | ByteArray,
     program: str = "",
-    models: Models | None = None,
+    models: RecoveryModels | None = None,
     up: Up = "",
     budget: int = 600,
     seed: int = 0,
-) -> Recovered:
+) -> RecoveryResult:
     """The shape of a program that is most like a cloud, float (n, 3), or a drawing, uint8 (h, w) or (h, w, 3).
 
     A cloud may have any number of points, stand anywhere, be of any size and have any of its axes up (`up`; empty: the
@@ -101,34 +101,36 @@ def recover(
     program that is not there.
     """
     if np.asarray(source).dtype == np.uint8:
-        given = Input("drawing", ink=ink_of(np.asarray(source, np.uint8)))
+        given = RecoveryInput("drawing", ink=ink_from_picture(np.asarray(source, np.uint8)))
     else:
-        given = Input("cloud", points=checked_cloud(source))
+        given = RecoveryInput("cloud", points=checked_cloud(source))
     return recover_input(given, program, models or {}, up, budget, seed)
 
 
 def recover_input(
-    given: Input, program: str, models: Models, up: Up, budget: int, seed: int, turned: bool = True
-) -> Recovered:
+    given: RecoveryInput, program: str, models: RecoveryModels, up: Up, budget: int, seed: int, turned: bool = True
+) -> RecoveryResult:
     """`recover` of what `read_inputs` has read. turned: whether the front of a cloud may look along any axis, and not
     only along the program's."""
     given, strays = _without_strays(given)
     kind = "points" if given.ink is None else "sketch"
     names = [program] if program else sorted({*program_names(), *(name for name, known in models if known == kind)})
-    looks = [first_look(find_program(name), models.get((name, kind)), given, up, turned, seed) for name in names]
+    looks = [initial_estimate(find_program(name), models.get((name, kind)), given, up, turned, seed) for name in names]
     if len(looks) > 1:
         rng = np.random.default_rng(seed)
-        glances = [refine(each.program, each.guess, each.target, GLANCE, rng).distance for each in looks]
+        glances = [
+            refine(each.program, each.estimate, each.target, PROGRAM_TRIAL_SHAPES, rng).distance for each in looks
+        ]
         looks = [looks[int(np.argmin(glances))]]
     fit = best_fit(looks[0], given, up, turned, budget, seed)
     return _told(fit, kind, strays, guessed_program=not program)
 
 
-def _without_strays(given: Input) -> tuple[Input, int]:
+def _without_strays(given: RecoveryInput) -> tuple[RecoveryInput, int]:
     """A cloud without the points that lie beside it, and how many these are."""
     if given.points is None:
         return given, 0
-    strays = strays_of(given.points)
+    strays = find_outliers(given.points)
     return replace(given, points=given.points[~strays]), int(strays.sum())
 
 
@@ -151,7 +153,9 @@ def _models_in(folder: Path, wrong: list[str]) -> dict[tuple[str, str], TrainedR
     """The best models in one folder; adds to `wrong`."""
     found: dict[tuple[str, str], TrainedRecovery] = {}
     losses: dict[tuple[str, str], float] = {}
-    for path in chain.from_iterable(weights_of_kind(each, KIND) for each in (folder, *sorted(folder.glob("*-models")))):
+    for path in chain.from_iterable(
+        weights_of_kind(each, RECOVERY_KIND) for each in (folder, *sorted(folder.glob("*-models")))
+    ):
         try:
             model = load_recovery(path)
             if model.entry.is_baseline:
@@ -167,9 +171,9 @@ def _models_in(folder: Path, wrong: list[str]) -> dict[tuple[str, str], TrainedR
     return found
 
 
-def _told(fit: Fit, kind: str, strays: int, guessed_program: bool) -> Recovered:
+def _told(fit: RecoveryFit, kind: str, strays: int, guessed_program: bool) -> RecoveryResult:
     """A fit, and what speaks against it."""
-    look, refined, program = fit.look, fit.refined, fit.look.program
+    look, refined, program = fit.initial, fit.refined, fit.initial.program
     warnings = []
     if guessed_program:
         warnings.append(f"no program was named: {program.name} fits best")
@@ -182,7 +186,7 @@ def _told(fit: Fit, kind: str, strays: int, guessed_program: bool) -> Recovered:
             f"the cloud is partial: beyond its edge lies {fit.missing:.0%} of the shape that was found, of which the "
             "cloud says nothing; its parameters there are guesses"
         )
-    limit = UNLIKE[kind] if look.model is None or kind == "sketch" else min(UNLIKE[kind], look.model.usual)
+    limit = UNLIKE[kind] if look.model is None or kind == "sketch" else min(UNLIKE[kind], look.model.typical_distance)
     if fit.distance - fit.floor > limit:
         warnings.append(
             f"the input is unlike any {program.name}: the nearest that was found is {fit.distance:.2g} away, where "
@@ -190,14 +194,14 @@ def _told(fit: Fit, kind: str, strays: int, guessed_program: bool) -> Recovered:
         )
     if fit.distance - fit.floor > NO_BETTER * (fit.base - fit.floor):
         warnings.append(f"the result is no better than the base shape of the program ({fit.base:.2g})")
-    confidence = None if look.model is None else _confidence(program, look.guess, refined)
-    return Recovered(
+    confidence = None if look.model is None else _confidence(program, look.estimate, refined)
+    return RecoveryResult(
         program, refined.values, fit.distance, fit.base, fit.missing, confidence, fit.placement, fit.camera, look.up,
         fit.tried, tuple(warnings),
     )  # fmt: skip
 
 
-def _confidence(program: Program, guess: Guess, refined: Refined) -> dict[str, float]:
+def _confidence(program: Program, guess: ParameterEstimate, refined: RefinedShape) -> dict[str, float]:
     _, visible = program.schema.settled(refined.values)
     return {
         each.name: round(float(guess.probabilities[each.name][each.class_of(refined.values[each.name])]), 4)
