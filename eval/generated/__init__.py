@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""Metrics about shapes that models generate from strings."""

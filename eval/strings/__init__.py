@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""Metrics about strings: corpora, growth, compression, ambiguity, and string VAEs."""
