@@ -19,16 +19,16 @@ from pipeline.errors import Rejected
 from stages.abstraction.hierarchy import Boxes, hierarchy_of
 from stages.abstraction.settings import AbstractionConfig
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.execution.fitting import fit, fit_cuboids
+from stages.shapeassembly.extraction.category_rules import RULES
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.rules import RULES
 from stages.shapeassembly.extraction.settings import Cleaning, Gates
-from stages.shapeassembly.fit import fit, fit_cuboids
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.program import Program
+from stages.training.latent import Points
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
-from stages.training.standing import Points
 
 NEAR = 0.02
 """Points agree that are no further apart, as a share of the diagonal of the target, as in `extraction.distance`."""

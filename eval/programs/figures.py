@@ -18,11 +18,11 @@ from eval.programs.quality import boxes_of_programs, clouds_of, shape_of_boxes
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.views.portrait import PAPER
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
-from stages.shapeassembly.edits import edited
+from stages.shapeassembly.analysis.structure import signature
+from stages.shapeassembly.editing.edits import edited
+from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.interpreter import execute
-from stages.shapeassembly.program import Program
-from stages.shapeassembly.structure import signature
+from stages.shapeassembly.syntax.program import Program
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 

@@ -14,10 +14,10 @@ from eval.engine.dataset_run import Subject
 from eval.engine.models import Trained, trained_models
 from pipeline.errors import Rejected
 from stages.shape.sample import read_samples
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.interpreter import execute
-from stages.shapeassembly.parser import parse
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.execution.interpreter import execute
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.parser import parse
+from stages.shapeassembly.syntax.program import Program
 from stages.training.cuboid_rnn.trained import load_cuboid_rnn
 from stages.training.part_graph_vae.corpus import nodes_of
 from stages.training.part_graph_vae.trained import load_part_graph_vae

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numba
 import numpy as np
 
-from stages.shapeassembly.program import Program
-from stages.shapeassembly.structure import token_distance, tokens
+from stages.shapeassembly.analysis.structure import token_distance, tokens
+from stages.shapeassembly.syntax.program import Program
 
 CELLS = 24
 """Cells along each axis of the grid that bounds of distances are looked up in."""

@@ -19,11 +19,11 @@ from stages.programs.program import find_program
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import box_corners, nearest_axes
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.minimum_box import minimum_box
+from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 from stages.shapeassembly.extraction.validity import surface_points
+from stages.training.latent import drawn as drawn_points
 from stages.training.recovery.shapes import TRAIN_INTERVAL, random_shapes
 from stages.training.recovery.surface import even_points
-from stages.training.standing import drawn as drawn_points
 
 POINTS = 256
 """Points of a part."""

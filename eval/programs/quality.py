@@ -17,15 +17,15 @@ from eval.programs.nearest import nearest, paired
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
+from stages.shapeassembly.analysis.structure import program_distance, signature
+from stages.shapeassembly.execution.interpreter import execute_all
 from stages.shapeassembly.extraction.boxes import box_corners
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import boxes_of, surface_points
-from stages.shapeassembly.interpreter import execute_all
-from stages.shapeassembly.program import Program
-from stages.shapeassembly.structure import program_distance, signature
+from stages.shapeassembly.syntax.program import Program
+from stages.training.latent import Points
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
-from stages.training.standing import Points
 
 POINTS = 256
 """Points of a shape's surface that Chamfer distances are measured with."""

@@ -13,7 +13,7 @@ from eval.programs.models import category_programs
 from eval.programs.quality import boxes_of_programs, clouds_of
 from eval.programs.two_sample_test import POINTS, features_of
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.syntax.program import Program
 
 
 @dataclass(frozen=True)

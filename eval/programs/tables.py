@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from eval.engine.table import Cell, Published, Table
 from eval.programs.quality import POINTS, Physics, Variability
 from eval.programs.two_sample_test import Realism
-from stages.shapeassembly.program import Program
-from stages.shapeassembly.statistics import program_statistics
+from stages.shapeassembly.analysis.statistics import program_statistics
+from stages.shapeassembly.syntax.program import Program
 
 _CATEGORIES = ("chair", "table", "storage")
 _METHODS = ("3D-PRNN", "StructureNet", "ShapeAssembly", "validation")

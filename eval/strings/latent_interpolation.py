@@ -16,8 +16,8 @@ from stages.shape.shape import kit_shape
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.layout import Method
 from stages.strings.decoder import Decoded, decode
-from stages.training.string_vae.sampling import linear_points, path_points
-from stages.training.string_vae.structuring import interpolation, search_graph
+from stages.training.string_vae.latent_graph import interpolation, search_graph
+from stages.training.string_vae.latent_sampling import linear_points, path_points
 from stages.training.string_vae.trained import TrainedStringVae
 
 STOPS = 8

@@ -16,8 +16,8 @@ from eval.engine.table import Cell, Published, Table
 from pipeline.randomness import decision_rng
 from stages.shape.graphs.canonical import graph_digest
 from stages.strings.decoder import decode
-from stages.training.string_vae.sampling import TEMPERATURE, sample
-from stages.training.string_vae.structuring import PathFigures, naive_graph, path_figures, search_graph
+from stages.training.string_vae.latent_graph import PathFigures, naive_graph, path_figures, search_graph
+from stages.training.string_vae.latent_sampling import TEMPERATURE, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 
 NODES = 1000

@@ -40,7 +40,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.string_sampling.mending import mended
     from stages.strings.alphabet import make_alphabet
     from stages.strings.decoder import decode
-    from stages.training.string_vae.sampling import sample
+    from stages.training.string_vae.latent_sampling import sample
 
     outcomes: list[tuple[str, Sequence[Attempt]]] = []
     compared: list[tuple[str, str, Sequence[Attempt]]] = []

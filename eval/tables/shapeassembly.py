@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from eval.engine.table import Table
     from eval.programs.reference import Reference
     from stages.shapeassembly.extraction.hierarchy import Box
-    from stages.shapeassembly.program import Program
+    from stages.shapeassembly.syntax.program import Program
 
 SHOWN = 16
 SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part_graph_vae": 120.0}

@@ -29,7 +29,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from eval.programs.quality import boxes_of_programs, clouds_of
     from eval.programs.two_sample_test import POINTS
     from pipeline.randomness import decision_rng
-    from stages.shapeassembly.interpreter import execute_all
+    from stages.shapeassembly.execution.interpreter import execute_all
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 
     models = [each for each in program_models(subject, asked.nucleus) if told_without(each) == "nothing"]

@@ -16,7 +16,7 @@ from stages.training.checkpoint import weights_of_kind
 if TYPE_CHECKING:
     from eval.engine.models import Trained
     from eval.strings.string_vaes import Reconstruction, Sampling
-    from stages.training.string_vae.structuring import PathFigures
+    from stages.training.string_vae.latent_graph import PathFigures
     from stages.training.string_vae.trained import TrainedStringVae
 
 
@@ -60,7 +60,7 @@ def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]
     from stages.exemplars.language import made_kits
     from stages.string_sampling.instantiation.layout import STANDARD
     from stages.strings.settings import StringsConfig
-    from stages.training.string_vae.sampling import WAYS
+    from stages.training.string_vae.latent_sampling import WAYS
 
     model, seed, kits = trained.model, subject.config.seed, made_kits(subject.places)
     train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))

@@ -10,9 +10,9 @@ from stages.abstraction.members import FOUND, PROGRAM
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 from stages.shape.geometry.bounds import shape_bounds
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.interpreter import execute
-from stages.shapeassembly.parser import parse
+from stages.shapeassembly.execution.interpreter import execute
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.parser import parse
 
 AROUND = 0.35
 """By how much of the sample's diagonal a corner of the box around a program may miss that of the sample: it was let

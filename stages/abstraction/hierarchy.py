@@ -11,7 +11,7 @@ from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
 from stages.shapeassembly.extraction.boxes import around, box_corners, gap
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy, bounded
-from stages.shapeassembly.extraction.minimum_box import minimum_box
+from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
 NEAR = 0.01
 """Up to which boxes count as touching, as a share of the diagonal of the shape."""

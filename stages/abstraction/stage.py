@@ -14,9 +14,9 @@ from stages.abstraction.settings import AbstractionConfig
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
+from stages.shapeassembly.extraction.category_rules import RULES
 from stages.shapeassembly.extraction.extract import Extraction, extract
-from stages.shapeassembly.extraction.rules import RULES
-from stages.shapeassembly.printer import print_program
+from stages.shapeassembly.syntax.printer import print_program
 
 BYTES_A_SAMPLE = 4096
 

@@ -14,8 +14,8 @@ from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.program_sampling.settings import WritingConfig
-from stages.shapeassembly.printer import print_program
 from stages.shapeassembly.settings import ShapeAssemblyConfig, WrittenPrograms
+from stages.shapeassembly.syntax.printer import print_program
 
 BYTES_A_PROGRAM = 3_000
 
@@ -58,7 +58,7 @@ def run_shard(task: Task) -> Outcome:
     all; ShardFailed for weights that are others than when the run began.
     """
     from stages.training.checkpoint import CheckpointError
-    from stages.training.program_writers import load_program_writer
+    from stages.training.load import load_program_writer
 
     params = task.shard.params
     path = task.published(f"{params['folder']}/weights.safetensors")

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
+from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.language import LANGUAGE
-from stages.shapeassembly.parser import parse
-from stages.shapeassembly.structure import signature
+from stages.shapeassembly.syntax.parser import parse
 
 
 def _faults(sample: Packaged) -> Iterator[str]:

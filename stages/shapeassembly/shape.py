@@ -9,8 +9,8 @@ import numpy as np
 from stages.shape.arrays import ByteArray
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
-from stages.shapeassembly.interpreter import Execution, execute
-from stages.shapeassembly.parser import parse
+from stages.shapeassembly.execution.interpreter import Execution, execute
+from stages.shapeassembly.syntax.parser import parse
 
 _FACES = np.array(
     [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],

@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.places import file_digest
-from stages.shapeassembly.limits import MAX_TEXT
+from stages.shapeassembly.syntax.limits import MAX_TEXT
 
 
 def existing_programs(path: Path) -> Path:

@@ -24,13 +24,13 @@ from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import unstated
 from stages.shape.collection.shards import planned_collection
 from stages.shape.sample import Sample, write_sample
-from stages.shapeassembly.accept import accepted_rows
+from stages.shapeassembly.acceptance import accepted_rows
 from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
 from stages.shapeassembly.language import Programs, assignment_name
 from stages.shapeassembly.origins import program_origins
 from stages.shapeassembly.settings import ShapeAssemblyConfig
-from stages.shapeassembly.sharing import splits_of
 from stages.shapeassembly.sources import program_texts, source_digest
+from stages.shapeassembly.splits import splits_of
 
 BYTES_A_PROGRAM = 12_000
 """A sample in its shard, and its line in the assignment."""

@@ -123,7 +123,7 @@ def _drawn(
 ) -> list[str | None]:
     """What each draw of a lane answers: a string of the grammar, or None."""
     from stages.string_sampling.mending import mended
-    from stages.training.string_vae.sampling import sample
+    from stages.training.string_vae.latent_sampling import sample
 
     found = sample(source.model, asked.way, source.strings, config.draws, task.rng("strings"), asked.temperature)
     return mended(source.model, found, maker, method, config.mends, int(task.rng("mending").integers(1 << 31)))

@@ -14,9 +14,9 @@ import numpy as np
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.layout import Method
 from stages.strings.decoder import Decoded, decode
-from stages.training.string_vae.sampling import Found
+from stages.training.string_vae.decoding import Draft
+from stages.training.string_vae.latent_sampling import Found
 from stages.training.string_vae.trained import TrainedStringVae
-from stages.training.string_vae.writing import Draft
 
 TRIED = 2000
 """Parts that are put down at most to learn whether an arrangement is left: most that have none are told by less."""

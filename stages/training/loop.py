@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from stages.training.checkpoint import tensors_of
-from stages.training.entry import ModelEntry
-from stages.training.learner import Learner
+from stages.training.model_config import ModelEntry
+from stages.training.training_task import Learner
 
 LAST_RATE = 0.05
 """Share of the learning rate that is left at the last step."""

@@ -13,7 +13,7 @@ from pipeline.errors import ShardFailed
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.programs.program import program_module
-from stages.training.entry import ModelEntry, Subject
+from stages.training.model_config import ModelEntry, Subject
 
 
 class Kind(Protocol):

@@ -20,11 +20,11 @@ from stages.shape.collection.shards import PRODUCERS, collection_shards, planned
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
-from stages.training.entry import KitModelEntry
+from stages.training.model_config import KitModelEntry
+from stages.training.model_folder import FILES, run_trained
 from stages.training.recovery.settings import RecoveryEntry
 from stages.training.rounds import Chain, kind_of, model_name, module_of, rounds, run_round
 from stages.training.settings import AnyEntry, TrainingConfig
-from stages.training.trained import FILES, run_trained
 
 LEARNT = ("train", "val")
 """The splits that models see."""

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from stages.shapeassembly.extraction.category_rules import RULES
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.hierarchy import PartHierarchy
-from stages.shapeassembly.extraction.rules import RULES
 from stages.shapeassembly.extraction.settings import Gates
 from tests.bench.measure import Measure, rate
 from tests.stages.shapeassembly.extraction.shapes import hierarchy, leaf, table, turned

@@ -12,10 +12,10 @@ from pathlib import Path
 import torch
 
 from stages.shapeassembly import execute, execute_all, parse
-from stages.shapeassembly.differentiable import DifferentiableProgram
-from stages.shapeassembly.parameters import parameters
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.execution.differentiable import DifferentiableProgram
+from stages.shapeassembly.execution.parameters import parameters
 from stages.shapeassembly.sources import program_texts
+from stages.shapeassembly.syntax.program import Program
 from tests.bench.measure import Measure, rate
 
 ROOT = Path(__file__).resolve().parents[2]

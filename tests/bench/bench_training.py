@@ -23,7 +23,7 @@ from torch.nn.utils.rnn import pack_sequence, pad_packed_sequence
 from stages.exemplars.build import read_kit
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shapeassembly import parse
-from stages.shapeassembly.errors import ProgramError
+from stages.shapeassembly.syntax.errors import ProgramError
 from stages.strings.acceptor import follow
 from stages.strings.kit_strings import KitStrings
 from stages.strings.rules import make_rules

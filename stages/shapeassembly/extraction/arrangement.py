@@ -8,8 +8,8 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import angle_between, around, box_corners, nearest_axes
+from stages.shapeassembly.extraction.category_rules import Rules
 from stages.shapeassembly.extraction.hierarchy import Box, Part
-from stages.shapeassembly.extraction.rules import Rules
 
 ALIGNED_DEGREES = 5.0
 """A part turned by less against its parent is aligned with it (shapeassembly §5.1)."""

@@ -8,18 +8,18 @@ import numpy as np
 
 from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.checks import overflow, violations
+from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_parts, leaf_corners
 from stages.shapeassembly.extraction.boxes import around
+from stages.shapeassembly.extraction.category_rules import Rules
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
-from stages.shapeassembly.extraction.rules import Rules
+from stages.shapeassembly.extraction.program_builder import Groups, Order, write_program
 from stages.shapeassembly.extraction.settings import EVERY_STEP, Cleaning, Gates
 from stages.shapeassembly.extraction.shortening import shorten_parts
 from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted
-from stages.shapeassembly.extraction.writing import Groups, Order, write_program
-from stages.shapeassembly.interpreter import execute
-from stages.shapeassembly.printer import rounded
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.syntax.checks import overflow, violations
+from stages.shapeassembly.syntax.printer import rounded
+from stages.shapeassembly.syntax.program import Program
 
 USUAL_DIAGONALS = (1.0, 4.0)
 """Of the bounding boxes of PartNet's shapes, which lie about the unit sphere: a shape of such size keeps it."""

@@ -18,8 +18,8 @@ from stages.shapeassembly.extraction.joints import (
     attach_contact,
     squeeze,
 )
-from stages.shapeassembly.extraction.layout import BBOX, Layout
-from stages.shapeassembly.program import Squeeze
+from stages.shapeassembly.extraction.node_layout import BBOX, Layout
+from stages.shapeassembly.syntax.program import Squeeze
 
 WELL_PLACED = 0.01
 """Cost up to which a tilted part takes its place in canonical order; others wait for what they may be attached to."""

@@ -13,7 +13,7 @@ from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.arrangement import leaf_corners
 from stages.shapeassembly.extraction.boxes import around, box_corners
 from stages.shapeassembly.extraction.hierarchy import Part
-from stages.shapeassembly.extraction.layout import Layout, lay_out
+from stages.shapeassembly.extraction.node_layout import Layout, lay_out
 from stages.shapeassembly.extraction.symmetry import BOTTOM, TOP, Body, Group, reflections, translations
 
 REFLECTION_AXES = (0, 2, 1)

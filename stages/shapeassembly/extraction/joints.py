@@ -9,9 +9,9 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import place_in, point_at
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.layout import BBOX, REACHES, Layout
-from stages.shapeassembly.program import BBOX as BBOX_NAME
-from stages.shapeassembly.program import Attach, Face, Point, Squeeze
+from stages.shapeassembly.extraction.node_layout import BBOX, REACHES, Layout
+from stages.shapeassembly.syntax.program import BBOX as BBOX_NAME
+from stages.shapeassembly.syntax.program import Attach, Face, Point, Squeeze
 
 Joint = Attach | Squeeze
 

@@ -9,8 +9,8 @@ from pydantic import AfterValidator, Field
 
 from pipeline.config import StrictModel
 from stages.shape.collection.origin import Credit
-from stages.shapeassembly.extraction.files import HierarchyKind, HierarchySource
-from stages.shapeassembly.extraction.rules import RULES, Rules
+from stages.shapeassembly.extraction.category_rules import RULES, Rules
+from stages.shapeassembly.extraction.readers.source import HierarchyKind, HierarchySource
 
 Category = Literal["any", "chair", "table", "storage"]
 

@@ -13,7 +13,7 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Shard, Task
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles
-from stages.shapeassembly.printer import print_program
+from stages.shapeassembly.syntax.printer import print_program
 
 HIERARCHIES_A_SHARD = 1000
 """About a minute of work."""

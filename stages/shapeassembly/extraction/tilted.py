@@ -8,6 +8,8 @@ from itertools import permutations
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shapeassembly.execution.interpreter import execute_all
+from stages.shapeassembly.execution.parameters import SMALLEST
 from stages.shapeassembly.extraction.boxes import box_corners
 from stages.shapeassembly.extraction.grounding import Placer, Placing
 from stages.shapeassembly.extraction.hierarchy import Box
@@ -22,13 +24,11 @@ from stages.shapeassembly.extraction.joints import (
     part_name,
     squeeze,
 )
-from stages.shapeassembly.extraction.layout import BBOX, Layout
+from stages.shapeassembly.extraction.node_layout import BBOX, Layout
 from stages.shapeassembly.extraction.validity import boxes_of
-from stages.shapeassembly.interpreter import execute_all
-from stages.shapeassembly.parameters import SMALLEST
-from stages.shapeassembly.printer import rounded
-from stages.shapeassembly.program import BBOX as BBOX_NAME
-from stages.shapeassembly.program import Block, Cuboid, Program
+from stages.shapeassembly.syntax.printer import rounded
+from stages.shapeassembly.syntax.program import BBOX as BBOX_NAME
+from stages.shapeassembly.syntax.program import Block, Cuboid, Program
 
 MOST_ATTACHMENTS = 3
 """A part that is held at three points is held."""

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shapeassembly.execution.interpreter import Execution
 from stages.shapeassembly.extraction.boxes import around, box_corners, gap, surface_distance
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.interpreter import Execution
 
 ROOTED_SHARE = 0.02
 """Parts further apart than this share of the shape's diagonal are not connected (shapeassembly App. E)."""

@@ -12,8 +12,8 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import FloatArray
-from stages.training.boxes import TURN, WIDTH
-from stages.training.pooling import pooled
+from stages.training.box_vectors import TURN, WIDTH
+from stages.training.bucketing import pooled
 
 MOST_BOXES = 32
 """Cuboids of a shape, mirror images counted once."""

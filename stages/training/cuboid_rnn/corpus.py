@@ -12,10 +12,10 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import FloatArray
+from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import boxes_of
-from stages.shapeassembly.interpreter import execute
-from stages.training.boxes import CENTRE, SIZE, numbers_of_box
+from stages.training.box_vectors import CENTRE, SIZE, numbers_of_box
 from stages.training.cuboid_rnn.batches import MOST_BOXES, Cuboids
 from stages.training.program_vae.corpus import category_programs
 

@@ -12,7 +12,7 @@ import torch
 
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.training.boxes import WIDTH, box_of_numbers
+from stages.training.box_vectors import WIDTH, box_of_numbers
 from stages.training.checkpoint import CheckpointError, load_checkpoint
 from stages.training.cuboid_rnn.batches import END, FLAGS, KINDS, MOST_BOXES, NUMBERS, SHOWN
 from stages.training.cuboid_rnn.corpus import mirrored

@@ -16,8 +16,8 @@ from stages.training.cuboid_rnn.batches import Batch, Cuboids, batches
 from stages.training.cuboid_rnn.corpus import prepare_corpus, read_corpus
 from stages.training.cuboid_rnn.model import CuboidRnn, density
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
-from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
+from stages.training.training_task import mean_figures, sample_digests
 
 
 def prepare(task: Task) -> Outcome:

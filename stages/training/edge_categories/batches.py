@@ -15,7 +15,7 @@ from stages.strings.alphabet import Alphabet
 from stages.strings.categories import CategorySpace, token_edges
 from stages.strings.decoder import decode
 from stages.strings.tokens import number_value
-from stages.training.pooling import pooled
+from stages.training.bucketing import pooled
 
 PAD = 0
 """The code of what stands behind a string; the code of a part is its label's number plus one."""

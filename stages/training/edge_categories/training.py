@@ -16,8 +16,8 @@ from stages.training.edge_categories.batches import Batch, CategoryTables, Strin
 from stages.training.edge_categories.corpus import prepare_corpus, read_corpus
 from stages.training.edge_categories.model import EdgeCategoriesModel, make_model, masked
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
-from stages.training.learner import sample_digests
 from stages.training.loop import device_of
+from stages.training.training_task import sample_digests
 
 
 def prepare(task: Task) -> Outcome:

@@ -12,8 +12,8 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.training.boxes import WIDTH
-from stages.training.pooling import pooled
+from stages.training.box_vectors import WIDTH
+from stages.training.bucketing import pooled
 
 MOST_CHILDREN = 12
 """Parts of a node. With ten, as StructureNet has, some storages and tables would be missing."""

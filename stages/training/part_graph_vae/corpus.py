@@ -11,11 +11,11 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import BoolArray
+from stages.shapeassembly.execution.interpreter import Execution, execute
 from stages.shapeassembly.extraction.boxes import around, box_corners, gap
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.validity import ROOTED_SHARE, boxes_of
-from stages.shapeassembly.interpreter import Execution, execute
-from stages.training.boxes import WIDTH, numbers_of_box
+from stages.training.box_vectors import WIDTH, numbers_of_box
 from stages.training.part_graph_vae.batches import MOST_CHILDREN, Graphs, Node
 from stages.training.program_vae.corpus import category_programs
 

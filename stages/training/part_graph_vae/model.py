@@ -14,10 +14,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu
 
-from stages.training.boxes import WIDTH
+from stages.training.box_vectors import WIDTH
+from stages.training.latent import Standing
 from stages.training.part_graph_vae.batches import MOST_CHILDREN, Level
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
-from stages.training.standing import Standing
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import torch
 
+from stages.shapeassembly.execution.interpreter import Execution
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.interpreter import Execution
-from stages.training.boxes import box_of_numbers
+from stages.training.box_vectors import box_of_numbers
 from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.latent import Points
 from stages.training.part_graph_vae.batches import Graphs, batch_of
 from stages.training.part_graph_vae.corpus import nodes_of
 from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
-from stages.training.program_vae.draft import MOST_DEPTH
-from stages.training.standing import Points
+from stages.training.program_vae.partial_assembly import MOST_DEPTH
 
 AT_ONCE = 256
 

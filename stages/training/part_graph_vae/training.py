@@ -13,13 +13,13 @@ from torch import Generator, Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from pipeline.stage import Outcome, Task
-from stages.training.learner import mean_figures, sample_digests
+from stages.training.latent import drawn
 from stages.training.loop import device_of
 from stages.training.part_graph_vae.batches import Batch, Graphs, batches
 from stages.training.part_graph_vae.corpus import prepare_corpus, read_corpus
 from stages.training.part_graph_vae.model import PartGraphVae
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
-from stages.training.standing import drawn
+from stages.training.training_task import mean_figures, sample_digests
 
 
 def prepare(task: Task) -> Outcome:

@@ -11,8 +11,8 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from stages.training.pooling import pooled
-from stages.training.program_lm.grammar import SEEN
+from stages.training.bucketing import pooled
+from stages.training.program_lm.partial_program import SEEN
 from stages.training.program_vae.lines import START
 
 

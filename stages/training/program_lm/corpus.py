@@ -11,10 +11,10 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.program import Program
 from stages.training.program_lm.batches import Texts, Written
-from stages.training.program_lm.grammar import Text
+from stages.training.program_lm.partial_program import Text
 from stages.training.program_lm.tokens import Word, middles, words_of
 from stages.training.program_vae.corpus import category_programs
 

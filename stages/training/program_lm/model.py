@@ -9,11 +9,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from stages.training.program_lm.grammar import SEEN
+from stages.training.program_lm.partial_program import SEEN
 from stages.training.program_lm.settings import ProgramLmEntry
 from stages.training.program_lm.tokens import STEPS, THIN, WORDS, Field, words_of_fields
-from stages.training.program_vae.draft import MOST_DEPTH
 from stages.training.program_vae.lines import SLOTS
+from stages.training.program_vae.partial_assembly import MOST_DEPTH
 from stages.training.transformer import Block
 
 Cache = list[tuple[Tensor, Tensor]]

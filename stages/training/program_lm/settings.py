@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.entry import KitModelEntry, Source
+from stages.training.model_config import KitModelEntry, Source
 
 
 class ProgramLmEntry(KitModelEntry):

@@ -13,10 +13,21 @@ from enum import IntEnum
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.program import AXES, BBOX, FACES, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
-from stages.training.program_vae.draft import MOST_COPIES
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.program import (
+    AXES,
+    BBOX,
+    FACES,
+    Attach,
+    Block,
+    Cuboid,
+    Line,
+    Program,
+    Reflect,
+    Squeeze,
+)
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOTS, SQUEEZE, START, STOP, TRANSLATE
+from stages.training.program_vae.partial_assembly import MOST_COPIES
 
 
 class Field(IntEnum):

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from stages.shapeassembly.program import Program
 from stages.shapeassembly.settings import NUCLEUS
+from stages.shapeassembly.syntax.program import Program
 from stages.training.checkpoint import CheckpointError, load_checkpoint
 from stages.training.program_lm.model import ProgramLm
+from stages.training.program_lm.sampling import Drawing, write_texts
 from stages.training.program_lm.settings import ProgramLmEntry
-from stages.training.program_lm.writing import Drawing, write_texts
 
 
 @dataclass(frozen=True)

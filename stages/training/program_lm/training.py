@@ -13,13 +13,13 @@ from torch.nn.functional import cross_entropy
 
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import FloatArray
-from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 from stages.training.program_lm.batches import Batch, Texts, batches
 from stages.training.program_lm.corpus import prepare_corpus, read_corpus
 from stages.training.program_lm.model import ProgramLm
 from stages.training.program_lm.settings import ProgramLmEntry
 from stages.training.program_lm.tokens import STEPS, WORDS
+from stages.training.training_task import mean_figures, sample_digests
 
 FIRST_NUMBER = WORDS - STEPS - 1
 

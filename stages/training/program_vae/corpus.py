@@ -12,11 +12,11 @@ from pipeline.errors import Rejected
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.sample import read_samples
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.flattening import without_hierarchy
-from stages.shapeassembly.parser import parse
-from stages.shapeassembly.program import Program
-from stages.shapeassembly.transforms import unaligned, unordered, without_macros
+from stages.shapeassembly.editing.ablations import unaligned, unordered, without_macros
+from stages.shapeassembly.editing.flattening import without_hierarchy
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.parser import parse
+from stages.shapeassembly.syntax.program import Program
 from stages.training.program_vae.batches import Programs
 from stages.training.program_vae.lines import NodeLines, node_lines
 from stages.training.program_vae.settings import Without

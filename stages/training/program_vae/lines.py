@@ -9,8 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.program import AXES, BBOX, FACES, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.program import (
+    AXES,
+    BBOX,
+    FACES,
+    Attach,
+    Block,
+    Cuboid,
+    Line,
+    Program,
+    Reflect,
+    Squeeze,
+)
 
 START, STOP, CUBOID, ATTACH, SQUEEZE, TRANSLATE, REFLECT = range(7)
 Rows = npt.NDArray[np.float32]

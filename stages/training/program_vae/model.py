@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
+from stages.training.latent import Standing
 from stages.training.program_vae.batches import Level
 from stages.training.program_vae.lines import SLOTS, WIDTH
 from stages.training.program_vae.settings import ProgramVaeEntry
-from stages.training.standing import Standing
 
 COMMANDS = 7
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.attached import ends_of
-from stages.shapeassembly.errors import ProgramError
-from stages.shapeassembly.parameters import SMALLEST
-from stages.shapeassembly.program import Attach, Point, Squeeze
-from stages.training.program_vae.draft import Choice, Draft, Numbers
+from stages.shapeassembly.execution.attachment_points import ends_of
+from stages.shapeassembly.execution.parameters import SMALLEST
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.program import Attach, Point, Squeeze
+from stages.training.program_vae.partial_assembly import Choice, Draft, Numbers
 
 APART = 0.01
 """How far a cuboid may stand from where it is attached, as a share of the diagonal of the bounding box: half of what

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.entry import KitModelEntry, Source
+from stages.training.model_config import KitModelEntry, Source
 
 Without = Literal["nothing", "hierarchy", "macros", "order", "align"]
 """What of the language programs are without (shapeassembly §7.1.1)."""

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import torch
 
-from stages.shapeassembly.program import Program
+from stages.shapeassembly.syntax.program import Program
 from stages.training.checkpoint import CheckpointError, load_checkpoint
+from stages.training.latent import Points
 from stages.training.program_vae.batches import Programs, batch_of
+from stages.training.program_vae.decoding import write_programs
 from stages.training.program_vae.lines import node_lines
 from stages.training.program_vae.model import ProgramVae
 from stages.training.program_vae.settings import ProgramVaeEntry
-from stages.training.program_vae.writing import write_programs
-from stages.training.standing import Points
 
 AT_ONCE = 128
 

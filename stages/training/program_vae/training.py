@@ -12,7 +12,7 @@ from torch import Generator, Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 
 from pipeline.stage import Outcome, Task
-from stages.training.learner import mean_figures, sample_digests
+from stages.training.latent import drawn
 from stages.training.loop import device_of
 from stages.training.program_vae.batches import Level, Programs, batches
 from stages.training.program_vae.corpus import prepare_corpus, read_corpus
@@ -35,7 +35,7 @@ from stages.training.program_vae.lines import (
 )
 from stages.training.program_vae.model import ProgramVae, sizes_of
 from stages.training.program_vae.settings import ProgramVaeEntry
-from stages.training.standing import drawn
+from stages.training.training_task import mean_figures, sample_digests
 
 
 def prepare(task: Task) -> Outcome:

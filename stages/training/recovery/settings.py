@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.entry import ModelEntry, Subject
+from stages.training.model_config import ModelEntry, Subject
 
 Size = Annotated[int, Field(ge=1, le=4096)]
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from stages.training.pooling import pooled
+from stages.training.bucketing import pooled
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from stages.training.entry import KitModelEntry
+from stages.training.model_config import KitModelEntry
 
 
 class StringVaeEntry(KitModelEntry):

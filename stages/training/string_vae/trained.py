@@ -17,10 +17,10 @@ from stages.strings.encoder import canonical_string
 from stages.strings.rules import Rules, rules_of
 from stages.strings.tokens import StringError
 from stages.training.checkpoint import load_checkpoint
+from stages.training.string_vae.decoding import Draft, write_codes
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import END, Vocabulary
-from stages.training.string_vae.writing import Draft, write_codes
 
 Points = npt.NDArray[np.float32]
 """Points of a latent space, float32 (n, latent)."""

@@ -13,13 +13,13 @@ from torch.nn.functional import relu
 
 from pipeline.stage import Outcome, Task
 from stages.shape.graphs.histograms import histogram_metric
-from stages.training.learner import mean_figures, sample_digests
 from stages.training.loop import device_of
 from stages.training.string_vae.batches import Batch, Strings, batches
 from stages.training.string_vae.corpus import prepare_corpus, read_corpus
 from stages.training.string_vae.model import StringVae, shifted
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.vocabulary import Vocabulary
+from stages.training.training_task import mean_figures, sample_digests
 
 ANNEAL_STEEPNESS = 12.0
 """The weight of the divergence goes from 0.25 % to 99.75 % of its value along its S."""

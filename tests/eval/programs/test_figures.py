@@ -16,8 +16,8 @@ from eval.programs.nearest import nearest, nearest_and_which, nearest_programs
 from eval.programs.part_surfaces import curve_parts, surface_of, surfaces_sheet, trained_surfaces
 from eval.programs.quality import boxes_of_programs, clouds_of
 from stages.shapeassembly import execute_all, parse
+from stages.shapeassembly.analysis.structure import program_distance
 from stages.shapeassembly.extraction.boxes import box_corners
-from stages.shapeassembly.structure import program_distance
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.part_graph_vae.training import new_model as new_part_graph_vae

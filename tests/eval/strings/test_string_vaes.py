@@ -24,10 +24,10 @@ from eval.strings.string_vaes import (
 )
 from pipeline.errors import ConfigError
 from stages.training.checkpoint import checkpoint_bytes
-from stages.training.string_vae.sampling import WAYS, sample
-from stages.training.string_vae.structuring import PathFigures
+from stages.training.model_folder import curves_csv
+from stages.training.string_vae.latent_graph import PathFigures
+from stages.training.string_vae.latent_sampling import WAYS, sample
 from stages.training.string_vae.trained import TrainedStringVae
-from stages.training.trained import curves_csv
 from tests.stages.training.string_vae.models import MOST, random_vae, toy_strings, trained_vae
 
 

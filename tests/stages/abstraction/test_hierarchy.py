@@ -9,9 +9,9 @@ from stages.abstraction.hierarchy import Boxes, hierarchy_of
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
 from stages.shapeassembly.extraction.boxes import around, box_corners, gap
+from stages.shapeassembly.extraction.category_rules import RULES
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.hierarchy import Part
-from stages.shapeassembly.extraction.rules import RULES
 from stages.shapeassembly.extraction.settings import Gates
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from stages.shapeassembly.program import (
+from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
     FACES,

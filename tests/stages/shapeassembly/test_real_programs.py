@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stages.shapeassembly import execute, execute_all, parse, print_program
-from stages.shapeassembly.checks import overflow, violations
-from stages.shapeassembly.program import Program
-from stages.shapeassembly.statistics import cluster_curves, program_statistics
+from stages.shapeassembly.analysis.statistics import cluster_curves, program_statistics
+from stages.shapeassembly.syntax.checks import overflow, violations
+from stages.shapeassembly.syntax.program import Program
 from tests.stages.shapeassembly.shared_programs import CATEGORIES, SHARED, needs_shared, shared_texts
 
 pytestmark = needs_shared

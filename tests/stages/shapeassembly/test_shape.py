@@ -12,8 +12,8 @@ import trimesh
 
 from stages.package.glb import glb_bytes
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.checks import violations
 from stages.shapeassembly.shape import label_colors, shape_of_text
+from stages.shapeassembly.syntax.checks import violations
 
 EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 

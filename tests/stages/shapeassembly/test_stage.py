@@ -17,10 +17,10 @@ import yaml
 from pipeline.errors import ShardFailed
 from stages.shape.sample import Sample, read_samples
 from stages.shapeassembly import execute, parse
+from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.settings import ProgramFiles, ShapeAssemblyConfig
 from stages.shapeassembly.shape import shape_of_text
-from stages.shapeassembly.sharing import splits_of
-from stages.shapeassembly.structure import signature
+from stages.shapeassembly.splits import splits_of
 from tests.mill import mill
 
 EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))

@@ -12,7 +12,7 @@ from stages.string_sampling.instantiation.layout import STANDARD
 from stages.string_sampling.mending import first_impossible, mended
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
-from stages.training.string_vae.sampling import Found, sample
+from stages.training.string_vae.latent_sampling import Found, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.string_sampling.learnt import publish_model

@@ -19,7 +19,7 @@ from stages.strings.grammar import check
 from stages.strings.rules import NEVER, make_rules, patterns_of, rules_of
 from stages.strings.tokens import StringError
 from stages.training.string_vae.vocabulary import Vocabulary
-from tests.stages.training import toy
+from tests.stages.training import toy_training
 
 ALL_LEVELS: tuple[Strictness, ...] = (*STRICTNESS, *SLOT_LEVELS)
 
@@ -151,13 +151,17 @@ def test_what_is_known_of_open_cycles_changes_no_answer(seed: int, partial: bool
         asking.take(token)
 
 
-@given(st.integers(0, 2**32), st.integers(0, toy.SHAPES * len(toy.SPLITS) - 1), st.sampled_from(ALL_LEVELS))
+@given(
+    st.integers(0, 2**32),
+    st.integers(0, toy_training.SHAPES * len(toy_training.SPLITS) - 1),
+    st.sampled_from(ALL_LEVELS),
+)
 def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, strictness: Strictness) -> None:
-    types, edges = toy.graphs()[number]
-    grammar = Grammar(toy.grammar().neighbourhoods, (), {}, strictness)
-    string = encode(types, edges, toy.ALPHABET, np.random.default_rng(seed)).string
-    check(string, toy.ALPHABET, grammar)
-    vocabulary = Vocabulary(toy.ALPHABET, 4)
+    types, edges = toy_training.graphs()[number]
+    grammar = Grammar(toy_training.grammar().neighbourhoods, (), {}, strictness)
+    string = encode(types, edges, toy_training.ALPHABET, np.random.default_rng(seed)).string
+    check(string, toy_training.ALPHABET, grammar)
+    vocabulary = Vocabulary(toy_training.ALPHABET, 4)
     codes = np.append(vocabulary.codes(string), END).astype(np.int64)
     masks, most = follow(make_rules(grammar, 3, 4), 4, codes)
     assert masks[np.arange(len(codes)), codes].all()

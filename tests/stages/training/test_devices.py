@@ -16,7 +16,6 @@ from stages.training.cuboid_rnn.corpus import rows_of
 from stages.training.cuboid_rnn.settings import CuboidRnnEntry
 from stages.training.cuboid_rnn.training import CuboidRnnLearner
 from stages.training.cuboid_rnn.training import new_model as new_cuboid_rnn
-from stages.training.learner import Learner
 from stages.training.part_graph_vae.batches import Graphs
 from stages.training.part_graph_vae.corpus import nodes_of
 from stages.training.part_graph_vae.settings import PartGraphVaeEntry
@@ -29,7 +28,8 @@ from stages.training.program_vae.lines import node_lines
 from stages.training.program_vae.settings import ProgramVaeEntry
 from stages.training.program_vae.training import ProgramVaeLearner
 from stages.training.program_vae.training import new_model as new_program_vae
-from tests.stages.training.program_lm.test_writing import ENTRY, LONGEST, TEXTS, VALUES
+from stages.training.training_task import Learner
+from tests.stages.training.program_lm.test_sampling import ENTRY, LONGEST, TEXTS, VALUES
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 FURNITURE = [parse(BOX), parse(STOOL)]

@@ -15,9 +15,9 @@ from safetensors import safe_open
 
 from pipeline.places import Places
 from pipeline.survey import Survey
-from stages.training.trained import FILES
+from stages.training.model_folder import FILES
 from tests.pipeline.conftest import made
-from tests.stages.training.toy import STAGES, config, train
+from tests.stages.training.toy_training import STAGES, config, train
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +25,7 @@ WORK = Path(".work/toys/training")
 TRAIN_THERE = """
 import sys
 from pathlib import Path
-from tests.stages.training.toy import config, train
+from tests.stages.training.toy_training import config, train
 train(config(), Path(sys.argv[1]))
 """
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_parts
+from stages.shapeassembly.extraction.category_rules import RULES
 from stages.shapeassembly.extraction.hierarchy import Part
-from stages.shapeassembly.extraction.rules import RULES
 from tests.stages.shapeassembly.extraction.shapes import leaf, node, turned
 
 BOX = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))

@@ -17,7 +17,7 @@ from stages.shapeassembly.extraction.boxes import (
     surface_distance,
 )
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.minimum_box import minimum_box
+from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 from tests.stages.shapeassembly.extraction.shapes import box, turned
 
 number = st.floats(-2, 2, allow_nan=False)

@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 
 from pipeline.errors import Rejected
 from stages.shapeassembly import execute, parse, print_program
-from stages.shapeassembly.checks import violations
+from stages.shapeassembly.analysis.structure import program_distance
 from stages.shapeassembly.extraction.boxes import box_corners, same_box
+from stages.shapeassembly.extraction.category_rules import RULES
 from stages.shapeassembly.extraction.extract import Extraction, extract
 from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
-from stages.shapeassembly.extraction.read_glb import read_glb
-from stages.shapeassembly.extraction.read_grass import read_grass
-from stages.shapeassembly.extraction.read_structurenet import read_structurenet
-from stages.shapeassembly.extraction.rules import RULES
+from stages.shapeassembly.extraction.readers.glb import read_glb
+from stages.shapeassembly.extraction.readers.grass import read_grass
+from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
 from stages.shapeassembly.extraction.settings import Cleaning, Gates
 from stages.shapeassembly.extraction.validity import boxes_of
-from stages.shapeassembly.structure import program_distance
+from stages.shapeassembly.syntax.checks import violations
 from tests.stages.shapeassembly.extraction.shapes import hierarchy, leaf, node, table, turned
 
 SHARED = Path(__file__).resolve().parents[4].parent / "shared"

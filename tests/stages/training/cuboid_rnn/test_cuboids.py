@@ -9,7 +9,7 @@ import torch
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.extraction.boxes import box_corners, same_box
 from stages.shapeassembly.extraction.validity import boxes_of
-from stages.training.boxes import box_of_numbers, numbers_of_box
+from stages.training.box_vectors import box_of_numbers, numbers_of_box
 from stages.training.cuboid_rnn.batches import END, Cuboids, batch_of
 from stages.training.cuboid_rnn.corpus import mirrored, rows_of
 from stages.training.cuboid_rnn.model import density

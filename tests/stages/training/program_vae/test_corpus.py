@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from stages.shapeassembly import parse
-from stages.shapeassembly.program import Attach, Cuboid
+from stages.shapeassembly.syntax.program import Attach, Cuboid
 from stages.training.program_vae.corpus import told_without
 from stages.training.program_vae.lines import ALIGNED, CUBOID, node_lines
 from stages.training.program_vae.settings import ProgramVaeEntry, Without
-from tests.stages.shapeassembly.test_flattening import BENCH
+from tests.stages.shapeassembly.editing.test_flattening import BENCH
 
 PROGRAM = parse(BENCH)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.training.program_vae.draft import Draft, Numbers
 from stages.training.program_vae.lines import ATTACH, SQUEEZE
+from stages.training.program_vae.partial_assembly import Draft, Numbers
 from stages.training.program_vae.reaching import APART, add_line, gap
 
 BOTTOM = Numbers(np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5]), 2, np.array([0.5, 0.5]), 0, 2, 0.5)

@@ -17,7 +17,7 @@ from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
 from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
-from tests.stages.training.toy import STAGES
+from tests.stages.training.toy_training import STAGES
 
 PROGRAM = "tests.stages.programs.stool"
 

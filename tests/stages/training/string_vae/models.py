@@ -16,15 +16,15 @@ from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.trained import TrainedStringVae
 from stages.training.string_vae.training import StringVaeLearner, new_model
 from stages.training.string_vae.vocabulary import END, Vocabulary
-from tests.stages.training import toy
+from tests.stages.training import toy_training
 
-VOCABULARY = Vocabulary(toy.ALPHABET, 2)
+VOCABULARY = Vocabulary(toy_training.ALPHABET, 2)
 MOST = 60
 
 
 @cache
 def rules() -> Rules:
-    return make_rules(toy.grammar(), 3, 2)
+    return make_rules(toy_training.grammar(), 3, 2)
 
 
 def entry(**changes: Any) -> StringVaeEntry:
@@ -36,12 +36,14 @@ def entry(**changes: Any) -> StringVaeEntry:
 @cache
 def toy_strings() -> tuple[str, ...]:
     """The strings of all shards of the toy."""
-    return tuple(each for shard in toy.SPLITS for _, strings in toy.strings(shard) for each in strings)
+    return tuple(
+        each for shard in toy_training.SPLITS for _, strings in toy_training.strings(shard) for each in strings
+    )
 
 
 def numbered() -> Strings:
     """The strings as a learner takes them."""
-    shapes = [strings for shard in toy.SPLITS for _, strings in toy.strings(shard)]
+    shapes = [strings for shard in toy_training.SPLITS for _, strings in toy_training.strings(shard)]
     codes = [np.append(VOCABULARY.codes(each), np.int16(END)) for each in toy_strings()]
     masks = [follow(rules(), 2, each.astype(np.int64))[0] for each in codes]
     return Strings(
@@ -60,7 +62,7 @@ def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringV
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "most": MOST,
         "patterns": patterns_of(rules()),
-        "names": list(toy.LABELS),
+        "names": list(toy_training.LABELS),
         "cycles": 2,
         "canonical": True,
     }

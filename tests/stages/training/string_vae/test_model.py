@@ -16,7 +16,7 @@ from stages.training.string_vae.model import shifted
 from stages.training.string_vae.trained import load_string_vae
 from stages.training.string_vae.training import StringVaeLearner, annealed, new_model, triplet_loss
 from stages.training.string_vae.vocabulary import END
-from tests.stages.training import toy
+from tests.stages.training import toy_training
 from tests.stages.training.string_vae.models import (
     MOST,
     VOCABULARY,
@@ -100,7 +100,7 @@ def test_every_string_of_a_masked_decoder_is_one_of_the_grammar(decoder: str, se
     points = (3 * rng.standard_normal((64, 8))).astype(np.float32)
     strings = model.decode(points, rng if drawn else None)
     for each in strings:
-        check(each, toy.ALPHABET, toy.grammar())
+        check(each, toy_training.ALPHABET, toy_training.grammar())
         assert model.is_valid(each)
         assert len(VOCABULARY.codes(each)) <= MOST
     assert len(set(strings)) > 1
@@ -112,7 +112,7 @@ def test_string_that_is_lost_in_cycles_is_ended_without_more() -> None:
         model.module.decoder.logits.bias[-2:] += 50.0
     strings = model.decode(np.random.default_rng(0).standard_normal((64, 8)).astype(np.float32), None)
     for each in strings:
-        check(each, toy.ALPHABET, toy.grammar())
+        check(each, toy_training.ALPHABET, toy_training.grammar())
     assert any(each.count("0") or each.count("1") for each in strings)
 
 

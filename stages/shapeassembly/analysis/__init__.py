@@ -1,0 +1,1 @@
+"""Program_analysis:_signatures,_distances_and_statistics."""

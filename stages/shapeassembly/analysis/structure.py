@@ -1,0 +1,93 @@
+"""What is left of a program without its continuous parameters: tokens, signatures, distances (shapeassembly §7.1).
+
+Names mean nothing: cuboids are counted within their assembly, and an assembly stands where its cuboid is declared.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from stages.shapeassembly.execution.tables import copy_name
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.limits import MAX_DEPTH, MAX_TEXT
+from stages.shapeassembly.syntax.program import BBOX, Attach, Block, Cuboid, Program, Reflect, Squeeze
+
+
+def tokens(program: Program) -> list[str]:
+    """The program as words: commands, numbers of cuboids, flags, faces, axes, counts; no continuous parameter.
+
+    Programs with equal tokens are the same up to continuous parameters (shapeassembly §7.1.4).
+    Raises ProgramError where assemblies stand in a circle, or the words are too many.
+    """
+    words: list[str] = []
+    _add(program.root, program, words, 1)
+    return words
+
+
+def _add(block: Block, program: Program | None, words: list[str], depth: int) -> None:
+    """Append the words of one assembly, with those of its cuboids if `program` is given."""
+    if depth > MAX_DEPTH:
+        raise ProgramError("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle")
+    if len(words) > MAX_TEXT:
+        raise ProgramError("too long", f"expanded it has more than {MAX_TEXT} words")
+    places = {BBOX: 0}
+    words.append("{")
+    for line in block.lines:
+        if isinstance(line, Cuboid):
+            places[line.name] = len(places)
+            words += ["Cuboid", str(line.aligned)]
+            below = program.named.get(line.name) if program else None
+            if below is not None:
+                _add(below, program, words, depth + 1)
+        elif isinstance(line, Attach):
+            words += ["attach", _number(places, line.moved), _number(places, line.target)]
+        elif isinstance(line, Squeeze):
+            words += ["squeeze", *(_number(places, name) for name in (line.moved, line.first, line.second)), line.face]
+        else:
+            copies = 1 if isinstance(line, Reflect) else line.copies
+            for _ in range(copies):
+                places[copy_name(places)] = len(places)
+            kind = ["reflect"] if isinstance(line, Reflect) else ["translate", str(copies)]
+            words += [*kind, _number(places, line.moved), line.axis]
+    words.append("}")
+
+
+def _number(places: dict[str, int], name: str) -> str:
+    return str(places.get(name, name))
+
+
+def signature(program: Program) -> str:
+    """Hex sha256 of the program's tokens: equal exactly for programs that are the same up to continuous parameters."""
+    return _digest(tokens(program))
+
+
+def block_signatures(program: Program) -> tuple[str, ...]:
+    """Hex sha256 of the tokens of each assembly by itself, which cuboids are expanded being part of it."""
+    digests = []
+    for block in program.blocks:
+        words: list[str] = []
+        _add(block, None, words, 1)
+        expanded = [str(index) for index, each in enumerate(block.cuboids) if each.name in program.named]
+        digests.append(_digest([*words, "|", *expanded]))
+    return tuple(digests)
+
+
+def program_distance(a: Program, b: Program) -> int:
+    """How many words must be put in, taken out or changed to make the tokens of one program those of the other."""
+    return token_distance(tokens(a), tokens(b))
+
+
+def token_distance(first: Sequence[str], second: Sequence[str]) -> int:
+    """The same of their tokens."""
+    from stages.shapeassembly.editing import edit_distance
+
+    codes = {word: index for index, word in enumerate(dict.fromkeys([*first, *second]))}
+    distance: int = edit_distance(np.array([codes[w] for w in first]), np.array([codes[w] for w in second]))
+    return distance
+
+
+def _digest(words: Sequence[str]) -> str:
+    return hashlib.sha256(" ".join(words).encode()).hexdigest()

@@ -1,0 +1,183 @@
+"""Fit the continuous parameters of a program, or cuboids without one, to a point cloud (shapeassembly §7.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.execution.differentiable import DifferentiableProgram
+from stages.shapeassembly.execution.interpreter import Execution, execute
+from stages.shapeassembly.execution.parameters import SMALLEST, parameter_ranges, parameters, with_parameters
+from stages.shapeassembly.extraction.hierarchy import Box
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.program import Program
+
+_SIGNS = torch.tensor([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)], dtype=torch.float64)
+
+RESAMPLED = 20
+"""Steps for which the same points of the cuboids are followed."""
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A fitted program. before, after: Chamfer distance to the points, in their unit, on other points of the surface
+    than the fit has seen."""
+
+    program: Program
+    before: float
+    after: float
+
+
+def fit(
+    program: Program,
+    points: FloatArray,
+    rng: np.random.Generator,
+    steps: int = 200,
+    rate: float = 0.01,
+    samples: int = 2000,
+) -> FitResult:
+    """Move the parameters of `program` so that its surface comes near `points`, float64 (n, 3), and they near it.
+
+    Adam on the mean squared distances both ways to the nearest point, `samples` points of the surface at a time;
+    the rate falls to a tenth. Every parameter stays in its range (`parameter_ranges`). The best step is kept; where a
+    step leads to a program that cannot be executed, the fit ends with what it has.
+    Raises ProgramError if the program itself cannot be executed, ValueError if there are no points, or it has no parts.
+    """
+    own = DifferentiableProgram(program)
+    low, high = parameter_ranges(program)
+    fitted = with_parameters(
+        program, _descended(own.corners, parameters(program), low, high, points, rng, steps, rate, samples)
+    )
+    states = rng.spawn(2)
+    before, after = (
+        chamfer_distance(surface_points(execute(each), samples, state), points)
+        for each, state in zip((program, fitted), states, strict=True)
+    )
+    return FitResult(fitted, before, after)
+
+
+def fit_cuboids(
+    boxes: Sequence[Box],
+    points: FloatArray,
+    rng: np.random.Generator,
+    steps: int = 200,
+    rate: float = 0.01,
+    samples: int = 2000,
+) -> list[Box]:
+    """Move, stretch and turn each of some cuboids by itself so that their surface comes near `points`, float64 (n, 3),
+    as `fit` does with a program: what was attached need not stay so (§7.3, "Opt Cuboids"). Raises ValueError if there
+    are no points, or no cuboids."""
+    if not boxes:
+        raise ValueError("there are no cuboids to fit")
+    start = np.stack([np.concatenate([box.center, box.size, np.zeros(3)]) for box in boxes])
+    axes = torch.from_numpy(np.stack([box.axes for box in boxes]))
+    low = np.full(start.shape, -np.inf)
+    low[:, 3:6] = np.minimum(start[:, 3:6], SMALLEST)
+
+    def placed(values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Centres (n, 3), sizes (n, 3) and axes (n, 3, 3), in rows."""
+        centres, sizes, turns = values.view(-1, 3, 3).unbind(1)
+        skew = torch.linalg.cross(turns[:, None], torch.eye(3, dtype=torch.float64)[None], dim=-1)
+        return centres, sizes, axes @ torch.linalg.matrix_exp(skew)
+
+    def corners(values: Tensor) -> Tensor:
+        centres, sizes, turned = placed(values)
+        return centres[:, None] + (_SIGNS * sizes[:, None]) @ turned
+
+    best = _descended(corners, start.ravel(), low.ravel(), np.inf, points, rng, steps, rate, samples)
+    found = (each.numpy() for each in placed(torch.from_numpy(best)))
+    return [Box(*each) for each in zip(*found, strict=True)]
+
+
+def _descended(
+    corners_of: Callable[[Tensor], Tensor],
+    start: FloatArray,
+    low: FloatArray | float,
+    high: FloatArray | float,
+    points: FloatArray,
+    rng: np.random.Generator,
+    steps: int,
+    rate: float,
+    samples: int,
+) -> FloatArray:
+    """The values, (k,), between `low` and `high`, at which the cuboids with corners `corners_of` them, (n, 8, 3), were
+    nearest to the points on the way down from `start`."""
+    if not len(points):
+        raise ValueError("there are no points to fit to")
+    target = cKDTree(points)
+    values = torch.tensor(start, requires_grad=True)
+    optimiser = torch.optim.Adam([values], lr=rate)
+    falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps, eta_min=rate / 10)
+    seen = torch.from_numpy(np.asarray(points, dtype=np.float64))
+    best, best_values = np.inf, values.detach().clone()
+    which, weights = np.empty(0, np.int64), torch.empty(0, 8)
+    for step in range(steps):
+        try:
+            corners = corners_of(values)
+        except ProgramError:
+            if step == 0:
+                raise
+            break
+        if step % RESAMPLED == 0:
+            which, weights = _chosen_points(corners.detach().numpy(), samples, rng)
+        surface = (corners[which] * weights[:, :, None]).sum(dim=1)
+        loss, distance = _squared_chamfer(surface, seen, target)
+        if distance < best:
+            best, best_values = distance, values.detach().clone()
+        optimiser.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        if not bool(torch.isfinite(values.grad).all()):  # type: ignore[arg-type]
+            break
+        optimiser.step()
+        falling.step()
+        with torch.no_grad():
+            values.copy_(torch.minimum(torch.maximum(values, _bound(low)), _bound(high)))
+    return best_values.numpy()
+
+
+def _bound(values: FloatArray | float) -> Tensor:
+    return torch.as_tensor(values, dtype=torch.float64)
+
+
+def chamfer_distance(a: FloatArray, b: FloatArray) -> float:
+    """Mean distance of each point of `a`, (n, 3), to the nearest of `b`, (m, 3), plus the same the other way round."""
+    return float(cKDTree(b).query(a)[0].mean() + cKDTree(a).query(b)[0].mean())
+
+
+def surface_points(execution: Execution, count: int, rng: np.random.Generator) -> FloatArray:
+    """Random points on the surfaces of all leaf cuboids, evenly by area, float64 (count, 3)."""
+    which, weights = _chosen_points(execution.corners, count, rng)
+    points: FloatArray = (execution.corners[which] * weights.numpy()[:, :, None]).sum(axis=1)
+    return points
+
+
+def _chosen_points(corners: FloatArray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, Tensor]:
+    """Points on the surfaces of cuboids, evenly by area: the cuboid of each, int64 (count,), and how much of each of
+    its corners is in it, float64 (count, 8)."""
+    if not len(corners):
+        raise ValueError("the program has no parts")
+    sizes = np.linalg.norm(corners[:, [4, 2, 1]] - corners[:, :1], axis=2)
+    areas = np.repeat(sizes[:, [1, 0, 0]] * sizes[:, [2, 2, 1]], 2, axis=1).ravel()
+    faces = np.searchsorted(np.cumsum(areas) / areas.sum(), rng.random(count), side="right").clip(max=len(areas) - 1)
+    local = rng.random((count, 3))
+    local[np.arange(count), faces % 6 // 2] = 1 - faces % 2
+    signs = np.array([[x, y, z] for x in (1, 0) for y in (1, 0) for z in (1, 0)])
+    weights = np.where(signs == 1, local[:, None], 1 - local[:, None]).prod(axis=2)
+    return faces // 6, torch.from_numpy(weights)
+
+
+def _squared_chamfer(surface: Tensor, points: Tensor, target: cKDTree) -> tuple[Tensor, float]:
+    """Mean squared nearest distances both ways, to differentiate; and the Chamfer distance. Who is nearest is looked up
+    in trees, and does not change with the parameters to first order."""
+    here = surface.detach().numpy()
+    there, nearest = target.query(here)
+    back, back_nearest = cKDTree(here).query(target.data)
+    loss = (surface - points[nearest]).square().sum(dim=1).mean()
+    loss = loss + (points - surface[back_nearest]).square().sum(dim=1).mean()
+    return loss, float(there.mean() + back.mean())

@@ -1,0 +1,138 @@
+"""Execute programs: the fast interpreter, one at a time or many at once (shapeassembly §4, App. A and B)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.execution.tables import Flat, Indices, flatten
+from stages.shapeassembly.syntax.errors import ProgramError
+from stages.shapeassembly.syntax.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS, MAX_REACH
+from stages.shapeassembly.syntax.program import Block, Program
+
+if TYPE_CHECKING:
+    from stages.shapeassembly.execution.kernels import Executed
+
+_REFUSALS = {
+    1: ("too many cuboids", f"expanded it has more than {MAX_PARTS}"),
+    2: ("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle"),
+    3: ("too many attachments", f"an assembly has at most {MAX_EVENTS}, those of copies included"),
+    4: ("too far", f"a cuboid reaches beyond {MAX_REACH:g}"),
+}
+
+
+@dataclass(frozen=True)
+class Execution:
+    """The leaf cuboids of an executed program, assembly by assembly, breadth first, each in the order of its lines.
+
+    corners: float64 (n, 8, 3), the local points (1, 1, 1), (1, 1, 0), (1, 0, 1), ... (0, 0, 0) of each cuboid;
+    centres, sizes: float64 (n, 3); frames: float64 (n, 3, 3), rotations whose columns are the cuboids' axes;
+    nodes: int64 (n,), the assembly that each stands in, counted breadth first.
+    """
+
+    corners: FloatArray
+    centres: FloatArray
+    sizes: FloatArray
+    frames: FloatArray
+    nodes: Indices
+    _parts: Indices
+    _tree: Indices
+    _root: str
+    _names: tuple[tuple[str, ...], ...]
+    _originals: tuple[tuple[str, ...], ...]
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    @cached_property
+    def node_names(self) -> tuple[str, ...]:
+        """The assemblies by path, the root first: `Program_0`, `Program_0/Program_1`, `Program_0/cube3` (a copy)."""
+        return self._node_paths(self._names)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The leaves by path: `Program_0/Program_1/cube0`. No two are alike."""
+        return self._leaf_paths(self._names)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """What each leaf is: its path, where a copy is called like what it is a copy of: `Armchair/arm`."""
+        return self._leaf_paths(self._originals)
+
+    def _node_paths(self, called: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
+        paths = [self._root]
+        for _, parent, part in self._tree[1:].tolist():
+            paths.append(f"{paths[parent]}/{called[self._tree[parent, 0]][part]}")
+        return tuple(paths)
+
+    def _leaf_paths(self, called: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
+        nodes, blocks = self._node_paths(called), self._tree[:, 0].tolist()
+        return tuple(
+            f"{nodes[node]}/{called[blocks[node]][part]}"
+            for node, part in zip(self.nodes.tolist(), self._parts.tolist(), strict=True)
+        )
+
+
+def execute(program: Program) -> Execution:
+    """The geometry of one program. Raises ProgramError where it cannot be executed or is beyond the limits."""
+    return execute_flat(flatten([program]), [program])[0]
+
+
+def execute_all(programs: Sequence[Program]) -> list[Execution]:
+    """The geometry of many programs, together faster than one by one. Raises ProgramError like `execute`."""
+    return execute_flat(flatten(programs), programs)
+
+
+def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
+    """The geometry of the programs that `flat` was made of."""
+    from stages.shapeassembly.execution.kernels import run
+
+    done: Executed
+    done, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+    check(done)
+    executions = []
+    leaf_starts, node_starts, blocks = (
+        each.tolist() for each in (done.program_leaves, done.program_nodes, flat.program_blocks)
+    )
+    centres, sizes = done.leaves[:, :3], done.leaves[:, 3:6]
+    frames = done.leaves[:, 6:].reshape(-1, 3, 3).transpose(0, 2, 1)
+    for index, program in enumerate(programs):
+        low, high = leaf_starts[index], leaf_starts[index + 1]
+        executions.append(
+            Execution(
+                done.corners[low:high],
+                centres[low:high],
+                sizes[low:high],
+                frames[low:high],
+                done.leaf_node[low:high],
+                done.leaf_part[low:high],
+                done.node[node_starts[index] : node_starts[index + 1]],
+                program.root.name,
+                flat.names[blocks[index] : blocks[index + 1]],
+                flat.originals[blocks[index] : blocks[index + 1]],
+            )
+        )
+    return executions
+
+
+def parts_of(block: Block) -> tuple[tuple[str, ...], FloatArray]:
+    """The names of the cuboids and copies of one assembly, whatever expands them, without the bounding box, and what
+    they are in its coordinates, float64 (n, 15): centre, sizes, axes. Raises ProgramError like `execute`."""
+    from stages.shapeassembly.execution.kernels import run
+
+    flat = flatten([Program((block,))])
+    done: Executed
+    done, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
+    check(done)
+    return flat.names[0][1:], done.boxes[1:]
+
+
+def check(done: Executed) -> None:
+    """Raises ProgramError if a program was not executed."""
+    if done.status.any():
+        place = int(done.status.nonzero()[0][0])
+        reason, detail = _REFUSALS[int(done.status[place])]
+        raise ProgramError(reason, f"program {place + 1} of {len(done.status)}: {detail}" if place else detail)

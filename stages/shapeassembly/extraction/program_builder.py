@@ -1,0 +1,115 @@
+"""From layouts to a program: the lines of every node, and the names of its assemblies."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from pipeline.errors import Rejected
+from stages.shapeassembly.execution.parameters import SMALLEST
+from stages.shapeassembly.extraction.grounding import ground
+from stages.shapeassembly.extraction.grouping import Symmetry, form_groups
+from stages.shapeassembly.extraction.hierarchy import Part
+from stages.shapeassembly.extraction.joints import part_name
+from stages.shapeassembly.extraction.node_layout import lay_out, localised
+from stages.shapeassembly.extraction.tilted import cuboid_of, tilted_placer
+from stages.shapeassembly.syntax.checks import MOST_CUBOIDS
+from stages.shapeassembly.syntax.program import (
+    AXES,
+    BBOX,
+    Attach,
+    Block,
+    Cuboid,
+    Line,
+    Program,
+    Reflect,
+    Squeeze,
+    Translate,
+)
+
+MOST_CHILDREN = 100
+"""Parts of one node before groups are formed: all pairs of them are looked at, and a program declares ten at most."""
+
+Order = Callable[[Part], tuple[Any, ...]]
+"""The key of the canonical order of the parts of one node, in the node's frame."""
+
+
+Groups = Literal["alike", "common", "none"]
+"""Which parts that repeat make a group: those attached alike to the same parts (shapeassembly App. C), those attached
+to a common part, or none."""
+
+
+@dataclass(frozen=True)
+class _Node:
+    """The block of a node, with parts called by their place in it, and what is to be expanded: by name, the part."""
+
+    block: Block
+    expanded: dict[str, Part]
+
+
+def write_program(root: Part, order: Order, groups: Groups, pool: bool) -> Program:
+    """The program of an arranged hierarchy, root first, assemblies numbered in breadth-first order.
+
+    groups: which parts that repeat are made by macros; pool: whether of what repeats together an assembly is made.
+
+    Raises Rejected where the parts of a node do not hang together, or are too many.
+    """
+    blocks: list[Block] = []
+    waiting = deque([root])
+    count = 0
+    while waiting:
+        node = _write_node(waiting.popleft(), order, groups, pool)
+        names = {}
+        for name, part in node.expanded.items():
+            count += 1
+            names[name] = f"Program_{count}"
+            waiting.append(part)
+        lines = tuple(_renamed(line, names) for line in node.block.lines)
+        blocks.append(Block(f"Program_{len(blocks)}", node.block.bbox, lines))
+    return Program(tuple(blocks))
+
+
+def _write_node(part: Part, order: Order, groups: Groups, pool: bool) -> _Node:
+    children = sorted((localised(child, part.box) for child in part.children), key=order)
+    if len(children) > MOST_CHILDREN:
+        raise Rejected("too many parts", f"{len(children)} below {part.label!r}, at most {MOST_CHILDREN} are looked at")
+    whole = lay_out(children, part.box.size)
+    layout, symmetries = (
+        (whole, [None] * len(children))
+        if groups == "none"
+        else form_groups(whole, order, strict=groups == "alike", pool=pool)
+    )
+    if len(layout.parts) > MOST_CUBOIDS:
+        raise Rejected("too many parts", f"{len(layout.parts)} below {part.label!r}, at most {MOST_CUBOIDS} are wanted")
+    joints = ground(layout, tilted_placer(layout))
+    if joints is None:
+        raise Rejected("parts not connected", f"below {part.label!r}")
+    indices = range(len(layout.parts))
+    macros = [_macro(index, each) for index, each in enumerate(symmetries) if each is not None]
+    lines = (*(cuboid_of(layout, index) for index in indices), *joints, *macros)
+    x, y, z = np.maximum(part.box.size, SMALLEST).tolist()
+    block = Block("", Cuboid(BBOX, (x, y, z), True), lines)
+    return _Node(block, {part_name(i): layout.parts[i] for i in indices if layout.parts[i].children})
+
+
+def _macro(part: int, symmetry: Symmetry) -> Line:
+    if symmetry.distance is None:
+        return Reflect(part_name(part), AXES[symmetry.axis])
+    return Translate(part_name(part), AXES[symmetry.axis], symmetry.copies, symmetry.distance)
+
+
+def _renamed(line: Line, names: dict[str, str]) -> Line:
+    def name(old: str) -> str:
+        return names.get(old, old)
+
+    if isinstance(line, Cuboid):
+        return replace(line, name=name(line.name))
+    if isinstance(line, Attach):
+        return replace(line, moved=name(line.moved), target=name(line.target))
+    if isinstance(line, Squeeze):
+        return replace(line, moved=name(line.moved), first=name(line.first), second=name(line.second))
+    return replace(line, moved=name(line.moved))

@@ -1,0 +1,70 @@
+"""Reads PartNet shapes: `result_after_merging.json` with the meshes of the parts in `objs/` beside it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import Rejected
+from stages.shape.arrays import FloatArray
+from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded
+from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
+
+
+def read_partnet(path: Path) -> PartHierarchy:
+    """The hierarchy of the PartNet file `path`, named by its folder; a part's box is the smallest around its meshes.
+
+    The file is a list with one tree of `{"name", "children"}` nodes; a leaf names its meshes in `objs`, found as
+    `objs/<name>.obj` beside the file. Raises Rejected, naming file and part, for what is not so.
+    """
+    try:
+        trees = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise Rejected(UNREADABLE, f"{path.name}: not JSON ({type(error).__name__}); download it again") from None
+    if not isinstance(trees, list) or len(trees) != 1:
+        raise Rejected(UNREADABLE, f"{path.name}: a PartNet hierarchy is a list with one tree")
+    name = path.resolve().parent.name
+    root, _ = _part(trees[0], path.parent / "objs", path.name, 0)
+    return PartHierarchy(name, bounded(root, name))
+
+
+def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[Part, FloatArray]:
+    """A part and the points of its meshes, float64 (n, 3)."""
+    if depth > MAX_DEPTH or not isinstance(node, dict):
+        raise Rejected(UNREADABLE, f"{place}: a part is an object, at most {MAX_DEPTH} levels deep")
+    label = node.get("name")
+    if not isinstance(label, str) or not label:
+        raise Rejected(UNREADABLE, f"{place}: a part has no `name`")
+    here = f"{place}/{label}"
+    children, meshes = node.get("children") or [], node.get("objs") or []
+    if not isinstance(children, list) or not isinstance(meshes, list):
+        raise Rejected(UNREADABLE, f"{here}: `children` and `objs` are lists")
+    if children:
+        parts = [_part(child, folder, here, depth + 1) for child in children]
+        points = np.concatenate([each for _, each in parts])
+        return Part(label, minimum_box(points), tuple(part for part, _ in parts)), points
+    if not meshes:
+        raise Rejected(UNREADABLE, f"{here}: a leaf names its meshes in `objs`")
+    points = np.concatenate([_points(mesh, folder, here) for mesh in meshes])
+    return Part(label, minimum_box(points)), points
+
+
+def _points(mesh: Any, folder: Path, place: str) -> FloatArray:
+    """The vertices of one OBJ file, float64 (n, 3)."""
+    if not isinstance(mesh, str) or not mesh or set(mesh) & set("/\\\0") or mesh in {".", ".."}:
+        raise Rejected(UNREADABLE, f"{place}: a mesh is named by a file of `objs`, without a folder: {mesh!r}")
+    path = folder / f"{mesh}.obj"
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        rows = [[float(number) for number in line.split()[1:4]] for line in lines if line.startswith("v ")]
+        points = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    except FileNotFoundError:
+        raise Rejected(UNREADABLE, f"{place}: objs/{mesh}.obj is not there; download the shape again") from None
+    except ValueError:
+        raise Rejected(UNREADABLE, f"{place}: objs/{mesh}.obj has a vertex that is not three numbers") from None
+    if not len(points) or not np.isfinite(points).all():
+        raise Rejected(UNREADABLE, f"{place}: objs/{mesh}.obj has no vertices, or some that are not finite")
+    return points

@@ -1,0 +1,91 @@
+"""Part hierarchies of a folder or a file, by place in their order: what a config names, what a shard reads."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from pipeline.errors import Rejected
+from pipeline.places import file_digest
+from stages.shapeassembly.extraction.hierarchy import PartHierarchy
+from stages.shapeassembly.extraction.readers.child_process import grass_read_apart, read_apart
+from stages.shapeassembly.extraction.readers.glb import read_glb
+from stages.shapeassembly.extraction.readers.grass import GrassFile
+from stages.shapeassembly.extraction.readers.partnet import read_partnet
+from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
+
+HierarchyKind = Literal["structurenet", "partnet", "grass", "glb"]
+
+_PATTERNS = {"structurenet": "*.json", "partnet": "result_after_merging.json", "glb": "*.glb"}
+
+
+@dataclass(frozen=True)
+class HierarchySource:
+    """Where hierarchies are. path: a folder, or one file; of `grass` an npz file with many shapes.
+    up: the axis that points up in `glb` files; the other kinds are y up."""
+
+    path: Path
+    kind: HierarchyKind
+    up: Literal["y", "z"]
+
+    def __len__(self) -> int:
+        """How many hierarchies there are, those that cannot be read included; of an unreadable npz file one."""
+        if self.kind != "grass":
+            return len(self._files())
+        try:
+            return len(self._grass())
+        except Rejected:
+            return 1
+
+    def read(self, first: int, last: int) -> Iterator[tuple[str, PartHierarchy | Rejected]]:
+        """Hierarchies `first` to before `last`: the name of each below the path, and what was read or why not."""
+        files = () if self.kind == "grass" else self._files()
+        for place in range(first, last):
+            name = self._name(files[place]) if files else f"{self.path.name}/{place:05d}"
+            try:
+                yield name, self._read(files[place]) if files else self._grass().shape(place)
+            except Rejected as error:
+                yield name, error
+
+    def digest(self, first: int, last: int) -> str:
+        """Hex sha256 of the names and bytes of what `read` reads."""
+        digest = hashlib.sha256()
+        for file in (self.path,) if self.kind == "grass" else self._files()[first:last]:
+            meshes = sorted((file.parent / "objs").glob("*.obj")) if self.kind == "partnet" else []
+            for each in (file, *meshes):
+                state = each.stat()
+                known = _known_digest(each, state.st_mtime_ns, state.st_size)
+                digest.update(f"{self._name(each)}\0{known}\n".encode())
+        return digest.hexdigest()
+
+    def _files(self) -> Sequence[Path]:
+        if self.path.is_file():
+            return (self.path,)
+        files = [each for each in self.path.rglob(_PATTERNS[self.kind]) if each.is_file() and not each.is_symlink()]
+        return sorted(files, key=self._name)
+
+    def _name(self, file: Path) -> str:
+        return file.relative_to(self.path).as_posix() if self.path.is_dir() else file.name
+
+    def _grass(self) -> GrassFile:
+        state = self.path.stat()
+        return _known_grass(self.path, state.st_mtime_ns, state.st_size)
+
+    def _read(self, file: Path) -> PartHierarchy:
+        readers = {"structurenet": read_structurenet, "partnet": read_partnet}
+        return read_apart(readers.get(self.kind, lambda path: read_glb(path, self.up)), file)
+
+
+@lru_cache(maxsize=65536)
+def _known_digest(file: Path, modified: int, size: int) -> str:
+    """`file_digest`, asked once for each state of a file: a plan is made often."""
+    return file_digest(file)
+
+
+@lru_cache(maxsize=4)
+def _known_grass(file: Path, modified: int, size: int) -> GrassFile:
+    return grass_read_apart(file)

@@ -1,0 +1,139 @@
+"""What a language model learns, and what it writes whatever its weights say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from stages.shapeassembly import execute, parse
+from stages.shapeassembly.analysis.structure import signature
+from stages.shapeassembly.syntax.checks import reaching_out, violations
+from stages.training.program_lm.batches import Texts, Written, batches
+from stages.training.program_lm.corpus import written
+from stages.training.program_lm.model import ProgramLm
+from stages.training.program_lm.sampling import drawn
+from stages.training.program_lm.settings import ProgramLmEntry
+from stages.training.program_lm.tokens import STEPS, WORDS, middles, words_of
+from stages.training.program_lm.trained import TrainedProgramLm
+from stages.training.program_lm.training import FIRST_NUMBER, ProgramLmLearner, jittered, new_model
+from stages.training.program_vae.lines import START
+from tests.stages.training.program_vae.test_lines import BOX, STOOL
+
+ENTRY = ProgramLmEntry(name="tiny", kind="program_lm", width=32, layers=2, batch=2)
+PROGRAMS = [parse(text) for text in (BOX, STOOL)]
+WORDED = [words_of(each, 1.2) for each in PROGRAMS]
+VALUES = middles(WORDED)
+READ = [each for each in (written(words, VALUES, 1.2) for words in WORDED) if each is not None]
+TEXTS = Texts.of(READ)
+LONGEST = 100
+
+
+def trained(module: ProgramLm, nucleus: float) -> TrainedProgramLm:
+    return TrainedProgramLm(module.eval(), {"unit": 1.2}, nucleus)
+
+
+def test_a_batch_holds_each_program_behind_its_start() -> None:
+    (batch,) = batches(TEXTS, 2, None)
+    rows = (batch.places // batch.words.shape[1]).tolist()
+    assert [rows.count(row) for row in range(2)] == [len(each.words) for each in READ]
+    for row, each in enumerate(READ):
+        np.testing.assert_array_equal(batch.words[row, : len(each.words)], each.words)
+        assert batch.before[row, 0] == START
+        assert batch.before[row, 1] == each.words[0]
+        np.testing.assert_array_equal(batch.cues[row, : len(each.words)], each.cues)
+
+
+@torch.no_grad()
+def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and_after_going_back() -> None:
+    module = new_model(ENTRY, VALUES, LONGEST, 1)
+    (batch,) = batches(TEXTS, 2, None)
+    whole = torch.zeros(*batch.words.shape, WORDS)
+    whole.flatten(0, 1)[batch.places] = module(batch.before, batch.cues, batch.seen, batch.places)
+    cache = module.start(2)
+    # The second program is ahead of the first; the first goes back once, over places that hold other words.
+    for first, second in [(0, 0), (1, 1), (2, 2), (3, 3), (1, 4), (2, 5), (3, 6), (4, 7)]:
+        places = torch.tensor([first, second])
+        rows = torch.arange(2)
+        shown = batch.before[rows, places].clone()
+        if (first, second) in [(2, 2), (3, 3)]:
+            shown[0] = 20
+        said = module.step(shown, batch.cues[rows, places], batch.seen[rows, places], places, cache)
+        torch.testing.assert_close(said[1], whole[1, second], atol=1e-4, rtol=1e-4)
+        if shown[0] == batch.before[0, first]:
+            torch.testing.assert_close(said[0], whole[0, first], atol=1e-4, rtol=1e-4)
+
+
+def test_numbers_alone_are_jittered_by_a_step_and_stay_numbers() -> None:
+    before = torch.arange(WORDS).repeat(400, 1)
+    found = jittered(before, 0.2, torch.Generator().manual_seed(0))
+    moved = (found - before)[:, FIRST_NUMBER:]
+    assert (found[:, :FIRST_NUMBER] == before[:, :FIRST_NUMBER]).all()
+    assert set(moved.unique().tolist()) == {-1, 0, 1}
+    assert found.max() == WORDS - 1
+    assert (moved != 0).float().mean().item() == pytest.approx(0.2 * STEPS / (STEPS + 1), abs=0.01)
+
+
+def test_words_are_drawn_by_their_shares_among_those_allowed_and_the_likeliest() -> None:
+    shares = np.array([0.5, 0.3, 0.15, 0.05])
+    allowed = np.array([True, True, True, True])
+    rows = 20_000
+
+    def found(nucleus: float, temperature: float, allowed: np.ndarray) -> np.ndarray:
+        logits = np.tile(np.log(shares), (rows, 1))
+        words = drawn(
+            logits, np.tile(allowed, (rows, 1)), temperature, np.full(rows, nucleus), np.random.default_rng(0)
+        )
+        return np.bincount(words, minlength=4) / rows
+
+    np.testing.assert_allclose(found(1.0, 1.0, allowed), shares, atol=0.01)
+    np.testing.assert_allclose(found(0.7, 1.0, allowed), [0.625, 0.375, 0, 0], atol=0.01)
+    np.testing.assert_allclose(found(0.1, 1.0, allowed), [1, 0, 0, 0])
+    np.testing.assert_allclose(found(1.0, 0.5, allowed), shares**2 / (shares**2).sum(), atol=0.01)
+    allowed[0] = False
+    np.testing.assert_allclose(found(0.9, 1.0, allowed), [0, 2 / 3, 1 / 3, 0], atol=0.01)
+
+
+def test_a_model_learns_two_programs_and_writes_them() -> None:
+    module = new_model(ENTRY, VALUES, LONGEST, 0)
+    learner = ProgramLmLearner(module, {}, ENTRY, TEXTS, TEXTS)
+    optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
+    noise = torch.Generator().manual_seed(0)
+    stream = learner.batches(np.random.default_rng(0))
+    with torch.no_grad():
+        before = learner.validate(noise)
+    assert before["loss"] > before["numbers"] > 0
+    for step in range(120):
+        losses = learner.losses(next(stream), step, noise)
+        optimizer.zero_grad()
+        losses["loss"].backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(module.parameters(), 1.0)
+        optimizer.step()
+    with torch.no_grad():
+        assert learner.validate(noise)["loss"] < 0.05 * before["loss"]
+    programs, begun = trained(module, 0.9).sample(40, np.random.default_rng(0))
+    assert begun == 40
+    assert {signature(each) for each in programs} == {signature(each) for each in PROGRAMS}
+    for each in programs:
+        (wanted,) = [of for of in PROGRAMS if signature(of) == signature(each)]
+        np.testing.assert_allclose(execute(each).corners, execute(wanted).corners, atol=0.03)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_written_keeps_every_rule_and_its_box_whatever_the_weights(seed: int) -> None:
+    module = new_model(ENTRY, VALUES, LONGEST, seed)
+    model = trained(module, 1.0)
+    programs, begun = model.sample(8, np.random.default_rng(seed))
+    assert begun > 8, "many are given up"
+    for program in programs:
+        assert violations(program) == []
+        assert not any(reaching_out(block) for block in program.blocks)
+        execute(program)
+    again, _ = model.sample(8, np.random.default_rng(seed))
+    assert again == programs
+
+
+def test_a_program_that_breaks_a_rule_is_not_learnt() -> None:
+    twice = BOX[:-1] + "attach(c, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5) }"
+    found: Written | None = written(words_of(parse(twice), 1.2), VALUES, 1.2)
+    assert found is None

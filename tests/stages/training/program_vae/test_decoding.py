@@ -1,0 +1,129 @@
+"""What a model learns, and what it writes whatever its weights say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from stages.shapeassembly import execute, parse
+from stages.shapeassembly.analysis.structure import signature
+from stages.shapeassembly.syntax.checks import reaching_out, violations
+from stages.shapeassembly.syntax.program import BBOX
+from stages.training.program_vae.batches import Programs, batch_of
+from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, STOP, TRANSLATE, node_lines
+from stages.training.program_vae.model import ProgramVae
+from stages.training.program_vae.partial_assembly import Draft, Numbers
+from stages.training.program_vae.reaching import add_line
+from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.program_vae.trained import TrainedProgramVae
+from stages.training.program_vae.training import ProgramVaeLearner, new_model, reconstruction
+from tests.stages.training.program_vae.test_lines import BOX, STOOL
+
+ENTRY = ProgramVaeEntry(name="tiny", kind="program_vae", latent=16, hidden=48, kl_weight=0.0, batch=2)
+PROGRAMS = Programs.of([node_lines(parse(text)) for text in (BOX, STOOL)])
+
+
+def trained(module: ProgramVae) -> TrainedProgramVae:
+    return TrainedProgramVae(module.eval(), {"settings": ENTRY.model_dump()})
+
+
+def test_losses_of_a_batch_are_those_of_its_programs_one_by_one() -> None:
+    """Whatever stands in one batch, and whatever stands behind an end."""
+    module = new_model(ENTRY, 1)
+    codes = torch.randn(2, ENTRY.latent, generator=torch.Generator().manual_seed(0))
+    together = reconstruction(module, batch_of(PROGRAMS, np.array([0, 1])), codes)
+    alone = [reconstruction(module, batch_of(PROGRAMS, np.array([row])), codes[row : row + 1]) for row in (0, 1)]
+    for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
+        assert whole.item() == pytest.approx(sum(each.item() for each in parts), rel=1e-5)
+    means = module.encode(batch_of(PROGRAMS, np.array([0, 1])))[0]
+    for row in (0, 1):
+        torch.testing.assert_close(module.encode(batch_of(PROGRAMS, np.array([row])))[0][0], means[row])
+
+
+def test_a_model_learns_two_programs_and_writes_them() -> None:
+    module = new_model(ENTRY, 0)
+    learner = ProgramVaeLearner(module, {}, ENTRY, PROGRAMS, PROGRAMS)
+    optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
+    noise = torch.Generator().manual_seed(0)
+    stream = learner.batches(np.random.default_rng(0))
+    with torch.no_grad():
+        before = learner.validate(noise)["loss"]
+    for step in range(300):
+        losses = learner.losses(next(stream), step, noise)
+        optimizer.zero_grad()
+        losses["loss"].backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(module.parameters(), 1.0)
+        optimizer.step()
+    with torch.no_grad():
+        assert learner.validate(noise)["loss"] < 0.1 * before
+    model = trained(module)
+    texts = [parse(text) for text in (BOX, STOOL)]
+    written = model.decode(model.encode(texts), reject=True)
+    for wanted, found in zip(texts, written, strict=True):
+        assert found is not None
+        assert signature(found) == signature(wanted)
+        away = np.abs(execute(found).corners - execute(wanted).corners).max()
+        assert away < 0.15
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_written_keeps_every_rule_whatever_the_weights(seed: int) -> None:
+    module = new_model(ENTRY, seed)
+    with torch.no_grad():
+        for parameter in module.parameters():
+            parameter.mul_(3.0)
+    points = np.random.default_rng(seed).normal(size=(40, ENTRY.latent)).astype(np.float32)
+    for reject in (True, False):
+        programs = [each for each in trained(module).decode(points, reject=reject) if each is not None]
+        for program in programs:
+            assert violations(program) == []
+            assert not any(reaching_out(block) for block in program.blocks)
+            execute(program)
+
+
+NUMBERS = Numbers(np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5]), 2, np.array([0.5, 0.5]), 0, 2, 0.5)
+
+
+def draft() -> Draft:
+    made = Draft((1.0, 1.0, 1.0))
+    for _ in range(2):
+        made.declare(np.array([0.2, 0.4, 2.0]), True, None)
+    return made
+
+
+def allowed(made: Draft) -> set[int]:
+    return set(np.flatnonzero(made.commands()).tolist())
+
+
+def choices(made: Draft, command: int) -> set[tuple[int, ...]]:
+    logits = np.full(7, -1.0)
+    logits[command] = 0.0
+    return {each[1:] for each in made.choices(logits, np.zeros((7, 3, 11)), 100) if each[0] == command}
+
+
+def test_lines_follow_in_the_order_of_the_grammar_and_only_grounded_cuboids_bear_others() -> None:
+    made = draft()
+    assert made.sizes[0] == (0.2, 0.4, 1.0)
+    assert allowed(made) == {CUBOID, ATTACH, SQUEEZE}
+    assert choices(made, ATTACH) == {(1, 0), (2, 0)}
+    assert add_line(made, (ATTACH, 1, 0), NUMBERS, reaching=True)
+    assert allowed(made) == {STOP, ATTACH, SQUEEZE, TRANSLATE, REFLECT}
+    assert choices(made, ATTACH) == {(1, 0), (2, 0), (2, 1)}
+    assert choices(made, REFLECT) == {(1,)}
+    assert not add_line(made, (ATTACH, 1, 0), NUMBERS, reaching=True), "it is attached to the bottom already"
+    assert add_line(made, (REFLECT, 1), NUMBERS, reaching=True)
+    assert allowed(made) == {STOP, TRANSLATE, REFLECT}
+    block = made.block("P", {})
+    assert [each.name for each in block.cuboids] == ["cube0"], "the other is not grounded"
+
+
+@pytest.mark.parametrize(
+    ("goal", "kept"),
+    [([0.5, 0.5, 0.5], False), ([0.5, 0.04, 0.5], True), ([0.5, 0.96, 0.5], False), ([0.95, 0, 0.5], True)],
+)
+def test_the_box_is_attached_to_at_its_ends_and_not_left_by_more_than_a_tenth(goal: list[float], kept: bool) -> None:
+    made = draft()
+    numbers = Numbers(np.array([0.5, 0.0, 0.5, *goal]), 0, np.zeros(2), 0, 1, 0.0)
+    assert add_line(made, (ATTACH, 1, 0), numbers, reaching=False) == kept
+    assert (BBOX in str(made.block("P", {}).lines)) == kept
