@@ -21,7 +21,7 @@ from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.kit import Assembly, Kit
-from stages.variations.copied import CopyTest
+from stages.variations.novelty.copied_pieces import CopyTest
 
 COLUMNS = (
     "shapes of",

@@ -16,6 +16,7 @@ from eval.engine.models import Trained, trained_models
 from eval.engine.table import Cell, Published, Table
 from pipeline.randomness import decision_rng
 from stages.exemplars.faults import assembly_faults
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.string_sampling.instantiation.guidance import NO_GUIDE, Guide, guide_of
@@ -25,7 +26,6 @@ from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
 from stages.training.checkpoint import weights_header, weights_of_kind
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.settings import VariationsConfig
 
 DRAWS = 4

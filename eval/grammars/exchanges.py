@@ -10,9 +10,9 @@ import numpy as np
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
-from stages.variations.substructures.motions import find_moves
-from stages.variations.substructures.moves import Moves
-from stages.variations.substructures.sites import contact_graph
+from stages.variations.substructures.alignments import find_moves
+from stages.variations.substructures.docking_sites import contact_graph
+from stages.variations.substructures.region_swaps import Moves
 
 LARGEST = 0.5
 """Share of the surface that a piece has at most: to exchange more is to exchange the rest."""

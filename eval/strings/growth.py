@@ -16,7 +16,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.strings.encoder import NotConnectedError
 from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import StringsConfig
-from stages.variations.pool import FoundVariants
+from stages.variations.search.pool import FoundVariants
 
 NOTES = (
     "Shapes, distinct graphs and strings after each iteration: a round of the search, with parents from what "

@@ -20,8 +20,8 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import kit_shape
-from stages.variations.carcass import carcass
-from stages.variations.dullness import COPIED
+from stages.variations.novelty.low_diversity import COPIED
+from stages.variations.requirements.required_labels import carcass
 from stages.variations.settings import CHOSEN_CARCASS, CHOSEN_COPIED, CHOSEN_STABLE
 
 

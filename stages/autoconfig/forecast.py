@@ -11,10 +11,10 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.bared import bared
 from stages.autoconfig.ladder import FEW, is_dull
 from stages.autoconfig.probe import Finds, Probe
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.shape.kit import Kit
-from stages.variations.advice import another_model, what_keeps
-from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.report.advice import another_model, what_keeps
 from stages.variations.search.search import DUPLICATE, Variant
 
 MANY = 300

@@ -11,11 +11,11 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.bared import bared
 from stages.autoconfig.probe import HUB, Finds, Probe
 from stages.autoconfig.sight import Setting, Sight
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
-from stages.variations.copied import CopyTest
-from stages.variations.dullness import COPIED
-from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.novelty.copied_pieces import CopyTest
+from stages.variations.novelty.low_diversity import COPIED
 from stages.variations.settings import CHOSEN_HUBS
 
 GRAPHS = 80

@@ -10,17 +10,17 @@ from typing import Any, Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
-from stages.variations.backdrop import NO_BACKDROP, Backdrop
-from stages.variations.carcass import NO_CARCASS, carcass, carcass_test
-from stages.variations.copied import CopyTest
-from stages.variations.dullness import COPIED
-from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.novelty.copied_pieces import CopyTest
+from stages.variations.novelty.low_diversity import COPIED
+from stages.variations.requirements.hub_restoration import NO_BACKDROP, Backdrop
+from stages.variations.requirements.required_labels import NO_CARCASS, carcass, carcass_test
 from stages.variations.search.search import Search, Variant
-from stages.variations.selection import farthest_first
+from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig
 
 SHOWN = 24

@@ -17,12 +17,12 @@ from stages.exemplars.build import Observation
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig, ReadLimits
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import Shape, kit_shape
-from stages.variations.backdrop import Backdrop, hubs_by_choice
-from stages.variations.facing import Facing
-from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.requirements.hub_restoration import Backdrop, hubs_by_choice
+from stages.variations.selection.orientation import Facing
 from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
 
 ACROSS = (

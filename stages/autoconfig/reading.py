@@ -15,7 +15,7 @@ from stages.exemplars.identify import Identified, identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
-from stages.variations.kernels.answers import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.variations.settings import CHOSEN_COPIED
 
 CHOSEN_PARTS = "parts"

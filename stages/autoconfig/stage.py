@@ -44,7 +44,7 @@ def run_shard(task: Task) -> Outcome:
     from stages.autoconfig.proportioned import instead_of_layouts
     from stages.autoconfig.prospect import foreseen
     from stages.autoconfig.reading import read_and_choose
-    from stages.variations.kernels.answers import ContactAnswers
+    from stages.shape.geometry.contact_oracle import ContactAnswers
 
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
     limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(AutoconfigConfig).max_tries

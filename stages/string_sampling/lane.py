@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Task
 from stages.exemplars.faults import assembly_faults
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_input import input_kit
@@ -23,7 +24,6 @@ from stages.string_sampling.source import Source, read_source
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
-from stages.variations.kernels.answers import ContactAnswers
 
 NO_STRING, DUPLICATE, FAULTY = "no valid string", "duplicate", "not valid by its meshes"
 NEW, TRAIN, EXEMPLAR = "new", "train", "exemplar"

@@ -13,9 +13,9 @@ from pkgutil import iter_modules
 
 from pipeline.config import nearest
 from stages.shape.kit import Assembly, Kit
-from stages.variations.labels import named_labels
-from stages.variations.resizing import Resizer
-from stages.variations.stretched import contact_fault
+from stages.variations.requirements.named_labels import named_labels
+from stages.variations.requirements.resizing import Resizer
+from stages.variations.requirements.stretched_contacts import contact_fault
 
 Labels = Mapping[str, Sequence[str]]
 """What a config says of a constraint: labels of parts, by what they are to it."""

@@ -12,9 +12,9 @@ from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
-from stages.variations.measures import measure_table
+from stages.variations.report.measures import measure_table
+from stages.variations.report.split_report import splits_table
 from stages.variations.settings import VariationsConfig
-from stages.variations.split_report import splits_table
 
 
 def _measures(plan: Plan) -> Mapping[str, Any]:

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import PhysicsConfig, Requirements
-from stages.variations.features import Axis
+from stages.variations.novelty.features import Axis
 
 CHOSEN_HUBS = 0.5
 """What is required of hubs that were chosen and not stated: a mile of rail on which one brick of the road fits is no

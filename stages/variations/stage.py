@@ -13,11 +13,16 @@ from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.assignment import shard_sizes
-from stages.variations.collection import assignment_shard, collection_shards_of, run_assignment, run_collection
 from stages.variations.constraint import unknown_in
 from stages.variations.instead import chosen_instead
-from stages.variations.measures import described, growth
-from stages.variations.rounds import last_pool, run_lane, run_pool, search_shards
+from stages.variations.report.measures import described, growth
+from stages.variations.search.rounds import last_pool, run_lane, run_pool, search_shards
+from stages.variations.selection.collection import (
+    assignment_shard,
+    collection_shards_of,
+    run_assignment,
+    run_collection,
+)
 from stages.variations.settings import VariationsConfig
 
 BYTES_A_VARIANT = 60_000

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 

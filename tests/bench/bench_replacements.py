@@ -13,13 +13,13 @@ import numpy as np
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.substructures.motions import find_moves
-from stages.variations.substructures.moves import Moves
+from stages.variations.substructures.alignments import find_moves
+from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import Operations, find_operations
-from stages.variations.substructures.ordered import OrderedGraph
-from stages.variations.substructures.sites import docking_graph
+from stages.variations.substructures.ordered_graph import OrderedGraph
+from stages.variations.substructures.region_swaps import Moves
 from tests.bench.measure import Measure
 
 REAL = Path("../shared/exemplars")

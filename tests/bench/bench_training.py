@@ -22,6 +22,7 @@ from torch.nn.utils.rnn import pack_sequence, pad_packed_sequence
 
 from stages.exemplars.build import read_kit
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shapeassembly import parse
 from stages.shapeassembly.syntax.errors import ProgramError
 from stages.strings.acceptor import follow
@@ -37,7 +38,6 @@ from stages.training.string_vae.batches import Strings
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.training import StringVaeLearner, new_model
 from stages.training.string_vae.vocabulary import END, Vocabulary
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.bench.bench_shapeassembly import category_texts

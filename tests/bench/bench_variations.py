@@ -14,17 +14,17 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Assembly, Kit
-from stages.variations.copied import CopyTest
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.checks import validate
-from stages.variations.kernels.layout import TRY, Outcome
-from stages.variations.kernels.variant import place_boxes
+from stages.variations.kernels.structs import TRY, Outcome
+from stages.variations.kernels.variant_graph import place_boxes
+from stages.variations.novelty.copied_pieces import CopyTest
 from stages.variations.search.search import Search
+from stages.variations.selection.shared_surface import PackedShapes
 from stages.variations.settings import NoveltyConfig, SearchConfig
-from stages.variations.shared_surface import PackedShapes
+from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import find_operations
-from stages.variations.substructures.sites import docking_graph
 from tests.bench.measure import Measure, rate
 
 SHIPPED = Path("datasets/exemplars")

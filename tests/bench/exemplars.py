@@ -130,7 +130,7 @@ def _made(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]
     if record is None:
         return whole, ["stopped at the limit" if ended.late else _why(ended), *[""] * 4]
     (found,) = record.summary["kits"].values()
-    run(["stages.variations.sheet", "--config", str(config), "--out", str(folder)], minutes)
+    run(["stages.variations.report.sheet", "--config", str(config), "--out", str(folder)], minutes)
     return whole, list(_cells(found))
 
 

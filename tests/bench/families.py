@@ -24,17 +24,17 @@ from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.programs.files import named_values, shape_glb
 from stages.programs.program import find_program
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
 from stages.variations.constraint import made_test
-from stages.variations.features import AXES, MIXED
-from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.selection import farthest_first
+from stages.variations.novelty.features import AXES, MIXED
+from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig, StretchConfig, VariantRequirements
-from stages.variations.substructures.motions import find_moves
+from stages.variations.substructures.alignments import find_moves
+from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import find_operations
-from stages.variations.substructures.sites import docking_graph
 from tests.bench.furniture import FURNITURE, MEANINGS, side_by_side
 from tests.bench.variety import Finds, configured, explore
 

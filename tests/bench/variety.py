@@ -28,13 +28,13 @@ from stages.autoconfig.sheet import SHOWN, forecast_sheet
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
-from stages.variations.features import AXES, MIXED
-from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.novelty.features import AXES, MIXED
 from stages.variations.search.search import Search, Variant
-from stages.variations.selection import farthest_first
+from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig, VariationsConfig
 
 OWN = ("default/castle", "default/temple", "default/space-base", "default/playground")

@@ -12,10 +12,10 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.pose_kernels import squared_distance
 from stages.string_sampling.instantiation.motions import compose
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import Decoded
-from stages.variations.kernels.poses import squared_distance
 
 REACH = 2.0
 """A place has the nearest category if that is at most so many pose tolerances away."""

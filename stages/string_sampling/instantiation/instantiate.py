@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
@@ -18,9 +19,8 @@ from stages.string_sampling.instantiation.layout import STANDARD, TRIES, Method,
 from stages.string_sampling.instantiation.reach import new_reach
 from stages.string_sampling.instantiation.solve import BUDGET, IMPOSSIBLE, NO_ROOM, SOLVED, solve
 from stages.strings.rules import make_rules
-from stages.variations.growth.layout import Contacts
-from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.kernels.layout import FORBIDDEN, NONE
+from stages.variations.growth.state import Contacts
+from stages.variations.kernels.structs import FORBIDDEN, NONE
 from stages.variations.kernels.tables import kit_tables
 
 FEWEST = 64

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.pose_kernels import same_rotation, squared_distance
 from stages.string_sampling.instantiation.motions import compose
-from stages.variations.kernels.lookup import mix
-from stages.variations.kernels.poses import same_rotation, squared_distance
 
 LONGEST = 24
 """Longer chains are taken to reach anything."""

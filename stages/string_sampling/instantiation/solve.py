@@ -5,12 +5,12 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from stages.shape.geometry.contact_lookup import ask, ask_python, hash_key, quantise
 from stages.string_sampling.instantiation.guidance import carry_frames, drop_frames, prefer
 from stages.string_sampling.instantiation.layout import FAILS, PLACED, TRAIL, TRIES, VALUES
 from stages.string_sampling.instantiation.motions import compose, seen_from
 from stages.string_sampling.instantiation.reach import LONGEST, can_reach
-from stages.variations.kernels.layout import MISSING, NONE
-from stages.variations.kernels.lookup import ask, ask_python, hash_key, quantise
+from stages.variations.kernels.structs import MISSING, NONE
 
 SOLVED, IMPOSSIBLE, BUDGET, NO_ROOM = 0, 1, 2, 3
 """How it ended; IMPOSSIBLE: every way has been tried."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from stages.shape.kit import Assembly, Kit
 from stages.variations.constraint import Constraint, Labels, Mend, Test
-from stages.variations.resizing import Resizer, spans_of
+from stages.variations.requirements.resizing import Resizer, spans_of
 from stages.variations.substitution.ground import GroundTest
 
 

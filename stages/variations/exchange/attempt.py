@@ -7,11 +7,11 @@ import numpy as np
 
 from stages.variations.exchange.cuts import cut
 from stages.variations.exchange.joins import join
-from stages.variations.exchange.matches import match_poses
-from stages.variations.exchange.units import shift
+from stages.variations.exchange.pose_matching import match_poses
+from stages.variations.exchange.repeated_units import shift
 from stages.variations.kernels.checks import connect
 from stages.variations.kernels.graph_key import graph_key
-from stages.variations.kernels.layout import PIECE, UNITS, Outcome
+from stages.variations.kernels.structs import PIECE, UNITS, Outcome
 
 SMALL, NEARLY_ALL = 0.2, 0.8
 """A piece with a share of parts between these is a large cut, one that can change a shape as a whole."""

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.kernels.layout import BOUNDARY, CHOICES
-from stages.variations.kernels.lookup import random_below
+from stages.shape.geometry.contact_lookup import random_below
+from stages.shape.geometry.pose_kernels import squared_distance, transform
 from stages.variations.kernels.membership import admitted
-from stages.variations.kernels.poses import squared_distance, transform
+from stages.variations.kernels.structs import BOUNDARY, CHOICES
 
 FEW = 6
 """Of so many components that touch the boundary every choice is tried; of more, random ones."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.kernels.layout import BOUNDARY, GROWN, JOINTS, PIECE, Outcome
-from stages.variations.kernels.lookup import random_below
+from stages.shape.geometry.contact_lookup import random_below
+from stages.variations.kernels.structs import BOUNDARY, GROWN, JOINTS, PIECE, Outcome
 
 OF_A_PART = 0.75
 """How likely planes stand along the axes of one of the parts; else they stand in any direction."""

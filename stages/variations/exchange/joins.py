@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numba
 
+from stages.shape.geometry.pose_kernels import looks_same, rotate, squared_distance, transform
 from stages.variations.exchange.components import choose_components, find_components
-from stages.variations.kernels.layout import BOUNDARY, EDGES, PARTS, TRY, UNKNOWNS, Outcome
-from stages.variations.kernels.poses import looks_same, rotate, squared_distance, transform
-from stages.variations.kernels.variant import inherit_edges, place_boxes
+from stages.variations.kernels.structs import BOUNDARY, EDGES, PARTS, TRY, UNKNOWNS, Outcome
+from stages.variations.kernels.variant_graph import inherit_edges, place_boxes
 
 
 @numba.njit(cache=True)

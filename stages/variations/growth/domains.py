@@ -5,11 +5,11 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.growth.layout import CANDIDATES, EVENTS, FREE, GROWN_PARTS, MEMBERS, SPOTS, TRAIL, WORK
-from stages.variations.growth.spots import FORBIDS, add_node, add_spot, boxes_meet, find_node, find_spot, relation
-from stages.variations.kernels.layout import FORBIDDEN, NONE, UPRIGHT
-from stages.variations.kernels.lookup import mix
-from stages.variations.kernels.poses import looks_same, squared_distance
+from stages.shape.geometry.contact_lookup import mix
+from stages.shape.geometry.pose_kernels import looks_same, squared_distance
+from stages.variations.growth.placements import FORBIDS, add_node, add_spot, boxes_meet, find_node, find_spot, relation
+from stages.variations.growth.state import CANDIDATES, EVENTS, FREE, GROWN_PARTS, MEMBERS, SPOTS, TRAIL, WORK
+from stages.variations.kernels.structs import FORBIDDEN, NONE, UPRIGHT
 
 FINE, CONFLICT, NO_ROOM = 0, 1, 2
 """How a step ended."""

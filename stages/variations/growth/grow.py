@@ -5,13 +5,13 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from stages.shape.geometry.contact_lookup import random_below
 from stages.variations.growth.domains import FINE, NO_ROOM, narrow, place, propagate, strike, undo
-from stages.variations.growth.layout import CONFLICTS, DECISIONS, FREE, GROWN_PARTS, TRAIL
-from stages.variations.growth.spots import add_spot
+from stages.variations.growth.placements import add_spot
+from stages.variations.growth.state import CONFLICTS, DECISIONS, FREE, GROWN_PARTS, TRAIL
 from stages.variations.kernels.checks import find_contacts
-from stages.variations.kernels.layout import EDGES, PARTS, TRY
-from stages.variations.kernels.lookup import random_below
-from stages.variations.kernels.variant import place_boxes
+from stages.variations.kernels.structs import EDGES, PARTS, TRY
+from stages.variations.kernels.variant_graph import place_boxes
 
 CONFLICTS_ALLOWED = 120
 """After so many conflicts a shape is given up."""

@@ -7,14 +7,14 @@ import ctypes
 import numpy as np
 
 from stages.shape.arrays import FloatArray
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.patterns import observed_patterns
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 from stages.variations.growth.grow import grow, take_over
-from stages.variations.growth.layout import WORK, Contacts, Field, growing
-from stages.variations.growth.patterns import pattern_tables
-from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.kernels.layout import PARTS, UNKNOWNS, KitTables, Outcome, Workspace
+from stages.variations.growth.pattern_tables import pattern_tables
+from stages.variations.growth.state import WORK, Contacts, Field, growing
+from stages.variations.kernels.structs import PARTS, UNKNOWNS, KitTables, Outcome, Workspace
 
 LONGEST = 2.5
 """How much longer, beside its other side, a field may be than the exemplar at most."""

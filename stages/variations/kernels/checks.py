@@ -5,10 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.kernels.layout import EDGES, FORBIDDEN, LABELS, MISSING, PARTS, TRY, UNKNOWNS, Outcome
-from stages.variations.kernels.lookup import ask, hash_key, quantise
+from stages.shape.geometry.contact_lookup import ask, hash_key, quantise
 from stages.variations.kernels.membership import admitted, neighbourhood_key, recalled
-from stages.variations.kernels.variant import set_edge
+from stages.variations.kernels.structs import EDGES, FORBIDDEN, LABELS, MISSING, PARTS, TRY, UNKNOWNS, Outcome
+from stages.variations.kernels.variant_graph import set_edge
 
 
 @numba.njit(cache=True, inline="always")

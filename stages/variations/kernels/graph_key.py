@@ -5,8 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.kernels.layout import EDGES, PARTS
-from stages.variations.kernels.lookup import mix
+from stages.shape.geometry.contact_lookup import mix
+from stages.variations.kernels.structs import EDGES, PARTS
 
 
 @numba.njit(cache=True)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.kernels.layout import MISSING
-from stages.variations.kernels.lookup import ask, mix
+from stages.shape.geometry.contact_lookup import ask, mix
+from stages.variations.kernels.structs import MISSING
 
 
 @numba.njit(cache=True, inline="always")

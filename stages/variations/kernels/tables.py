@@ -7,7 +7,7 @@ import numpy as np
 from stages.shape.arrays import IntArray
 from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit import Assembly, Grammar, Kit
-from stages.variations.kernels.layout import KitTables, Rules, ShapeTables, Workspace
+from stages.variations.kernels.structs import KitTables, Rules, ShapeTables, Workspace
 
 QUANTUM = 1 / 64
 """Step of the poses by which contact answers are looked up, as a share of the contact tolerance."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly
-from stages.variations.archive import Archive, Place
-from stages.variations.features import MIXED
-from stages.variations.kernels.layout import ShapeTables
+from stages.variations.kernels.structs import ShapeTables
+from stages.variations.novelty.archive import Archive, Place
+from stages.variations.novelty.features import MIXED
 
 RIVALS = 6
 """Of so many variants of the largest family the most crowded makes room for another."""

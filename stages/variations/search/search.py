@@ -10,22 +10,19 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
-from stages.variations.archive import Archive, Cell, Place, cell_of
-from stages.variations.copied import CopyTest
 from stages.variations.exchange.attempt import attempt, complete, cut_piece
-from stages.variations.exchange.centroids import match_centroids
-from stages.variations.exchange.correction import correct_orientations
+from stages.variations.exchange.centroid_matching import match_centroids
 from stages.variations.exchange.joins import join
-from stages.variations.exchange.matches import lies_in
-from stages.variations.features import FeatureTest, material_shares
+from stages.variations.exchange.orientation_correction import correct_orientations
+from stages.variations.exchange.pose_matching import lies_in
 from stages.variations.growth.grower import Grower
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.checks import find_contacts, validate
 from stages.variations.kernels.graph_key import graph_key
-from stages.variations.kernels.layout import (
+from stages.variations.kernels.structs import (
     BOUNDARY,
     EDGES,
     MEANINGS,
@@ -37,12 +34,15 @@ from stages.variations.kernels.layout import (
     Outcome,
 )
 from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
+from stages.variations.novelty.archive import Archive, Cell, Place, cell_of
+from stages.variations.novelty.copied_pieces import CopyTest
+from stages.variations.novelty.features import FeatureTest, material_shares
+from stages.variations.requirements.stretched_contacts import contact_fault
+from stages.variations.search.operator_selection import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.search.parents import Parent, Parents
-from stages.variations.search.steering import BATCH, TRY_WORK, Choice, Steering
 from stages.variations.settings import SearchConfig
-from stages.variations.stretched import contact_fault
+from stages.variations.substitution.attachment import HoldTest
 from stages.variations.substitution.ground import GroundTest
-from stages.variations.substitution.held import HoldTest
 from stages.variations.substitution.substitute import substitute
 from stages.variations.substructures.replacer import Replacer
 

@@ -12,7 +12,7 @@ from stages.shape.arrays import FloatArray, TypeArray
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.geometry.pose import invert, rigid_fit, rotation_angle
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.layout import (
+from stages.variations.kernels.structs import (
     BOUNDARY,
     EDGES,
     PARTS,
@@ -24,7 +24,7 @@ from stages.variations.kernels.layout import (
     Outcome,
     Workspace,
 )
-from stages.variations.kernels.variant import inherit_edges, place_boxes
+from stages.variations.kernels.variant_graph import inherit_edges, place_boxes
 from stages.variations.search.parents import Parent
 from stages.variations.substitution.pieces import Exchanged, draw_pieces
 

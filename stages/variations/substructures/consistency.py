@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.kernels.lookup import random_below
+from stages.shape.geometry.contact_lookup import random_below
 from stages.variations.kernels.membership import admitted
 
 CHANGES = 24

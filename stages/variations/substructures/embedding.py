@@ -14,8 +14,8 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.layout import UPRIGHT
-from stages.variations.substructures.ordered import OrderedGraph
+from stages.variations.kernels.structs import UPRIGHT
+from stages.variations.substructures.ordered_graph import OrderedGraph
 from stages.variations.substructures.replacement import piece_of
 
 

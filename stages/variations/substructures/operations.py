@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from stages.variations.kernels.lookup import mix
-from stages.variations.substructures.dummies import is_alike, pass_over
+from stages.shape.geometry.contact_lookup import mix
+from stages.variations.substructures.dummy_edges import is_alike, pass_over
 from stages.variations.substructures.keys import grown, holds, with_key
-from stages.variations.substructures.ordered import OrderedGraph
-from stages.variations.substructures.regions import find_regions, region_of
-from stages.variations.substructures.symmetry import (
+from stages.variations.substructures.ordered_graph import OrderedGraph
+from stages.variations.substructures.partial_symmetry import (
     CONFLICTS,
     DEFECTS,
     MATCHED,
@@ -25,6 +24,7 @@ from stages.variations.substructures.symmetry import (
     pair_hash,
     side_by_side,
 )
+from stages.variations.substructures.regions import find_regions, region_of
 
 DUMMY_WORK = 5_500_000
 """Darts that are looked at for symmetries with dummy edges, which are for sparse outliers, about a third of a second:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.substructures.symmetry import MATCHED, ROWS, WORK, agree
+from stages.variations.substructures.partial_symmetry import MATCHED, ROWS, WORK, agree
 
 LEADER, FIRST, LAST, LIVE = range(4)
 """Columns of `lines`."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
+from stages.variations.substructures.ordered_graph import OrderedGraph, ordered_graph
 from stages.variations.substructures.regions import cut_off
 
 

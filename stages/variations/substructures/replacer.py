@@ -9,30 +9,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import split
-from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.kernels.layout import TRY, UPRIGHT, KitTables, Outcome, Workspace
+from stages.variations.kernels.structs import TRY, UPRIGHT, KitTables, Outcome, Workspace
 from stages.variations.kernels.tables import shape_tables
-from stages.variations.kernels.variant import set_edge
-from stages.variations.resizing import rigid_types
+from stages.variations.kernels.variant_graph import set_edge
+from stages.variations.requirements.resizing import rigid_types
+from stages.variations.search.operator_selection import Choice
 from stages.variations.search.parents import Parent
-from stages.variations.search.steering import Choice
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import Exchanged
 from stages.variations.substitution.substitute import Docked, find_motion, put_together
-from stages.variations.substructures.blending import blend, is_oriented_alike
+from stages.variations.substructures.alignments import MOST_WORK, find_moves
 from stages.variations.substructures.consistency import make_consistent
+from stages.variations.substructures.deformation import blend, is_oriented_alike
+from stages.variations.substructures.docking_sites import contact_graph, docking_graph
 from stages.variations.substructures.embedding import Side, embed, pieces
-from stages.variations.substructures.motions import MOST_WORK, find_moves
-from stages.variations.substructures.moves import Moves
 from stages.variations.substructures.operations import Operations, find_operations
-from stages.variations.substructures.ordered import OrderedGraph
-from stages.variations.substructures.recursion import cut_again, cut_farther, growth_of
+from stages.variations.substructures.ordered_graph import OrderedGraph
+from stages.variations.substructures.recursive_rules import cut_again, cut_farther, growth_of
+from stages.variations.substructures.region_swaps import Moves
 from stages.variations.substructures.replacement import replace_piece
 from stages.variations.substructures.result_key import moved_key, result_key
-from stages.variations.substructures.sites import contact_graph, docking_graph
 from stages.variations.substructures.stretching import stretch_onto
 
 FIRST_WORK, DEEPER = 1 << 19, 16

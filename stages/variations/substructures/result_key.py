@@ -6,7 +6,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.variations.kernels.lookup import mix
+from stages.shape.geometry.contact_lookup import mix
 
 GOLDEN, ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0x7F4A7C15)
 ODD_TYPE = np.uint64(0x51ED270B)

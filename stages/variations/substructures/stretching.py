@@ -13,7 +13,7 @@ from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.contact import world_boxes
 from stages.shape.kit import Kit
 from stages.shape.stretch import STRETCHED_DEPTH
-from stages.variations.substructures.blending import boundary_moves
+from stages.variations.substructures.deformation import boundary_moves
 from stages.variations.substructures.embedding import Side
 
 STIFFNESS = 1e-6

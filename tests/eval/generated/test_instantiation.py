@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from eval.generated.instantiation import METHODS, Attempt, attempts, distinct_graphs, methods_table, outcome_table
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
 from stages.string_sampling.instantiation.guidance import guide_of
@@ -15,7 +16,6 @@ from stages.strings.alphabet import make_alphabet
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
-from stages.variations.kernels.answers import ContactAnswers
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 

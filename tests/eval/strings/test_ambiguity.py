@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from eval.strings.ambiguity import Ambiguity, ambiguity, ambiguity_table
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Assembly
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.training.edge_categories.networks import kit, network, writer
 
 

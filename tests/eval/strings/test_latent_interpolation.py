@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from eval.strings.latent_interpolation import journey_strips, journeys
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.layout import STANDARD
@@ -17,7 +18,6 @@ from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.trained import TrainedStringVae
 from stages.training.string_vae.training import new_model
 from stages.training.string_vae.vocabulary import Vocabulary
-from stages.variations.kernels.answers import ContactAnswers
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 MOST = 40

@@ -22,8 +22,8 @@ from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import ContactKind
-from stages.variations.kernels.answers import ContactAnswers
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, config_of, kit_of, models_of, pose, ring
 from tests.toy_kits.tables import ROUND, SQUARE, THICK, THIN, table
 

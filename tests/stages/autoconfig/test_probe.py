@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stages.autoconfig.probe import Probe
-from stages.variations.kernels.answers import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 

@@ -13,9 +13,9 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Kit
-from stages.variations.backdrop import Backdrop
-from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.requirements.hub_restoration import Backdrop
 
 ROOT = Path(__file__).resolve().parents[3]
 EXEMPLARS = ROOT.parent / "shared" / "exemplars"

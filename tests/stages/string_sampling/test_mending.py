@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.layout import STANDARD
 from stages.string_sampling.mending import first_impossible, mended
@@ -14,7 +15,6 @@ from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.training.string_vae.latent_sampling import Found, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
-from stages.variations.kernels.answers import ContactAnswers
 from tests.stages.string_sampling.learnt import publish_model
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 

@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from stages.exemplars.build import read_kit
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.geometry.pose import pose_vectors
 from stages.shape.kit import Assembly, Kit
 from stages.strings.compression import DUMMY, Codebook, Described, describe, pack, restore, unpack
 from stages.strings.encoder import Encoded
 from stages.strings.settings import Edges
 from stages.strings.tokens import split_tokens
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.stages.strings.test_kit_strings import kit_of, pairs

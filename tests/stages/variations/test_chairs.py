@@ -13,6 +13,7 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.package.glb import glb_bytes
 from stages.package.record import describe_sample
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import judge_shape
@@ -22,7 +23,6 @@ from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar import check
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.program_chairs import write_chairs

@@ -17,7 +17,7 @@ from stages.shape.collection.assignment import SPLITS, assign_splits
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
-from stages.variations.shared_surface import PackedShapes
+from stages.variations.selection.shared_surface import PackedShapes
 from tests.mill import mill
 from tests.stated import stated
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, chain, pose, ring, write_model

@@ -10,11 +10,11 @@ import pytest
 import trimesh
 
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.search.test_search import SHIPPED, shipped_kit

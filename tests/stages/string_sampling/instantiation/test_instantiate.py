@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from stages.exemplars.faults import assembly_faults
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.pose import invert
 from stages.shape.graphs.canonical import graph_digest
@@ -23,7 +24,6 @@ from stages.string_sampling.instantiation.instantiate import Instantiation, Inst
 from stages.string_sampling.instantiation.layout import STANDARD, Method
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
-from stages.variations.kernels.answers import ContactAnswers
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring
 
 

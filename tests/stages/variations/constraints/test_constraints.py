@@ -15,7 +15,7 @@ from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import moved_by
 from stages.variations.constraint import made_mend, made_test, unknown_in
-from stages.variations.resizing import heights_of, spans_of
+from stages.variations.requirements.resizing import heights_of, spans_of
 from tests.stages.variations.substructures.test_replacing import replaced
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.patterns import observed_patterns
 from stages.shape.kit import Exemplar, Kit
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.stages.variations.search.test_search import SHIPPED, shipped_kit

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stages.shape.geometry.contact_lookup import ask, hash_key, quantise
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
 from stages.variations.exchange.cuts import cut
 from stages.variations.exchange.joins import join
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.kernels.checks import connect
-from stages.variations.kernels.layout import BOUNDARY, EDGES, FORBIDDEN, LABELS, NONE, PARTS, UNKNOWNS, Outcome
-from stages.variations.kernels.lookup import ask, hash_key, quantise
+from stages.variations.kernels.structs import BOUNDARY, EDGES, FORBIDDEN, LABELS, NONE, PARTS, UNKNOWNS, Outcome
 from stages.variations.kernels.tables import shape_tables
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig

@@ -13,9 +13,9 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.shape.kit import Kit
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, box, chain, kit_of, ring, with_arrow

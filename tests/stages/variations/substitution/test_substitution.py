@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
-from stages.variations.kernels.answers import ContactAnswers
-from stages.variations.kernels.layout import MEANINGS
+from stages.variations.kernels.structs import MEANINGS
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import draw_pieces

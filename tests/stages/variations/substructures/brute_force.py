@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
+from stages.variations.substructures.ordered_graph import OrderedGraph, ordered_graph
 from tests.stages.variations.substructures.graphs import code
 
 Orders = list[list[int]]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
+from stages.variations.substructures.ordered_graph import OrderedGraph, ordered_graph
 
 
 def path(*types: int) -> OrderedGraph:

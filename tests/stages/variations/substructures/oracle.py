@@ -23,10 +23,10 @@ import numpy as np
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
+from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import find_operations
-from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
+from stages.variations.substructures.ordered_graph import OrderedGraph, ordered_graph
 from stages.variations.substructures.replacement import replace_piece
-from stages.variations.substructures.sites import docking_graph
 from tests.stages.variations.substructures import brute_force
 from tests.stages.variations.substructures.graphs import code, crop, is_connected, patterned_graph, random_graph
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from stages.variations.substructures.operations import DUMMY_WORK, MOST_WAITING, find_operations
-from stages.variations.substructures.ordered import OrderedGraph, ordered_graph
-from stages.variations.substructures.recursion import cut_again, cut_farther, growth_of
+from stages.variations.substructures.ordered_graph import OrderedGraph, ordered_graph
+from stages.variations.substructures.recursive_rules import cut_again, cut_farther, growth_of
 from stages.variations.substructures.replacement import piece_of, replace_piece
 from stages.variations.substructures.result_key import result_key
 from tests.stages.variations.substructures import brute_force

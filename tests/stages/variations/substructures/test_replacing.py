@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Kit
-from stages.variations.kernels.answers import ContactAnswers
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow

@@ -11,13 +11,13 @@ from stages.exemplars.faults import geometry_faults
 from stages.package.glb import glb_bytes
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact import ContactTest
+from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Kit
 from stages.shape.shape import kit_shape
 from stages.shape.stretch import moved_by
-from stages.variations.kernels.answers import ContactAnswers
+from stages.variations.requirements.stretched_contacts import contact_fault
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
-from stages.variations.stretched import contact_fault
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose, with_arrow
 
 GATE = {

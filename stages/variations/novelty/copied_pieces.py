@@ -1,0 +1,208 @@
+"""How much of a shape is copied whole: pieces that stand rigidly so in one exemplar."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stages.shape.arrays import FloatArray, IntArray
+from stages.shape.geometry.docking import DockingTable
+from stages.shape.geometry.pose import invert
+from stages.shape.kit import Assembly, Kit
+from stages.variations.kernels.structs import ShapeTables
+from stages.variations.kernels.tables import shape_tables
+from stages.variations.novelty.rigid_pieces import Dockings, Groups, Joints, Target, cover, locate, rigid_pieces
+
+BUDGET = 2_000_000
+"""Contacts that are looked at for one shape at most. Rare dockings are looked at first, so that what is left unseen
+beyond it are repetitions of common ones: `largest` may then be too small, and `pieces` too many."""
+
+
+@dataclass(frozen=True)
+class Copied:
+    """How much of a shape is copied whole.
+
+    A piece is a connected set of parts that stand so in one exemplar: one rigid motion, no reflection, lays each part
+    on one that looks the same there, and the contacts that connect them are contacts there, too.
+
+    largest: share of the shape's parts in its largest piece, 0 to 1; pieces: how many pieces cover the shape, each
+    chosen to cover most of what those before it left; exemplar: share of an exemplar's parts that the largest piece is,
+    and `of` its name: of several exemplars that show it, the smallest.
+    """
+
+    largest: float
+    pieces: int
+    exemplar: float
+    of: str
+
+    def described(self) -> dict[str, Any]:
+        """The same as JSON, as it stands in a lineage."""
+        return {
+            "largest": round(self.largest, 6),
+            "pieces": self.pieces,
+            "exemplar": round(self.exemplar, 6),
+            "of": self.of,
+        }
+
+
+class CopyTest:
+    """What assemblies of one kit have copied of its exemplars."""
+
+    def __init__(self, kit: Kit, dockings: DockingTable) -> None:
+        self._names = tuple(each.name for each in kit.exemplars)
+        self._types = len(kit.types)
+        self._groups = _groups(kit)
+        self._dockings = _dockings(kit, self._groups)
+        self._target = self._exemplars(kit, dockings)
+        self._has = np.array([np.isin(np.arange(self._types), each.assembly.types) for each in kit.exemplars])
+
+    def copied(self, assembly: Assembly, labels: IntArray) -> Copied:
+        """How much of `assembly` is copied. labels: int32 (m, 2), directed docking labels of its edges, as from
+        `DockingTable.label_edges`, -1 for contacts that no exemplar shows."""
+        shape = shape_tables(assembly, labels, self._types)
+        parts, starts, owners = rigid_pieces(
+            self._groups,
+            self._dockings,
+            shape.types,
+            _handed(shape.rotations),
+            _tails(shape),
+            self._joints(shape),
+            self._target,
+            BUDGET,
+        )
+        sizes = np.diff(starts)
+        if len(sizes):
+            largest = int(sizes.max())
+            showing = np.unique(owners[sizes == largest])
+        else:
+            largest = 1
+            showing = np.flatnonzero(self._has[:, shape.types].any(axis=1))
+        smallest = int(showing[self._target.sizes[showing].argmin()])
+        share = largest / int(self._target.sizes[smallest])
+        return Copied(largest / len(assembly), int(cover(parts, starts, len(assembly))), share, self._names[smallest])
+
+    def _joints(self, shape: ShapeTables) -> Joints:
+        return Joints(shape.starts, shape.ends, shape.labels, *locate(self._groups, self._dockings, shape))
+
+    def _exemplars(self, kit: Kit, table: DockingTable) -> Target:
+        assemblies = [each.assembly for each in kit.exemplars]
+        sizes = np.array([len(each) for each in assemblies])
+        shifts = np.cumsum(sizes) - sizes
+        whole = Assembly(
+            np.concatenate([each.types for each in assemblies]),
+            np.concatenate([each.poses for each in assemblies]),
+            np.concatenate([each.edges + shift for each, shift in zip(assemblies, shifts, strict=True)]),
+        )
+        shape = shape_tables(whole, table.label_edges(whole.types, whole.poses, whole.edges), self._types)
+        type_sizes = np.diff(shape.type_starts)
+        rank = np.empty(len(whole), dtype=np.int64)
+        rank[shape.by_type] = np.arange(len(whole)) - np.repeat(shape.type_starts[:-1], type_sizes)
+        joints, tails = self._joints(shape), _tails(shape)
+        groups, dockings = self._groups, self._dockings
+        by_label = np.argsort(shape.labels, kind="stable")
+        rooms = dockings.spot_counts[shape.types]
+        at_starts, at = np.cumsum(rooms) - rooms, np.full(rooms.sum(), -1, dtype=np.int32)
+        # Contacts between two dockings, which are neither within tolerance, have no label and no spot.
+        told = np.flatnonzero(joints.labels >= 0)
+        spots = dockings.spots[dockings.rows[joints.labels[told]] + joints.near[told]]
+        at[at_starts[tails[told]] + spots] = told
+        directed = np.arange(2 * len(kit.grammar.dockings) + 1)
+        return Target(
+            rank=rank,
+            type_sizes=type_sizes,
+            handed=_handed(shape.rotations),
+            owner=np.repeat(np.arange(len(sizes)), sizes),
+            sizes=sizes,
+            joints=joints,
+            undo_near=groups.inverses[groups.starts[shape.types[tails]] + joints.near],
+            undo_far=groups.inverses[groups.starts[shape.types[shape.ends]] + joints.far],
+            at=at,
+            at_starts=at_starts,
+            tails=tails,
+            by_label=by_label,
+            label_starts=np.searchsorted(shape.labels[by_label], directed),
+        )
+
+
+def _tails(shape: ShapeTables) -> np.ndarray:
+    """The part that each contact of a shape is seen from, int64 (2 m,)."""
+    return np.repeat(np.arange(len(shape.types)), np.diff(shape.starts))
+
+
+def _handed(rotations: FloatArray) -> IntArray:
+    """1 for rotations (n, 3, 3), -1 for reflections, int64 (n,)."""
+    handed: IntArray = np.where(np.linalg.det(rotations) < 0, -1, 1)
+    return handed
+
+
+def _groups(kit: Kit) -> Groups:
+    rotations = [np.ascontiguousarray(each.symmetries[:, :3, :3]) for each in kit.types]
+    orders = np.array([len(each) for each in rotations])
+    inverses, products = [], []
+    for each in rotations:
+        table = np.full((len(each) + 1, len(each) + 1), len(each))
+        table[:-1, :-1] = [_numbers(each, first @ each) for first in each]
+        products.append(table.ravel())
+        inverses.append(_numbers(each, np.swapaxes(each, 1, 2)))
+    sizes = (orders + 1) ** 2
+    return Groups(
+        orders=orders,
+        starts=np.cumsum(orders) - orders,
+        rotations=np.concatenate(rotations),
+        inverses=np.concatenate(inverses),
+        signs=_handed(np.concatenate(rotations)),
+        products=np.concatenate(products),
+        rows=np.cumsum(sizes) - sizes,
+        reach=np.array([each.diagonal / 2 for each in kit.types]),
+    )
+
+
+def _numbers(group: FloatArray, rotations: FloatArray) -> np.ndarray:
+    """The number in a group (k, 3, 3) of each of some rotations (r, 3, 3), int64 (r,), k where it has none: those of
+    round parts are found by their corners and need not be all."""
+    apart = np.linalg.norm(group[1:] - group[0], axis=(1, 2)).min() / 2 if len(group) > 1 else np.inf
+    gaps = np.linalg.norm(group[None] - rotations[:, None], axis=(2, 3))
+    return np.where(gaps.min(axis=1) <= apart, gaps.argmin(axis=1), len(group))
+
+
+def _dockings(kit: Kit, groups: Groups) -> Dockings:
+    ends, poses = np.empty((0, 2), np.int64), np.empty((0, 4, 4))
+    for each in kit.grammar.dockings:
+        ends = np.concatenate([ends, [(each.a, each.b), (each.b, each.a)]])
+        poses = np.concatenate([poses, [each.pose, invert(each.pose)]])
+    passed, kept, spots = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    spot_counts = np.zeros(len(kit.types), dtype=np.int64)
+    # Two images of a docking are the same where one pose is within tolerance of both.
+    within = 2 * kit.pose_tolerance
+    for (a, b), pose in zip(ends.tolist(), poses, strict=True):
+        first, other = kit.types[a].symmetries[:, :3, :3], kit.types[b].symmetries[:, :3, :3]
+        turned = pose[:3, :3].T @ first @ pose[:3, :3]
+        moved = np.linalg.norm(first @ pose[:3, 3] - pose[:3, 3], axis=1)
+        gaps = np.linalg.norm(turned[:, None] - other[None], axis=(2, 3)) * groups.reach[b]
+        same = np.hypot(moved, gaps.min(axis=1)) <= within
+        passed.append(np.append(np.where(same, gaps.argmin(axis=1), len(other)), len(other)))
+        kept.append(np.flatnonzero(same))
+        side = len(first) + 1
+        table = groups.products[groups.rows[a] :][: side**2].reshape(side, side)
+        # Symmetries that differ by one that is kept put the other part into one place.
+        _, places = np.unique(table[:-1, kept[-1]].min(axis=1), return_inverse=True)
+        spots.append(np.append(spot_counts[a] + places, -1))
+        spot_counts[a] += places.max() + 1
+    lengths = groups.orders[ends[:, 0]] + 1
+    joined_spots = np.concatenate(spots)
+    # The last place around a type is that of what stands nowhere.
+    joined_spots = np.where(joined_spots < 0, spot_counts[np.repeat(ends[:, 0], lengths)], joined_spots)
+    return Dockings(
+        ends=ends,
+        rotations=np.ascontiguousarray(poses[:, :3, :3]),
+        translations=np.ascontiguousarray(poses[:, :3, 3]),
+        passed=np.concatenate(passed),
+        rows=np.cumsum(lengths) - lengths,
+        kept=np.concatenate(kept),
+        kept_starts=np.cumsum([len(each) for each in kept]),
+        spots=joined_spots,
+        spot_counts=spot_counts + 1,
+        tolerance=kit.pose_tolerance,
+    )

@@ -1,0 +1,61 @@
+"""The carcass of a kit: the parts that are as large as its exemplars."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.errors import ConfigError
+from stages.exemplars.settings import HubConfig
+from stages.variations.requirements.required_labels import carcass, carcass_test, spanning_hubs
+from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, kit_of, pose
+
+MESHES = {"top": box(4.0, 0.2, 2.0), "leg": box(0.2, 2.0, 0.2), "shelf": box(3.2, 0.2, 1.5)}
+
+
+def stand(*legs: tuple[float, float]) -> list[Placed]:
+    """A top of a diagonal of 4.48 on legs, all in all 4.98 across."""
+    return [("top", pose(0, 1.1, 0)), *(("leg", pose(x, 0, z)) for x, z in legs)]
+
+
+FOUR = stand((-1.5, -0.5), (1.5, -0.5), (-1.5, 0.5), (1.5, 0.5))
+
+
+def test_what_spans_an_exemplar_is_its_carcass_and_what_is_small_is_not() -> None:
+    assert carcass(kit_of(MESHES, [FOUR])) == ("top",)
+    assert carcass(kit_of(CHAIN, [chain(5)])) == ()
+
+
+def test_of_a_part_of_the_carcass_every_exemplar_has_one_that_spans_it() -> None:
+    shelf = ("shelf", pose(0, -1.1, 0))  # on the ground below the legs: 3.54 of 5.07 across
+    both = kit_of(MESHES, [[*FOUR, shelf], FOUR])
+    assert carcass(kit_of(MESHES, [[*FOUR, shelf]])) == ("top", "shelf")
+    assert carcass(both) == ("top",)
+
+
+def test_hubs_are_put_back_and_are_none_of_it() -> None:
+    table = [*FOUR, ("shelf", pose(0, -1.1, 0))]
+    kit = kit_of(MESHES, [table])
+    hub = kit_of(MESHES, [table], hubs=HubConfig(types=("top",)))
+    assert carcass(kit) == ("top", "shelf")
+    assert carcass(hub) == ("shelf",)
+    assert spanning_hubs(hub) == {hub.type_names().index("top"): 1}
+    assert spanning_hubs(kit) == {}
+
+
+def test_of_large_hubs_as_many_are_awaited_as_the_exemplar_with_fewest_has() -> None:
+    sides: list[Placed] = [("side", pose(x, 0, 0)) for x in (-1.05, 1.05)]
+    shelves: list[Placed] = [("board", pose(0, y, 0)) for y in (-0.1, 0.0, 0.1)]
+    lining: Placed = ("side", pose(-1.15, 0, 0))
+    meshes = {"side": box(0.1, 4.0, 2.0), "board": box(2.0, 0.1, 1.5)}
+    kit = kit_of(meshes, [[*sides, *shelves], [*sides, *shelves, lining]], hubs=HubConfig(types=("side",)))
+    assert spanning_hubs(kit) == {kit.type_names().index("side"): 2}
+
+
+def test_an_assembly_has_it_or_not_and_a_wrong_name_is_named() -> None:
+    kit = kit_of(MESHES, [FOUR])
+    whole = kit.exemplars[0].assembly
+    legs = whole.select([part for part in range(len(whole)) if kit.types[whole.types[part]].name == "leg"])
+    asked = carcass_test(kit, ("top",))
+    assert (asked(whole), asked(legs), carcass_test(kit, ())(legs)) == (True, False, True)
+    with pytest.raises(ConfigError, match=r"require\.carcass: kit toy has no parts called tap; did you mean top\?"):
+        carcass_test(kit, ("top", "tap"))

@@ -1,0 +1,124 @@
+"""Families are cut: nothing near in two splits, sizes as asked where the pool allows, and said where it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stages.variations.report.split_report import shortage, splits_table
+from stages.variations.selection.ancestry import Ancestry
+from stages.variations.selection.families import LET_GO, Cut, Near, cut_families
+
+
+def near_by(matrix: np.ndarray) -> Near:
+    def near(variant: int, among: np.ndarray) -> np.ndarray:
+        return among[matrix[variant, among] & (among != variant)]
+
+    return near
+
+
+def crossings(matrix: np.ndarray, cut: Cut) -> int:
+    """How many near pairs stand in two splits."""
+    i, j = np.nonzero(matrix)
+    a, b = cut.split_of[i], cut.split_of[j]
+    return int(((a != b) & (a != LET_GO) & (b != LET_GO)).sum())
+
+
+def test_clusters_are_not_divided_and_every_split_has_its_size() -> None:
+    cluster = np.arange(120) // 6
+    matrix = cluster[:, None] == cluster[None]
+    wanted = {"train": 40, "val": 10, "test": 14}
+    cut = cut_families(near_by(matrix), 120, wanted, np.random.default_rng(0))
+    assert cut.sizes(wanted) == wanted
+    assert crossings(matrix, cut) == 0
+    for number in range(20):
+        assert len(set(cut.split_of[cluster == number].tolist()) - {LET_GO}) <= 1
+
+
+def test_a_chain_of_cousins_is_cut_with_a_gap_between_splits() -> None:
+    places = np.arange(300)
+    matrix = np.abs(places[:, None] - places[None]) <= 4
+    wanted = {"train": 100, "val": 15, "test": 15}
+    cut = cut_families(near_by(matrix), 300, wanted, np.random.default_rng(0))
+    assert cut.sizes(wanted) == wanted
+    assert cut.regions > 1
+    for split in (1, 2):
+        own, others = np.flatnonzero(cut.split_of == split), np.flatnonzero(~np.isin(cut.split_of, (split, LET_GO)))
+        assert np.abs(own[:, None] - others[None]).min() > 4
+    assert (cut.split_of == LET_GO).any()
+
+
+def test_of_a_large_pool_no_pair_is_asked_about_twice_and_a_few_tell_what_it_allows() -> None:
+    count, asked = 1500, 0
+    places = np.random.default_rng(1).permutation(count)
+    matrix = np.abs(places[:, None] - places[None]) <= 60
+
+    def near(variant: int, among: np.ndarray) -> np.ndarray:
+        nonlocal asked
+        asked += len(among)
+        return near_by(matrix)(variant, among)
+
+    wanted = {"train": 600, "val": 60, "test": 60}
+    cut = cut_families(near, count, wanted, np.random.default_rng(0))
+    assert cut.sizes(wanted) == wanted
+    assert crossings(matrix, cut) == 0
+    assert asked < count**2 / 2
+
+
+def test_where_all_are_twins_there_is_only_train_and_that_is_said() -> None:
+    wanted = {"train": 8, "val": 1, "test": 1}
+    cut = cut_families(near_by(np.ones((10, 10), dtype=bool)), 10, wanted, np.random.default_rng(0))
+    assert cut.sizes(wanted) == {"train": 8, "val": 0, "test": 0}
+    splits = {split: {"wanted": wanted[split], "samples": size} for split, size in cut.sizes(wanted).items()}
+    measures = {"splits": splits, "split_by": "family", "split_near": 0.8, "let_go": 0, "pool": 10}
+    assert shortage(measures) == "val 0 of 1, test 0 of 1"
+    assert "toys: 0 of 10 variants found stood too near to another split; fewer than asked for: val 0" in splits_table(
+        {"toys": measures}
+    )
+
+
+def test_where_hardly_two_stand_apart_train_has_its_samples_and_val_and_test_go_without() -> None:
+    matrix = np.ones((200, 200), dtype=bool)
+    matrix[0, 1:15] = matrix[1:15, 0] = matrix[1, 2:15] = matrix[2:15, 1] = False  # 13 are apart from these two
+    wanted = {"train": 80, "val": 10, "test": 10}
+    cut = cut_families(near_by(matrix), 200, wanted, np.random.default_rng(0))
+    assert cut.sizes(wanted) == {"train": 80, "val": 0, "test": 0}
+    assert crossings(matrix, cut) == 0
+
+
+def test_a_pool_too_dense_for_its_sizes_gives_each_split_a_part() -> None:
+    cluster = np.arange(40) // 20
+    matrix = cluster[:, None] == cluster[None]
+    wanted = {"train": 30, "val": 5, "test": 5}
+    cut = cut_families(near_by(matrix), 40, wanted, np.random.default_rng(0))
+    sizes = cut.sizes(wanted)
+    assert crossings(matrix, cut) == 0
+    assert sum(sizes.values()) >= 25
+    assert sizes != wanted
+
+
+@given(st.integers(1, 60), st.floats(0, 0.5), st.integers(0, 10_000))
+def test_no_two_splits_share_a_near_pair(count: int, density: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    matrix = rng.random((count, count)) < density
+    matrix |= matrix.T
+    val, test = count // 8, count // 6
+    wanted = {"train": count // 3 or 1, "val": val, "test": test}
+    cut = cut_families(near_by(matrix), count, wanted, rng)
+    assert crossings(matrix, cut) == 0
+    assert (cut.split_of == 1).sum() <= val
+    assert (cut.split_of == 2).sum() <= test
+
+
+def test_kin_are_parents_children_and_siblings_of_one_cut() -> None:
+    ancestry = Ancestry([("keep",), (0, "ward"), (0, "ward"), (1, 2)], ["", "same", "same", ""])
+    assert [each.tolist() for each in ancestry.kin()] == [[1, 2], [0, 2, 3], [0, 1, 3], [1, 2]]
+
+
+def test_parents_that_are_no_samples_of_the_split_give_way_to_theirs() -> None:
+    ancestry = Ancestry([("keep",), (0, "ward"), (1,), (1, 0), (2, 3)], [""] * 5)
+    keys = {0: "k-0", 2: "k-2", 3: "k-3", 4: "k-4"}
+    splits = {0: 0, 2: 2, 3: 0, 4: 0}
+    named = ancestry.named(keys, splits)
+    assert named == {0: ["keep"], 2: ["keep", "ward"], 3: ["k-0", "ward"], 4: ["k-0", "ward", "k-3"]}

@@ -1,0 +1,87 @@
+"""The selection covers the pool better than first come does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.variations.novelty.features import AXES, FeatureTest, material_shares
+from stages.variations.report.measures import growth, pool_measures
+from stages.variations.selection.farthest_first import farthest_first, select, selection_space
+from stages.variations.settings import NoveltyConfig, SelectionConfig
+from tests.stages.variations.search.test_search import search
+from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
+
+
+def test_farthest_first_on_a_line() -> None:
+    points = np.array([[0.0], [1.0], [9.0], [10.0], [5.0]])
+    assert farthest_first(points, np.array([[0.0]]), 5).tolist() == [3, 4, 1, 2, 0]
+    assert farthest_first(points, np.array([[0.0], [10.0]]), 2).tolist() == [4, 1]
+
+
+def test_farthest_first_takes_no_point_twice_where_points_are_equal() -> None:
+    points = np.zeros((6, 2))
+    assert sorted(farthest_first(points, np.zeros((1, 2)), 6).tolist()) == list(range(6))
+
+
+def test_the_selection_spreads_wider_than_first_come_and_is_the_same_every_time() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    _, found = search(kit, tries=3000, largest=3.0)
+    counts = np.array([np.bincount(each.assembly.types, minlength=len(kit.types)) for each in found])
+    features = np.array([each.features for each in found])
+    taken = select(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
+    again = select(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
+    assert taken.tolist() == again.tolist()
+    space = selection_space(counts, features)
+
+    def nearest(chosen: np.ndarray) -> float:
+        gaps = np.linalg.norm(space[chosen][:, None] - space[chosen][None], axis=2)
+        return float(gaps[~np.eye(len(chosen), dtype=bool)].min())
+
+    def farthest_left(chosen: np.ndarray) -> float:
+        return float(np.linalg.norm(space[:, None] - space[chosen][None], axis=2).min(axis=1).max())
+
+    first_come = np.arange(12)
+    assert nearest(taken) > nearest(first_come)
+    assert farthest_left(taken) < farthest_left(first_come)
+
+
+def test_what_is_wanted_beyond_the_spread_is_drawn_without_doubles() -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
+    test = FeatureTest(kit)
+    shape = kit.exemplars[0].assembly
+    pure = test.features(shape, material_shares(np.zeros(len(shape), int), 2), test.marks(shape), 1.0)
+    features = np.tile(pure, (20, 1))
+    features[:, AXES.index("parts")] += np.arange(20)
+    counts = np.tile(np.bincount(shape.types, minlength=2), (20, 1))
+    chosen = select(kit, counts, features, 15, SelectionConfig(spread=4), np.random.default_rng(1))
+    assert len(set(chosen.tolist())) == 15
+    assert chosen[0] == 19
+    everything = select(kit, counts, features, 50, SelectionConfig(), np.random.default_rng(1))
+    assert sorted(everything.tolist()) == list(range(20))
+
+
+def test_measures_of_a_set_that_can_be_counted_by_hand() -> None:
+    counts = np.array([[1, 2], [1, 2], [3, 0]], dtype=np.int32)
+    features = np.zeros((3, len(AXES)), dtype=np.float32)
+    features[:, AXES.index("parts")] = 3
+    features[:, AXES.index("mixture")] = [0.0, 0.05, 0.5]
+    features[:, AXES.index("blend")] = [0.0, 0.01, 0.0]
+    features[:, AXES.index("distance")] = [0.0, 0.5, 0.25]
+    features[:, AXES.index("copied")] = [0.25, 1.0, 0.5]
+    digests = np.zeros((3, 2, 32), dtype=np.uint8)
+    digests[2] = 1
+    measures = pool_measures(counts, features, digests, NoveltyConfig(axes=("mixture",)))
+    assert (measures["graphs"], measures["histograms"], measures["cells"]) == (2, 2, 3)
+    assert (measures["mixed"], measures["blended"]) == (0.3333, 0.3333)
+    assert (measures["distance"], measures["distances"]) == (0.25, [0.0, 0.0, 0.25, 0.25, 0.5])
+    assert measures["parts"] == [3.0] * 5
+    # Of three pairs one is equal, and two differ by four of six parts.
+    assert (measures["copied"], measures["apart"]) == (0.5, 0.4444)
+    nothing = pool_measures(counts[:0], features[:0], digests[:0], NoveltyConfig())
+    assert (nothing["graphs"], nothing["mixed"], nothing["parts"]) == (0, 0.0, [])
+
+
+def test_the_saturation_curve_is_shown_at_its_quarters() -> None:
+    curve = [[100 * step, 10 * step, step] for step in range(1, 9)]
+    assert growth(curve) == "2 after 200 tries, 4 after 400 tries, 6 after 600 tries, 8 after 800 tries"
+    assert growth(curve[:1]) == "1 after 100 tries"

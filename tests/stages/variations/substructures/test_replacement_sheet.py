@@ -1,0 +1,87 @@
+"""The sheet of replacements shows what left, what came and what was made of them."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from stages.shape.kit import Kit
+from stages.shape.sample import Sample
+from stages.variations.selection.orientation import vertical_turn
+from stages.variations.substructures.replacement_sheet import (
+    Replacement,
+    known_shapes,
+    replacement_of,
+    replacements_sheet,
+)
+from tests.stages.variations.substructures.test_replacing import replaced
+from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, ring
+
+
+def samples_of(kit: Kit, turned: float = 0.0) -> list[Sample]:
+    """What a short search finds, as a dataset has it."""
+    _, found = replaced(kit, 600, repeats=1, largest=3.0)
+    turn = vertical_turn(1, turned)
+    told = {"turned": turned, "backdrop": 0}
+    return [
+        Sample(
+            f"toy-{place}",
+            "train",
+            "variations",
+            kit.name,
+            "",
+            {**each.lineage, "made_of": each.lineage["parents"], "name": f"test-{place}", **told},
+            replace(each.assembly, poses=turn @ each.assembly.poses),
+        )
+        for place, each in enumerate(found)
+    ]
+
+
+def shown(kit: Kit, samples: list[Sample]) -> list[tuple[Sample, Replacement]]:
+    known = known_shapes(kit, samples)
+    told = [(each, replacement_of(kit, each, known)) for each in samples]
+    return [(sample, found) for sample, found in told if found is not None]
+
+
+@pytest.mark.parametrize("turned", [0.0, 90.0])
+@pytest.mark.parametrize("rings", [False, True])
+def test_the_parts_that_left_and_came_are_told_from_the_lineage(turned: float, rings: bool) -> None:
+    kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)]) if rings else kit_of(CHAIN, [chain(3), chain(5)])
+    samples = samples_of(kit, turned)
+    told = shown(kit, samples)
+    assert len(told) == len(samples)
+    for sample, found in told:
+        assert len(found.base[1]) - found.taken.sum() + found.piece.sum() == len(sample.assembly)
+        assert found.piece.sum() == found.came.sum() == min(sample.lineage["parts_from"])
+        assert found.taken.sum() == len(found.base[1]) - max(sample.lineage["parts_from"])
+        stays = found.base[1].poses[~found.taken]
+        gaps = np.abs(stays[:, None] - found.result.poses[~found.came]).max(axis=(2, 3)).min(axis=1)
+        assert gaps.max() < kit.pose_tolerance
+
+
+def test_what_was_made_of_another_sample_is_told_and_of_what_is_not_kept_is_not() -> None:
+    kit = kit_of(CHAIN, [chain(3), chain(5)])
+    samples = samples_of(kit)
+    names = {each.name for each in kit.exemplars}
+    later = [each for each in samples if not set(each.lineage["made_of"]) <= names]
+    assert later
+    assert len(shown(kit, later)) < len(later)
+    keys = {each.key for each in samples}
+    assert any(found.base[0] in keys for _, found in shown(kit, samples))
+
+
+def test_a_sheet_has_a_row_for_each_replacement_and_is_not_made_of_none() -> None:
+    kit = kit_of(CHAIN, [chain(3), chain(5)])
+    samples = [sample for sample, _ in shown(kit, samples_of(kit))]
+    assert replacements_sheet(kit, []) is None
+    heights = []
+    for few in (samples[:1], samples[:2]):
+        sheet = replacements_sheet(kit, few)
+        assert sheet is not None
+        picture = np.array(Image.open(io.BytesIO(sheet)))
+        heights.append(picture.shape[0])
+    assert heights[1] > heights[0]
