@@ -1,1 +1,1 @@
-"""Program_analysis:_signatures,_distances_and_statistics."""
+"""Program analysis: signatures, distances and statistics."""

@@ -82,7 +82,7 @@ def program_distance(a: Program, b: Program) -> int:
 
 def token_distance(first: Sequence[str], second: Sequence[str]) -> int:
     """The same of their tokens."""
-    from stages.shapeassembly.editing import edit_distance
+    from stages.shapeassembly.analysis.edit_distance import edit_distance
 
     codes = {word: index for index, word in enumerate(dict.fromkeys([*first, *second]))}
     distance: int = edit_distance(np.array([codes[w] for w in first]), np.array([codes[w] for w in second]))

@@ -1,1 +1,1 @@
-"""Program_edits:_continuous_changes_and_language_ablations."""
+"""Program edits: continuous changes and language ablations."""

@@ -1,1 +1,1 @@
-"""Execution:_programs_to_cuboids,_fast_and_differentiable."""
+"""Execution: programs to cuboids, fast and differentiable."""

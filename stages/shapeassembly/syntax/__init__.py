@@ -1,1 +1,1 @@
-"""ShapeAssembly_syntax:_the_program_tree,_its_text_and_its_rules."""
+"""ShapeAssembly syntax: the program tree, its text and its rules."""

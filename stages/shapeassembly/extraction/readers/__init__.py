@@ -1,1 +1,1 @@
-"""Readers_of_part_hierarchies,_by_file_format."""
+"""Readers of part hierarchies, by file format."""

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stages.shapeassembly import parse
+from stages.shapeassembly.analysis.edit_distance import edit_distance
 from stages.shapeassembly.analysis.figures import cluster_figure
 from stages.shapeassembly.analysis.statistics import cluster_curve, program_statistics
 from stages.shapeassembly.analysis.structure import block_signatures, program_distance, signature, tokens
-from stages.shapeassembly.editing import edit_distance
 from stages.shapeassembly.execution.parameters import parameters, with_parameters
 from stages.shapeassembly.syntax.program import Program
 from tests.stages.shapeassembly.execution.test_interpreter import renamed
