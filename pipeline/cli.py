@@ -146,7 +146,7 @@ def verify(
 @app.command(context_settings=_PASS_ON)
 def inspect(context: typer.Context) -> None:
     """Show what Shapemill sees in some meshes and what it can make of them, and write a config for it."""
-    raise typer.Exit(_entry(context, "autoconfig.inspect")(context.args))
+    raise typer.Exit(_entry(context, "inspection.inspect")(context.args))
 
 
 @app.command()

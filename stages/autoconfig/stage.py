@@ -41,20 +41,20 @@ def plan(plan: Plan) -> list[Shard]:
 
 def run_shard(task: Task) -> Outcome:
     """Read the models and decide."""
-    from stages.autoconfig.proportioned import instead_of_layouts
-    from stages.autoconfig.prospect import foreseen
-    from stages.autoconfig.reading import read_and_choose
+    from stages.autoconfig.resize_fallback import resize_fallback
+    from stages.autoconfig.resolved_kit import read_and_resolve
+    from stages.inspection.report import foreseen
     from stages.shape.geometry.contact_oracle import ContactAnswers
 
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
     limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(AutoconfigConfig).max_tries
-    reading = read_and_choose(config, limits, tries, task.shard.params["require"])
+    reading = read_and_resolve(config, limits, tries, task.shard.params["require"])
     choices = reading.choices
     if task.shard.params["instead"] and not choices.enough:
         built = reading.observe(choices.values)
         if not built.refusals:
             expected = foreseen(config, reading, ContactAnswers(built.kit), tries)
-            instead = instead_of_layouts(reading, expected, shown=0)
+            instead = resize_fallback(reading, expected, shown=0)
             choices = choices if instead is None else instead.choices
     made = choices.as_json()
     with task.output(f"{config.name}.json") as stream:

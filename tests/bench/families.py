@@ -17,11 +17,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from pipeline.places import write_file
-from stages.autoconfig.probe import type_counts
-from stages.autoconfig.sheet import SHOWN, forecast_sheet
+from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit, read_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
+from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
 from stages.programs.files import named_values, shape_glb
 from stages.programs.program import find_program
 from stages.shape.geometry.contact_oracle import ContactAnswers
@@ -144,10 +144,10 @@ def main() -> None:
             rows.append(_found(name, method, kit, finds, len(standing)))
             if asked.sheets and standing:
                 lists = (type_counts(kit, [each.types for each in of]) for of in (standing, _exemplars(kit)))
-                chosen = farthest_first(*lists, min(SHOWN, len(standing))).tolist()
+                chosen = farthest_first(*lists, min(MAX_SHAPES_SHOWN, len(standing))).tolist()
                 shapes = [kit_shape(kit, standing[place]) for place in chosen]
                 path = asked.sheets / f"{name.replace(' ', '-')}-{method}.png"
-                write_file(path, forecast_sheet(kit, shapes, "Most different finds", name, method))
+                write_file(path, sample_figure(kit, shapes, "Most different finds", name, method))
     print("\n".join(["", FOUND, *rows]))
 
 

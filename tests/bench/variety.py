@@ -23,11 +23,11 @@ from joblib import Parallel, delayed
 from pipeline.config import load_config
 from pipeline.places import write_file
 from pipeline.registry import find_stages
-from stages.autoconfig.probe import type_counts
-from stages.autoconfig.sheet import SHOWN, forecast_sheet
+from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
+from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Assembly, Kit
@@ -107,7 +107,9 @@ def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int, shown: bo
     finds.crossings, finds.rejects = line.crossings, line.rejects
     finds.kept = [each.assembly for each in variants]
     lists = (type_counts(kit, [each.assembly.types for each in of]) for of in (variants, kit.exemplars))
-    finds.different = [variants[place].assembly for place in farthest_first(*lists, min(SHOWN, len(variants))).tolist()]
+    finds.different = [
+        variants[place].assembly for place in farthest_first(*lists, min(MAX_SHAPES_SHOWN, len(variants))).tolist()
+    ]
     finds.megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return finds
 
@@ -158,7 +160,7 @@ def main() -> None:
             if asked.sheets and workers[0].different:
                 shapes = [kit_shape(kit, each) for each in workers[0].different]
                 path = asked.sheets / f"{name.replace('/', '-')}-{how}.png"
-                write_file(path, forecast_sheet(kit, shapes, "Most different finds", name, how))
+                write_file(path, sample_figure(kit, shapes, "Most different finds", name, how))
         if len(kit.exemplars) > 1:
             crossings = sum((each.crossings for each in workers), Counter[str]()).most_common()
             notes.append(

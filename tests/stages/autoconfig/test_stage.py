@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from stages.autoconfig.inspect import main
+from stages.inspection.inspect import main
 from stages.shape.sample import read_samples
 from tests.mill import mill
 from tests.stages.variations.test_stage import write_model

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from pipeline.errors import ConfigError
-from stages.autoconfig import reading
-from stages.autoconfig.choose import Choices
-from stages.autoconfig.probe import Finds
-from stages.autoconfig.reading import Reading, cut_if_nothing_comes
+from stages.autoconfig import resolved_kit
+from stages.autoconfig.resolve import Resolution
+from stages.autoconfig.resolved_kit import ResolvedKit, use_sections_if_empty
+from stages.autoconfig.trial_search import TrialResult
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ReadLimits
@@ -24,17 +24,17 @@ from tests.toy_kits.chains_and_rings import CHAIN, Placed, chain, models_of
 LUMP: list[Placed] = chain(2)[1:2]
 
 
-def told(graphs: int, enough: bool, **values: Any) -> Choices:
+def told(graphs: int, enough: bool, **values: Any) -> Resolution:
     said = {"up": "z", **values}
     reasons = dict.fromkeys(said, "so it is")
-    return Choices(said, reasons, Finds(100, graphs, graphs, 0.1, 0.1), 1.0, enough, 1)
+    return Resolution(said, reasons, TrialResult(100, graphs, graphs, 0.1, 0.1), 1.0, enough, 1)
 
 
-def read_first(graphs: int = 0, segmentation: Any = "components", parts: Any = "auto", **stated: Any) -> Reading:
+def read_first(graphs: int = 0, segmentation: Any = "components", parts: Any = "auto", **stated: Any) -> ResolvedKit:
     """What `auto` made of a model, and how many graphs a search found in it."""
     config = KitConfig(name="toy", shapes=(Path(__file__),), parts=parts, **stated)
     models = [replace(each, segmentation=segmentation) for each in models_of(CHAIN, [LUMP])]
-    return Reading(config, models, identify_parts(models, config), told(graphs, False))
+    return ResolvedKit(config, models, identify_parts(models, config), told(graphs, False))
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[KitConfig]:
     """The configs that a model is cut and searched with: sections make a chain of it, in which enough is found."""
     configs: list[KitConfig] = []
 
-    def choose(config: KitConfig, *_: Any) -> Choices:
+    def choose(config: KitConfig, *_: Any) -> Resolution:
         configs.append(config)
         return told(90, True)
 
@@ -50,13 +50,13 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[KitConfig]:
         assert segmentation == "sections"
         return models_of(CHAIN, [chain(5)])[0]
 
-    monkeypatch.setattr(reading, "choose", choose)
-    monkeypatch.setattr(reading, "read_model", read)
+    monkeypatch.setattr(resolved_kit, "choose", choose)
+    monkeypatch.setattr(resolved_kit, "read_model", read)
     return configs
 
 
-def cut(first: Reading, require: Sequence[str] = ()) -> Reading:
-    return cut_if_nothing_comes(first, ReadLimits(), 100, require)
+def cut(first: ResolvedKit, require: Sequence[str] = ()) -> ResolvedKit:
+    return use_sections_if_empty(first, ReadLimits(), 100, require)
 
 
 def test_a_mesh_of_which_nothing_comes_is_cut_by_sections_and_searched_by_the_strictest_rules(
@@ -79,7 +79,7 @@ def test_what_gives_something_or_was_meant_is_not_cut(asked: list[KitConfig], ch
 
 
 def test_a_cut_that_repeats_nothing_is_not_searched(asked: list[KitConfig], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reading, "read_model", lambda *_: models_of(CHAIN, [chain(1)[:2]])[0])
+    monkeypatch.setattr(resolved_kit, "read_model", lambda *_: models_of(CHAIN, [chain(1)[:2]])[0])
     first = read_first()
     assert cut(first) is first
     assert not asked
@@ -89,13 +89,13 @@ def test_a_cut_that_cannot_be_made_or_gives_too_little_changes_nothing(
     asked: list[KitConfig], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = read_first()
-    monkeypatch.setattr(reading, "choose", lambda *_: told(0, False))
+    monkeypatch.setattr(resolved_kit, "choose", lambda *_: told(0, False))
     assert cut(first) is first
 
     def refuse(*_: Any) -> Model:
         raise ConfigError("too much")
 
-    monkeypatch.setattr(reading, "read_model", refuse)
+    monkeypatch.setattr(resolved_kit, "read_model", refuse)
     assert cut(first) is first
 
 
@@ -106,7 +106,7 @@ def test_under_looser_rules_a_longer_search_says_whether_a_cut_is_a_dataset(
     loose = {key: STRICTEST[key] for key in read_first().config.left_open()} | {"grammar": "slots", "up": "z"}
     known: list[int] = []
 
-    def choose(config: KitConfig, *_: Any) -> Choices:
+    def choose(config: KitConfig, *_: Any) -> Resolution:
         return told(2, False, **loose) if config.grammar == "auto" else told(0, False)
 
     def forecast(kit: Kit, _: Any, __: int, graphs: int, **___: Any) -> Any:
@@ -114,8 +114,8 @@ def test_under_looser_rules_a_longer_search_says_whether_a_cut_is_a_dataset(
         known.append(graphs)
         return SimpleNamespace(is_poor=poor)
 
-    monkeypatch.setattr(reading, "choose", choose)
-    monkeypatch.setattr(reading, "forecast", forecast)
+    monkeypatch.setattr(resolved_kit, "choose", choose)
+    monkeypatch.setattr(resolved_kit, "yield_estimate", forecast)
     first = read_first()
     found = cut(first)
     assert known == [2]

@@ -25,7 +25,7 @@ MANY = 0.05
 """Shapes are broken where labels of so many of the exemplars' parts are bared."""
 
 
-def bared(kit: Kit, shapes: Sequence[Assembly]) -> tuple[str, ...]:
+def lost_support(kit: Kit, shapes: Sequence[Assembly]) -> tuple[str, ...]:
     """The labels whose parts have something close above them, or close below, in the exemplars of a kit, and nearly
     never in `shapes`; none where these are few of the exemplars' parts. Hubs, if they are left out, are not asked."""
     if not shapes:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.autoconfig.plain import is_closed_box, plain_shares
-from stages.autoconfig.proportioned import in_proportions
+from stages.autoconfig.closed_box import is_closed_box, side_shares
+from stages.autoconfig.resize_fallback import estimate_resizing
 from stages.shape.shape import Shape, kit_shape
 from tests.stages.proportions.stools import kit as stools
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
@@ -49,7 +49,7 @@ def test_a_box_is_closed_with_one_side_that_has_something_on_it(more: list[Place
 
 
 def test_shares_are_those_of_the_sides_of_the_box_around_a_shape() -> None:
-    front, right, back, left, top, bottom = plain_shares(whole(WITHOUT_FRONT))
+    front, right, back, left, top, bottom = side_shares(whole(WITHOUT_FRONT))
     np.testing.assert_allclose([right, back, left, top, bottom], 1.0)
     # of 2 x 1 the edges of two lids and two sides
     assert front == pytest.approx((2 * 2 * 0.1 + 2 * 0.1 * 0.8) / 2, abs=0.03)
@@ -57,5 +57,5 @@ def test_shares_are_those_of_the_sides_of_the_box_around_a_shape() -> None:
 
 def test_other_proportions_of_a_closed_box_are_said_to_look_alike() -> None:
     kit = kit_of(PANELS, [[*WITHOUT_FRONT, ("back", pose(0, 0, 0.45))]])
-    assert "look alike, for it is a closed box with plain sides" in in_proportions(kit, 2).sentence
-    assert "alike" not in in_proportions(stools(), 2).sentence
+    assert "look alike, for it is a closed box with plain sides" in estimate_resizing(kit, 2).sentence
+    assert "alike" not in estimate_resizing(stools(), 2).sentence

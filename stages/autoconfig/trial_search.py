@@ -23,24 +23,24 @@ from stages.variations.search.search import Search, Variant
 from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig
 
-SHOWN = 24
+MAX_MOST_DIFFERENT = 24
 """So many of the finds, those most different, say how different finds can be."""
 
-METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
+TRIAL_METHODS: tuple[Literal["exchange", "growth"], ...] = ("exchange", "growth")
 """Each has tries of its own, for a grown shape of a large kit costs as much as hundreds of exchanges."""
-HUB = 40
+MAX_GROWTH_DEGREE = 40
 """Where a part has more neighbours than this, nothing is grown: all around it is a copy, and dear."""
 FIRST = 5
 """Growth that finds nothing in one of so many parts of its tries is given up."""
 VAIN = 4
 """As many times sooner where the exchange found nothing either, by a grammar that has nothing but what was observed."""
-SEARCH = SearchConfig(duplicates="graph")
+TRIAL_CONFIG = SearchConfig(duplicates="graph")
 """A probe counts distinct graphs, whatever the config calls a duplicate. By meaning these do not tell a turned leg from
 a square one, and what counts are parts lists."""
 
 
 @dataclass(frozen=True)
-class Finds:
+class TrialResult:
     """What a probe found.
 
     tries: how many; graphs, histograms: distinct ones, by meaning only those of different histograms; distance: mean
@@ -77,7 +77,7 @@ class Finds:
         }
 
 
-class Probe:
+class TrialSearch:
     """A search of one kit that can be continued. Everything in it depends on `rng` and the kit alone. What lacks the
     kit's carcass is no find, nor is that which does not get back the `hubs` that are required, as `Backdrop.has_hubs`
     says, or of which a greater share than `copied` is copied whole. `copies`: as for Search."""
@@ -100,17 +100,17 @@ class Probe:
         self._backdrop = Backdrop(answers, upright=True)
         self._tries = 0
         widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
-        methods = METHODS if widest <= HUB else METHODS[:1]
+        methods = TRIAL_METHODS if widest <= MAX_GROWTH_DEGREE else TRIAL_METHODS[:1]
         slotted = self.kit.grammar.strictness in SLOT_LEVELS
-        self._slots = SlotGrammar(self.kit, answers.dockings, SEARCH.upright) if slotted else None
+        self._slots = SlotGrammar(self.kit, answers.dockings, TRIAL_CONFIG.upright) if slotted else None
         same = {"duplicates": "histogram"} if self.kit.by_meaning else {}
         copies = copies or CopyTest(self.kit, answers.dockings)
         self._searches = [
-            Search(answers, SEARCH.model_copy(update={"method": method, **same}), self._slots, copies)
+            Search(answers, TRIAL_CONFIG.model_copy(update={"method": method, **same}), self._slots, copies)
             for method in methods
         ]
 
-    def go_on(self, tries: int, wanted: int, evenly: bool = False) -> Finds:
+    def go_on(self, tries: int, wanted: int, evenly: bool = False) -> TrialResult:
         """Search on by each method until there are `wanted` variants, or it has had so many more `tries`; `evenly`:
         no method finds more than its share of them while another can. Growth, whose shapes are all complete, gives up
         as soon as the first of them show nothing new."""
@@ -154,19 +154,19 @@ class Probe:
         """The find at this place among the variants, with its backdrop."""
         return self._backdrop.fit(self.variants[place].assembly)
 
-    def finds(self) -> Finds:
+    def finds(self) -> TrialResult:
         """What was found so far."""
         rejects = sum((each.rejects for each in self._searches), self._refused)
         counts = type_counts(self.kit, [each.assembly.types for each in self.variants])
         exemplars = type_counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:
-            return Finds(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
+            return TrialResult(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
         whole = np.array([each.lineage["copied"]["largest"] for each in self.variants])
-        taken = farthest_first(counts, exemplars, min(SHOWN, len(counts)))
+        taken = farthest_first(counts, exemplars, min(MAX_MOST_DIFFERENT, len(counts)))
         chosen = counts[taken]
         near = histogram_metric(chosen[:, None], exemplars[None]).min(axis=1)
         apart = histogram_metric(chosen[:, None], chosen[None])[np.triu_indices(len(chosen), 1)]
-        return Finds(
+        return TrialResult(
             tries=self._tries,
             graphs=len(self.variants),
             histograms=len(np.unique(counts, axis=0)),

@@ -19,7 +19,7 @@ MOST_PIECES = 8
 """So are the sizes of so many pieces."""
 
 
-def inspection(seen: Observation, models: Sequence[Model], config: KitConfig) -> dict[str, Any]:
+def describe_observation(seen: Observation, models: Sequence[Model], config: KitConfig) -> dict[str, Any]:
     """What was found, as JSON.
 
     For one model `parts` (name and type, in the order of the file), `contacts` (those that count, as pairs i < j of
@@ -67,8 +67,8 @@ def _model(seen: Observation, index: int, model: Model) -> dict[str, Any]:
     }
 
 
-def inspection_lines(found: dict[str, Any], config: KitConfig) -> Iterator[str]:
-    """What `inspection` found, for people. `config` leaves nothing open."""
+def observation_lines(found: dict[str, Any], config: KitConfig) -> Iterator[str]:
+    """What `describe_observation` found, for people. `config` leaves nothing open."""
     made = config.decided()
     models = found.get("models", [found])
     for model in models:

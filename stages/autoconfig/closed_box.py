@@ -23,10 +23,10 @@ PLAIN = 0.85
 def is_closed_box(shape: Shape) -> bool:
     """Whether all sides of a shape but one, at least, are plain: a cabinet is one, with all its drawers and doors in
     front; a shelf is open on one side or two, with boards to be seen behind."""
-    return bool(np.sort(plain_shares(shape))[1] >= PLAIN)
+    return bool(np.sort(side_shares(shape))[1] >= PLAIN)
 
 
-def plain_shares(shape: Shape) -> FloatArray:
+def side_shares(shape: Shape) -> FloatArray:
     """For each of SIDES, float64 (6,), how much of the side of the box around a shape is its own surface."""
     placed = zip(shape.assembly.types.tolist(), shape.placements, strict=True)
     parts = [(transform_points(pose, shape.meshes[kind].vertices), shape.meshes[kind].faces) for kind, pose in placed]

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.randomness import decision_rng
-from stages.autoconfig.choose import REQUIREMENTS, Choices
-from stages.autoconfig.config_text import MOST
-from stages.autoconfig.forecast import LOOK, Forecast, rounded
-from stages.autoconfig.plain import is_closed_box
-from stages.autoconfig.reading import Reading
+from stages.autoconfig.closed_box import is_closed_box
+from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution
+from stages.autoconfig.resolved_kit import ResolvedKit
+from stages.autoconfig.yield_estimate import LOOK_FIRST, YieldEstimate, rounded_text
 from stages.exemplars.build import Observation
+from stages.inspection.config_text import MAX_SAMPLES_REQUESTED
 from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault
 from stages.proportions.settings import ProportionsConfig
@@ -30,7 +30,7 @@ LEAST = 0.2
 
 
 @dataclass(frozen=True)
-class Proportioned:
+class ResizeEstimate:
     """What other proportions of a kit's exemplars promise.
 
     holds: share of the draws that hold together; different: how many that differ a dataset finds, of MOST at most;
@@ -51,40 +51,40 @@ class Proportioned:
     @property
     def sentence(self) -> str:
         """How many there are, and whether they differ to the eye."""
-        many = "hundreds" if self.different >= MOST else f"about {rounded(self.different)}"
+        many = "hundreds" if self.different >= MAX_SAMPLES_REQUESTED else f"about {rounded_text(self.different)}"
         said = f"{many} of the same layout in other proportions"
         if not self.plain:
             return said
-        return f"{said} that look alike, for it is a closed box with plain sides, whatever is in it; {LOOK}"
+        return f"{said} that look alike, for it is a closed box with plain sides, whatever is in it; {LOOK_FIRST}"
 
 
 @dataclass(frozen=True)
-class Instead:
+class ResizeFallback:
     """What is chosen where exemplars come in other proportions instead of other layouts, and what a run builds then."""
 
-    choices: Choices
+    choices: Resolution
     built: Observation
-    proportioned: Proportioned
+    proportioned: ResizeEstimate
 
 
-def instead_of_layouts(reading: Reading, expected: Forecast, shown: int) -> Instead | None:
+def resize_fallback(reading: ResolvedKit, expected: YieldEstimate, shown: int) -> ResizeFallback | None:
     """Other proportions with at most `shown` shapes, where `expected` promises next to no other layouts, or all alike,
     and the exemplars hold together in other proportions."""
     if reading.choices.enough or not expected.is_poor:
         return None
     unvaried = _unvaried(reading)
     built = reading.observe(unvaried.values)
-    found = in_proportions(built.kit, shown) if not built.refusals else None
+    found = estimate_resizing(built.kit, shown) if not built.refusals else None
     if found is None or not found.enough:
         return None
     why = f"{found.holds:.0%} of what is drawn holds together; of other layouts {expected.sentence}"
     stands = "the exemplars stand" if found.stable else "not even the exemplars stand"
     values = {**unvaried.values, CHOSEN_INSTEAD: "proportions", CHOSEN_INSTEAD_STABLE: found.stable}
     reasons = {**unvaried.reasons, CHOSEN_INSTEAD: why, CHOSEN_INSTEAD_STABLE: stands}
-    return Instead(replace(unvaried, values=values, reasons=reasons), built, found)
+    return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, found)
 
 
-def _unvaried(reading: Reading) -> Choices:
+def _unvaried(reading: ResolvedKit) -> Resolution:
     """What is chosen where layouts stay as they are: no hub is left out, of what stands apart the largest piece stays,
     and nothing is required of layouts."""
     choices = reading.choices
@@ -93,7 +93,7 @@ def _unvaried(reading: Reading) -> Choices:
         "disconnected": ("error", "nothing stands apart"),
     }
     open_keys = others.keys() & choices.values.keys()
-    kept = [key for key in choices.values if key not in REQUIREMENTS]
+    kept = [key for key in choices.values if key not in REQUIREMENT_KEYS]
     values = {key: others[key][0] if key in open_keys else choices.values[key] for key in kept}
     reasons = {key: others[key][1] if key in open_keys else choices.reasons[key] for key in kept}
     if reading.observe(values).refusals:
@@ -114,7 +114,7 @@ def _different(lattice: Lattice, config: ProportionsConfig, exemplar: int, most:
     return len(drawn.farthest_first(most))
 
 
-def in_proportions(kit: Kit, shown: int) -> Proportioned:
+def estimate_resizing(kit: Kit, shown: int) -> ResizeEstimate:
     """A probe of the exemplars of a kit, with all of their parts; what is random depends on the kit alone."""
     config = ProportionsConfig()
     stands = Requirements(stable=True)
@@ -136,6 +136,6 @@ def in_proportions(kit: Kit, shown: int) -> Proportioned:
                 drawn.add(warp)
         held += len(kept)
         found += [kept[place] for place in drawn.farthest_first(len(range(number, shown, len(kit.exemplars))))]
-        different += _different(lattice, config, number, len(range(number, MOST, len(kit.exemplars))))
+        different += _different(lattice, config, number, len(range(number, MAX_SAMPLES_REQUESTED, len(kit.exemplars))))
     plain = all(is_closed_box(kit_shape(kit, each.whole)) for each in kit.exemplars)
-    return Proportioned(held / max(tried, 1), different, found, stable, plain)
+    return ResizeEstimate(held / max(tried, 1), different, found, stable, plain)

@@ -48,7 +48,7 @@ REASONS = {
 """What the axis is told from, each with its sentence."""
 
 
-def upward(models: Sequence[Model], identified: Identified) -> tuple[Literal["y", "z"], str]:
+def resolve_up_axis(models: Sequence[Model], identified: Identified) -> tuple[Literal["y", "z"], str]:
     """The axis that points up in `models`, whose parts are `identified`, and the reason, a sentence.
 
     A format that lets files choose is believed (COLLADA). glTF calls y up whatever stands in it, and other formats

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pipeline.errors import ConfigError
-from stages.autoconfig.choose import Choices, choose
-from stages.autoconfig.forecast import forecast
+from stages.autoconfig.resolve import Resolution, resolve_settings
+from stages.autoconfig.yield_estimate import estimate_yield
 from stages.exemplars.build import Observation, observe_parts
 from stages.exemplars.identify import Identified, identify_parts
 from stages.exemplars.model import Model
@@ -18,20 +18,20 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.variations.settings import CHOSEN_COPIED
 
-CHOSEN_PARTS = "parts"
+PARTS_KEY = "parts"
 """What `parts` is called among the keys that are chosen for a kit."""
-COPIES = 2.0
+MIN_PARTS_PER_TYPE = 2.0
 """Cuts are tried where they make so many parts of each type: what repeats can be there once more, or gone."""
 
 
 @dataclass(frozen=True)
-class Reading:
+class ResolvedKit:
     """Models with their identified parts, what was chosen for them, and the config that says which parts they have."""
 
     config: KitConfig
     models: Sequence[Model]
     identified: Identified
-    choices: Choices
+    choices: Resolution
     _observed: dict[str, Observation] = field(default_factory=dict, compare=False, repr=False)
 
     def observe(self, values: Mapping[str, Any]) -> Observation:
@@ -43,15 +43,15 @@ class Reading:
         return self._observed[told]
 
 
-def read_and_choose(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> Reading:
-    """Read the models of a kit and decide what its config leaves open, as `choose` and `cut_if_nothing_comes`."""
+def read_and_resolve(config: KitConfig, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
+    """Read the models of a kit and decide its auto keys, as `resolve_settings` and `use_sections_if_empty`."""
     models = [read_model(shape.path, config.parts, limits) for shape in config.shapes]
     identified = identify_parts(models, config)
-    first = Reading(config, models, identified, choose(config, models, identified, tries, require))
-    return cut_if_nothing_comes(first, limits, tries, require)
+    first = ResolvedKit(config, models, identified, resolve_settings(config, models, identified, tries, require))
+    return use_sections_if_empty(first, limits, tries, require)
 
 
-def cut_if_nothing_comes(first: Reading, limits: ReadLimits, tries: int, require: Sequence[str]) -> Reading:
+def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, require: Sequence[str]) -> ResolvedKit:
     """Models cut by sections where `auto` took pieces of meshes for parts and a search found nothing in them, if it
     finds enough then under the strictest rules, or under others what a longer search makes a dataset of: the first find
     of slabs is rare, for all that passes a section must fit at once. Else as they were read first."""
@@ -65,24 +65,24 @@ def cut_if_nothing_comes(first: Reading, limits: ReadLimits, tries: int, require
         identified = identify_parts(models, config)
     except ConfigError:
         return first
-    if sum(len(each) for each in identified.assemblies) < COPIES * len(identified.types):
+    if sum(len(each) for each in identified.assemblies) < MIN_PARTS_PER_TYPE * len(identified.types):
         return first
     searched = ("contact.kinds", "grammar", "hubs.types")
     strictest = {key: STRICTEST[key] for key in config.left_open() if key in searched}
-    choices = choose(config.decide(strictest), models, identified, tries, require)
+    choices = resolve_settings(config.decide(strictest), models, identified, tries, require)
     values = {**strictest, **choices.values}
     reasons = {**dict.fromkeys(strictest, "the strictest, and it gives enough"), **choices.reasons}
     if not choices.enough:
-        choices = choose(config, models, identified, tries, require)
+        choices = resolve_settings(config, models, identified, tries, require)
         values, reasons = dict(choices.values), dict(choices.reasons)
-        if not _is_dataset(Reading(config, models, identified, choices), tries):
+        if not _is_dataset(ResolvedKit(config, models, identified, choices), tries):
             return first
     why = f"cut across: nothing comes of {len(first.models[0].parts)} {first.models[0].segmentation}"
-    values, reasons = {CHOSEN_PARTS: config.parts, **values}, {CHOSEN_PARTS: why, **reasons}
-    return Reading(config, models, identified, replace(choices, values=values, reasons=reasons))
+    values, reasons = {PARTS_KEY: config.parts, **values}, {PARTS_KEY: why, **reasons}
+    return ResolvedKit(config, models, identified, replace(choices, values=values, reasons=reasons))
 
 
-def _is_dataset(reading: Reading, tries: int) -> bool:
+def _is_dataset(reading: ResolvedKit, tries: int) -> bool:
     """Whether a longer search of what a short one found anything in promises enough that is neither dull nor broken."""
     choices = reading.choices
     if choices.finds is None or not choices.finds.graphs:
@@ -91,4 +91,4 @@ def _is_dataset(reading: Reading, tries: int) -> bool:
     if built.refusals:
         return False
     copied = choices.values.get(CHOSEN_COPIED, 1.0)
-    return not forecast(built.kit, ContactAnswers(built.kit), tries, choices.finds.graphs, copied=copied).is_poor
+    return not estimate_yield(built.kit, ContactAnswers(built.kit), tries, choices.finds.graphs, copied=copied).is_poor

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from PIL import Image
 
-from stages.autoconfig.inspect import main
+from stages.inspection.inspect import main
 from tests.stages.exemplars.model_files import box, write_obj
 
 

@@ -24,7 +24,7 @@ AS_LARGE = 0.98
 ALL_KINDS: tuple[ContactKind, ...] = ("point", "line", "face")
 
 
-def contact_tolerance(identified: Identified, strictest: float) -> tuple[float, str]:
+def resolve_contact_tolerance(identified: Identified, strictest: float) -> tuple[float, str]:
     """The tolerance to type, as a share of the median part's diagonal, and the reason.
 
     `strictest` where it makes one piece of every exemplar; else the least of some multiples that does and of which the
@@ -69,7 +69,7 @@ class Setting:
     hubs: tuple[int, ...] = ()
 
 
-class Sight:
+class ContactAnalysis:
     """The parts of some models with all their contacts at one tolerance."""
 
     def __init__(

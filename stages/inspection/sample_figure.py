@@ -12,16 +12,16 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 
-SHOWN = 12
+MAX_SHAPES_SHOWN = 12
 COLUMNS = 4
 CELL = 300
 CAMERA = Camera(azimuth=-40.0, elevation=25.0)
 
 
-def forecast_sheet(kit: Kit, shapes: Sequence[Shape], found: str, title: str, note: str) -> bytes:
+def sample_figure(kit: Kit, shapes: Sequence[Shape], found: str, title: str, note: str) -> bytes:
     """A PNG of the exemplars of a kit and of at most SHOWN `shapes`; `found`: what these are."""
     whole = [_cell(kit_shape(kit, each.whole), each.name) for each in kit.exemplars]
-    cells = [_cell(each, part_count(each)) for each in shapes[:SHOWN]]
+    cells = [_cell(each, part_count(each)) for each in shapes[:MAX_SHAPES_SHOWN]]
     sections = [Section("Exemplars", _rows(whole), "what goes in")]
     if cells:
         sections.append(Section(found, _rows(cells), note))

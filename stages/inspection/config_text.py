@@ -14,7 +14,7 @@ from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.variations.settings import CHOSEN_HUBS
 
-MOST = 200
+MAX_SAMPLES_REQUESTED = 200
 """Variants that the config asks for, if there are as many."""
 _DUPLICATES = (
     ("graph", "distinct shape graphs, not ways to turn a part in its place"),
@@ -89,10 +89,12 @@ def variations_section(
 ) -> list[str]:
     """The lines of a dataset of other layouts. `reasons`: of `require`, what variants must be, by REQUIREMENTS;
     `layouts`: about how many there are, None for very many."""
-    wanted = MOST if layouts is None else max(1, min(MOST, UNSEEN * layouts))
+    wanted = MAX_SAMPLES_REQUESTED if layouts is None else max(1, min(MAX_SAMPLES_REQUESTED, UNSEEN * layouts))
     lines = [
         "variations:",
-        _line(1, "per_kit", wanted, "more than there may be" if wanted < MOST else "raise it for more"),
+        _line(
+            1, "per_kit", wanted, "more than there may be" if wanted < MAX_SAMPLES_REQUESTED else "raise it for more"
+        ),
         "  search:",
         _line(2, "duplicates", *_DUPLICATES[config.types == "meaning"]),
         "  require:",
@@ -110,12 +112,12 @@ def variations_section(
 def proportions_section(different: int, stable: bool, why: str, layouts: str) -> list[str]:
     """The lines of a dataset of other proportions. different: how many are to be had; stable: whether shapes must
     stand, and why; layouts: what is to be said of other layouts."""
-    more = "raise it for more" if different >= MOST else "that differ by proportions.apart"
+    more = "raise it for more" if different >= MAX_SAMPLES_REQUESTED else "that differ by proportions.apart"
     return [
         "variations:",
         _line(1, "per_kit", 0, f"other layouts: {layouts}"),
         "proportions:",
-        _line(1, "per_kit", min(different, MOST), f"the same parts longer, wider, thicker; {more}"),
+        _line(1, "per_kit", min(different, MAX_SAMPLES_REQUESTED), f"the same parts longer, wider, thicker; {more}"),
         "  require:",
         _line(2, "stable", stable, why),
     ]

@@ -8,10 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from stages.autoconfig.ladder import GRAMMARS, GRAPHS, KINDS, STAY, TELLING, Rails, Rung, climb, is_dull, peeled
-from stages.autoconfig.probe import Finds
-from stages.autoconfig.sight import Setting, Sight, contact_tolerance
-from stages.autoconfig.up import upward
+from stages.autoconfig.contact_analysis import ContactAnalysis, Setting, resolve_contact_tolerance
+from stages.autoconfig.setting_search import (
+    CANDIDATE_GRAMMARS,
+    CANDIDATE_KINDS,
+    MIN_KEPT_SHARE,
+    MIN_NON_COPY_RATE,
+    SUFFICIENT_GRAPHS,
+    CandidateSetting,
+    SearchSpace,
+    has_low_diversity,
+    parts_without_hubs,
+    search_settings,
+)
+from stages.autoconfig.trial_search import TrialResult
+from stages.autoconfig.up_axis import resolve_up_axis
 from stages.exemplars.hubs import chosen_hubs
 from stages.exemplars.identify import Identified
 from stages.exemplars.model import Model
@@ -26,7 +37,7 @@ from stages.variations.settings import CHOSEN_CARCASS, CHOSEN_COPIED, CHOSEN_STA
 
 
 @dataclass(frozen=True)
-class Choices:
+class Resolution:
     """What was chosen for a kit.
 
     values: of the keys that the config left open, by OPEN_KEYS and REQUIREMENTS; reasons: a sentence for each; finds:
@@ -37,7 +48,7 @@ class Choices:
 
     values: Mapping[str, Any]
     reasons: Mapping[str, str]
-    finds: Finds | None
+    finds: TrialResult | None
     kept: float
     enough: bool
     settings: int
@@ -57,16 +68,16 @@ class Choices:
         }
 
 
-REQUIREMENTS = (CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS)
+REQUIREMENT_KEYS = (CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS)
 
 
-def choose(
+def resolve_settings(
     config: KitConfig,
     models: Sequence[Model],
     identified: Identified,
     tries: int,
-    require: Sequence[str] = REQUIREMENTS,
-) -> Choices:
+    require: Sequence[str] = REQUIREMENT_KEYS,
+) -> Resolution:
     """Decide what `config` leaves open for a kit of `models`, whose parts are `identified`; what it states is obeyed.
 
     In this order: the axis that points up, the contact tolerance, the first rung of a ladder over kinds of contact,
@@ -79,20 +90,20 @@ def choose(
     values: dict[str, Any] = {key: STRICTEST[key] for key in open_keys}
     reasons = dict.fromkeys(open_keys, "the default")
     if "up" in open_keys:
-        values["up"], reasons["up"] = upward(models, identified)
+        values["up"], reasons["up"] = resolve_up_axis(models, identified)
     if "contact.tolerance" in open_keys:
-        found = contact_tolerance(identified, STRICTEST["contact.tolerance"])
+        found = resolve_contact_tolerance(identified, STRICTEST["contact.tolerance"])
         values["contact.tolerance"], reasons["contact.tolerance"] = found
     stated = config.decide(values)
     fitting = config.fit_tolerance if config.types == "meaning" else None
-    sight = Sight(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up, fitting)
+    sight = ContactAnalysis(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up, fitting)
     one_surface = any(each.is_cut for each in models)
-    rungs = climb(sight, _rails(stated, sight, open_keys, one_surface), tries)
+    rungs = search_settings(sight, _rails(stated, sight, open_keys, one_surface), tries)
     for key, (value, why) in _required(sight, rungs).items():
         if key in require:
             values[key], reasons[key] = value, why
     if not rungs:
-        return Choices(values, reasons, None, 1.0, False, 0)
+        return Resolution(values, reasons, None, 1.0, False, 0)
     chosen = rungs[-1]
     setting = chosen.setting
     hubs = tuple(sight.types[index].name for index in setting.hubs)
@@ -115,40 +126,40 @@ def choose(
     if "disconnected" in open_keys:
         stand = "1 part stands" if left == 1 else f"{left} parts stand"
         reasons["disconnected"] = f"{stand} apart from the largest piece" if left else "nothing stands apart"
-    return Choices(values, reasons, chosen.finds, chosen.kept, chosen.gives_enough, len(rungs))
+    return Resolution(values, reasons, chosen.finds, chosen.kept, chosen.gives_enough, len(rungs))
 
 
-def most_copied(finds: Finds | None) -> tuple[float, str]:
+def resolve_max_copied(finds: TrialResult | None) -> tuple[float, str]:
     """The greatest share of a variant that may be copied whole, and why: near copies are refused where a search that
     found `finds` finds much more, and enough that is none."""
-    if finds is None or finds.graphs < GRAPHS:
+    if finds is None or finds.graphs < SUFFICIENT_GRAPHS:
         return 1.0, "a short search finds too little to refuse any of it"
     if finds.by_meaning:
         return 1.0, "a part that takes another's place leaves all others as they stood"
-    if finds.telling < TELLING:
+    if finds.telling < MIN_NON_COPY_RATE:
         return 1.0, f"only {finds.telling:.0%} of the finds of a short search are no near copies"
     beside = f"{finds.telling:.0%} of the finds of a short search are none"
     return COPIED, f"refuses copies with little beside them; {beside}"
 
 
-def _required(sight: Sight, rungs: Sequence[Rung]) -> dict[str, tuple[Any, str]]:
+def _required(sight: ContactAnalysis, rungs: Sequence[CandidateSetting]) -> dict[str, tuple[Any, str]]:
     """Value and reason of each of REQUIREMENTS, after the rung that was chosen, the last."""
     if not rungs:
         nothing = "there is nothing to search"
-        return {CHOSEN_COPIED: most_copied(None), CHOSEN_STABLE: (False, nothing), CHOSEN_CARCASS: ((), nothing)}
+        return {CHOSEN_COPIED: resolve_max_copied(None), CHOSEN_STABLE: (False, nothing), CHOSEN_CARCASS: ((), nothing)}
     kit, finds = sight.kit(rungs[-1].setting), rungs[-1].finds
     spanning = carcass(kit)
     why = (
         "the exemplars have parts of these as large as themselves" if spanning else "no part is as large as an exemplar"
     )
     return {
-        CHOSEN_COPIED: most_copied(finds),
-        CHOSEN_STABLE: must_stand(kit, rungs[-1].different),
+        CHOSEN_COPIED: resolve_max_copied(finds),
+        CHOSEN_STABLE: resolve_stable(kit, rungs[-1].different),
         CHOSEN_CARCASS: (spanning, why),
     }
 
 
-def must_stand(kit: Kit, different: Sequence[Assembly]) -> tuple[bool, str]:
+def resolve_stable(kit: Kit, different: Sequence[Assembly]) -> tuple[bool, str]:
     """Whether what falls over is refused, and why: where the exemplars of a kit stand, some of the most different finds
     of a short search do not, and enough do."""
     standing = Requirements(stable=True)
@@ -160,20 +171,20 @@ def must_stand(kit: Kit, different: Sequence[Assembly]) -> tuple[bool, str]:
     told = f"of the {len(different)} most different finds of a short search"
     if not falls:
         return False, f"none {told} falls"
-    if len(different) - falls < TELLING * len(different):
+    if len(different) - falls < MIN_NON_COPY_RATE * len(different):
         return False, f"{falls} {told} fall, so that too few would be left"
     return True, f"{falls} {told} fall, and the exemplars stand"
 
 
-def found_words(finds: Finds) -> str:
+def trial_text(finds: TrialResult) -> str:
     """What a probe found, in words."""
     if not finds.graphs:
         return f"nothing in {finds.tries:,} tries"
-    alike = ", much alike" if is_dull(finds) else ""
+    alike = ", much alike" if has_low_diversity(finds) else ""
     return f"{finds.graphs:,} graphs and {finds.histograms:,} histograms in {finds.tries:,} tries{alike}"
 
 
-def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str], one_surface: bool) -> Rails:
+def _rails(stated: KitConfig, sight: ContactAnalysis, open_keys: Sequence[str], one_surface: bool) -> SearchSpace:
     """What the ladder may choose from: one value of each key that the config states.
 
     Hubs are peeled off because shapes stand without them, and get back those that fit. Pieces of one surface are no
@@ -182,37 +193,39 @@ def _rails(stated: KitConfig, sight: Sight, open_keys: Sequence[str], one_surfac
     """
     made = stated.decided()
     peels = "hubs.types" in open_keys and stated.types != "meaning" and not one_surface
-    return Rails(
-        kinds=KINDS if "contact.kinds" in open_keys else (made.kinds,),
-        grammars=GRAMMARS if "grammar" in open_keys and stated.types != "meaning" else (made.grammar,),
+    return SearchSpace(
+        kinds=CANDIDATE_KINDS if "contact.kinds" in open_keys else (made.kinds,),
+        grammars=CANDIDATE_GRAMMARS if "grammar" in open_keys and stated.types != "meaning" else (made.grammar,),
         hubs=None if peels else chosen_hubs(stated, sight.types),
         largest="disconnected" in open_keys or made.disconnected == "largest",
     )
 
 
-def _without_hub(sight: Sight) -> str:
+def _without_hub(sight: ContactAnalysis) -> str:
     """Why not even the hub that touches most was left out, where too little would stay; else empty."""
     hub = sight.widest(())
-    stay = sight.parts if hub is None else peeled(sight, (hub,))
-    if hub is None or stay >= STAY * sight.parts:
+    stay = sight.parts if hub is None else parts_without_hubs(sight, (hub,))
+    if hub is None or stay >= MIN_KEPT_SHARE * sight.parts:
         return ""
     return f"the model falls apart without {sight.types[hub].name}: {stay} of {sight.parts} parts stay in one piece"
 
 
-def _reason(key: str, chosen: Rung, rungs: Sequence[Rung]) -> str:
+def _reason(key: str, chosen: CandidateSetting, rungs: Sequence[CandidateSetting]) -> str:
     """Why the ladder ended at this value of a key: what it found there, and one step stricter in this key alone."""
     setting = chosen.setting
     stricter: list[Setting] = []
     if key == "contact.kinds":
-        stricter = [replace(setting, kinds=kinds) for kinds in KINDS if len(kinds) > len(setting.kinds)]
-    elif key == "grammar" and setting.grammar in GRAMMARS:
-        stricter = [replace(setting, grammar=each) for each in GRAMMARS[: GRAMMARS.index(setting.grammar)]]
+        stricter = [replace(setting, kinds=kinds) for kinds in CANDIDATE_KINDS if len(kinds) > len(setting.kinds)]
+    elif key == "grammar" and setting.grammar in CANDIDATE_GRAMMARS:
+        stricter = [
+            replace(setting, grammar=each) for each in CANDIDATE_GRAMMARS[: CANDIDATE_GRAMMARS.index(setting.grammar)]
+        ]
     elif key == "hubs.types" and setting.hubs:
         stricter = [replace(setting, hubs=())]
     for other in reversed(stricter):
         rung = next((each for each in rungs if each.setting == other), None)
         if rung is not None:
-            return f"{found_words(chosen.finds)}; the next stricter: {found_words(rung.finds)}"
+            return f"{trial_text(chosen.finds)}; the next stricter: {trial_text(rung.finds)}"
     if chosen.gives_enough:
         return "the strictest, and it gives enough"
-    return f"nothing else gives more than {found_words(chosen.finds)}"
+    return f"nothing else gives more than {trial_text(chosen.finds)}"

@@ -8,28 +8,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from stages.autoconfig.bared import bared
-from stages.autoconfig.ladder import FEW, is_dull
-from stages.autoconfig.probe import Finds, Probe
+from stages.autoconfig.lost_support import lost_support
+from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS, has_low_diversity
+from stages.autoconfig.trial_search import TrialResult, TrialSearch
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.shape.kit import Kit
 from stages.variations.report.advice import another_model, what_keeps
 from stages.variations.search.search import DUPLICATE, Variant
 
-MANY = 300
+MAX_ESTIMATE_GRAPHS = 300
 """The search for a forecast ends at so many distinct graphs."""
-LISTS = 50
+MIN_PARTS_LISTS = 50
 """With fewer parts lists than this a dataset of MANY shapes has each of them many times."""
-LOOK = "look at the sheet before you make many"
-NAMED = 2
+LOOK_FIRST = "look at the sheet before you make many"
+MAX_LABELS_SHOWN = 2
 """So many labels are named in a sentence."""
-LONG = 4
+ESTIMATE_TRIES_FACTOR = 4
 """It has so many times the tries of a probe, as long as it finds something in the first."""
 
 
 @dataclass(frozen=True)
-class Forecast:
+class YieldEstimate:
     """What a short search of a kit found, and what it says of a long one.
 
     layouts: about how many distinct graphs there are, None where the end is not in sight; parts: fewest and most parts
@@ -38,19 +38,19 @@ class Forecast:
     above or below them.
     """
 
-    finds: Finds
+    finds: TrialResult
     layouts: int | None
     parts: tuple[int, int]
     seen_once: float
     sentence: str
     variants: Sequence[Variant]
-    bared: tuple[str, ...] = ()
+    lost_support: tuple[str, ...] = ()
 
     @property
     def is_poor(self) -> bool:
         """Whether it is no dataset: next to nothing, or all of it alike, or broken."""
-        few = not self.finds.graphs or (self.layouts is not None and self.layouts < FEW)
-        return few or is_dull(self.finds) or bool(self.bared)
+        few = not self.finds.graphs or (self.layouts is not None and self.layouts < MIN_USEFUL_GRAPHS)
+        return few or has_low_diversity(self.finds) or bool(self.lost_support)
 
     @property
     def chosen(self) -> list[Variant]:
@@ -58,32 +58,32 @@ class Forecast:
         return [self.variants[place] for place in self.finds.most_different]
 
 
-def forecast(
+def estimate_yield(
     kit: Kit, answers: ContactAnswers, tries: int, known: int = 0, hubs: float = 0, copied: float = 1.0
-) -> Forecast:
+) -> YieldEstimate:
     """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone. `known`:
     how many graphs a probe has found in it: where there are any, a first search in vain is no answer; `hubs`, `copied`:
     as for Probe, for what will be refused does not count."""
-    probe = Probe(answers, decision_rng(0, "choices", "forecast"), hubs, copied)
-    finds = probe.go_on(tries, MANY, evenly=True)
+    probe = TrialSearch(answers, decision_rng(0, "choices", "forecast"), hubs, copied)
+    finds = probe.go_on(tries, MAX_ESTIMATE_GRAPHS, evenly=True)
     if finds.graphs or known:
-        finds = probe.go_on((LONG - 1) * tries, MANY, evenly=True)
+        finds = probe.go_on((ESTIMATE_TRIES_FACTOR - 1) * tries, MAX_ESTIMATE_GRAPHS, evenly=True)
     layouts = _layouts(finds)
     sizes = [len(each.assembly) for each in probe.variants]
     parts = (min(sizes, default=0), max(sizes, default=0))
     once = seen_once(observed_patterns(kit, answers.dockings, upright=True))
-    broken = bared(kit, [probe.whole(place) for place in finds.most_different])
+    broken = lost_support(kit, [probe.whole(place) for place in finds.most_different])
     said = _sentence(kit, finds, layouts, parts, broken)
-    return Forecast(finds, layouts, parts, once, said, probe.variants, broken)
+    return YieldEstimate(finds, layouts, parts, once, said, probe.variants, broken)
 
 
-def _layouts(finds: Finds) -> int | None:
+def _layouts(finds: TrialResult) -> int | None:
     """About how many distinct graphs there are, from how often the search found what it had: n finds of which g differ
     are to be expected of N equally likely ones where N (1 - exp(-n / N)) = g. None where few came twice."""
     graphs, again = finds.graphs, finds.rejects.get(DUPLICATE, 0)
     if graphs == 0:
         return 0
-    if graphs >= MANY or again < graphs:
+    if graphs >= MAX_ESTIMATE_GRAPHS or again < graphs:
         return None
     low, high = float(graphs), 1e6
     while high / low > 1.01:
@@ -92,29 +92,31 @@ def _layouts(finds: Finds) -> int | None:
     return round(low)
 
 
-def _sentence(kit: Kit, finds: Finds, layouts: int | None, parts: tuple[int, int], broken: tuple[str, ...] = ()) -> str:
+def _sentence(
+    kit: Kit, finds: TrialResult, layouts: int | None, parts: tuple[int, int], broken: tuple[str, ...] = ()
+) -> str:
     if not finds.graphs:
         return f"nothing: {what_keeps(kit, finds.rejects, finds.tries)}"
     size = f"{parts[0]} to {parts[1]} parts" if parts[0] < parts[1] else f"{parts[0]} parts each"
-    count = "hundreds of layouts" if layouts is None else f"about {rounded(layouts)} layout{'s'[: layouts != 1]}"
-    if layouts is not None and layouts < FEW:
+    count = "hundreds of layouts" if layouts is None else f"about {rounded_text(layouts)} layout{'s'[: layouts != 1]}"
+    if layouts is not None and layouts < MIN_USEFUL_GRAPHS:
         return f"{count}, no dataset: {what_keeps(kit, finds.rejects, finds.tries)}"
     if layouts is not None:  # at least: some are far rarer than others, and a long search builds on what it found
-        count = f"{rounded(layouts)} or more layouts"
+        count = f"{rounded_text(layouts)} or more layouts"
     if broken:
-        names = " and ".join(broken[:NAMED]) + (" and others" if len(broken) > NAMED else "")
+        names = " and ".join(broken[:MAX_LABELS_SHOWN]) + (" and others" if len(broken) > MAX_LABELS_SHOWN else "")
         why = f"nothing stands close above or below {names}, as it does in the exemplar"
-        return f"{count} of {size} that look broken, for {why}; {LOOK}, and bring {another_model(kit)}"
-    if is_dull(finds):
+        return f"{count} of {size} that look broken, for {why}; {LOOK_FIRST}, and bring {another_model(kit)}"
+    if has_low_diversity(finds):
         alike = "like the exemplar" if finds.spread >= finds.distance else "like each other"
-        return f"{count} of {size} that look {alike}; {LOOK}, and bring {another_model(kit)}"
-    if finds.histograms < LISTS and not finds.by_meaning:
-        few = f"about {rounded(finds.histograms)} parts lists, so that many will look alike"
-        return f"{count} of {size}, but only of {few}; {LOOK}, and bring {another_model(kit)}"
-    return f"{count} of {size}, {rounded(finds.histograms)} or more of them of different parts lists"
+        return f"{count} of {size} that look {alike}; {LOOK_FIRST}, and bring {another_model(kit)}"
+    if finds.histograms < MIN_PARTS_LISTS and not finds.by_meaning:
+        few = f"about {rounded_text(finds.histograms)} parts lists, so that many will look alike"
+        return f"{count} of {size}, but only of {few}; {LOOK_FIRST}, and bring {another_model(kit)}"
+    return f"{count} of {size}, {rounded_text(finds.histograms)} or more of them of different parts lists"
 
 
-def rounded(number: int) -> str:
+def rounded_text(number: int) -> str:
     """A number with one or two digits that mean something."""
     if number < 20:
         return str(number)

@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stages.autoconfig.choose import REQUIREMENTS, Choices, choose, most_copied, must_stand
-from stages.autoconfig.forecast import forecast
-from stages.autoconfig.probe import Finds, Probe
-from stages.autoconfig.prospect import look_at
-from stages.autoconfig.sight import Setting, Sight, contact_tolerance
-from stages.autoconfig.up import upward
+from stages.autoconfig.contact_analysis import ContactAnalysis, Setting, resolve_contact_tolerance
+from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution, resolve_max_copied, resolve_settings, resolve_stable
+from stages.autoconfig.trial_search import TrialResult, TrialSearch
+from stages.autoconfig.up_axis import resolve_up_axis
+from stages.autoconfig.yield_estimate import estimate_yield
 from stages.exemplars.build import build_kit
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
+from stages.inspection.report import inspect_models
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import ContactKind
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, config_of, kit_of, models_of, pose, ring
@@ -38,9 +38,9 @@ def left_open(shapes: Sequence[Sequence[Placed]], **stated: Any) -> KitConfig:
     return KitConfig(name="toy", shapes=tuple(config_of(shapes).shapes), **stated)
 
 
-def chosen(shapes: Sequence[Sequence[Placed]], meshes: dict[str, Any], **stated: Any) -> Choices:
+def chosen(shapes: Sequence[Sequence[Placed]], meshes: dict[str, Any], **stated: Any) -> Resolution:
     config, models = left_open(shapes, **stated), models_of(meshes, shapes)
-    return choose(config, models, identify_parts(models, config), TRIES)
+    return resolve_settings(config, models, identify_parts(models, config), TRIES)
 
 
 def turned(shape: Sequence[Placed]) -> list[Placed]:
@@ -52,19 +52,19 @@ class TestUp:
     def test_a_model_stands_on_its_broad_side(self, turn: bool, axis: str) -> None:
         shape = turned(ring(2, 3)) if turn else ring(2, 3)
         models = models_of(ROAD, [shape])
-        assert upward(models, identify_parts(models, config_of([shape])))[0] == axis
+        assert resolve_up_axis(models, identify_parts(models, config_of([shape])))[0] == axis
 
     def test_a_tower_stands_where_its_middle_is_above_its_foot(self) -> None:
         # wider and deeper from storey to storey: along z it would stand on a side of its top, the larger foot
         storeys = {f"storey{k}": box(1 + 0.3 * k, 1.0, 1 + 0.4 * k) for k in range(6)}
         shape = [(name, pose(0, k, 0)) for k, name in enumerate(storeys)]
         models = models_of(storeys, [shape])
-        axis, why = upward(models, identify_parts(models, config_of([shape])))
+        axis, why = resolve_up_axis(models, identify_parts(models, config_of([shape])))
         assert (axis, "not above its foot" in why) == ("y", True)
 
     def test_the_word_of_a_file_that_chose_it_is_believed(self) -> None:
         models = [replace(each, up="z") for each in models_of(ROAD, [ring(2, 3)])]
-        assert upward(models, identify_parts(models, config_of([ring(2, 3)]))) == ("z", "the file says so")
+        assert resolve_up_axis(models, identify_parts(models, config_of([ring(2, 3)]))) == ("z", "the file says so")
 
     def test_where_feet_are_alike_equal_parts_are_turned_about_the_vertical(self) -> None:
         # a cube of eight bricks stands on the same foot along every axis; four of them are quarter turns about z
@@ -73,7 +73,7 @@ class TestUp:
         shape = [("brick", pose(*at)) for at in corners]
         shape += [("fin", pose(2, 2, 2) @ Z_UP @ pose(0, 0, 0, turns)) for turns in range(4)]
         models = models_of(brick, [shape])
-        axis, why = upward(models, identify_parts(models, config_of([shape])))
+        axis, why = resolve_up_axis(models, identify_parts(models, config_of([shape])))
         assert (axis, "3 of 3 times" in why) == ("z", True)
 
 
@@ -85,7 +85,7 @@ class TestTolerance:
 
     def tolerance(self, *gaps: float) -> float:
         models = self.row(*gaps)
-        return contact_tolerance(identify_parts(models, config_of([[]])), 1e-3)[0]
+        return resolve_contact_tolerance(identify_parts(models, config_of([[]])), 1e-3)[0]
 
     def test_the_default_stays_where_it_makes_one_piece(self) -> None:
         assert self.tolerance(0.0, 0.0) == 1e-3
@@ -102,14 +102,14 @@ class TestLadder:
         paths = sorted((ROOT / "datasets" / "exemplars" / "playground").glob("*.glb"))
         config = KitConfig(name="playground", shapes=tuple(paths))
         models = [read_model(path) for path in paths]
-        made = choose(config, models, identify_parts(models, config), 2500)
+        made = resolve_settings(config, models, identify_parts(models, config), 2500)
         unasked = {"require.copied": 0.9, "require.stable": False, "require.carcass": ()}
         assert (dict(made.values), made.settings, made.enough) == ({**STRICTEST, **unasked}, 1, True)
 
     def test_what_the_config_states_is_obeyed_and_not_chosen(self) -> None:
         stated = {"up": "z", "grammar": "count_and_set", "disconnected": "error", "hubs": HubConfig(types="none")}
         made = chosen([chain(3), chain(5)], CHAIN, **stated)
-        assert set(made.values) == {"contact.tolerance", "contact.kinds", *REQUIREMENTS} == set(made.reasons)
+        assert set(made.values) == {"contact.tolerance", "contact.kinds", *REQUIREMENT_KEYS} == set(made.reasons)
 
     def test_choices_are_the_same_every_time(self) -> None:
         shapes = [ring(1, 1), ring(2, 3)]
@@ -133,7 +133,7 @@ class TestLadder:
         config, models = left_open(shapes), models_of(meshes, shapes)
         identified = identify_parts(models, config)
         cut = [replace(each, segmentation="symmetry") for each in models]
-        parts, pieces = (choose(config, each, identified, TRIES) for each in (models, cut))
+        parts, pieces = (resolve_settings(config, each, identified, TRIES) for each in (models, cut))
         assert pieces.values["hubs.types"] == "none"
         assert "a hole where one is left out" in pieces.reasons["hubs.types"]
         assert parts.settings > pieces.settings
@@ -150,15 +150,15 @@ class TestLadder:
         config = left_open([[], []], types="meaning")
         identified = identify_parts(models, config)
         kinds: tuple[ContactKind, ...] = ("point", "line", "face")
-        sight = Sight(identified, 1e-3, config.pose_tolerance, "y", config.fit_tolerance)
+        sight = ContactAnalysis(identified, 1e-3, config.pose_tolerance, "y", config.fit_tolerance)
         probed = sight.kit(Setting(kinds, "multiset"))
         built, _ = build_kit(config.decide(STRICTEST), models)
         assert probed.grammar.neighbourhoods == built.grammar.neighbourhoods
         pairs = [(each.a, each.b, each.kind, each.depth) for each in built.grammar.dockings]
         assert [(each.a, each.b, each.kind, each.depth) for each in probed.grammar.dockings] == pairs
         assert len(pairs) > len(sight.contacts.dockings)
-        made = choose(config, models, identified, TRIES)
-        assert set(made.values) == {*config.left_open(), *REQUIREMENTS}
+        made = resolve_settings(config, models, identified, TRIES)
+        assert set(made.values) == {*config.left_open(), *REQUIREMENT_KEYS}
         assert made.values["grammar"] == "multiset"
         assert made.finds is not None
         assert made.finds.by_meaning
@@ -169,23 +169,23 @@ class TestCopies:
     @pytest.mark.parametrize(
         ("finds", "most"),
         [
-            (Finds(5000, 80, 40, 0.1, 0.1, telling=0.6), 0.9),
-            (Finds(5000, 80, 40, 0.1, 0.1, telling=0.1), 1.0),  # the search would refuse nearly all it finds
-            (Finds(5000, 40, 30, 0.1, 0.1, telling=0.6), 1.0),  # there are too few to choose from
+            (TrialResult(5000, 80, 40, 0.1, 0.1, telling=0.6), 0.9),
+            (TrialResult(5000, 80, 40, 0.1, 0.1, telling=0.1), 1.0),  # the search would refuse nearly all it finds
+            (TrialResult(5000, 40, 30, 0.1, 0.1, telling=0.6), 1.0),  # there are too few to choose from
             (None, 1.0),
         ],
     )
-    def test_near_copies_are_refused_where_enough_is_left(self, finds: Finds | None, most: float) -> None:
-        assert most_copied(finds)[0] == most
+    def test_near_copies_are_refused_where_enough_is_left(self, finds: TrialResult | None, most: float) -> None:
+        assert resolve_max_copied(finds)[0] == most
 
     def test_a_limit_that_is_stated_is_not_chosen(self) -> None:
         config, models = left_open([ring(1, 1), ring(2, 3)]), models_of(ROAD, [ring(1, 1), ring(2, 3)])
-        made = choose(config, models, identify_parts(models, config), TRIES, require=())
+        made = resolve_settings(config, models, identify_parts(models, config), TRIES, require=())
         assert set(made.values) == set(config.left_open())
 
     def test_finds_tell_something_unless_they_are_copied_but_for_a_tenth(self) -> None:
         kit, _ = build_kit(config_of([chain(3), chain(5)]), models_of(CHAIN, [chain(3), chain(5)]))
-        probe = Probe(ContactAnswers(kit), np.random.default_rng(1))
+        probe = TrialSearch(ContactAnswers(kit), np.random.default_rng(1))
         assert probe.go_on(TRIES, 4).telling == 1.0
         shares = [0.5, 0.9, 0.95, 1.0]
         probe.variants[:] = [replace(probe.variants[0], lineage={"copied": {"largest": each}}) for each in shares]
@@ -201,15 +201,18 @@ class TestStanding:
     def test_what_falls_is_refused_where_exemplars_stand_and_enough_finds_do(self) -> None:
         kit = kit_of(CUBE, [[("cube", pose(0, 0, 0)), ("cube", pose(1, 0, 0))]])
         flat, arm = self.row(0, 0, 0).assembly, self.row(0, 0.9, 1.8).assembly
-        assert must_stand(kit, [flat, flat]) == (False, "none of the 2 most different finds of a short search falls")
-        assert must_stand(kit, [flat, arm, arm])[0]
-        assert not must_stand(kit, [flat, *[arm] * 4])[0]  # hardly any would be left
-        assert not must_stand(kit, [])[0]
+        assert resolve_stable(kit, [flat, flat]) == (
+            False,
+            "none of the 2 most different finds of a short search falls",
+        )
+        assert resolve_stable(kit, [flat, arm, arm])[0]
+        assert not resolve_stable(kit, [flat, *[arm] * 4])[0]  # hardly any would be left
+        assert not resolve_stable(kit, [])[0]
 
     def test_kits_that_do_not_stand_themselves_are_not_asked_to(self) -> None:
         kit = kit_of(CUBE, [[("cube", pose(k, 0.9 * k, 0)) for k in range(3)]])
         flat = self.row(0, 0, 0).assembly
-        assert must_stand(kit, [flat, kit.exemplars[0].assembly]) == (False, "not even the exemplars stand")
+        assert resolve_stable(kit, [flat, kit.exemplars[0].assembly]) == (False, "not even the exemplars stand")
 
 
 class TestForecast:
@@ -218,14 +221,14 @@ class TestForecast:
 
     def test_chains_are_as_many_as_there_are_lengths(self) -> None:
         kit = self.kit([chain(3), chain(5)], CHAIN)
-        found = forecast(kit, ContactAnswers(kit), 2000)
+        found = estimate_yield(kit, ContactAnswers(kit), 2000)
         # 2.5 to 14 parts, the exemplars' 5 and 7 aside, and no link without a cap: 1 to 12 links
         assert found.finds.graphs == found.finds.histograms == found.layouts
         assert found.sentence.startswith(f"about {found.layouts} layouts, no dataset")
 
     def test_as_many_as_are_in_sight_are_said_to_be_no_more_than_the_fewest(self) -> None:
         kit = self.kit([chain(13), chain(15)], CHAIN)
-        found = forecast(kit, ContactAnswers(kit), 2000)
+        found = estimate_yield(kit, ContactAnswers(kit), 2000)
         assert found.layouts is not None
         assert 20 <= found.finds.graphs <= found.layouts <= 32
         assert re.match(
@@ -236,22 +239,22 @@ class TestForecast:
     def test_layouts_that_look_broken_are_no_dataset_and_it_is_said_what_they_lack(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("stages.autoconfig.forecast.bared", lambda *_: ("link", "cap", "ring"))
+        monkeypatch.setattr("stages.autoconfig.yield_estimate.bared", lambda *_: ("link", "cap", "ring"))
         kit = self.kit([chain(13), chain(15)], CHAIN)
-        found = forecast(kit, ContactAnswers(kit), 2000)
+        found = estimate_yield(kit, ContactAnswers(kit), 2000)
         assert found.is_poor
         assert "look broken, for nothing stands close above or below link and cap and others" in found.sentence
 
     def test_what_will_be_refused_for_what_it_copies_does_not_count(self) -> None:
         kit = self.kit([ring(1, 1), ring(2, 3)], ROAD)
-        found = [forecast(kit, ContactAnswers(kit), TRIES, copied=most) for most in (1.0, 0.6)]
+        found = [estimate_yield(kit, ContactAnswers(kit), TRIES, copied=most) for most in (1.0, 0.6)]
         copied = [[each.lineage["copied"]["largest"] for each in one.variants] for one in found]
         assert max(copied[0]) > 0.6 >= max(copied[1]) > 0.0
 
     def test_every_part_its_own_type_is_said_with_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
         kit = self.kit([[("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]], meshes)
-        found = forecast(kit, ContactAnswers(kit), TRIES)
+        found = estimate_yield(kit, ContactAnswers(kit), TRIES)
         assert (found.finds.graphs, found.layouts) == (0, 0)
         assert "every part is its own type; bring a second model" in found.sentence
 
@@ -263,7 +266,7 @@ class TestForecast:
     ) -> None:
         shape = [("link", pose(0, 0, 0)), ("cap", pose(0.75, 0, 0))]
         models = [replace(each, segmentation=segmentation) for each in models_of(CHAIN, [shape])]
-        sentence = look_at(left_open([shape], parts=parts), models, 50).sentence
+        sentence = inspect_models(left_open([shape], parts=parts), models, 50).sentence
         assert "nothing: every part is its own type" in sentence
         assert ("`parts: sections`" in sentence) == (parts == "auto" and segmentation == "components")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from stages.autoconfig.config_text import config_text, proportions_section, variations_section
+from stages.inspection.config_text import config_text, proportions_section, variations_section
 from tests.toy_kits.chains_and_rings import ROAD, config_of, models_of, ring
 
 

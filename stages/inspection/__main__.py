@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pipeline.errors import ConfigError
-from stages.autoconfig.config_text import dataset_name
-from stages.autoconfig.prospect import Prospect, look_at
 from stages.autoconfig.settings import AutoconfigConfig
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import KitConfig
+from stages.inspection.config_text import dataset_name
+from stages.inspection.report import InspectionReport, inspect_models
 
 HEADER = ("model", "parts", "types", "up", "tolerance", "kinds", "grammar", "hubs", "stay", "graphs", "histograms",
           "distance", "CPU s", "forecast")  # fmt: skip
@@ -33,13 +33,13 @@ def main() -> None:
     for path in asked.models:
         try:
             config = KitConfig(name="inspected", shapes=(path,))
-            found = look_at(config, [read_model(path)], asked.tries)
+            found = inspect_models(config, [read_model(path)], asked.tries)
             print(f"| {' | '.join(_row(dataset_name([path]), found))} |", flush=True)
         except ConfigError as error:
             print(error, file=sys.stderr)
 
 
-def _row(name: str, found: Prospect) -> Iterator[str]:
+def _row(name: str, found: InspectionReport) -> Iterator[str]:
     made, seen = found.config.decided(), found.seen.kit
     yield name
     yield str(sum(len(each.assembly) for each in seen.exemplars))
@@ -50,7 +50,7 @@ def _row(name: str, found: Prospect) -> Iterator[str]:
     yield made.grammar
     yield ", ".join(made.hubs) or "none"
     yield f"{found.choices.kept:.0%}"
-    finds = found.forecast.finds if found.forecast is not None else None
+    finds = found.yield_estimate.finds if found.yield_estimate is not None else None
     yield f"{finds.graphs:,}" if finds else "0"
     yield f"{finds.histograms:,}" if finds else "0"
     yield f"{finds.distance:.2f}" if finds else ""

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from stages.autoconfig.bared import bared
-from stages.autoconfig.ladder import Rung
-from stages.autoconfig.probe import Finds
-from stages.autoconfig.sight import Setting
+from stages.autoconfig.contact_analysis import Setting
+from stages.autoconfig.lost_support import lost_support
+from stages.autoconfig.setting_search import CandidateSetting
+from stages.autoconfig.trial_search import TrialResult
 from stages.exemplars.settings import ContactConfig
 from stages.shape.kit import Assembly, Kit
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
@@ -46,10 +46,10 @@ def put(kit: Kit, shape: Sequence[Placed]) -> Assembly:
 def test_columns_are_bared_where_the_walls_grow_past_them() -> None:
     kit = kit_of(HALL, [hall(4)])
     low, high = put(kit, hall(6)), put(kit, hall(4, 2))
-    assert bared(kit, [high, high, low]) == ("column",)
-    assert bared(kit, [low, low, high]) == ()  # most of the shapes are whole
-    assert bared(kit, [put(kit, hall(4, 2, columns=False))]) == ()  # what is not there is not bared
-    assert bared(kit, []) == ()
+    assert lost_support(kit, [high, high, low]) == ("column",)
+    assert lost_support(kit, [low, low, high]) == ()  # most of the shapes are whole
+    assert lost_support(kit, [put(kit, hall(4, 2, columns=False))]) == ()  # what is not there is not bared
+    assert lost_support(kit, []) == ()
 
 
 def test_what_hung_close_below_something_and_what_stood_close_above_it_are_both_missed() -> None:
@@ -57,22 +57,25 @@ def test_what_hung_close_below_something_and_what_stood_close_above_it_are_both_
     row = [("board", pose(1.5 * k, 0, 0)) for k in range(4)] + [("jar", pose(1.5 * k, 0.36, 0)) for k in range(4)]
     lifted = [(name, pose(0, 3.0, 0) @ at if name == "jar" else at) for name, at in row]
     kit = kit_of(shelf, [row], disconnected="largest", contact=LOOSE)
-    assert bared(kit, [put(kit, row)]) == ()
-    assert set(bared(kit, [put(kit, lifted)])) == {"jar", "board"}
+    assert lost_support(kit, [put(kit, row)]) == ()
+    assert set(lost_support(kit, [put(kit, lifted)])) == {"jar", "board"}
 
 
 def test_a_lamp_among_many_parts_does_not_count() -> None:
     lamp: Placed = ("lamp", pose(0, 0.85, 0.2))
     kit = kit_of(HALL, [[*hall(8), lamp]])
     lower: Placed = ("lamp", pose(0, 0.5, 0.2))
-    assert bared(kit, [put(kit, [*hall(8), lower])]) == ()
+    assert lost_support(kit, [put(kit, [*hall(8), lower])]) == ()
 
 
 @pytest.mark.parametrize(("names", "enough"), [((), True), (("column",), False)])
 def test_what_looks_broken_is_not_enough_and_hardly_more_than_nothing(names: tuple[str, ...], enough: bool) -> None:
     setting = Setting(("face",), "multiset")
-    found = Rung(setting, Finds(2500, 100, 90, 0.2, 0.1, 0.5, 1.0), 1.0, (), names)
-    nothing, few = Rung(setting, Finds(2500, 0, 0, 0.0, 0.0), 1.0), Rung(setting, Finds(2500, 3, 3, 0.1, 0.1), 1.0)
+    found = CandidateSetting(setting, TrialResult(2500, 100, 90, 0.2, 0.1, 0.5, 1.0), 1.0, (), names)
+    nothing, few = (
+        CandidateSetting(setting, TrialResult(2500, 0, 0, 0.0, 0.0), 1.0),
+        CandidateSetting(setting, TrialResult(2500, 3, 3, 0.1, 0.1), 1.0),
+    )
     assert found.gives_enough == enough
     assert found.score > nothing.score
     assert (found.score > few.score) == enough

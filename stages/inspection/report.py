@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from stages.autoconfig.choose import REQUIREMENTS, Choices, choose, found_words
-from stages.autoconfig.forecast import Forecast, forecast
-from stages.autoconfig.proportioned import Proportioned, instead_of_layouts
-from stages.autoconfig.reading import Reading, cut_if_nothing_comes
-from stages.autoconfig.sheet import SHOWN
+from stages.autoconfig.resize_fallback import ResizeEstimate, resize_fallback
+from stages.autoconfig.resolve import REQUIREMENT_KEYS, Resolution, resolve_settings, trial_text
+from stages.autoconfig.resolved_kit import ResolvedKit, use_sections_if_empty
+from stages.autoconfig.yield_estimate import YieldEstimate, estimate_yield
 from stages.exemplars.build import Observation
 from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig, ReadLimits
+from stages.inspection.sample_figure import MAX_SHAPES_SHOWN
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
@@ -33,7 +33,7 @@ ACROSS = (
 
 
 @dataclass(frozen=True)
-class Prospect:
+class InspectionReport:
     """What some models will give.
 
     config: nothing left open; models: as they are read by it; asked: the config that they were looked at with; seen:
@@ -46,23 +46,23 @@ class Prospect:
     config: KitConfig
     models: Sequence[Model]
     asked: KitConfig
-    choices: Choices
+    choices: Resolution
     seen: Observation
     built: Observation
-    forecast: Forecast | None
+    yield_estimate: YieldEstimate | None
     shapes: Sequence[Shape]
     rate: float
     seconds: float
     torn: bool
-    proportioned: Proportioned | None
+    proportioned: ResizeEstimate | None
 
     @property
     def sentence(self) -> str:
         """What to expect."""
-        if self.forecast is None:
+        if self.yield_estimate is None:
             return f"nothing, for a run refuses the models: {self.built.refusals[0]}"
-        said = self.forecast.sentence
-        if self.torn and not self.forecast.finds.graphs:
+        said = self.yield_estimate.sentence
+        if self.torn and not self.yield_estimate.finds.graphs:
             said = f"{said}; or {ACROSS}"
         if self.proportioned is None:
             return said
@@ -72,42 +72,44 @@ class Prospect:
         """Choices and forecast, beside what `inspection` finds."""
         made = self.choices.as_json()
         expected: dict[str, Any] = {"sentence": self.sentence}
-        if self.forecast is not None:
+        if self.yield_estimate is not None:
             expected |= {
-                **self.forecast.finds.as_json(),
-                "layouts": self.forecast.layouts,
+                **self.yield_estimate.finds.as_json(),
+                "layouts": self.yield_estimate.layouts,
                 "variants_a_cpu_second": round(self.rate, 1),
-                "seen_once": round(self.forecast.seen_once, 4),
+                "seen_once": round(self.yield_estimate.seen_once, 4),
             }
         if self.proportioned is not None:
             expected["proportions"] = {"holds": round(self.proportioned.holds, 4), "stable": self.proportioned.stable}
-        return {"autoconfig": made, "forecast": expected, "cpu_seconds": round(self.seconds, 1)}
+        return {"autoconfig": made, "yield_estimate": expected, "cpu_seconds": round(self.seconds, 1)}
 
     def lines(self) -> list[tuple[str, str]]:
         """Title and text of each thing that was chosen and foreseen."""
         chosen = [(key, f"{_shown(each)}: {self.choices.reasons[key]}") for key, each in self.choices.values.items()]
-        lines = [*chosen, ("forecast", self.sentence)]
-        if self.forecast is not None:
-            whole = f"half of the finds have {self.forecast.finds.copied:.0%} or more in one piece of an exemplar"
-            once = f"{self.forecast.seen_once:.0%} of the parts stand in a pattern that occurs once"
+        lines = [*chosen, ("yield_estimate", self.sentence)]
+        if self.yield_estimate is not None:
+            whole = f"half of the finds have {self.yield_estimate.finds.copied:.0%} or more in one piece of an exemplar"
+            once = f"{self.yield_estimate.seen_once:.0%} of the parts stand in a pattern that occurs once"
             lines += [
-                ("search", f"{found_words(self.forecast.finds)}, {self.rate:.3g} variants a CPU second"),
+                ("search", f"{trial_text(self.yield_estimate.finds)}, {self.rate:.3g} variants a CPU second"),
                 ("copied", whole),
                 ("patterns", once),
             ]
         return lines
 
 
-def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: ReadLimits | None = None) -> Prospect:
+def inspect_models(
+    config: KitConfig, models: Sequence[Model], tries: int, limits: ReadLimits | None = None
+) -> InspectionReport:
     """Decide what `config` leaves open, and forecast what comes of it. Models that are read otherwise, as
-    `cut_if_nothing_comes` says, are read within `limits`.
+    `use_sections_if_empty` says, are read within `limits`.
 
     Raises ConfigError for a model in which no part has any area, and for stated hubs that are no types.
     """
     start = time.process_time()
     identified = identify_parts(models, config)
-    first = Reading(config, models, identified, choose(config, models, identified, tries))
-    reading = cut_if_nothing_comes(first, limits or ReadLimits(), tries, REQUIREMENTS)
+    first = ResolvedKit(config, models, identified, resolve_settings(config, models, identified, tries))
+    reading = use_sections_if_empty(first, limits or ReadLimits(), tries, REQUIREMENT_KEYS)
     models, choices = reading.models, reading.choices
     decided = reading.config.decide(choices.values)
     built = seen = reading.observe(choices.values)
@@ -124,25 +126,27 @@ def look_at(config: KitConfig, models: Sequence[Model], tries: int, limits: Read
         fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
         kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
         facing = Facing(built.kit)
-        assemblies = [facing.turned_back(each, facing.turn(each)) for each in islice(kept, SHOWN)]
+        assemblies = [facing.turned_back(each, facing.turn(each)) for each in islice(kept, MAX_SHAPES_SHOWN)]
     shapes = [kit_shape(built.kit, each) for each in assemblies]
     proportioned = None
-    instead = None if expected is None else instead_of_layouts(reading, expected, SHOWN)
+    instead = None if expected is None else resize_fallback(reading, expected, MAX_SHAPES_SHOWN)
     if instead is not None:
         proportioned, choices, built = instead.proportioned, instead.choices, instead.built
         decided, shapes = reading.config.decide(choices.values), list(proportioned.shapes)
     torn = reading.config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
     seconds = time.process_time() - start
-    return Prospect(decided, models, config, choices, seen, built, expected, shapes, rate, seconds, torn, proportioned)
+    return InspectionReport(
+        decided, models, config, choices, seen, built, expected, shapes, rate, seconds, torn, proportioned
+    )
 
 
-def foreseen(asked: KitConfig, reading: Reading, answers: ContactAnswers, tries: int) -> Forecast:
+def foreseen(asked: KitConfig, reading: ResolvedKit, answers: ContactAnswers, tries: int) -> YieldEstimate:
     """What a short search promises of the layouts of the kit of `answers`, which is built as `reading` has chosen of
     what `asked` leaves open."""
     choices = reading.choices
     known = choices.finds.graphs if choices.finds is not None else 0
     hubs = hubs_by_choice(asked, answers.kit)
-    return forecast(answers.kit, answers, tries, known, hubs, choices.values.get(CHOSEN_COPIED, 1.0))
+    return estimate_yield(answers.kit, answers, tries, known, hubs, choices.values.get(CHOSEN_COPIED, 1.0))
 
 
 def _shown(value: Any) -> str:

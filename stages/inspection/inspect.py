@@ -14,12 +14,8 @@ from pydantic import ValidationError
 
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
-from stages.autoconfig.choose import REQUIREMENTS
-from stages.autoconfig.config_text import config_text, dataset_name, proportions_section, variations_section
-from stages.autoconfig.prospect import Prospect, look_at
+from stages.autoconfig.resolve import REQUIREMENT_KEYS
 from stages.autoconfig.settings import AutoconfigConfig
-from stages.autoconfig.sheet import forecast_sheet
-from stages.exemplars.inspect import inspection, inspection_lines
 from stages.exemplars.parse import FORMATS
 from stages.exemplars.portrait import kit_sheet
 from stages.exemplars.read import read_model
@@ -27,6 +23,10 @@ from stages.exemplars.segment import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.grammars.inspect import has_grammar, written_grammar
 from stages.grammars.read_surface import is_cloud
+from stages.inspection.config_text import config_text, dataset_name, proportions_section, variations_section
+from stages.inspection.observation import describe_observation, observation_lines
+from stages.inspection.report import InspectionReport, inspect_models
+from stages.inspection.sample_figure import sample_figure
 from stages.shape.kit import ContactKind, Strictness
 from stages.variations.settings import CHOSEN_INSTEAD_STABLE
 
@@ -46,14 +46,14 @@ def main(arguments: list[str]) -> int:
             return 0
         models = [read_model(path, asked.parts, limits) for path in paths]
         config = _config(asked, paths)
-        found = look_at(config, models, asked.tries, limits)
-        seen = inspection(found.seen, found.models, found.config)
+        found = inspect_models(config, models, asked.tries, limits)
+        seen = describe_observation(found.seen, found.models, found.config)
         if asked.json:
             written = {} if asked.out is None else dict(_written(asked.out, paths, found))
             files = {title: str(path) for title, path in written.items()}
             print(json.dumps({**seen, **found.as_json(), "files": files}, ensure_ascii=False, allow_nan=False))
             return 0
-        for line in inspection_lines(seen, found.config):
+        for line in observation_lines(seen, found.config):
             print(line)
         print()
         for title, line in found.lines():
@@ -83,12 +83,12 @@ def _show_cloud(asked: argparse.Namespace, path: Path, limits: ReadLimits) -> No
         print(f"{title:<18} {said}", flush=True)
 
 
-def _written(folder: Path, paths: Sequence[Path], found: Prospect) -> Iterator[tuple[str, Path]]:
+def _written(folder: Path, paths: Sequence[Path], found: InspectionReport) -> Iterator[tuple[str, Path]]:
     """Write the picture of what was seen, the sheet of what it can become and the config; what each is, and where."""
     name = dataset_name(paths)
     kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
     yield "picture", write_file(folder / f"{name}.png", kit_sheet(kit))
-    layouts = found.forecast.layouts if found.forecast is not None else 0
+    layouts = found.yield_estimate.layouts if found.yield_estimate is not None else 0
     if found.shapes:
         title, note = "Most different finds of a short search", found.sentence
         if found.proportioned is not None:
@@ -96,14 +96,14 @@ def _written(folder: Path, paths: Sequence[Path], found: Prospect) -> Iterator[t
                 "The same in other proportions",
                 f"{found.proportioned.holds:.0%} of what is drawn holds together",
             )
-        sheet = forecast_sheet(found.built.kit, found.shapes, title, name, note)
+        sheet = sample_figure(found.built.kit, found.shapes, title, name, note)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
     if found.proportioned is not None:
         why = found.choices.reasons[CHOSEN_INSTEAD_STABLE]
-        others = found.forecast.sentence if found.forecast else "nothing"
+        others = found.yield_estimate.sentence if found.yield_estimate else "nothing"
         asked = proportions_section(found.proportioned.different, found.proportioned.stable, why, others)
     else:
-        require = {key: found.choices.values[key] for key in REQUIREMENTS}
+        require = {key: found.choices.values[key] for key in REQUIREMENT_KEYS}
         asked = variations_section(found.config, found.choices.reasons, require, layouts)
     text = config_text(name, found.config, found.models, found.choices.reasons, asked, found.sentence)
     yield "config", write_file(folder / f"{name}.yaml", text.encode())
