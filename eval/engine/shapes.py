@@ -69,7 +69,7 @@ def model_kits(path: Path, up: str) -> Iterator[tuple[str, Kit]]:
     """The kit of a model file, with the file's name, or its folder's where the file is just called `model`."""
     name = path.parent.name if path.stem == "model" else path.stem
     config = KitConfig(name="model", shapes=(ShapeFile(path=path),), up="z" if up == "z" else "y")
-    config = config.decide(STRICTEST)
+    config = config.resolve(STRICTEST)
     yield name, observe_models(config, [read_model(path, config.parts)]).kit
 
 

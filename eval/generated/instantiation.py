@@ -15,7 +15,7 @@ from eval.engine.dataset_run import Subject
 from eval.engine.models import Trained, trained_models
 from eval.engine.table import Cell, Published, Table
 from pipeline.randomness import decision_rng
-from stages.exemplars.faults import assembly_faults
+from stages.shape.assembly_faults import assembly_faults
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit

@@ -16,7 +16,7 @@ from eval.engine.table import Cell, Table
 from pipeline.errors import ConfigError
 from stages.exemplars.build import observe_models
 from stages.exemplars.read import read_model
-from stages.exemplars.segment import Segmentation
+from stages.exemplars.segmentation import Segmentation
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.points.area_sampling import SurfacePoints, sample_shape
 from stages.shape.arrays import IntArray
@@ -98,7 +98,7 @@ def _cut(shape: Shape, cut: Segmentation) -> Shape:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "merged.glb"
         merged(shape, path)
-        config = KitConfig(name="merged", shapes=(ShapeFile(path=path),), parts=cut, up=shape.up).decide(STRICTEST)
+        config = KitConfig(name="merged", shapes=(ShapeFile(path=path),), parts=cut, up=shape.up).resolve(STRICTEST)
         kit = observe_models(config, [read_model(path, cut)]).kit
     return Shape(kit.types, kit.exemplars[0].whole, kit.up, kit.type_names())
 

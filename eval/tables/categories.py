@@ -32,13 +32,13 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from eval.generated.pose_clusters import clusters_of
     from eval.strings.ambiguity import ambiguity, ambiguity_table
     from pipeline.randomness import decision_rng
-    from stages.exemplars.language import made_kits
+    from stages.exemplars.language import dataset_kits
     from stages.shape.shape import kit_shape
     from stages.strings.categories import CategorySpace
     from stages.strings.kit_strings import KitStrings
     from stages.strings.settings import StringsConfig
 
-    kits = made_kits(subject.places)
+    kits = dataset_kits(subject.places)
     edges = subject.config.section(StringsConfig).edges
     writers = {name: KitStrings(kit, edges) for name, kit in kits.items()}
     judged, clusters, open_graphs, lines, strips = [], [], [], {}, []

@@ -17,7 +17,7 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
     from eval.engine.pictures import shape_picture
     from eval.strings.compression import Stored, compression_row, compression_table, round_trip
     from pipeline.shards import read_shard
-    from stages.exemplars.language import LANGUAGE, made_kits
+    from stages.exemplars.language import LANGUAGE, dataset_kits
     from stages.shape.collection.pairs import CONTACTS, pairs_of
     from stages.shape.shape import Shape
     from stages.strings.compression import Codebook
@@ -30,7 +30,7 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
             if not shape.is_stretched:
                 samples.setdefault(record["kit"], []).append(Stored(shape.assembly, members["json"], members["glb"]))
     rows, pictures = [], []
-    for name, kit in made_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.places).items():
         stored = samples.get(name, [])
         for edges in EDGES if stored else ():
             book = Codebook(kit, edges)

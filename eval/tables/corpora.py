@@ -17,12 +17,12 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
     from eval.strings.corpora import corpora_table, corpus_row
     from eval.strings.growth import read_finds
     from pipeline.randomness import decision_rng
-    from stages.exemplars.language import made_kits
+    from stages.exemplars.language import dataset_kits
     from stages.strings.settings import Edges
 
     folder = subject.places.stage("variations").root
     rows = []
-    for name, kit in made_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.places).items():
         finds = read_finds(folder, name)
         groups = {
             f"{name}, inputs": [each.assembly for each in kit.exemplars],

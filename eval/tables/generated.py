@@ -34,7 +34,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from eval.engine.pictures import shape_picture
     from eval.generated.generated_shapes import Dream, dream_row, dreams_table, finished_shapes
     from pipeline.places import Places
-    from stages.exemplars.language import made_kits
+    from stages.exemplars.language import dataset_kits
     from stages.shape.shape import kit_shape
 
     learnt: dict[str, list[Dream]] = {}
@@ -47,7 +47,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         if len(made := dreamt.setdefault(name, [])) < asked.dreams:
             made.append(each)
     rows, strips = [], []
-    for name, kit in made_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.places).items():
         groups = {f"{name}, learnt": learnt.get(name, []), f"{name}, dreamt": dreamt.get(name, [])}
         base = groups[f"{name}, learnt"]
         for title, shapes in groups.items():

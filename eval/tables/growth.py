@@ -19,11 +19,11 @@ GENERATIONS = 5
 
 def _answer(subject: Subject, _: Namespace) -> Answer:
     from eval.strings.growth import generation_table, grown, growth_table
-    from stages.exemplars.language import made_kits
+    from stages.exemplars.language import dataset_kits
     from stages.strings.settings import StringsConfig
 
     strings, folder = subject.config.section(StringsConfig), subject.places.stage("variations").root
-    kits = made_kits(subject.places)
+    kits = dataset_kits(subject.places)
     found = {name: grown(kit, folder, strings, subject.config.seed) for name, kit in kits.items()}
     lines = {
         name: [(0.0, float(each.inputs.graphs)), *((float(n), float(s.graphs)) for n, s in each.generations.items())]

@@ -34,7 +34,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         outcome_table,
     )
     from eval.strings.string_vaes import string_vaes
-    from stages.exemplars.language import made_kits
+    from stages.exemplars.language import dataset_kits
     from stages.shape.graphs.canonical import graph_digest
     from stages.shape.shape import kit_shape
     from stages.string_sampling.mending import mended
@@ -46,7 +46,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     compared: list[tuple[str, str, Sequence[Attempt]]] = []
     strips: list[Strip] = []
     models, seed = [each for each in string_vaes(subject.models) if each.seed == 0], subject.config.seed
-    for name, kit in made_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.places).items():
         train, test = (_lines(subject, name, split) for split in ("train", "test"))
         if not test:
             continue

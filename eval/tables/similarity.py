@@ -36,13 +36,13 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
 def _exemplars(subject: Subject) -> dict[str, list[FloatArray]]:
     """The triangles of the exemplars of each kit, and of the mesh of each grammar."""
     from eval.grammars.similarity import triangles_of
-    from stages.exemplars.language import made_kits
+    from stages.exemplars.language import dataset_kits
     from stages.grammars.files import made_grammars
     from stages.shape.shape import kit_shape
 
     found = {
         name: [triangles_of(kit_shape(kit, each.assembly)) for each in kit.exemplars]
-        for name, kit in made_kits(subject.places).items()
+        for name, kit in dataset_kits(subject.places).items()
     }
     for name, grammar in made_grammars(subject.places).items():
         found[name] = [grammar.exemplar.vertices[grammar.exemplar.faces]]

@@ -57,12 +57,12 @@ def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]
     from eval.generated.instantiation import instantiator_of
     from eval.strings.latent_interpolation import journey_strips
     from eval.strings.string_vaes import corpus_strings, model_rng, reconstruction, sampling, shape_graphs, structure
-    from stages.exemplars.language import made_kits
+    from stages.exemplars.language import dataset_kits
     from stages.string_sampling.instantiation.layout import STANDARD
     from stages.strings.settings import StringsConfig
     from stages.training.string_vae.latent_sampling import WAYS
 
-    model, seed, kits = trained.model, subject.config.seed, made_kits(subject.places)
+    model, seed, kits = trained.model, subject.config.seed, dataset_kits(subject.places)
     train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))
     strips: list[Strip] = []
     if not trained.seed and trained.kit in kits:

@@ -9,11 +9,17 @@ from typing import Literal
 
 import numpy as np
 
-from stages.exemplars.findings import LOOSER, pieces
-from stages.exemplars.fits import fitting_dockings
-from stages.exemplars.grammar import Contacts, observe_contacts, observe_neighbourhoods, observe_nested, with_depths
-from stages.exemplars.hubs import set_hubs_aside, with_touching
-from stages.exemplars.identify import Identified
+from stages.exemplars.diagnostics import TOLERANCE_FACTORS, connected_pieces
+from stages.exemplars.hubs import remove_hubs, with_touching_types
+from stages.exemplars.identify import IdentifiedParts
+from stages.exemplars.inferred_dockings import infer_dockings
+from stages.exemplars.observed_grammar import (
+    ObservedContacts,
+    measure_depths,
+    observe_contacts,
+    observe_neighbourhoods,
+    observe_nested,
+)
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Assembly, ContactKind, Docking, Exemplar, Grammar, Kit, Strictness, labels_of
 
@@ -24,7 +30,7 @@ AS_LARGE = 0.98
 ALL_KINDS: tuple[ContactKind, ...] = ("point", "line", "face")
 
 
-def resolve_contact_tolerance(identified: Identified, strictest: float) -> tuple[float, str]:
+def resolve_contact_tolerance(identified: IdentifiedParts, strictest: float) -> tuple[float, str]:
     """The tolerance to type, as a share of the median part's diagonal, and the reason.
 
     `strictest` where it makes one piece of every exemplar; else the least of some multiples that does and of which the
@@ -32,10 +38,10 @@ def resolve_contact_tolerance(identified: Identified, strictest: float) -> tuple
     """
     found: list[tuple[float, int, int, bool]] = []
     total = sum(len(each) for each in identified.assemblies)
-    for factor in (1.0, *LOOSER):
+    for factor in (1.0, *TOLERANCE_FACTORS):
         test = ContactTest(identified.types, factor * strictest * identified.median_diagonal)
         joined = [replace(each, edges=test.contacts(each.types, each.poses)) for each in identified.assemblies]
-        largest = sum(int((pieces(each) == 0).sum()) for each in joined)
+        largest = sum(int((connected_pieces(each) == 0).sum()) for each in joined)
         count = sum(len(each.edges) for each in joined)
         if largest == total and factor == 1.0:
             return strictest, "every exemplar is in one piece"
@@ -74,7 +80,7 @@ class ContactAnalysis:
 
     def __init__(
         self,
-        identified: Identified,
+        identified: IdentifiedParts,
         tolerance: float,
         pose_tolerance: float,
         up: Literal["y", "z"],
@@ -93,7 +99,7 @@ class ContactAnalysis:
         ]
 
     @cached_property
-    def contacts(self) -> Contacts:
+    def contacts(self) -> ObservedContacts:
         """All contacts, with their classes and kinds."""
         return observe_contacts(self.types, self._touching, self._contact, self.pose_tolerance, ALL_KINDS)
 
@@ -135,7 +141,7 @@ class ContactAnalysis:
         found = []
         for assembly in self.counted(setting):
             bare = np.flatnonzero(~np.isin(assembly.types, setting.hubs))
-            found.append(bare[pieces(assembly.select(bare)) == 0] if len(bare) else bare)
+            found.append(bare[connected_pieces(assembly.select(bare)) == 0] if len(bare) else bare)
         return found
 
     def kit(self, setting: Setting) -> Kit:
@@ -144,7 +150,7 @@ class ContactAnalysis:
         counted, staying = self.counted(setting), self.staying(setting)
         if not all(map(len, staying)):
             raise ValueError("nothing stays of a model")
-        seen = [with_touching(each, keep, setting.hubs) for each, keep in zip(counted, staying, strict=True)]
+        seen = [with_touching_types(each, keep, setting.hubs) for each, keep in zip(counted, staying, strict=True)]
         everything = [each.select(parts) for each, parts in zip(counted, seen, strict=True)]
         dockings = self._dockings(setting)
         labels = labels_of(self.types)[1]
@@ -153,7 +159,7 @@ class ContactAnalysis:
         edges = [each.edges for each in everything]
         face: ContactKind = "face"  # no kinds are asked for
         kinds = [(face,) * len(each) for each in edges]
-        bare, backdrops, rules, _ = set_hubs_aside(self._used(setting, everything), everything, grammar, kinds, edges)
+        bare, backdrops, rules, _ = remove_hubs(self._used(setting, everything), everything, grammar, kinds, edges)
         return Kit(
             name="seen",
             types=self.types,
@@ -174,9 +180,9 @@ class ContactAnalysis:
         if self._fit_tolerance is None:
             return seen
         if setting.kinds not in self._dockings_by_meaning:
-            assemblies, deep = self.counted(setting), with_depths(self.types, seen)
+            assemblies, deep = self.counted(setting), measure_depths(self.types, seen)
             tolerances = (self._fit_tolerance, self.pose_tolerance)
-            fits = fitting_dockings(self.types, assemblies, deep, self._contact, *tolerances)
+            fits = infer_dockings(self.types, assemblies, deep, self._contact, *tolerances)
             self._dockings_by_meaning[setting.kinds] = (*deep, *fits)
         return self._dockings_by_meaning[setting.kinds]
 

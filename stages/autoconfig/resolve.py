@@ -23,8 +23,8 @@ from stages.autoconfig.setting_search import (
 )
 from stages.autoconfig.trial_search import TrialResult
 from stages.autoconfig.up_axis import resolve_up_axis
-from stages.exemplars.hubs import chosen_hubs
-from stages.exemplars.identify import Identified
+from stages.exemplars.hubs import hub_types
+from stages.exemplars.identify import IdentifiedParts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.kit import Assembly, Kit
@@ -74,7 +74,7 @@ REQUIREMENT_KEYS = (CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS)
 def resolve_settings(
     config: KitConfig,
     models: Sequence[Model],
-    identified: Identified,
+    identified: IdentifiedParts,
     tries: int,
     require: Sequence[str] = REQUIREMENT_KEYS,
 ) -> Resolution:
@@ -86,7 +86,7 @@ def resolve_settings(
     is random in it depends on the models and on what is stated alone, so every run and `make inspect` choose alike.
     Raises ConfigError for stated hubs that are no types.
     """
-    open_keys = config.left_open()
+    open_keys = config.auto_keys()
     values: dict[str, Any] = {key: STRICTEST[key] for key in open_keys}
     reasons = dict.fromkeys(open_keys, "the default")
     if "up" in open_keys:
@@ -94,9 +94,11 @@ def resolve_settings(
     if "contact.tolerance" in open_keys:
         found = resolve_contact_tolerance(identified, STRICTEST["contact.tolerance"])
         values["contact.tolerance"], reasons["contact.tolerance"] = found
-    stated = config.decide(values)
+    stated = config.resolve(values)
     fitting = config.fit_tolerance if config.types == "meaning" else None
-    sight = ContactAnalysis(identified, stated.decided().tolerance, config.pose_tolerance, stated.decided().up, fitting)
+    sight = ContactAnalysis(
+        identified, stated.resolved().tolerance, config.pose_tolerance, stated.resolved().up, fitting
+    )
     one_surface = any(each.is_cut for each in models)
     rungs = search_settings(sight, _rails(stated, sight, open_keys, one_surface), tries)
     for key, (value, why) in _required(sight, rungs).items():
@@ -191,12 +193,12 @@ def _rails(stated: KitConfig, sight: ContactAnalysis, open_keys: Sequence[str], 
     such parts: a piece that does not come back is a hole. By meaning labels alone say what may stand beside what, and
     all of them must have been seen: with looser rules a chair has one leg.
     """
-    made = stated.decided()
+    made = stated.resolved()
     peels = "hubs.types" in open_keys and stated.types != "meaning" and not one_surface
     return SearchSpace(
         kinds=CANDIDATE_KINDS if "contact.kinds" in open_keys else (made.kinds,),
         grammars=CANDIDATE_GRAMMARS if "grammar" in open_keys and stated.types != "meaning" else (made.grammar,),
-        hubs=None if peels else chosen_hubs(stated, sight.types),
+        hubs=None if peels else hub_types(stated, sight.types),
         largest="disconnected" in open_keys or made.disconnected == "largest",
     )
 

@@ -11,7 +11,7 @@ from pipeline.errors import ConfigError
 from stages.autoconfig.resolve import Resolution, resolve_settings
 from stages.autoconfig.yield_estimate import estimate_yield
 from stages.exemplars.build import Observation, observe_parts
-from stages.exemplars.identify import Identified, identify_parts
+from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
@@ -30,13 +30,13 @@ class ResolvedKit:
 
     config: KitConfig
     models: Sequence[Model]
-    identified: Identified
+    identified: IdentifiedParts
     choices: Resolution
     _observed: dict[str, Observation] = field(default_factory=dict, compare=False, repr=False)
 
     def observe(self, values: Mapping[str, Any]) -> Observation:
         """What a run builds of the models where the keys left open come to `values`; built once for the same."""
-        config = self.config.decide(values)
+        config = self.config.resolve(values)
         told = config.model_dump_json()
         if told not in self._observed:
             self._observed[told] = observe_parts(config, self.models, self.identified)
@@ -68,8 +68,8 @@ def use_sections_if_empty(first: ResolvedKit, limits: ReadLimits, tries: int, re
     if sum(len(each) for each in identified.assemblies) < MIN_PARTS_PER_TYPE * len(identified.types):
         return first
     searched = ("contact.kinds", "grammar", "hubs.types")
-    strictest = {key: STRICTEST[key] for key in config.left_open() if key in searched}
-    choices = resolve_settings(config.decide(strictest), models, identified, tries, require)
+    strictest = {key: STRICTEST[key] for key in config.auto_keys() if key in searched}
+    choices = resolve_settings(config.resolve(strictest), models, identified, tries, require)
     values = {**strictest, **choices.values}
     reasons = {**dict.fromkeys(strictest, "the strictest, and it gives enough"), **choices.reasons}
     if not choices.enough:

@@ -22,7 +22,7 @@ def plan(plan: Plan) -> list[Shard]:
     """One shard for each kit that leaves a key open; its params hold the kit's config, its models' digests, and what
     variants must be that is open, too."""
     variations = plan.config.section(VariationsConfig)
-    left_open = variations.require.left_open if variations.per_kit else ()
+    left_open = variations.require.auto_keys if variations.per_kit else ()
     if variations.search.sub_assemblies:  # what is asked for by this name has no carcass
         left_open = tuple(key for key in left_open if key != CHOSEN_CARCASS)
     return [
@@ -77,7 +77,7 @@ def _shown(value: Any) -> str:
 
 
 def _open_kits(config: Config) -> list[KitConfig]:
-    return [kit for kit in config.section(ExemplarsConfig).kits if kit.left_open()]
+    return [kit for kit in config.section(ExemplarsConfig).kits if kit.auto_keys()]
 
 
 STAGE = Stage(

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.randomness import decision_rng
-from stages.exemplars.identify import Identified
+from stages.exemplars.identify import IdentifiedParts
 from stages.exemplars.model import Model
 from stages.points.area_sampling import sample_surface
 from stages.shape.arrays import FloatArray
@@ -48,7 +48,7 @@ REASONS = {
 """What the axis is told from, each with its sentence."""
 
 
-def resolve_up_axis(models: Sequence[Model], identified: Identified) -> tuple[Literal["y", "z"], str]:
+def resolve_up_axis(models: Sequence[Model], identified: IdentifiedParts) -> tuple[Literal["y", "z"], str]:
     """The axis that points up in `models`, whose parts are `identified`, and the reason, a sentence.
 
     A format that lets files choose is believed (COLLADA). glTF calls y up whatever stands in it, and other formats
@@ -126,7 +126,7 @@ def _foot(corners: FloatArray, axis: int) -> tuple[float, bool]:
     return float(hull.volume / np.ptp(points, axis=0).max() ** 2), bool(above)
 
 
-def _turns(identified: Identified) -> list[int]:
+def _turns(identified: IdentifiedParts) -> list[int]:
     """How many parts are turned against the first of their type about x, y and z, by the least of such turns."""
     counts = np.zeros(3, dtype=np.int64)
     for assembly in identified.assemblies:

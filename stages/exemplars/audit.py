@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.places import Places
-from stages.exemplars.faults import geometry_faults
-from stages.exemplars.language import LANGUAGE, made_kits
+from stages.exemplars.language import LANGUAGE, dataset_kits
+from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
@@ -14,7 +14,7 @@ from stages.shape.collection.packaged import Packaged
 def _anew(sample: Packaged, places: Places) -> Iterator[str]:
     """Contacts, grammar and penetration, from the mesh as it stands in the file."""
     if sample.record["language"] == LANGUAGE.name:
-        yield from geometry_faults(made_kits(places)[sample.record["kit"]], sample.members)
+        yield from geometry_faults(dataset_kits(places)[sample.record["kit"]], sample.members)
 
 
 AUDIT = Audit(anew=_anew)

@@ -9,13 +9,13 @@ from typing import get_args
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.findings import kit_warnings, pieces, refusals, some
-from stages.exemplars.fits import fitting_dockings
+from stages.exemplars.diagnostics import connected_pieces, kit_warnings, listed_names, refusals
 from stages.exemplars.formats.scene import UniqueNames
-from stages.exemplars.grammar import observe_contacts, observe_grammar
-from stages.exemplars.hubs import chosen_hubs, set_hubs_aside, with_touching
-from stages.exemplars.identify import Identified, identify_parts
+from stages.exemplars.hubs import hub_types, remove_hubs, with_touching_types
+from stages.exemplars.identify import IdentifiedParts, identify_parts
+from stages.exemplars.inferred_dockings import infer_dockings
 from stages.exemplars.model import Model
+from stages.exemplars.observed_grammar import observe_contacts, observe_grammar
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
@@ -86,7 +86,7 @@ def observe_models(config: KitConfig, models: Sequence[Model]) -> Observation:
     return observe_parts(config, models, identify_parts(models, config))
 
 
-def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identified) -> Observation:
+def observe_parts(config: KitConfig, models: Sequence[Model], identified: IdentifiedParts) -> Observation:
     """What Shapemill sees in `models`, whose parts are `identified`, also where it could make no kit of them.
 
     Hubs that the config leaves out are not in the exemplars; those kept as backdrop are types of the kit, and what
@@ -94,14 +94,14 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
     piece of what is left of each exemplar is seen. Raises ConfigError for a model in which no part has any area, or
     nothing but hubs, for hubs that are no types, and for a config that leaves a key at `auto`.
     """
-    made = config.decided()
+    made = config.resolved()
     types, aliases, names = identified.types, identified.aliases, list(identified.part_names)
     median = identified.median_diagonal
     contact = ContactTest(types, made.tolerance * median)
     pose_tolerance, counted = config.pose_tolerance * median, made.kinds
     touching = [replace(each, edges=contact.contacts(each.types, each.poses)) for each in identified.assemblies]
     contacts = observe_contacts(types, touching, contact, pose_tolerance, counted)
-    hubs = chosen_hubs(config, types)
+    hubs = hub_types(config, types)
     left_out = [types[index].name for index in hubs]
     kept, warnings = _kept_parts(config, models, identified, contacts.counted, hubs)
     is_whole = all(len(keep) == len(each) for keep, each in zip(kept, touching, strict=True))
@@ -111,7 +111,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
     else:
         # Classes of dockings, their order and their poses are those of the parts that are seen.
         backdrop = hubs if config.hubs.keep == "backdrop" else ()
-        seen = [with_touching(each, keep, backdrop) for each, keep in zip(contacts.counted, kept, strict=True)]
+        seen = [with_touching_types(each, keep, backdrop) for each, keep in zip(contacts.counted, kept, strict=True)]
         everything = [each.select(parts) for each, parts in zip(touching, seen, strict=True)]
         used = np.unique(np.concatenate([each.types for each in everything]))
         types, aliases = tuple(types[index] for index in used), tuple(aliases[index] for index in used)
@@ -121,11 +121,11 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         grammar = observe_grammar(types, everything, contacts, counted)
         aside = np.flatnonzero(np.isin(used, backdrop)).tolist()
         edges = [each.edges for each in everything]
-        assemblies, backdrops, grammar, kinds = set_hubs_aside(aside, contacts.counted, grammar, contacts.kinds, edges)
+        assemblies, backdrops, grammar, kinds = remove_hubs(aside, contacts.counted, grammar, contacts.kinds, edges)
         names = [tuple(words[part] for part in keep.tolist()) for words, keep in zip(names, kept, strict=True)]
         touching = [each.select(keep) for each, keep in zip(touching, kept, strict=True)]
     if config.types == "meaning":
-        fits = fitting_dockings(
+        fits = infer_dockings(
             types, assemblies, grammar.dockings, contact, config.fit_tolerance * median, pose_tolerance
         )
         grammar = replace(grammar, dockings=(*grammar.dockings, *fits))
@@ -154,7 +154,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
 def _kept_parts(
     config: KitConfig,
     models: Sequence[Model],
-    identified: Identified,
+    identified: IdentifiedParts,
     assemblies: Sequence[Assembly],
     hubs: Sequence[int],
 ) -> tuple[list[np.ndarray], list[str]]:
@@ -166,7 +166,7 @@ def _kept_parts(
         left_out = [f"{part} ({why})" for owner, part, why in identified.left_out if owner is model]
         if left_out:
             parts = "1 part is" if len(left_out) == 1 else f"{len(left_out)} parts are"
-            warnings.append(f"{model.path.name}: {parts} left out of the model: {some(left_out)}")
+            warnings.append(f"{model.path.name}: {parts} left out of the model: {listed_names(left_out)}")
     kept = [np.flatnonzero(~np.isin(each.types, hubs)) for each in assemblies]
     for model, each, keep in zip(models, assemblies, kept, strict=True):
         if not len(keep):
@@ -174,9 +174,9 @@ def _kept_parts(
         if len(keep) < len(each):
             named = ", ".join(types[index].name for index in np.intersect1d(hubs, each.types))
             warnings.append(f"{model.path.name}: {len(each) - len(keep)} hubs are left out of the graph: {named}")
-    if config.decided().disconnected == "largest":
+    if config.resolved().disconnected == "largest":
         for index, (each, model) in enumerate(zip(assemblies, models, strict=True)):
-            apart = kept[index][pieces(each.select(kept[index])) > 0]
+            apart = kept[index][connected_pieces(each.select(kept[index])) > 0]
             if len(apart):
                 left = ", ".join(identified.part_names[index][part] for part in apart[:5].tolist())
                 warnings.append(f"{model.path.name}: {len(apart)} parts apart from the rest are left out: {left}")

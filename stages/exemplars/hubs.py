@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
-from stages.exemplars.grammar import observe_neighbourhoods
+from stages.exemplars.observed_grammar import observe_neighbourhoods
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import IntArray
 from stages.shape.kit import Assembly, ContactKind, Grammar, PartType
@@ -17,10 +17,10 @@ from stages.shape.kit import Assembly, ContactKind, Grammar, PartType
 NO_EDGES = np.empty((0, 2), dtype=np.int32)
 
 
-def chosen_hubs(config: KitConfig, types: Sequence[PartType]) -> tuple[int, ...]:
+def hub_types(config: KitConfig, types: Sequence[PartType]) -> tuple[int, ...]:
     """The types that the config leaves out of the graphs, ascending. Raises ConfigError for a name that no type has."""
     names = [each.name for each in types]
-    wanted = config.decided().hubs
+    wanted = config.resolved().hubs
     for name in wanted:
         if name not in names:
             near = nearest(name, names)
@@ -29,7 +29,7 @@ def chosen_hubs(config: KitConfig, types: Sequence[PartType]) -> tuple[int, ...]
     return tuple(sorted(names.index(name) for name in wanted))
 
 
-def with_touching(assembly: Assembly, parts: np.ndarray, types: Sequence[int]) -> np.ndarray:
+def with_touching_types(assembly: Assembly, parts: np.ndarray, types: Sequence[int]) -> np.ndarray:
     """`parts` of an assembly and those of the given `types` that touch one of them, ascending."""
     chosen = np.zeros(len(assembly), dtype=bool)
     chosen[parts] = True
@@ -40,7 +40,7 @@ def with_touching(assembly: Assembly, parts: np.ndarray, types: Sequence[int]) -
     return found
 
 
-def set_hubs_aside(
+def remove_hubs(
     hub_types: Sequence[int],
     assemblies: Sequence[Assembly],
     grammar: Grammar,

@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 
 from pipeline.errors import ConfigError
 from stages.exemplars.congruence import ComparableMesh, comparable_mesh, congruences
-from stages.exemplars.frame import extremal_frame
-from stages.exemplars.meanings import meant
+from stages.exemplars.extremal_frame import extremal_frame
+from stages.exemplars.label_map import apply_label_map
 from stages.exemplars.model import Model, RawPart
 from stages.exemplars.repair import repair_mesh
 from stages.exemplars.settings import KitConfig
@@ -24,7 +24,7 @@ from stages.shape.kit import Assembly, PartType
 
 
 @dataclass(frozen=True)
-class Identified:
+class IdentifiedParts:
     """The parts of the models by type.
 
     assemblies: one for each model, without edges yet; part_names: the names of their parts; repairs: how often a
@@ -57,7 +57,7 @@ class _Type:
     words: dict[str, None]
 
 
-def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
+def identify_parts(models: Sequence[Model], config: KitConfig) -> IdentifiedParts:
     """Repair the parts of `models`, called by what the config says they mean, and give each its type, in the order in
     which types appear.
 
@@ -70,7 +70,7 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
     assemblies: list[Assembly] = []
     part_names: list[tuple[str, ...]] = []
     left_out: list[tuple[Model, str, str]] = []
-    for model, parts in zip(models, meant(models, config), strict=True):
+    for model, parts in zip(models, apply_label_map(models, config), strict=True):
         seen: dict[tuple[str, str | None], tuple[int, FloatArray] | None] = {}
         names: list[str] = []
         indices: list[int] = []
@@ -96,9 +96,11 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
         part_names.append(tuple(names))
     part_types = tuple(each.part for each in types)
     aliases = tuple(tuple(each.words)[1:] for each in types)
-    whole = Identified(part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases)
+    whole = IdentifiedParts(
+        part_types, tuple(assemblies), tuple(part_names), dict(sorted(repairs.items())), (), aliases
+    )
     for index, model in enumerate(models):
-        other = standing_twice(part_types, assemblies[index], config.pose_tolerance * whole.median_diagonal)
+        other = coincident_parts(part_types, assemblies[index], config.pose_tolerance * whole.median_diagonal)
         called = part_names[index]
         left_out += [
             (model, called[part], f"it stands at the very place of {called[first]}") for part, first in other.items()
@@ -108,7 +110,7 @@ def identify_parts(models: Sequence[Model], config: KitConfig) -> Identified:
     return replace(whole, assemblies=tuple(assemblies), part_names=tuple(part_names), left_out=tuple(left_out))
 
 
-def standing_twice(types: Sequence[PartType], assembly: Assembly, tolerance: float) -> dict[int, int]:
+def coincident_parts(types: Sequence[PartType], assembly: Assembly, tolerance: float) -> dict[int, int]:
     """The parts at the very place of an earlier one of their type, each with that one.
 
     tolerance: how far a pose, up to the symmetries of its type, may be from another's to be the same, in units of the

@@ -69,7 +69,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def made_kits(places: Places) -> dict[str, Kit]:
+def dataset_kits(places: Places) -> dict[str, Kit]:
     """The kits of a dataset out of the mill's folder."""
     made = places.stage("exemplars").root
     return {
@@ -81,7 +81,7 @@ def made_kits(places: Places) -> dict[str, Kit]:
 
 def _anew(places: Places) -> Anew:
     """The kit's meshes at the poses of the record."""
-    kits = made_kits(places)
+    kits = dataset_kits(places)
 
     def shape(record: Mapping[str, Any], contacts: IntArray) -> Shape:
         if record["kit"] not in kits:

@@ -10,10 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stages.exemplars.segment import Segmentation
+from stages.exemplars.segmentation import Segmentation
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
-STATED = "as the config says"
+STATED_IN_CONFIG = "as the config says"
 """Why a model has the parts that it has where nobody looked for others."""
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from pipeline.bounded import Escaped, in_child
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, pack_model, unpack_model
-from stages.exemplars.parse import parse_model
-from stages.exemplars.segment import Segmentation
+from stages.exemplars.scene_file import parse_model
+from stages.exemplars.segmentation import Segmentation
 from stages.exemplars.settings import ReadLimits
 
 

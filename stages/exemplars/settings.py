@@ -13,7 +13,7 @@ from pipeline.errors import ConfigError
 from stages.shape.collection.origin import Credit
 from stages.shape.kit import ContactKind, Strictness
 
-OPEN_KEYS = ("up", "contact.tolerance", "contact.kinds", "grammar", "hubs.types", "disconnected")
+AUTO_KEYS = ("up", "contact.tolerance", "contact.kinds", "grammar", "hubs.types", "disconnected")
 """The keys of a kit that may be left at `auto`, in the order in which they are decided."""
 
 STRICTEST: Mapping[str, Any] = {
@@ -26,7 +26,7 @@ STRICTEST: Mapping[str, Any] = {
 }
 """Where every choice of these keys begins."""
 
-LOOSEST = 0.05
+MAX_CONTACT_TOLERANCE = 0.05
 """The greatest contact tolerance, as a share of the median part's diagonal."""
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
@@ -48,7 +48,7 @@ class ReadLimits(StrictModel):
 class ContactConfig(StrictModel):
     """When two parts are neighbours."""
 
-    tolerance: Literal["auto"] | Annotated[float, Field(gt=0, le=LOOSEST)] = Field(
+    tolerance: Literal["auto"] | Annotated[float, Field(gt=0, le=MAX_CONTACT_TOLERANCE)] = Field(
         "auto",
         description="Largest distance of parts in contact, as a share of the median part diagonal; `auto` takes 0.001, "
         "or as much more as makes one piece of every exemplar.",
@@ -117,7 +117,7 @@ class KitConfig(StrictModel):
         description="What makes a part type: congruent geometry; congruent geometry with the model's own label; or "
         "that label alone, whatever the geometry: parts of one meaning take each other's places where they fit.",
     )
-    meanings: dict[str, Annotated[tuple[str, ...], Field(min_length=1)]] = Field(
+    label_map: dict[str, Annotated[tuple[str, ...], Field(min_length=1)]] = Field(
         default_factory=dict,
         description="With `types: meaning` or `labels` what parts mean whose models do not say so: a meaning, and the "
         "names or patterns (`leg*`) of the parts, of their labels or of their meshes; `chair/leg*` for those of the "
@@ -174,18 +174,18 @@ class KitConfig(StrictModel):
 
     @model_validator(mode="after")
     def _meanings_are_asked_for(self) -> KitConfig:
-        if self.meanings and self.types == "congruence":
+        if self.label_map and self.types == "congruence":
             raise ValueError("`meanings` name parts, and types go by congruence; set `types: meaning`, or `labels`")
         return self
 
-    def left_open(self) -> tuple[str, ...]:
+    def auto_keys(self) -> tuple[str, ...]:
         """Those of OPEN_KEYS that are `auto`."""
-        return tuple(key for key in OPEN_KEYS if self._value(key) == "auto")
+        return tuple(key for key in AUTO_KEYS if self._value(key) == "auto")
 
-    def decide(self, chosen: Mapping[str, Any]) -> KitConfig:
+    def resolve(self, chosen: Mapping[str, Any]) -> KitConfig:
         """This kit with the values `chosen`, by OPEN_KEYS, of the keys that it leaves open; what it states stays."""
         listed = {key: tuple(each) if isinstance(each, list) else each for key, each in chosen.items()}
-        left = {key: listed[key] for key in self.left_open() if key in listed}
+        left = {key: listed[key] for key in self.auto_keys() if key in listed}
         contact = {key.removeprefix("contact."): each for key, each in left.items() if key.startswith("contact.")}
         hubs = {"types": left["hubs.types"]} if "hubs.types" in left else {}
         own = {key: each for key, each in left.items() if "." not in key}
@@ -197,7 +197,7 @@ class KitConfig(StrictModel):
             }
         )
 
-    def decided(self) -> Decided:
+    def resolved(self) -> ResolvedSettings:
         """The values of OPEN_KEYS. Raises ConfigError where one of them is still `auto`."""
         tolerance, kinds, hubs = self.contact.tolerance, self.contact.kinds, self.hubs.types
         up, grammar, disconnected = self.up, self.grammar, self.disconnected
@@ -209,8 +209,8 @@ class KitConfig(StrictModel):
             or hubs == "auto"
             or disconnected == "auto"
         ):
-            raise ConfigError(f"kit {self.name}: nobody has decided {', '.join(self.left_open())}")
-        return Decided(up, tolerance, kinds, grammar, () if hubs == "none" else hubs, disconnected)
+            raise ConfigError(f"kit {self.name}: nobody has decided {', '.join(self.auto_keys())}")
+        return ResolvedSettings(up, tolerance, kinds, grammar, () if hubs == "none" else hubs, disconnected)
 
     def _value(self, key: str) -> Any:
         found: Any = self
@@ -220,7 +220,7 @@ class KitConfig(StrictModel):
 
 
 @dataclass(frozen=True)
-class Decided:
+class ResolvedSettings:
     """What a kit's config says of the keys that could be left open. tolerance: a share of the median part diagonal;
     hubs: names of the types that are left out."""
 

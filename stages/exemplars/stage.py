@@ -22,7 +22,7 @@ def plan(plan: Plan) -> list[Shard]:
         Shard(
             kit.name,
             {"kit": kit.name, "digests": [file_digest(shape.path) for shape in kit.shapes]},
-            (f"autoconfig/{kit.name}",) if kit.left_open() else (),
+            (f"autoconfig/{kit.name}",) if kit.auto_keys() else (),
         )
         for kit in plan.config.section(ExemplarsConfig).kits
     ]
@@ -31,23 +31,23 @@ def plan(plan: Plan) -> list[Shard]:
 def run_shard(task: Task) -> Outcome:
     """Read, repair, identify, observe, write."""
     from stages.exemplars.build import build_kit
-    from stages.exemplars.portrait import kit_sheet
+    from stages.exemplars.kit_figure import kit_figure
     from stages.exemplars.read import read_model
     from stages.shape.kit_files import write_kit
 
     section = task.config.section(ExemplarsConfig)
     config = next(kit for kit in section.kits if kit.name == task.shard.params["kit"])
     chosen: dict[str, Any] = {"chosen": {}, "why": {}}
-    if config.left_open():
+    if config.auto_keys():
         chosen = json.loads(task.input("autoconfig", f"{config.name}.json").read_bytes())
-        config = config.decide(chosen["chosen"])
+        config = config.resolve(chosen["chosen"])
         config = config.model_copy(update={"parts": chosen["chosen"].get("parts", config.parts)})
     models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
         write_kit(kit, text, arrays)
     with task.output(f"{kit.name}.png") as picture:
-        picture.write(kit_sheet(kit))
+        picture.write(kit_figure(kit))
     return Outcome(
         samples=len(kit.exemplars),
         summary={

@@ -40,7 +40,7 @@ def main() -> None:
 
 
 def _row(name: str, found: InspectionReport) -> Iterator[str]:
-    made, seen = found.config.decided(), found.seen.kit
+    made, seen = found.config.resolved(), found.seen.kit
     yield name
     yield str(sum(len(each.assembly) for each in seen.exemplars))
     yield str(len(seen.types))

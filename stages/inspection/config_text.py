@@ -45,14 +45,14 @@ def config_text(
 ) -> str:
     """The YAML of a dataset of one kit. `config` leaves nothing open; `reasons` are by key; `asked`: the lines that say
     what is made of it; `said`: the forecast in a sentence."""
-    made = config.decided()
+    made = config.resolved()
     segmentation = ", ".join(dict.fromkeys(model.segmentation for model in models))
     why = "; ".join(dict.fromkeys(model.why for model in models))
     kit: list[tuple[int, str, Any, str]] = [
         (3, "parts", config.parts, f"{segmentation}: {why}" if config.parts == "auto" else reasons.get("parts", "")),
         (3, "types", config.types, "what makes a part type"),
-        *([(3, "meanings", None, "")] if config.meanings else []),
-        *((4, _value(name), list(patterns), "") for name, patterns in config.meanings.items()),
+        *([(3, "label_map", None, "")] if config.label_map else []),
+        *((4, _value(name), list(patterns), "") for name, patterns in config.label_map.items()),
         (3, "up", made.up, reasons.get("up", "")),
         (3, "contact", None, ""),
         (4, "tolerance", made.tolerance, reasons.get("contact.tolerance", "")),
@@ -99,7 +99,7 @@ def variations_section(
         _line(2, "duplicates", *_DUPLICATES[config.types == "meaning"]),
         "  require:",
     ]
-    if config.decided().hubs and config.hubs.keep == "backdrop":
+    if config.resolved().hubs and config.hubs.keep == "backdrop":
         lines.append(
             _line(2, "hubs", CHOSEN_HUBS, "a variant with a smaller share of what the exemplars have is refused")
         )

@@ -16,10 +16,10 @@ from pipeline.errors import ConfigError
 from pipeline.places import write_file
 from stages.autoconfig.resolve import REQUIREMENT_KEYS
 from stages.autoconfig.settings import AutoconfigConfig
-from stages.exemplars.parse import FORMATS
-from stages.exemplars.portrait import kit_sheet
+from stages.exemplars.kit_figure import kit_figure
 from stages.exemplars.read import read_model
-from stages.exemplars.segment import Segmentation
+from stages.exemplars.scene_file import READERS
+from stages.exemplars.segmentation import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
 from stages.grammars.inspect import has_grammar, written_grammar
 from stages.grammars.read_surface import is_cloud
@@ -63,7 +63,7 @@ def main(arguments: list[str]) -> int:
             print(f"{title:<18} {path}")
         if len(models) == 1 and has_grammar(models[0], asked.parts):
             sys.stdout.flush()
-            up, name = found.config.decided().up, dataset_name(paths)
+            up, name = found.config.resolved().up, dataset_name(paths)
             for title, said in written_grammar(asked.out or FOLDER, name, paths[0], up, limits):
                 print(f"{title:<18} {said}")
     except ConfigError as error:
@@ -87,7 +87,7 @@ def _written(folder: Path, paths: Sequence[Path], found: InspectionReport) -> It
     """Write the picture of what was seen, the sheet of what it can become and the config; what each is, and where."""
     name = dataset_name(paths)
     kit = replace(found.seen.kit, name=" + ".join(each.name for each in found.seen.kit.exemplars))
-    yield "picture", write_file(folder / f"{name}.png", kit_sheet(kit))
+    yield "picture", write_file(folder / f"{name}.png", kit_figure(kit))
     layouts = found.yield_estimate.layouts if found.yield_estimate is not None else 0
     if found.shapes:
         title, note = "Most different finds of a short search", found.sentence
@@ -112,7 +112,7 @@ def _written(folder: Path, paths: Sequence[Path], found: InspectionReport) -> It
 def _paths(text: str) -> list[Path]:
     """The models that one argument names: a file, or several with spaces between them, as in MESH="a.glb b.glb"."""
     several = [Path(each) for each in text.split()]
-    if Path(text).exists() or not all(each.suffix.lower() in FORMATS for each in several):
+    if Path(text).exists() or not all(each.suffix.lower() in READERS for each in several):
         return [Path(text)]
     return several
 
@@ -125,7 +125,7 @@ def _config(asked: argparse.Namespace, paths: Sequence[Path]) -> KitConfig:
             name="inspected",
             shapes=tuple(ShapeFile(path=path) for path in paths),
             parts=asked.parts,
-            meanings=dict(asked.meaning),
+            label_map=dict(asked.meaning),
             contact=ContactConfig(**{key: value for key, value in contact.items() if value is not None}),
             **{key: value for key, value in settings.items() if value is not None},
         )
@@ -162,7 +162,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--types", choices=["congruence", "labels", "meaning"], help="what makes a part type")
     parser.add_argument(
         "--meaning", type=_meaning, action="append", default=[], metavar="NAME=PATTERN,...",
-        help="what parts mean whose names do not say so, as exemplars.kits[].meanings in a config",
+        help="what parts mean whose names do not say so, as exemplars.kits[].label_map in a config",
     )  # fmt: skip
     parser.add_argument("--tolerance", type=float, help="contact tolerance, as a share of the median part's diagonal")
     parser.add_argument("--kinds", type=_kinds, help="kinds of contact that count, such as face or line,face")

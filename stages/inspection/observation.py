@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stages.exemplars.build import Observation
-from stages.exemplars.findings import hubs, mirror_twins, pieces
+from stages.exemplars.diagnostics import connected_pieces, hub_parts, mirror_twins
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from stages.shape.kit_files import describe_kit
@@ -50,7 +50,7 @@ def describe_observation(seen: Observation, models: Sequence[Model], config: Kit
 def _model(seen: Observation, index: int, model: Model) -> dict[str, Any]:
     exemplar = seen.kit.exemplars[index]
     assembly, names = exemplar.assembly, exemplar.part_names
-    piece = pieces(assembly)
+    piece = connected_pieces(assembly)
     degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly)).tolist()
     return {
         "model": str(model.path),
@@ -63,13 +63,13 @@ def _model(seen: Observation, index: int, model: Model) -> dict[str, Any]:
             [i, j, kind] for (i, j), kind in zip(seen.contacts[index].tolist(), seen.kinds[index], strict=True)
         ],
         "pieces": [np.flatnonzero(piece == number).tolist() for number in range(int(piece.max()) + 1)],
-        "hubs": [{"part": part, "name": names[part], "contacts": degrees[part]} for part in hubs(assembly)],
+        "hubs": [{"part": part, "name": names[part], "contacts": degrees[part]} for part in hub_parts(assembly)],
     }
 
 
 def observation_lines(found: dict[str, Any], config: KitConfig) -> Iterator[str]:
     """What `describe_observation` found, for people. `config` leaves nothing open."""
-    made = config.decided()
+    made = config.resolved()
     models = found.get("models", [found])
     for model in models:
         yield model["model"]
@@ -116,7 +116,7 @@ def _model_lines(model: dict[str, Any], config: KitConfig) -> Iterator[tuple[str
     words = {"face": "over a face", "line": "along a line", "point": "in a point"}
     found = ", ".join(f"{kinds.count(kind)} {word}" for kind, word in words.items() if kind in kinds)
     uncounted = len(kinds) - len(model["contacts"])
-    aside = f"; {uncounted} of them do not count, only kinds {', '.join(config.decided().kinds)}" if uncounted else ""
+    aside = f"; {uncounted} of them do not count, only kinds {', '.join(config.resolved().kinds)}" if uncounted else ""
     yield "contacts", f"{len(kinds)}" + (f": {found}" if found else "") + aside
     listed = ", ".join(map(str, sizes[:MOST_PIECES])) + (" ..." if len(sizes) > MOST_PIECES else "")
     yield "connected", "yes" if len(sizes) == 1 else f"no, {len(sizes)} pieces of {listed} parts"

@@ -111,9 +111,9 @@ def inspect_models(
     first = ResolvedKit(config, models, identified, resolve_settings(config, models, identified, tries))
     reading = use_sections_if_empty(first, limits or ReadLimits(), tries, REQUIREMENT_KEYS)
     models, choices = reading.models, reading.choices
-    decided = reading.config.decide(choices.values)
+    decided = reading.config.resolve(choices.values)
     built = seen = reading.observe(choices.values)
-    if decided.decided().hubs or decided.decided().disconnected == "largest":
+    if decided.resolved().hubs or decided.resolved().disconnected == "largest":
         seen = reading.observe({**choices.values, "hubs.types": "none", "disconnected": "error"})
     expected, assemblies, rate = None, [], 0.0
     if not built.refusals:
@@ -132,7 +132,7 @@ def inspect_models(
     instead = None if expected is None else resize_fallback(reading, expected, MAX_SHAPES_SHOWN)
     if instead is not None:
         proportioned, choices, built = instead.proportioned, instead.choices, instead.built
-        decided, shapes = reading.config.decide(choices.values), list(proportioned.shapes)
+        decided, shapes = reading.config.resolve(choices.values), list(proportioned.shapes)
     torn = reading.config.parts == "auto" and all(each.segmentation not in ("nodes", "objects") for each in models)
     seconds = time.process_time() - start
     return InspectionReport(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.places import Places
-from stages.exemplars.language import made_kits
+from stages.exemplars.language import dataset_kits
 from stages.proportions.faults import warp_fault
 from stages.proportions.language import LANGUAGE
 from stages.proportions.text import ProportionError, exemplar_of, proportion_text, read_proportions, shape_of_text
@@ -18,7 +18,7 @@ def _anew(sample: Packaged, places: Places) -> Iterator[str]:
     record = sample.record
     if record["language"] != LANGUAGE.name:
         return
-    kit = made_kits(places)[record["kit"]]
+    kit = dataset_kits(places)[record["kit"]]
     try:
         name, warp = read_proportions(record["text"])
         fault = warp_fault(kit, exemplar_of(kit, name).whole, shape_of_text(kit, record["text"]))

@@ -7,7 +7,7 @@ from typing import Any
 
 from pipeline.places import Places
 from pipeline.stage import Plan
-from stages.exemplars.language import Kits, made_kits
+from stages.exemplars.language import Kits, dataset_kits
 from stages.proportions.text import shape_of_text
 from stages.shape.arrays import IntArray
 from stages.shape.collection.language import Anew, Language
@@ -39,7 +39,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
 
 
 def _anew(places: Places) -> Anew:
-    kits = made_kits(places)
+    kits = dataset_kits(places)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
         if record["kit"] not in kits:

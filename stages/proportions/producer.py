@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stages.exemplars.chosen import chosen_table
 from stages.exemplars.origins import exemplar_origins
+from stages.exemplars.resolved_table import resolved_table
 from stages.proportions.settings import ProportionsConfig
 from stages.shape.collection.producer import Producer
 
@@ -18,7 +18,7 @@ PRODUCER = Producer(
     "same exemplars: they tell whether a model knows sizes that it has not seen, not layouts.",
     apart=False,
     origins=lambda plan: exemplar_origins(plan.config),
-    card=chosen_table,
+    card=resolved_table,
     limits=(
         "All shapes have the parts of an exemplar, in the same order and with the same contacts; only sizes differ.",
         "What is round becomes oval, and what stands aslant leans otherwise.",

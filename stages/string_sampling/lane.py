@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Task
-from stages.exemplars.faults import assembly_faults
+from stages.shape.assembly_faults import assembly_faults
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.exemplars.formats.scene import Placement, Scene, Surface
+from stages.exemplars.formats.scene import ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.symmetry.pieces import RADIUS, Piece, repeated_pieces
@@ -22,19 +22,19 @@ STRAINED = 0.02
 """Share of the surface of what runs along a row from which on it is told that one copy stands for others."""
 
 
-def by_symmetry(scene: Scene) -> Scene:
+def by_symmetry(scene: ModelScene) -> ModelScene:
     """The scene as one mesh in the world, cut into `repeated_pieces`: a surface for each of them, `piece-00` and so on,
     with a placement for each of its poses. Triangles without area are left out, with a warning that counts them; where
     there are no others, the scene stays as it is."""
     return _parted(scene, repeated_pieces)
 
 
-def by_sections(scene: Scene) -> Scene:
+def by_sections(scene: ModelScene) -> ModelScene:
     """The scene as one mesh in the world, cut into `slab_pieces`; as `by_symmetry`."""
     return _parted(scene, slab_pieces)
 
 
-def _parted(scene: Scene, pieces_of: Callable[[FloatArray, IntArray], list[Piece]]) -> Scene:
+def _parted(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[Piece]]) -> ModelScene:
     vertices, joined = _in_the_world(scene)
     real = with_area(vertices[joined])
     if not real.any():
@@ -60,7 +60,7 @@ def _parted(scene: Scene, pieces_of: Callable[[FloatArray, IntArray], list[Piece
     return replace(scene, kind="nodes", surfaces=tuple(surfaces), placements=tuple(placements), warnings=warnings)
 
 
-def search_size(scene: Scene) -> int:
+def search_size(scene: ModelScene) -> int:
     """How large a search for symmetries of the scene would be: `about_size`."""
     vertices, faces = _in_the_world(scene)
     return about_size(vertices[faces], RADIUS)
@@ -77,7 +77,7 @@ def about_size(corners: FloatArray, radius: float) -> int:
     return len(corners) + round(1.5 * area / 2 / size**2)
 
 
-def _in_the_world(scene: Scene) -> tuple[FloatArray, IntArray]:
+def _in_the_world(scene: ModelScene) -> tuple[FloatArray, IntArray]:
     """All surfaces where they are placed, as one mesh: vertices float64 (v, 3), faces int32 (f, 3)."""
     moved = [
         transform_points(placement.pose, scene.surfaces[placement.surface].vertices) for placement in scene.placements

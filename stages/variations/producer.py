@@ -7,8 +7,8 @@ from typing import Any
 
 from pipeline.config import Config
 from pipeline.stage import Plan
-from stages.exemplars.chosen import chosen_table
 from stages.exemplars.origins import exemplar_origins
+from stages.exemplars.resolved_table import resolved_table
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
@@ -52,7 +52,7 @@ def _listed(counts: Mapping[str, int]) -> str:
 
 
 def _made(plan: Plan) -> Sequence[str]:
-    return [*chosen_table(plan), *_endings(plan)]
+    return [*resolved_table(plan), *_endings(plan)]
 
 
 def _lineage(_: Config) -> Mapping[str, Field]:

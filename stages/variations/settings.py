@@ -247,7 +247,7 @@ class VariantRequirements(StrictModel):
     )
 
     @property
-    def left_open(self) -> tuple[str, ...]:
+    def auto_keys(self) -> tuple[str, ...]:
         """Those of CHOSEN_COPIED, CHOSEN_STABLE and CHOSEN_CARCASS that are left at `auto`."""
         said = {CHOSEN_COPIED: self.copied, CHOSEN_STABLE: self.stable, CHOSEN_CARCASS: self.carcass}
         return tuple(key for key, each in said.items() if each == "auto")

@@ -20,7 +20,7 @@ BATCH = 10
 def bench() -> Iterator[Measure]:
     """Shapes a second and core, of the larger castle that comes with Shapemill."""
     shapes = tuple(ShapeFile(path=path) for path in sorted(Path("datasets/exemplars/castle").glob("*.glb")))
-    kit = read_kit(KitConfig(name="castle", shapes=shapes).decide(STRICTEST))
+    kit = read_kit(KitConfig(name="castle", shapes=shapes).resolve(STRICTEST))
     book, assembly = Codebook(kit, "all"), kit.exemplars[0].assembly
     (encoded,) = book.writer.strings(book.writer.graph(assembly), 0, np.random.default_rng(0))
     packed = pack(book, describe(book, assembly, encoded))

@@ -37,7 +37,7 @@ def bench() -> Iterator[Measure]:
         path = REAL / name / "model.glb"
         contact = ContactConfig(kinds=("point", "line", "face"))
         config = KitConfig(name="bench", shapes=(ShapeFile(path=path),), contact=contact)
-        kit, _ = build_kit(config.decide(STRICTEST), [read_model(path)])
+        kit, _ = build_kit(config.resolve(STRICTEST), [read_model(path)])
         whole = kit.exemplars[0].assembly
         crops = [_crop(kit, whole, size) for size in sorted({min(size, len(whole)) for size in SIZES})]
         short = name.split("_")[0]

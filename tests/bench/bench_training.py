@@ -86,7 +86,7 @@ def _programs_measure() -> Measure:
 def castle_strings() -> tuple[Strings, Vocabulary, int]:
     """Nine strings of each of SHAPES variants."""
     shapes = tuple(ShapeFile(path=path) for path in sorted(Path("datasets/exemplars/castle").glob("*.glb")))
-    kit = read_kit(KitConfig(name="castle", shapes=shapes).decide(STRICTEST))
+    kit = read_kit(KitConfig(name="castle", shapes=shapes).resolve(STRICTEST))
     rng = np.random.default_rng(0)
     found, _ = Search(ContactAnswers(kit), SearchConfig()).run(rng, SHAPES, 10**9, "bench", lambda count: None)
     writer = KitStrings(kit, "all")

@@ -88,7 +88,7 @@ def _some(line: Search, rng: np.random.Generator, found: list[Assembly]) -> int:
 def _kit(paths: tuple[Path, ...], kinds: tuple[Any, ...]) -> Kit:
     config = KitConfig(
         name="bench", shapes=tuple(ShapeFile(path=path) for path in paths), contact=ContactConfig(kinds=kinds)
-    ).decide(STRICTEST)
+    ).resolve(STRICTEST)
     kit, _ = build_kit(config, [read_model(path) for path in paths])
     return kit
 

@@ -68,7 +68,7 @@ they stand themselves."""
 def _real(*folders: str, grammar: str = "multiset", up: str = "y") -> Family:
     paths = tuple(ShapeFile(path=REAL / each / "model.glb") for each in folders)
     chosen = {**STRICTEST, "grammar": grammar, "up": up}
-    return read_kit(KitConfig(name="family", shapes=paths).decide(chosen)), SearchConfig(duplicates="graph")
+    return read_kit(KitConfig(name="family", shapes=paths).resolve(chosen)), SearchConfig(duplicates="graph")
 
 
 def _dungeon() -> Family:
@@ -83,7 +83,7 @@ def _furniture() -> Family:
     """As coarse as meanings may be: what is stretched by four at most and stands about as it stood."""
     paths = [REAL / each / "model.glb" for each in FURNITURE]
     config = KitConfig(
-        name="furniture", shapes=tuple(ShapeFile(path=path) for path in paths), types="meaning", meanings=MEANINGS
+        name="furniture", shapes=tuple(ShapeFile(path=path) for path in paths), types="meaning", label_map=MEANINGS
     )
     chosen = {
         **STRICTEST,
@@ -92,7 +92,7 @@ def _furniture() -> Family:
         "contact.tolerance": 0.02,
         "disconnected": "largest",
     }
-    kit, _ = build_kit(config.decide(chosen), side_by_side([read_model(path) for path in paths]))
+    kit, _ = build_kit(config.resolve(chosen), side_by_side([read_model(path) for path in paths]))
     return kit, SearchConfig(duplicates="graph", smallest=0.5, stretch=StretchConfig(most=4.0))
 
 
@@ -104,7 +104,7 @@ def _chairs() -> Family:
             for seed in range(1, 11)
         ]
         config = KitConfig(name="chairs", shapes=tuple(ShapeFile(path=path) for path in paths), types="meaning")
-        kit = read_kit(config.decide({**STRICTEST, "contact.tolerance": 0.01}))
+        kit = read_kit(config.resolve({**STRICTEST, "contact.tolerance": 0.01}))
     return kit, SearchConfig(duplicates="graph")
 
 

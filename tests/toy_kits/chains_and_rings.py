@@ -61,7 +61,7 @@ def config_of(shapes: Sequence[Sequence[Placed]], kinds: Sequence[str] = ("face"
         name="toy",
         shapes=tuple(Path(__file__) for _ in shapes),
         contact=ContactConfig(kinds=tuple(kinds)),  # type: ignore[arg-type]
-    ).decide(STRICTEST)
+    ).resolve(STRICTEST)
 
 
 def kit_of(

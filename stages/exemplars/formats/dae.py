@@ -19,7 +19,7 @@ from stages.exemplars.formats.colors import color_bytes, decode_image, face_pain
 from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.markup import check_markup
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, SENSELESS, Placement, Scene, Surface, type_label
+from stages.exemplars.formats.scene import GREY, SENSELESS, ModelScene, Placement, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _DEEPEST = 200
@@ -30,7 +30,7 @@ X_TO_Y = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 
 """The turn after which y points up where x did."""
 
 
-def read_dae(path: Path, enclosure: Enclosure) -> Scene:
+def read_dae(path: Path, enclosure: Enclosure) -> ModelScene:
     """The scene of a `.dae` file; placements stand in depth-first order of its node tree.
 
     Everything that one node places is one surface. Coordinates are in metres, by the file's own unit; up is the axis
@@ -60,7 +60,7 @@ class _Reader:
         self.images: dict[str, ByteArray | None] = {}
         self.walked = 0
 
-    def scene(self) -> Scene:
+    def scene(self) -> ModelScene:
         surfaces: list[Surface] = []
         placements: list[Placement] = []
         place_of: dict[tuple[Any, ...], int] = {}
@@ -81,7 +81,7 @@ class _Reader:
         said = getattr(self.document.assetInfo, "upaxis", None)
         placed = self.in_metres(surfaces, placements, X_TO_Y if said == "X_UP" else np.eye(4))
         warnings = tuple(dict.fromkeys(self.warnings))
-        return Scene("nodes", *placed, warnings, "z" if said == "Z_UP" else "y")
+        return ModelScene("nodes", *placed, warnings, "z" if said == "Z_UP" else "y")
 
     def in_metres(
         self, surfaces: list[Surface], placements: list[Placement], turn: FloatArray

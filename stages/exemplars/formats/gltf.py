@@ -23,13 +23,13 @@ from stages.exemplars.formats.colors import (
 )
 from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.gltf_file import COMPRESSED, GltfFile
-from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface, type_label
+from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, ModelScene, Placement, Surface, type_label
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
-def read_gltf(path: Path, enclosure: Enclosure) -> Scene:
+def read_gltf(path: Path, enclosure: Enclosure) -> ModelScene:
     """The scene of a `.glb` or `.gltf` file; placements stand in depth-first order of its node tree.
 
     Several primitives of a mesh are one surface. Skins, morph targets, cameras, lights and animations are left out.
@@ -51,7 +51,7 @@ class _Reader:
         self.warnings: list[str] = []
         self.images: dict[int, ByteArray | None] = {}
 
-    def scene(self) -> Scene:
+    def scene(self) -> ModelScene:
         nodes = list(self.walk())
         used = sorted({self.header["nodes"][index]["mesh"] for index, _ in nodes})
         surfaces = [self.surface(index) for index in used]
@@ -67,7 +67,7 @@ class _Reader:
                 self.warnings.append(f"node {name!r} has a skin; it is left out and the mesh is taken as it stands")
             label = type_label(name) if type_label(name) != name else mesh_name or node_name
             placements.append(Placement(name, label, place_of[node["mesh"]], pose))
-        return Scene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
+        return ModelScene("nodes", tuple(surfaces), tuple(placements), tuple(dict.fromkeys(self.warnings)))
 
     def walk(self) -> Iterator[tuple[int, FloatArray]]:
         """Index and world matrix of each node with a mesh, depth first, children in file order."""

@@ -9,18 +9,18 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, face_paint
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface
+from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray
 
 
-def read_off(path: Path) -> Scene:
+def read_off(path: Path) -> ModelScene:
     """The one surface of an ASCII `.off` file. Raises ConfigError for a file that is cut off or malformed."""
     try:
         surface = _parse(path.read_bytes().decode("utf-8", errors="replace"), path.stem)
     except (ArithmeticError, LookupError, ValueError) as error:
         reason = error if isinstance(error, Malformed) else f"its count of vertices and faces, or a colour, {SENSELESS}"
         raise ConfigError(f"{path}: not a whole ASCII OFF file ({reason}); copy or export it again") from None
-    return Scene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),))
+    return ModelScene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),))
 
 
 def _parse(text: str, name: str) -> Surface:

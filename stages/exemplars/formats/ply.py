@@ -15,7 +15,7 @@ from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture, unit_colors
 from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, Placement, Scene, Surface
+from stages.exemplars.formats.scene import GREY, SENSELESS, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray
 
 _TYPES = {
@@ -63,7 +63,7 @@ class _Column:
     lengths: np.ndarray | None = None
 
 
-def read_ply(path: Path, enclosure: Enclosure) -> Scene:
+def read_ply(path: Path, enclosure: Enclosure) -> ModelScene:
     """The one surface of a `.ply` file. Raises ConfigError for a file that is cut off or malformed."""
     content = path.read_bytes()
     try:
@@ -95,7 +95,7 @@ def read_ply(path: Path, enclosure: Enclosure) -> Scene:
     elif texture is not None:
         face_colors = _textured(texture, enclosure, vertex, face, lengths, triangles, faces, face_colors, warnings)
     surface = Surface(path.stem, vertices, faces, face_colors, paint=paint)
-    return Scene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),), tuple(warnings))
+    return ModelScene("objects", (surface,), (Placement(path.stem, None, 0, np.eye(4)),), tuple(warnings))
 
 
 def read_ply_points(path: Path, enclosure: Enclosure) -> tuple[FloatArray, FloatArray | None, ByteArray | None] | None:

@@ -72,7 +72,7 @@ class Placement:
 
 
 @dataclass(frozen=True)
-class Scene:
+class ModelScene:
     """The surfaces of a file and their placements, in the order of the file.
 
     kind: whether placements are nodes of a scene graph or named objects of one mesh.

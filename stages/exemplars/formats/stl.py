@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from stages.exemplars.formats.scene import GREY, Malformed, Placement, Scene, Surface
+from stages.exemplars.formats.scene import GREY, Malformed, ModelScene, Placement, Surface
 from stages.shape.arrays import FloatArray
 
 _HEAD, _TRIANGLE = 84, 50  # bytes
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(path: Path) -> Scene:
+def read_stl(path: Path) -> ModelScene:
     """The surfaces of a `.stl` file, one for each solid. Raises ConfigError, with the line where the file is text, for
     a file that is cut off or malformed."""
     content = path.read_bytes()
@@ -39,7 +39,7 @@ def read_stl(path: Path) -> Scene:
         grey = np.tile(np.array(GREY, np.uint8), (len(faces), 1))
         placements.append(Placement(name, None, len(surfaces), np.eye(4)))
         surfaces.append(Surface(name, vertices, faces, grey))
-    return Scene("objects", tuple(surfaces), tuple(placements))
+    return ModelScene("objects", tuple(surfaces), tuple(placements))
 
 
 def _solids(text: str, stem: str) -> list[tuple[str, FloatArray]]:

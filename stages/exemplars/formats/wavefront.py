@@ -17,7 +17,7 @@ from pipeline.errors import ConfigError
 from stages.exemplars.formats.colors import color_bytes, decode_image, face_paint, sample_texture
 from stages.exemplars.formats.enclosure import Enclosure, Outside
 from stages.exemplars.formats.polygons import triangulate
-from stages.exemplars.formats.scene import GREY, Placement, Scene, Surface, type_label
+from stages.exemplars.formats.scene import GREY, ModelScene, Placement, Surface, type_label
 from stages.shape.arrays import ByteArray
 
 _MAP_OPTIONS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
@@ -44,7 +44,7 @@ class _Lines:
     skipped: set[str] = field(default_factory=set)
 
 
-def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
+def read_wavefront(path: Path, enclosure: Enclosure) -> ModelScene:
     """The scene of an `.obj` file: a placement for each object (`o`; `g` where there is at most one `o`).
 
     Raises ConfigError, with the line, for a number or an index that makes no sense.
@@ -86,7 +86,7 @@ def read_wavefront(path: Path, enclosure: Enclosure) -> Scene:
         for name, start, end in zip(objects, starts, starts[1:], strict=False)
     ]
     placements = [Placement(name, type_label(name), index, np.eye(4)) for index, name in enumerate(objects)]
-    return Scene("objects", tuple(surfaces), tuple(placements), tuple(warnings))
+    return ModelScene("objects", tuple(surfaces), tuple(placements), tuple(warnings))
 
 
 def _parse(path: Path) -> _Lines:

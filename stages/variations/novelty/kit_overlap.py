@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 
-from stages.exemplars.grammar import observe_neighbourhoods
+from stages.exemplars.observed_grammar import observe_neighbourhoods
 from stages.shape.kit import Kit, Multiset
 
 Rule = tuple[int, Multiset]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stages.exemplars.findings import SMALL, hubs
+from stages.exemplars.diagnostics import MAX_PARTS_WITHOUT_HUBS, hub_parts
 from stages.shape.kit import Kit
 from stages.variations.requirements.hub_restoration import NO_BACKDROP
 from stages.variations.requirements.required_labels import NO_CARCASS, carcass
@@ -46,7 +46,7 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
     if pinned:
         return f"{pinned}; split it into several parts in the model, or bring {another}"
     most = max(map(len, labelled))
-    if most <= SMALL:
+    if most <= MAX_PARTS_WITHOUT_HUBS:
         by_meaning = "" if kit.by_meaning else f", or name types {fitting}"
         return f"of {most} parts hardly any can be exchanged; bring more models of the same parts{by_meaning}"
     known = rejects.get(DUPLICATE, 0) + rejects.get(SUBASSEMBLY, 0)
@@ -81,7 +81,7 @@ def _hub(kit: Kit) -> str:
     for exemplar in kit.exemplars:
         assembly = exemplar.assembly
         degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
-        for part in hubs(assembly):
+        for part in hub_parts(assembly):
             share = degrees[part] / (len(assembly) - 1)
             if share > worst[0]:
                 name = exemplar.part_names[part]

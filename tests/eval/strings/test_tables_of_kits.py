@@ -18,7 +18,7 @@ from eval.strings.compression import Stored, compression_row, round_trip
 from eval.strings.corpora import COLUMNS, corpus_row
 from eval.strings.growth import Find, Size, grown, growth_table, read_finds, sizes_by
 from pipeline.records import read_record
-from stages.exemplars.language import made_kits
+from stages.exemplars.language import dataset_kits
 from stages.shape.kit import Assembly
 from stages.strings.compression import Codebook
 from stages.strings.settings import StringsConfig
@@ -64,7 +64,7 @@ def test_a_collection_grows_by_what_is_new_in_each_step() -> None:
 
 def test_growth_agrees_with_the_records_of_the_search(subject: Subject) -> None:
     places = subject.places.stage("variations")
-    for name, kit in made_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.places).items():
         found = grown(kit, places.root, StringsConfig(), 3)
         records = [read_record(path) for path in sorted(places.records.glob(f"{name}-r*-pool.json"))]
         summary = records[-1].summary
@@ -116,7 +116,7 @@ def test_growth_is_a_table_of_what_has_been_searched(subject: Subject, tmp_path:
 
 
 def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: Subject) -> None:
-    for kit in made_kits(subject.places).values():
+    for kit in dataset_kits(subject.places).values():
         for exemplar in kit.exemplars:
             shapes = [exemplar.assembly]
             rows = {
@@ -132,7 +132,7 @@ def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: Su
 
 
 def test_shapes_in_pieces_are_counted_as_without_strings(subject: Subject) -> None:
-    kit = made_kits(subject.places)["castle"]
+    kit = dataset_kits(subject.places)["castle"]
     whole = kit.exemplars[0].assembly
     apart = Assembly(whole.types, whole.poses, whole.edges[:10])
     row = dict(zip(COLUMNS, corpus_row("two", kit, [whole, apart], "tree", np.random.default_rng(1)), strict=True))
@@ -152,7 +152,7 @@ def test_corpora_is_a_table_of_inputs_and_variants(subject: Subject) -> None:
 
 
 def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: Subject) -> None:
-    for name, kit in made_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.places).items():
         finds = [each.assembly for each in read_finds(subject.places.stage("variations").root, name)]
         for edges in ("all", "tree"):
             book = Codebook(kit, edges)
@@ -168,7 +168,7 @@ def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: Subject) -> 
 
 def test_a_shape_that_does_not_come_back_is_told(subject: Subject) -> None:
     """A part that touches another in a way that the kit has not seen: a tree cannot find that contact again."""
-    kit = made_kits(subject.places)["castle"]
+    kit = dataset_kits(subject.places)["castle"]
     whole = kit.exemplars[0].assembly
     touching = {tuple(each) for each in whole.edges.tolist()}
     apart = next(pair for pair in combinations(range(len(whole)), 2) if pair not in touching)

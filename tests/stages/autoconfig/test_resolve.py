@@ -118,7 +118,7 @@ class TestLadder:
     def test_a_chosen_config_builds_the_kit(self) -> None:
         shapes = [ring(1, 1), ring(2, 3)]
         config = left_open(shapes)
-        kit, _ = build_kit(config.decide(chosen(shapes, ROAD).values), models_of(ROAD, shapes))
+        kit, _ = build_kit(config.resolve(chosen(shapes, ROAD).values), models_of(ROAD, shapes))
         assert sum(len(each.assembly) for each in kit.exemplars) == sum(map(len, shapes))
 
     def test_what_stands_apart_is_left_out_and_the_reason_says_so(self) -> None:
@@ -152,13 +152,13 @@ class TestLadder:
         kinds: tuple[ContactKind, ...] = ("point", "line", "face")
         sight = ContactAnalysis(identified, 1e-3, config.pose_tolerance, "y", config.fit_tolerance)
         probed = sight.kit(Setting(kinds, "multiset"))
-        built, _ = build_kit(config.decide(STRICTEST), models)
+        built, _ = build_kit(config.resolve(STRICTEST), models)
         assert probed.grammar.neighbourhoods == built.grammar.neighbourhoods
         pairs = [(each.a, each.b, each.kind, each.depth) for each in built.grammar.dockings]
         assert [(each.a, each.b, each.kind, each.depth) for each in probed.grammar.dockings] == pairs
         assert len(pairs) > len(sight.contacts.dockings)
         made = resolve_settings(config, models, identified, TRIES)
-        assert set(made.values) == {*config.left_open(), *REQUIREMENT_KEYS}
+        assert set(made.values) == {*config.auto_keys(), *REQUIREMENT_KEYS}
         assert made.values["grammar"] == "multiset"
         assert made.finds is not None
         assert made.finds.by_meaning
@@ -181,7 +181,7 @@ class TestCopies:
     def test_a_limit_that_is_stated_is_not_chosen(self) -> None:
         config, models = left_open([ring(1, 1), ring(2, 3)]), models_of(ROAD, [ring(1, 1), ring(2, 3)])
         made = resolve_settings(config, models, identify_parts(models, config), TRIES, require=())
-        assert set(made.values) == set(config.left_open())
+        assert set(made.values) == set(config.auto_keys())
 
     def test_finds_tell_something_unless_they_are_copied_but_for_a_tenth(self) -> None:
         kit, _ = build_kit(config_of([chain(3), chain(5)]), models_of(CHAIN, [chain(3), chain(5)]))
@@ -273,7 +273,7 @@ class TestForecast:
 
 def test_an_undecided_kit_says_what_is_open() -> None:
     config = KitConfig(name="toy", shapes=(Path(__file__),), grammar="multiset")
-    assert config.left_open() == ("up", "contact.tolerance", "contact.kinds", "hubs.types", "disconnected")
-    assert config.decide({"up": "z", "grammar": "count_and_pairs"}).grammar == "multiset"
-    assert config.decide({"up": "z"}).left_open() == config.left_open()[1:]
-    assert config.decide(STRICTEST).decided().kinds == ("point", "line", "face")
+    assert config.auto_keys() == ("up", "contact.tolerance", "contact.kinds", "hubs.types", "disconnected")
+    assert config.resolve({"up": "z", "grammar": "count_and_pairs"}).grammar == "multiset"
+    assert config.resolve({"up": "z"}).auto_keys() == config.auto_keys()[1:]
+    assert config.resolve(STRICTEST).resolved().kinds == ("point", "line", "face")

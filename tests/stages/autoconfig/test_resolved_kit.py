@@ -103,7 +103,7 @@ def test_a_cut_that_cannot_be_made_or_gives_too_little_changes_nothing(
 def test_under_looser_rules_a_longer_search_says_whether_a_cut_is_a_dataset(
     asked: list[KitConfig], monkeypatch: pytest.MonkeyPatch, poor: bool
 ) -> None:
-    loose = {key: STRICTEST[key] for key in read_first().config.left_open()} | {"grammar": "slots", "up": "z"}
+    loose = {key: STRICTEST[key] for key in read_first().config.auto_keys()} | {"grammar": "slots", "up": "z"}
     known: list[int] = []
 
     def choose(config: KitConfig, *_: Any) -> Resolution:
@@ -128,7 +128,7 @@ def test_under_looser_rules_a_longer_search_says_whether_a_cut_is_a_dataset(
 
 def test_what_a_run_builds_is_built_once_for_the_same_values() -> None:
     first = read_first()
-    values = {key: STRICTEST[key] for key in first.config.left_open()}
+    values = {key: STRICTEST[key] for key in first.config.auto_keys()}
     built = first.observe(values)
     assert first.observe(dict(values)) is built
     assert first.observe({**values, "up": "z"}) is not built

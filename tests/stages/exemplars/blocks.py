@@ -41,7 +41,7 @@ def block_config(**settings: Any) -> KitConfig:
         **{key: field.get_default(call_default_factory=True) for key, field in KitConfig.model_fields.items()}
         | {"name": "blocks", "shapes": ()}
         | settings
-    ).decide(STRICTEST)
+    ).resolve(STRICTEST)
 
 
 def block_kit(*models: Model, **settings: Any) -> Kit:

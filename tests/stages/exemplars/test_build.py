@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.exemplars.build import build_kit, observe_models
-from stages.exemplars.findings import hubs, mirror_twins, pieces
-from stages.exemplars.model import STATED, Model
+from stages.exemplars.diagnostics import connected_pieces, hub_parts, mirror_twins
+from stages.exemplars.model import STATED_IN_CONFIG, Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ContactConfig
 from stages.shape.geometry.pose import transform_points
@@ -112,7 +112,7 @@ class TestRefusals:
         assert message.startswith("blocks.glb: has 1 part by nodes (1 scene nodes)")
         assert "split the model into one scene node a part" in message
         assert "parts: auto" not in message
-        assert "set `parts: auto`" in refusal(replace(alone, why=STATED))
+        assert "set `parts: auto`" in refusal(replace(alone, why=STATED_IN_CONFIG))
 
     def test_an_exemplar_in_pieces_is_refused_with_what_is_apart(self) -> None:
         apart = model({"a": (CUBE, (0, 0, 0)), "b": (CUBE, (1, 0, 0)), "c": (CUBE, (2, 0, 0)), "moon": (CUBE, FAR)})
@@ -202,23 +202,23 @@ class TestWarnings:
         floor = {"floor": (box(30, 2, 1), (15, 0, -1))}
         posts = {f"post.{k}": (CUBE, (1 + 1.3 * k, 0.0, 0.0)) for k in range(20)}
         kit, report = build_kit(block_config(), [model(floor | posts)])
-        assert hubs(kit.exemplars[0].assembly) == [0]
+        assert hub_parts(kit.exemplars[0].assembly) == [0]
         assert any("floor (20)" in warning for warning in report.warnings)
 
     def test_small_shapes_have_no_hubs(self) -> None:
-        assert hubs(block_kit(ring()).exemplars[0].assembly) == []
+        assert hub_parts(block_kit(ring()).exemplars[0].assembly) == []
 
     def test_many_contacts_are_a_hub_in_the_largest_shape_too(self) -> None:
         edges = np.array([[0, k] for k in range(1, 22)] + [[30, k] for k in range(31, 51)], dtype=np.int32)
         assembly = Assembly(np.zeros(900, np.int16), np.tile(np.eye(4), (900, 1, 1)), edges)
-        assert hubs(assembly) == [0]
+        assert hub_parts(assembly) == [0]
 
 
 class TestPieces:
     def test_they_are_numbered_from_the_largest_on(self) -> None:
         edges = np.array([[1, 2], [3, 4], [4, 5]], dtype=np.int32)
         assembly = Assembly(np.zeros(6, np.int16), np.tile(np.eye(4), (6, 1, 1)), edges)
-        assert pieces(assembly).tolist() == [2, 1, 1, 0, 0, 0]
+        assert connected_pieces(assembly).tolist() == [2, 1, 1, 0, 0, 0]
 
     @pytest.mark.parametrize(("stated", "named"), [(1e-3, "0.005"), (2e-3, "0.004"), (3e-3, "0.006")])
     def test_the_tolerance_that_is_named_joins_them(self, stated: float, named: str) -> None:

@@ -14,9 +14,9 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import pack_model, unpack_model
-from stages.exemplars.parse import parse_model
 from stages.exemplars.read import read_model
-from stages.exemplars.segment import Segmentation
+from stages.exemplars.scene_file import parse_model
+from stages.exemplars.segmentation import Segmentation
 from stages.exemplars.settings import ReadLimits
 from tests.hostile.corpus import LIMITS, outcomes
 from tests.hostile.good import write_good

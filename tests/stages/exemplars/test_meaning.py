@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from stages.exemplars.faults import geometry_faults
 from stages.exemplars.language import Kits
 from stages.exemplars.settings import KitConfig
 from stages.package.glb import glb_bytes
 from stages.package.record import describe_sample
+from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_files import describe_kit

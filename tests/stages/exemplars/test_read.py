@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, RawPart
-from stages.exemplars.parse import parse_model
 from stages.exemplars.read import read_model
+from stages.exemplars.scene_file import parse_model
 from stages.exemplars.settings import ReadLimits
 from tests.stages.exemplars.model_files import (
     BOX_FACES,

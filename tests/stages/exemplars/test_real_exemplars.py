@@ -36,7 +36,7 @@ pytestmark = pytest.mark.skipif(not FOLDERS, reason="the public exemplars lie be
 def build(folder: Path, mirrored: bool = False, kinds: tuple[ContactKind, ...] = ALL_KINDS) -> Kit:
     path = folder / "model.glb"
     contact = ContactConfig(tolerance=TOLERANCES.get(folder.name[:3], 1e-3), kinds=kinds)
-    config = KitConfig(name="real", shapes=(path,), contact=contact, mirror_images_match=mirrored).decide(STRICTEST)
+    config = KitConfig(name="real", shapes=(path,), contact=contact, mirror_images_match=mirrored).resolve(STRICTEST)
     return build_kit(config, [read_model(path)])[0]
 
 

@@ -25,10 +25,10 @@ def test_what_variants_must_be_is_typed_out_with_its_reasons(copied: float, carc
 def test_names_that_yaml_reads_as_something_else_come_back_as_they_are() -> None:
     shapes = [ring(1, 1), ring(2, 3)]
     meanings = {"no": ("yes", "12", "leg*"), "3: top": ("null",)}
-    config = config_of(shapes).model_copy(update={"types": "meaning", "meanings": meanings})
+    config = config_of(shapes).model_copy(update={"types": "meaning", "label_map": meanings})
     text = config_text("toy", config, models_of(ROAD, shapes), {}, variations_section(config, {}, {}, None), "hundreds")
     (kit,) = yaml.safe_load(text)["exemplars"]["kits"]
-    assert kit["meanings"] == {name: list(patterns) for name, patterns in meanings.items()}
+    assert kit["label_map"] == {name: list(patterns) for name, patterns in meanings.items()}
 
 
 def test_a_config_of_other_proportions_varies_no_layouts_and_says_why() -> None:

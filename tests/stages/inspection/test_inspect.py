@@ -83,7 +83,7 @@ class TestJson:
         found = seen(capsys, ring(tmp_path), *said)
         assert [(each["name"], each["count"]) for each in found["types"]] == [("post", 3), ("cap", 1)]
         kit = yaml.safe_load(Path(found["files"]["config"]).read_text())["exemplars"]["kits"][0]
-        assert kit["meanings"] == {"post": ["cube.00[0-2]"], "cap": ["*.003"]}
+        assert kit["label_map"] == {"post": ["cube.00[0-2]"], "cap": ["*.003"]}
 
     def test_mirror_images_are_pointed_out(self, tmp_path: Path, capsys: Any) -> None:
         skew = (

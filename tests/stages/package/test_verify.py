@@ -129,7 +129,7 @@ def test_a_contact_that_the_meshes_do_not_have_is_found(toy_folder: Path, tmp_pa
     import json
 
     from pipeline.shards import read_shard
-    from stages.exemplars.faults import geometry_faults
+    from stages.shape.assembly_faults import geometry_faults
     from stages.shape.collection.pairs import CONTACTS, pair_bytes, pairs_of
     from tests.stages.package.toy import toy_kit
 

@@ -14,7 +14,7 @@ import yaml
 from eval.engine.dataset_run import load_subject
 from eval.engine.registry import find_tables
 from pipeline.places import Places, file_digest
-from stages.exemplars.language import made_kits
+from stages.exemplars.language import dataset_kits
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
 from stages.shape.sample import Sample, read_samples
@@ -87,7 +87,7 @@ def with_kit(bare: Path, folder: Path) -> Path:
 
 
 def kit_in(out: Path) -> Kit:
-    return made_kits(Places(out, "dreamt"))["chain"]
+    return dataset_kits(Places(out, "dreamt"))["chain"]
 
 
 def samples(out: Path) -> list[Sample]:
@@ -140,7 +140,7 @@ def test_bytes_are_the_same_with_two_workers(dreamt: tuple[Path, str], bare: Pat
 
 def test_known_shapes_are_kept_and_marked_where_they_are_asked_for(bare: Path, tmp_path: Path) -> None:
     config = write_config(tmp_path, known="keep", rounds=2)
-    kit = made_kits(Places(bare, "dreamt"))["chain"]
+    kit = dataset_kits(Places(bare, "dreamt"))["chain"]
     publish_model(tmp_path, "learnt", kit, [string_of(4)])
     assert run(config, tmp_path, *STAGES)[0] == 0
     marks = {each.lineage["string"]: each.lineage["known"] for each in samples(tmp_path)}

@@ -249,7 +249,7 @@ def test_categories_of_other_tokens_are_refused() -> None:
 @pytest.mark.slow
 def test_parts_of_one_label_come_back_with_the_surface_that_they_have(tmp_path: Path) -> None:
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
-    kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").decide(STRICTEST))
+    kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
     space = CategorySpace(kit)
     assert len(kit.labels) < len(kit.types)
     for exemplar in kit.exemplars:

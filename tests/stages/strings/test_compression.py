@@ -77,7 +77,7 @@ def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -
 def test_parts_of_one_label_keep_the_surface_that_they_have(edges: Edges, tmp_path: Path) -> None:
     """Also where they dock as parts of their labels do, though these two were never seen to."""
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
-    kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").decide(STRICTEST))
+    kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
     book = Codebook(kit, edges)
     assert len(kit.labels) < len(kit.types)
     search = Search(ContactAnswers(kit), SearchConfig())
@@ -182,7 +182,7 @@ def test_categories_that_the_kit_does_not_have_are_refused() -> None:
 def test_shapes_with_hundreds_of_cycles_come_back() -> None:
     shared = Path(__file__).resolve().parents[4] / "shared" / "exemplars"
     paths = tuple(shared / name / "model.glb" for name in ("a12_dungeon_room_large", "a13_dungeon_junction"))
-    kit = read_kit(KitConfig(name="dungeon", shapes=paths).decide(STRICTEST))
+    kit = read_kit(KitConfig(name="dungeon", shapes=paths).resolve(STRICTEST))
     for edges in EDGES:
         book = Codebook(kit, edges)
         for exemplar in kit.exemplars:

@@ -41,7 +41,7 @@ def kit_of(name: str) -> Kit:
         meshes = {"plain": box(1, 1, 1), "arrow": with_arrow(box(1, 1, 1))}
         return toy_kit(meshes, [cubes(*BLOCK), cubes(*STAIRS)], ("face", "line", "point"))
     config = KitConfig(name=name, shapes=tuple(sorted((EXEMPLARS / name).glob("*.glb"))))
-    return read_kit(config.decide(STRICTEST))
+    return read_kit(config.resolve(STRICTEST))
 
 
 def contact_kinds(kit: Kit, assembly: Assembly) -> list[str | None]:

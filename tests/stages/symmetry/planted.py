@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stages.exemplars.formats.scene import Placement, Scene, Surface
+from stages.exemplars.formats.scene import ModelScene, Placement, Surface
 
 Ticks = list[float]
 
@@ -17,11 +17,11 @@ def mesh(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return vertices, place.reshape(-1, 3).astype(np.int32)
 
 
-def one_object(triangles: np.ndarray) -> Scene:
+def one_object(triangles: np.ndarray) -> ModelScene:
     """A grey object of triangles (f, 3, 3)."""
     vertices, faces = mesh(triangles)
     grey = np.full((len(faces), 3), 160, dtype=np.uint8)
-    return Scene("objects", (Surface("all", vertices, faces, grey),), (Placement("all", None, 0, np.eye(4)),))
+    return ModelScene("objects", (Surface("all", vertices, faces, grey),), (Placement("all", None, 0, np.eye(4)),))
 
 
 def blocks(x: Ticks, y: Ticks, z: Ticks, solid: Callable[[float, float, float], bool]) -> np.ndarray:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.exemplars.segment import pick, segment
+from stages.exemplars.segmentation import pick_segmentation, segment_scene
 from stages.symmetry.pieces import repeated_pieces
 from stages.symmetry.surface.grid import surface_grid
 from stages.symmetry.surface.soup import Soup, carve
@@ -75,7 +75,7 @@ class TestRepeatedPieces:
 
 class TestBridge:
     def test_a_mesh_in_one_piece_is_cut_by_what_it_repeats(self) -> None:
-        source, why, parts = pick(one_object(wall(4)))
+        source, why, parts = pick_segmentation(one_object(wall(4)))
         assert source == "symmetry"
         assert "6 pieces between copies of what repeats" in why
         assert len(parts.surfaces) == 3
@@ -89,12 +89,12 @@ class TestBridge:
         """The far end of a cable is thicker by less than a cell."""
         cable = box((0.0, -0.031, 1.6), (6.2, -0.001, 1.7))
         cable[..., 2] += taper * cable[..., 0] * (cable[..., 2] > 1.65)
-        parts = segment(one_object(np.concatenate([wall(5), cable])), "symmetry")
+        parts = segment_scene(one_object(np.concatenate([wall(5), cable])), "symmetry")
         assert np.bincount([each.surface for each in parts.placements]).max() == 5
         assert parts.warnings == said
 
     def test_a_mesh_that_repeats_nothing_is_left_alone(self) -> None:
-        source, why, _ = pick(one_object(box((0, 0, 0), (3, 2, 1))))
+        source, why, _ = pick_segmentation(one_object(box((0, 0, 0), (3, 2, 1))))
         assert source == "objects"
         assert "nothing tells parts apart" in why
 
@@ -104,19 +104,19 @@ class TestBridge:
         back = np.array(
             [[[x[k + 1], y[0], z[k + 1]], [x[k + 1], y[1], z[k + 1]], [x[k], y[1], z[k]]] for k in range(19)]
         )
-        source, why, parts = pick(one_object(np.concatenate([fold, back])))
+        source, why, parts = pick_segmentation(one_object(np.concatenate([fold, back])))
         assert source == "objects"
         assert "too much surface to look unasked for what repeats" in why
         assert len(parts.placements) == 1
 
     def test_a_mesh_without_any_area_stays_as_it_is(self) -> None:
         flat = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
-        source, why, parts = pick(one_object(flat))
+        source, why, parts = pick_segmentation(one_object(flat))
         assert source == "objects"
         assert "nothing tells parts apart" in why
         assert len(parts.placements) == 1
 
     def test_triangles_without_area_are_counted(self) -> None:
         flat = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]], dtype=float)
-        parts = segment(one_object(np.concatenate([wall(4), flat])), "symmetry")
+        parts = segment_scene(one_object(np.concatenate([wall(4), flat])), "symmetry")
         assert parts.warnings == ("1 triangles without area are left out",)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.exemplars.parse import parse_model
-from stages.exemplars.segment import segment
+from stages.exemplars.scene_file import parse_model
+from stages.exemplars.segmentation import segment_scene
 from stages.exemplars.settings import ReadLimits
 from stages.symmetry.sections.parallel_cuts import parallel_cuts
 from stages.symmetry.sections.slabs import slab_pieces
@@ -82,11 +82,11 @@ class TestSlabs:
 
 class TestBridge:
     def test_a_beam_that_all_bays_stand_on_is_cut_with_them(self) -> None:
-        parted = segment(one_object(truss(8)), "sections")
+        parted = segment_scene(one_object(truss(8)), "sections")
         assert np.bincount([each.surface for each in parted.placements]).max() >= 5
 
     def test_what_has_no_like_sections_stays_whole(self) -> None:
-        assert len(segment(one_object(tetrahedron()), "sections").placements) == 1
+        assert len(segment_scene(one_object(tetrahedron()), "sections").placements) == 1
 
 
 @pytest.mark.slow

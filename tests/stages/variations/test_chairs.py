@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from stages.exemplars.build import read_kit
-from stages.exemplars.faults import geometry_faults
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.package.glb import glb_bytes
 from stages.package.record import describe_sample
+from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def kit(tmp_path_factory: pytest.TempPathFactory) -> Kit:
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path_factory.mktemp("chairs"), 6))
-    return read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").decide(STRICTEST))
+    return read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
 
 
 @pytest.fixture(scope="module")

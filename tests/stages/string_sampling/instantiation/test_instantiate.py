@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.exemplars.faults import assembly_faults
 from stages.shape.arrays import IntArray
+from stages.shape.assembly_faults import assembly_faults
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.geometry.docking import DockingTable, symmetric_images

@@ -159,7 +159,7 @@ def test_only_what_the_mask_allows_is_chosen(reader: str) -> None:
 def test_parts_of_one_label_have_one_surface_in_all_their_categories(tmp_path: Path) -> None:
     """Labels do not tell the type of a part; the category of a part binds those beside it, if there are any."""
     shapes = tuple(ShapeFile(path=path) for path in write_chairs(tmp_path, 4))
-    chairs = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").decide(STRICTEST))
+    chairs = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
     of_chairs, of_kit = CategorySpace(chairs), KitStrings(chairs, "all")
     settings = model_entry(random_model(reader="walker"))
     module = new_model(settings, CategoryTables.of(of_chairs), CYCLES, 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from stages.exemplars.faults import assembly_faults
+from stages.shape.assembly_faults import assembly_faults
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Assembly, Kit
 from stages.variations.exchange.repeated_units import shift

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.exemplars.grammar import observe_dockings
+from stages.exemplars.observed_grammar import observe_dockings
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, Exemplar, Grammar, Kit, PartType

@@ -9,9 +9,9 @@ import pytest
 import trimesh
 from trimesh.transformations import translation_matrix
 
-from stages.exemplars.faults import geometry_faults
 from stages.exemplars.settings import HubConfig
 from stages.package.glb import glb_bytes
+from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.kit import Assembly, Kit

@@ -41,7 +41,7 @@ def histogram(kit: Kit, variant: Variant) -> tuple[int, ...]:
 def shipped_kit(folder: Path) -> Kit:
     shapes = tuple(sorted(folder.glob("*.glb")))
     kit, _ = build_kit(
-        KitConfig(name=folder.name, shapes=shapes).decide(STRICTEST), [read_model(shape) for shape in shapes]
+        KitConfig(name=folder.name, shapes=shapes).resolve(STRICTEST), [read_model(shape) for shape in shapes]
     )
     return kit
 

@@ -193,7 +193,7 @@ def _shape_graphs(paths: Sequence[Path]) -> list[OrderedGraph]:
     for path in paths:
         contact = ContactConfig(kinds=("point", "line", "face"))
         config = KitConfig(name="oracle", shapes=(ShapeFile(path=path),), contact=contact)
-        kit, _ = build_kit(config.decide(STRICTEST), [read_model(path)])
+        kit, _ = build_kit(config.resolve(STRICTEST), [read_model(path)])
         whole = kit.exemplars[0].assembly
         graphs.append(docking_graph(kit, whole, np.zeros_like(whole.edges)))
     return graphs

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stages.exemplars.faults import geometry_faults
 from stages.package.glb import glb_bytes
+from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.contact_oracle import ContactAnswers

@@ -3,7 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.exemplars.grammar import observe_contacts, observe_dockings, observe_grammar, observe_neighbourhoods
+from stages.exemplars.observed_grammar import (
+    observe_contacts,
+    observe_dockings,
+    observe_grammar,
+    observe_neighbourhoods,
+)
 from stages.exemplars.settings import ContactConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import ContactTest

@@ -58,7 +58,7 @@ def observe_dockings(types: Sequence[PartType], assemblies: Sequence[Assembly], 
 
 
 @dataclass(frozen=True)
-class Contacts:
+class ObservedContacts:
     """The contacts in some assemblies.
 
     dockings: their classes, with their kinds of contact and depths of 0; counted: the assemblies with those edges alone
@@ -76,7 +76,7 @@ def observe_contacts(
     contact: ContactTest,
     tolerance: float,
     kinds: Sequence[ContactKind],
-) -> Contacts:
+) -> ObservedContacts:
     """What the contacts of `assemblies` are, and which of them count: those of the given `kinds`."""
     dockings = tuple(
         replace(each, kind=contact.kind(each.a, each.b, each.pose) or "point")
@@ -90,23 +90,23 @@ def observe_contacts(
         found.append(tuple(dockings[label].kind for label in labels.tolist()))
         chosen = np.array([kind in kinds for kind in found[-1]], dtype=bool)
         counted.append(replace(assembly, edges=assembly.edges[chosen]))
-    return Contacts(dockings, counted, found)
+    return ObservedContacts(dockings, counted, found)
 
 
 def observe_grammar(
     types: Sequence[PartType],
     assemblies: Sequence[Assembly],
-    contacts: Contacts,
+    contacts: ObservedContacts,
     kinds: Sequence[ContactKind],
 ) -> Grammar:
     """The grammar of `assemblies`, whose `contacts` count where they are of the given `kinds`."""
-    dockings = with_depths(types, [each for each in contacts.dockings if each.kind in kinds])
+    dockings = measure_depths(types, [each for each in contacts.dockings if each.kind in kinds])
     labels = labels_of(types)[1]
     labelled = [replace(each, types=labels[each.types]) for each in contacts.counted]
     return Grammar(observe_neighbourhoods(labelled), dockings, observe_nested(types, assemblies))
 
 
-def with_depths(types: Sequence[PartType], dockings: Sequence[Docking]) -> tuple[Docking, ...]:
+def measure_depths(types: Sequence[PartType], dockings: Sequence[Docking]) -> tuple[Docking, ...]:
     """The dockings with how deep their parts reach into each other."""
     penetration = PenetrationTest(types)
     return tuple(replace(each, depth=round(_deepest(types, each, penetration), 6)) for each in dockings)

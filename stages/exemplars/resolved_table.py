@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pipeline.stage import Plan
 
 
-def chosen_table(plan: Plan) -> Sequence[str]:
+def resolved_table(plan: Plan) -> Sequence[str]:
     """What was chosen for each kit whose config left keys open, and why, as a table."""
     rows = []
     for kit in plan.shards("exemplars"):

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from stages.exemplars.components import connected_faces
-from stages.exemplars.formats.scene import Placement, Scene, Surface, UniqueNames
+from stages.exemplars.formats.scene import ModelScene, Placement, Surface, UniqueNames
 from stages.symmetry.parts import by_sections, by_symmetry, search_size
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
@@ -31,7 +31,7 @@ _WORDS = {
 }
 
 
-def count_parts(scene: Scene) -> dict[Segmentation, int]:
+def count_parts(scene: ModelScene) -> dict[Segmentation, int]:
     """How many parts each source of parts would make of a scene; a source that the scene does not have is left out, and
     so is symmetry, which takes long."""
     counts: dict[Segmentation, int] = {scene.kind: len(scene.placements)}
@@ -43,7 +43,7 @@ def count_parts(scene: Scene) -> dict[Segmentation, int]:
     return counts
 
 
-def pick(scene: Scene) -> tuple[Segmentation, str, Scene]:
+def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]:
     """The source that `auto` takes, one sentence that says why, and the scene with one placement for each part.
 
     Scene nodes or named objects if there are at least two, for they are their author's parts; then materials, then
@@ -64,7 +64,7 @@ def pick(scene: Scene) -> tuple[Segmentation, str, Scene]:
             pieces = f"{counts[source]} {_WORDS[source]}"
             if source != "components":
                 pieces = f"{counts[source]} connected pieces of {labels} {_WORDS[source]}"
-            return source, f"{', '.join(passed)}; {pieces}", segment(scene, source)
+            return source, f"{', '.join(passed)}; {pieces}", segment_scene(scene, source)
         else:
             passed.append("one connected component")
     told = ", ".join(passed)
@@ -78,7 +78,7 @@ def pick(scene: Scene) -> tuple[Segmentation, str, Scene]:
     return scene.kind, f"{told}: nothing tells parts apart", scene
 
 
-def segment(scene: Scene, source: Segmentation) -> Scene:
+def segment_scene(scene: ModelScene, source: Segmentation) -> ModelScene:
     """The scene with one placement for each part.
 
     Nodes and objects are what the scene already has. The pieces of one material or of one colour are the connected
@@ -138,7 +138,7 @@ def _pieces(surface: Surface, source: Segmentation) -> list[tuple[str, str | Non
     return pieces
 
 
-def _label_count(scene: Scene, source: Segmentation) -> int:
+def _label_count(scene: ModelScene, source: Segmentation) -> int:
     """How many materials or colours the faces of a scene have."""
     of_faces = [each.face_material if source == "materials" else each.paint for each in scene.surfaces]
     found = [each for each in of_faces if each is not None]

@@ -27,7 +27,7 @@ def centre(surfaces: Sequence[Surface], placements: Sequence[Placement]) -> tupl
     ], moved
 
 
-def bake(surfaces: Sequence[Surface], placements: Sequence[Placement]) -> tuple[list[Surface], list[Placement]]:
+def bake_stretch(surfaces: Sequence[Surface], placements: Sequence[Placement]) -> tuple[list[Surface], list[Placement]]:
     """The same scene with rigid poses of determinant +1.
 
     Placements of one surface with the same stretch go on sharing one surface; a surface that is stretched or

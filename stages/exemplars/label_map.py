@@ -14,7 +14,7 @@ NAMED = 8
 """So many names of parts are shown to somebody whose pattern fits none."""
 
 
-def meant(models: Sequence[Model], config: KitConfig) -> list[tuple[RawPart, ...]]:
+def apply_label_map(models: Sequence[Model], config: KitConfig) -> list[tuple[RawPart, ...]]:
     """The parts of each model, their labels replaced by what `config.meanings` calls them: the first meaning of which
     a pattern fits. A part that none fits keeps the label that it has.
 
@@ -24,7 +24,7 @@ def meant(models: Sequence[Model], config: KitConfig) -> list[tuple[RawPart, ...
     """
     used: set[tuple[str, str]] = set()
     named = [tuple(_called(part, _places(model), config, used) for part in model.parts) for model in models]
-    for meaning, patterns in config.meanings.items():
+    for meaning, patterns in config.label_map.items():
         for pattern in patterns:
             if (meaning, pattern) not in used:
                 raise ConfigError(_unused(models, config, meaning, pattern))
@@ -37,7 +37,7 @@ def _called(part: RawPart, places: Sequence[str], config: KitConfig, used: set[t
     words += [f"{place}/{word}" for place in places for word in words]
     fitting = [
         (meaning, pattern)
-        for meaning, patterns in config.meanings.items()
+        for meaning, patterns in config.label_map.items()
         for pattern in patterns
         if any(fnmatchcase(word, pattern) for word in words)
     ]
@@ -54,5 +54,5 @@ def _unused(models: Sequence[Model], config: KitConfig, meaning: str, pattern: s
     names = [part.name for model in models for part in model.parts]
     shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
     return (
-        f"kit {config.name}: meanings.{meaning}: no part of its models is called {pattern!r}; parts are called {shown}"
+        f"kit {config.name}: label_map.{meaning}: no part of its models is called {pattern!r}; parts are called {shown}"
     )

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.exemplars.frame import extremal_frame
+from stages.exemplars.extremal_frame import extremal_frame
 from tests.stages.shape.geometry.bodies import box, hull, placed, prism, random_rotation, sphere
 
 

@@ -19,7 +19,7 @@ EXEMPLAR = Camera(azimuth=-36.0, elevation=28.0, fov=24.0, margin=0.04)
 PART = Camera(azimuth=-36.0, elevation=24.0, fov=24.0, margin=0.12)
 
 
-def kit_sheet(kit: Kit) -> bytes:
+def kit_figure(kit: Kit) -> bytes:
     """A PNG of the kit: its exemplars large, and below them one picture for each part type, the commonest first, with
     its name, how often it stands in the exemplars and how many rigid motions map it onto itself.
 

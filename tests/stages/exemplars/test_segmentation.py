@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
 from stages.exemplars.components import connected_faces
-from stages.exemplars.formats.scene import Placement, Scene, Surface
+from stages.exemplars.formats.scene import ModelScene, Placement, Surface
 from stages.exemplars.read import read_model
-from stages.exemplars.segment import count_parts, pick, segment
+from stages.exemplars.segmentation import count_parts, pick_segmentation, segment_scene
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, signed_volume, write_obj
 
 RED, BLUE = (255, 0, 0), (0, 0, 255)
@@ -22,12 +22,12 @@ def boxes(corners: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(corners), np.concatenate([BOX_FACES + 8 * number for number in range(len(corners))])
 
 
-def painted(corners: list[np.ndarray], colors: list[tuple[int, int, int]]) -> Scene:
+def painted(corners: list[np.ndarray], colors: list[tuple[int, int, int]]) -> ModelScene:
     """One surface of boxes, each in its colour."""
     vertices, faces = boxes(corners)
     paint = np.repeat(np.array(colors, dtype=np.uint8), 12, axis=0)
     surface = Surface("all", vertices, faces.astype(np.int32), paint, paint=paint)
-    return Scene("objects", (surface,), (Placement("all", None, 0, np.eye(4)),))
+    return ModelScene("objects", (surface,), (Placement("all", None, 0, np.eye(4)),))
 
 
 def grid(size: int) -> list[np.ndarray]:
@@ -68,14 +68,14 @@ class TestAuto:
 
     def test_colours_of_one_object_are_labels_of_its_pieces(self) -> None:
         scene = painted([box(), box(at=(1, 0, 0)), box(at=(2, 0, 0))], [RED, BLUE, RED])
-        source, why, parted = pick(scene)
+        source, why, parted = pick_segmentation(scene)
         assert source == "colors"
         assert "3 connected pieces of 2 face or vertex colours" in why
         assert [part.name for part in parted.placements] == ["#ff0000", "#0000ff", "#ff0000#2"]
 
     def test_shading_is_no_label(self) -> None:
         corners = [box(at=(3 * k, 0, 0)) for k in range(70)]
-        source, why, _ = pick(painted(corners, [(k, k, k) for k in range(70)]))
+        source, why, _ = pick_segmentation(painted(corners, [(k, k, k) for k in range(70)]))
         assert source == "components"
         assert "70 colours, which are shading" in why
 
@@ -122,7 +122,7 @@ class TestSources:
     def test_counts_are_what_segmenting_gives(self) -> None:
         scene = painted([box(), box(at=(1, 0, 0)), box(at=(2, 0, 0))], [RED, BLUE, RED])
         for source, count in count_parts(scene).items():
-            assert len(segment(scene, source).placements) == count
+            assert len(segment_scene(scene, source).placements) == count
 
 
 class TestComponents:

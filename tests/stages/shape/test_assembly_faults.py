@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from stages.exemplars.faults import assembly_faults, geometry_faults
 from stages.package.glb import glb_bytes
+from stages.shape.assembly_faults import assembly_faults, geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.geometry.pose import invert

@@ -17,16 +17,16 @@ from stages.exemplars.formats.enclosure import Enclosure
 from stages.exemplars.formats.gltf import read_gltf
 from stages.exemplars.formats.off import read_off
 from stages.exemplars.formats.ply import read_ply
-from stages.exemplars.formats.scene import Placement, Scene, Surface, UniqueNames, plain_name, plain_text
+from stages.exemplars.formats.scene import ModelScene, Placement, Surface, UniqueNames, plain_name, plain_text
 from stages.exemplars.formats.stl import read_stl
 from stages.exemplars.formats.wavefront import read_wavefront
-from stages.exemplars.model import STATED, Model, RawPart
-from stages.exemplars.placing import bake, centre, distance_from_origin
-from stages.exemplars.segment import Segmentation, count_parts, pick, segment
+from stages.exemplars.model import STATED_IN_CONFIG, Model, RawPart
+from stages.exemplars.rigid_parts import bake_stretch, centre, distance_from_origin
+from stages.exemplars.segmentation import Segmentation, count_parts, pick_segmentation, segment_scene
 from stages.exemplars.settings import ReadLimits
 from stages.shape.arrays import FloatArray
 
-FORMATS: dict[str, Callable[[Path, Enclosure], Scene]] = {
+READERS: dict[str, Callable[[Path, Enclosure], ModelScene]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
     ".obj": read_wavefront,
@@ -63,15 +63,15 @@ def parse_model(path: Path, segmentation: Segmentation, limits: ReadLimits) -> M
     _check_size(path, scene, limits)
     warnings = list(scene.warnings)
     if segmentation == "auto":
-        source, why, parted = pick(scene)
+        source, why, parted = pick_segmentation(scene)
     else:
-        source, why = segmentation, STATED
+        source, why = segmentation, STATED_IN_CONFIG
         if source not in (scene.kind, "symmetry", "sections") and source not in (counts := count_parts(scene)):
             offered = ", ".join(f"{name} ({count})" for name, count in counts.items())
             raise ConfigError(f"{path}: has no {source} to take parts from; it has {offered}, or set `parts: auto`")
-        parted = segment(scene, source)
+        parted = segment_scene(scene, source)
     _check_size(path, parted, limits)
-    surfaces, placements = bake(*centre(parted.surfaces, parted.placements))
+    surfaces, placements = bake_stretch(*centre(parted.surfaces, parted.placements))
     offset = _off_origin(path, surfaces, placements, warnings)
     names = UniqueNames()
     parts = []
@@ -93,15 +93,15 @@ def parse_model(path: Path, segmentation: Segmentation, limits: ReadLimits) -> M
     return Model(path, tuple(parts), source, why, _few(warnings), scene.up)
 
 
-def _read(path: Path) -> Scene:
+def _read(path: Path) -> ModelScene:
     """The scene in a file, once it is known to be a readable file of a known format."""
-    reader = FORMATS.get(path.suffix.lower())
+    reader = READERS.get(path.suffix.lower())
     if reader is None:
-        near = difflib.get_close_matches(path.suffix.lower(), FORMATS, n=1, cutoff=0.4)
+        near = difflib.get_close_matches(path.suffix.lower(), READERS, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]}? " if near else ""
         raise ConfigError(
             f"{path}: {path.suffix or 'a name without an extension'} is no model format; {hint}"
-            f"Shapemill reads {', '.join(FORMATS)}"
+            f"Shapemill reads {', '.join(READERS)}"
         )
     if not os.access(path, os.F_OK):  # Path.exists() raises where a folder on the way may not be entered
         beside: list[str] = []
@@ -129,7 +129,7 @@ def _read(path: Path) -> Scene:
     return _solid_placements(path, scene)
 
 
-def _check_size(path: Path, scene: Scene, limits: ReadLimits) -> None:
+def _check_size(path: Path, scene: ModelScene, limits: ReadLimits) -> None:
     """Raise ConfigError for a scene of more parts or triangles than are read."""
     triangles = sum(len(each.faces) for each in scene.surfaces)
     for count, most, what in (
@@ -150,7 +150,7 @@ def _few(warnings: list[str]) -> tuple[str, ...]:
     return (*shown, f"and {beyond:,} more warnings") if beyond else shown
 
 
-def _solid_placements(path: Path, scene: Scene) -> Scene:
+def _solid_placements(path: Path, scene: ModelScene) -> ModelScene:
     """The scene without placements that show no triangle, and without vertices that no face uses.
 
     Raises ConfigError if nothing is left, or for coordinates that are not finite.
@@ -186,7 +186,7 @@ def _solid_placements(path: Path, scene: Scene) -> Scene:
             "which has no parts, make a grammar of it: grammars.models"
         )
     used = sorted({each.surface for each in placements})
-    return Scene(
+    return ModelScene(
         kind=scene.kind,
         surfaces=tuple(surfaces[index] for index in used),
         placements=tuple(replace(each, surface=used.index(each.surface)) for each in placements),

@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from pipeline.errors import ConfigError
-from stages.exemplars.meanings import meant
+from stages.exemplars.label_map import apply_label_map
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
 from tests.toy_kits.chains_and_rings import config_of
@@ -32,12 +32,12 @@ ONE, TWO = numbered(table(THIN, SQUARE), "low"), numbered(table(THICK, ROUND), "
 
 
 def named(meanings: dict[str, tuple[str, ...]], *models: Model) -> list[list[str | None]]:
-    config = config_of([[] for _ in models]).model_copy(update={"types": "meaning", "meanings": meanings})
-    return [[part.label for part in parts] for parts in meant(models, config)]
+    config = config_of([[] for _ in models]).model_copy(update={"types": "meaning", "label_map": meanings})
+    return [[part.label for part in parts] for parts in apply_label_map(models, config)]
 
 
 def test_numbered_parts_make_the_kit_that_named_ones_make() -> None:
-    said, told = table_kit(ONE, TWO, meanings=MEANINGS), table_kit(table(THIN, SQUARE), table(THICK, ROUND))
+    said, told = table_kit(ONE, TWO, label_map=MEANINGS), table_kit(table(THIN, SQUARE), table(THICK, ROUND))
     assert said.labels == told.labels == ("top", "leg")
     assert said.grammar.neighbourhoods == told.grammar.neighbourhoods
     assert np.array_equal(*([each.pose for each in kit.grammar.dockings] for kit in (said, told)))
@@ -65,4 +65,4 @@ def test_a_pattern_that_fits_nothing_is_refused_with_the_names_that_there_are() 
 
 def test_meanings_are_refused_where_types_go_by_congruence() -> None:
     with pytest.raises(ValidationError, match="set `types: meaning`"):
-        KitConfig.model_validate({"name": "toy", "shapes": (Path(__file__),), "meanings": MEANINGS})
+        KitConfig.model_validate({"name": "toy", "shapes": (Path(__file__),), "label_map": MEANINGS})

@@ -42,7 +42,7 @@ class _Anchor:
     extent: float
 
 
-def fitting_dockings(
+def infer_dockings(
     types: Sequence[PartType], assemblies: Sequence[Assembly], dockings: Sequence[Docking], contact: ContactTest,
     tolerance: float, pose_tolerance: float,
 ) -> tuple[Docking, ...]:  # fmt: skip

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from stages.exemplars.congruence import comparable_mesh, congruences
-from stages.exemplars.model import STATED, Model
-from stages.exemplars.settings import LOOSEST
+from stages.exemplars.model import STATED_IN_CONFIG, Model
+from stages.exemplars.settings import MAX_CONTACT_TOLERANCE
 from stages.shape.arrays import IntArray
 from stages.shape.geometry.contact import ContactTest
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
@@ -21,15 +21,15 @@ HUB_CONTACTS = 20
 """A part with more contacts than this is a hub."""
 HUB_SHARE = 1 / 3
 """So is a part that touches more than this share of all parts, in shapes of some size."""
-SMALL = 12
+MAX_PARTS_WITHOUT_HUBS = 12
 """Shapes of at most so many parts have no hubs: there, to touch a third of all parts is nothing."""
-LOOSER = (2.0, 5.0, 10.0, 20.0, 50.0)
+TOLERANCE_FACTORS = (2.0, 5.0, 10.0, 20.0, 50.0)
 """Multiples of the contact tolerance that are tried for shapes in pieces."""
 NAMED = 5
 """So many parts are named in a sentence."""
 
 
-def pieces(assembly: Assembly) -> IntArray:
+def connected_pieces(assembly: Assembly) -> IntArray:
     """The piece that each part belongs to, int32 (n,): parts of one piece are connected; piece 0 is the largest."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -44,10 +44,10 @@ def pieces(assembly: Assembly) -> IntArray:
     return ranked
 
 
-def hubs(assembly: Assembly) -> list[int]:
+def hub_parts(assembly: Assembly) -> list[int]:
     """The parts that touch so many others that hardly another shape can repeat their neighbourhood."""
     degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
-    most = min(HUB_CONTACTS, HUB_SHARE * len(assembly)) if len(assembly) > SMALL else HUB_CONTACTS
+    most = min(HUB_CONTACTS, HUB_SHARE * len(assembly)) if len(assembly) > MAX_PARTS_WITHOUT_HUBS else HUB_CONTACTS
     found: list[int] = np.flatnonzero(degrees > most).tolist()
     return found
 
@@ -63,13 +63,13 @@ def refusals(
     for model, exemplar in zip(models, kit.exemplars, strict=True):
         assembly = exemplar.assembly
         if len(model.parts) < 2:
-            mend = "set `parts: auto`, or " if model.why == STATED else ""
+            mend = "set `parts: auto`, or " if model.why == STATED_IN_CONFIG else ""
             yield (
                 f"{model.path}: has {len(model.parts)} part by {model.segmentation} ({model.why}), an exemplar needs "
                 f"at least 2; {mend}split the model into one scene node a part in the modelling tool"
             )
-        elif pieces(assembly).any():
-            without = f" without its hubs {some(left_out)}" if left_out else ""
+        elif connected_pieces(assembly).any():
+            without = f" without its hubs {listed_names(left_out)}" if left_out else ""
             yield f"{model.path}: the exemplar{without} falls into {_falls_apart(kit, exemplar, tolerance)}"
         elif len(assembly) < 2:
             yield f"{model.path}: only one part of it is connected or has area, an exemplar needs at least 2"
@@ -115,9 +115,9 @@ def mirror_twins(types: Sequence[PartType], tolerance: float) -> list[tuple[int,
 def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
     assembly = exemplar.assembly
     degrees = np.bincount(assembly.edges.ravel(), minlength=len(assembly))
-    found = sorted(hubs(assembly), key=lambda part: (-degrees[part], part))
+    found = sorted(hub_parts(assembly), key=lambda part: (-degrees[part], part))
     if found:
-        named = some([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
+        named = listed_names([f"{exemplar.part_names[part]} ({degrees[part]})" for part in found])
         yield (
             f"{exemplar.name}: {_count(len(found), 'part')} of {len(assembly)} with very many contacts: {named}; "
             "hardly another shape has the same around them, so variants may keep them as they are; split them in the "
@@ -127,26 +127,26 @@ def _hub_warning(exemplar: Exemplar) -> Iterator[str]:
 
 def _falls_apart(kit: Kit, exemplar: Exemplar, tolerance: float) -> str:
     """The pieces of an exemplar, and of all mends those that help it."""
-    piece = pieces(exemplar.assembly)
+    piece = connected_pieces(exemplar.assembly)
     sizes = np.bincount(piece).tolist()
-    alone = some([exemplar.part_names[index] for index in np.flatnonzero(piece).tolist()])
+    alone = listed_names([exemplar.part_names[index] for index in np.flatnonzero(piece).tolist()])
     way = _way_together(kit, exemplar, tolerance)
     mends = [f"set {way}" if way else "no contact tolerance joins them, so move the parts together in the model"]
     if sizes[0] > 1:
         mends.append("keep the largest piece alone with `disconnected: largest`")
     if len(sizes) > 1 and sizes[1] > 1:
         mends.append("export each piece as a model of its own and name them all as shapes of one kit")
-    listed = some([str(size) for size in sizes], 8)
+    listed = listed_names([str(size) for size in sizes], 8)
     return f"{len(sizes)} pieces of {listed} parts (apart: {alone}); {', or '.join(mends)}"
 
 
 def _way_together(kit: Kit, exemplar: Exemplar, tolerance: float) -> str:
     """What a config must say so that an exemplar is in one piece; empty where nothing makes it so."""
     assembly = exemplar.assembly
-    for looser in dict.fromkeys(min(factor * tolerance, LOOSEST) for factor in (1.0, *LOOSER)):
+    for looser in dict.fromkeys(min(factor * tolerance, MAX_CONTACT_TOLERANCE) for factor in (1.0, *TOLERANCE_FACTORS)):
         test = ContactTest(kit.types, looser / tolerance * kit.contact_tolerance)
         edges = test.contacts(assembly.types, assembly.poses)
-        if not pieces(replace(assembly, edges=edges)).any():
+        if not connected_pieces(replace(assembly, edges=edges)).any():
             said = [f"`contact.tolerance: {looser:g}`"] if looser > tolerance else []
             if set(kit.contact_kinds) < {"point", "line", "face"}:
                 said.append("`contact.kinds: [point, line, face]`")
@@ -158,7 +158,7 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
-def some(words: Sequence[str], count: int = NAMED) -> str:
+def listed_names(words: Sequence[str], count: int = NAMED) -> str:
     """The first words of a list, and how many more there are."""
     more = f" and {len(words) - count} more" if len(words) > count else ""
     return ", ".join(words[:count]) + more
