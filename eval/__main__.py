@@ -20,8 +20,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
-from eval.engine.dataset_run import Subject, load_subject
-from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.dataset_run import DatasetRun, load_dataset_run
+from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.registry import find_tables
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> int:
     try:
         if asked.files:
             return _print_of_files(_known(tables, asked.table), asked)
-        subject = load_subject(asked.config, asked.out)
+        subject = load_dataset_run(asked.config, asked.out)
         if not asked.table:
             print(listing(subject, tables), end="")
             return 0
@@ -73,7 +73,7 @@ def _known(tables: Mapping[str, Evaluation], name: str) -> str:
     return name
 
 
-def listing(subject: Subject, tables: Mapping[str, Evaluation]) -> str:
+def listing(subject: DatasetRun, tables: Mapping[str, Evaluation]) -> str:
     """Every table with its question, and what it needs that is not there, or how long it takes."""
     where = f"{subject.folder}, {subject.samples:,} shapes" if subject.manifest else f"nothing in {subject.folder} yet"
     lines = [f"Tables about {subject.config.name} ({where}):", ""]
@@ -102,8 +102,8 @@ def _print_of_files(name: str, asked: argparse.Namespace) -> int:
     return 0
 
 
-def _make_one(subject: Subject, name: str, asked: argparse.Namespace) -> int:
-    from eval.engine.report import Made, report_html
+def _make_one(subject: DatasetRun, name: str, asked: argparse.Namespace) -> int:
+    from eval.engine.report import FinishedTable, report_html
 
     evaluation = find_tables()[name]
     missing = evaluation.missing(subject)
@@ -112,7 +112,7 @@ def _make_one(subject: Subject, name: str, asked: argparse.Namespace) -> int:
     start, began = perf_counter(), datetime.now(UTC)
     answer = evaluation.answer(subject, asked)
     _keep(subject, name, answer)
-    made = Made(name, evaluation.question, answer, perf_counter() - start)
+    made = FinishedTable(name, evaluation.question, answer, perf_counter() - start)
     write_file(subject.results / f"{name}.html", report_html(subject, [made], {}, began).encode())
     print(_markdown(answer), end="")
     drawn = ", with curves and pictures" if answer.curves or answer.strips else ""
@@ -120,11 +120,11 @@ def _make_one(subject: Subject, name: str, asked: argparse.Namespace) -> int:
     return 0
 
 
-def _make_all(subject: Subject, tables: Mapping[str, Evaluation], asked: argparse.Namespace) -> int:
+def _make_all(subject: DatasetRun, tables: Mapping[str, Evaluation], asked: argparse.Namespace) -> int:
     """Make every table that has what it needs, one after another; a failure is told and takes no other with it."""
-    from eval.engine.report import Made, report_html
+    from eval.engine.report import FinishedTable, report_html
 
-    made: list[Made] = []
+    made: list[FinishedTable] = []
     unmade: dict[str, str] = {}
     failed, began = 0, datetime.now(UTC)
     for name, evaluation in tables.items():
@@ -141,7 +141,7 @@ def _make_all(subject: Subject, tables: Mapping[str, Evaluation], asked: argpars
             unmade[name] = f"it failed: {type(error).__name__}: {error}"
             traceback.print_exc()
             continue
-        made.append(Made(name, evaluation.question, answer, perf_counter() - start))
+        made.append(FinishedTable(name, evaluation.question, answer, perf_counter() - start))
         _keep(subject, name, answer)
         print(f"{name}: made in {made[-1].seconds:.0f} s")
     write_file(subject.results / REPORT, report_html(subject, made, unmade, began).encode())
@@ -149,11 +149,11 @@ def _make_all(subject: Subject, tables: Mapping[str, Evaluation], asked: argpars
     return 1 if failed else 0
 
 
-def _markdown(answer: Answer) -> str:
+def _markdown(answer: TableResult) -> str:
     return "\n".join(table.markdown() for table in answer.tables)
 
 
-def _keep(subject: Subject, name: str, answer: Answer) -> None:
+def _keep(subject: DatasetRun, name: str, answer: TableResult) -> None:
     """Write the tables of an answer: the first as `<name>`, others as `<name>_2` and so on, but all in one `.md`; and
     its sheets, as `<name>_<sheet>.png`."""
     write_file(subject.results / f"{name}.md", _markdown(answer).encode())

@@ -20,7 +20,7 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
 from stages.strings.alphabet import make_alphabet
-from stages.strings.grammar import check
+from stages.strings.grammar_check import check_string
 from tests.mill import mill
 from tests.stated import stated
 
@@ -165,7 +165,7 @@ def test_every_string_of_the_corpus_decodes_to_its_graph_and_obeys_the_grammar(m
         exemplars = work / "exemplars"
         kit = load_kit(exemplars / f"{kit_name}.json", exemplars / f"{kit_name}.tar")
         alphabet = make_alphabet(kit.type_names())
-        decoded = [check(line, alphabet, kit.grammar) for line in text.read_text().splitlines()]
+        decoded = [check_string(line, alphabet, kit.grammar) for line in text.read_text().splitlines()]
         assert {graph_digest(each.types, each.edges) for each in decoded} == graphs[text.stem]
         seen += len(decoded)
     statistics = json.loads((one / "small-corpus" / "statistics.json").read_text())

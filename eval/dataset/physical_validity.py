@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import fmean, median
 
 from eval.engine.shapes import shared_meshes
-from eval.engine.table import Cell, Published, Table
+from eval.engine.table import Cell, ReferenceRow, Table
 from stages.shape.physics.judge import Judge, Validity
 from stages.shape.physics.settings import PhysicsConfig
 from stages.shape.shape import Shape
@@ -33,7 +33,7 @@ COLUMNS = (
 SOURCE = "shapeassembly Table 2, by simulation"
 
 PUBLISHED = tuple(
-    Published(f"{category}, {of}", SOURCE, {"rooted %": rooted, "dropped %": stable})
+    ReferenceRow(f"{category}, {of}", SOURCE, {"rooted %": rooted, "dropped %": stable})
     for category, of, rooted, stable in (
         ("chair", "ground truth", 100.0, 88.0),
         ("table", "ground truth", 100.0, 93.1),
@@ -95,7 +95,7 @@ def judged_by_name(named: Iterable[tuple[str, Shape]], config: PhysicsConfig) ->
 
 
 def physical_table(
-    judged: Mapping[str, Judged], config: PhysicsConfig, most_dry: int, published: Sequence[Published] = ()
+    judged: Mapping[str, Judged], config: PhysicsConfig, most_dry: int, published: Sequence[ReferenceRow] = ()
 ) -> Table:
     """One row for each name. As dry blocks, which takes long, at most `most_dry` shapes of a name are judged, evenly
     spread."""

@@ -6,19 +6,19 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from eval.engine.evaluation import Curve
+from eval.engine.evaluation import Chart
 
-COLORS = 8
+NUM_COLORS = 8
 """So many lines have colours of their own, the classes `line0`, `line1` and so on; then they begin again."""
 
-MARKED = 12
+MAX_MARKED_POINTS = 12
 """A line of at most so many points has a dot at each."""
 
-WIDTH, HEIGHT = 520, 300
-LEFT, RIGHT, TOP, BOTTOM = 52, 12, 12, 44
+CHART_WIDTH, CHART_HEIGHT = 520, 300
+LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 52, 12, 12, 44
 
 
-def chart_svg(curve: Curve) -> str:
+def chart_svg(curve: Chart) -> str:
     """The plot of a curve; its lines are named by whoever shows it. Markup: what the curve says is escaped.
 
     Raises ValueError for a curve without points.
@@ -31,26 +31,36 @@ def chart_svg(curve: Curve) -> str:
 
     def at(x: float, y: float) -> tuple[float, float]:
         return (
-            LEFT + (WIDTH - LEFT - RIGHT) * (x - across[0]) / (across[-1] - across[0]),
-            HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * (y - up[0]) / (up[-1] - up[0]),
+            LEFT_MARGIN + (CHART_WIDTH - LEFT_MARGIN - RIGHT_MARGIN) * (x - across[0]) / (across[-1] - across[0]),
+            CHART_HEIGHT - BOTTOM_MARGIN - (CHART_HEIGHT - BOTTOM_MARGIN - TOP_MARGIN) * (y - up[0]) / (up[-1] - up[0]),
         )
 
-    drawn = [f'<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(curve.title)}">']
+    drawn = [
+        f'<svg class="chart" viewBox="0 0 {CHART_WIDTH} {CHART_HEIGHT}" role="img" aria-label="{escape(curve.title)}">'
+    ]
     for x in across:
         left, _ = at(x, up[0])
-        drawn.append(f'<text x="{left:.1f}" y="{HEIGHT - BOTTOM + 17}" text-anchor="middle">{_number(x)}</text>')
+        drawn.append(
+            f'<text x="{left:.1f}" y="{CHART_HEIGHT - BOTTOM_MARGIN + 17}" text-anchor="middle">{_number(x)}</text>'
+        )
     for y in up:
         _, top = at(across[0], y)
-        drawn.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{top:.1f}" y2="{top:.1f}"/>')
-        drawn.append(f'<text x="{LEFT - 7}" y="{top + 4:.1f}" text-anchor="end">{_number(y)}</text>')
-    middle = (LEFT + WIDTH - RIGHT) / 2
-    drawn.append(f'<text class="axis" x="{middle}" y="{HEIGHT - 6}" text-anchor="middle">{escape(curve.across)}</text>')
+        drawn.append(
+            f'<line class="grid" x1="{LEFT_MARGIN}" x2="{CHART_WIDTH - RIGHT_MARGIN}" y1="{top:.1f}" y2="{top:.1f}"/>'
+        )
+        drawn.append(f'<text x="{LEFT_MARGIN - 7}" y="{top + 4:.1f}" text-anchor="end">{_number(y)}</text>')
+    middle = (LEFT_MARGIN + CHART_WIDTH - RIGHT_MARGIN) / 2
+    drawn.append(
+        f'<text class="axis" x="{middle}" y="{CHART_HEIGHT - 6}" text-anchor="middle">{escape(curve.across)}</text>'
+    )
     for place, line in enumerate(curve.lines.values()):
         corners = [at(x, y) for x, y in line]
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
-        drawn.append(f'<polyline class="line line{place % COLORS}" points="{path}"/>')
-        if len(corners) <= MARKED:
-            drawn += [f'<circle class="dot line{place % COLORS}" cx="{x:.1f}" cy="{y:.1f}" r="3"/>' for x, y in corners]
+        drawn.append(f'<polyline class="line line{place % NUM_COLORS}" points="{path}"/>')
+        if len(corners) <= MAX_MARKED_POINTS:
+            drawn += [
+                f'<circle class="dot line{place % NUM_COLORS}" cx="{x:.1f}" cy="{y:.1f}" r="3"/>' for x, y in corners
+            ]
     return "".join([*drawn, "</svg>"])
 
 

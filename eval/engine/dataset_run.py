@@ -16,7 +16,7 @@ from stages.package.layout import MANIFEST
 
 
 @dataclass(frozen=True)
-class Subject:
+class DatasetRun:
     """config: the dataset's; out: the folder that datasets are made in."""
 
     config: Config
@@ -60,6 +60,6 @@ class Subject:
         return int(self.manifest.get("samples", 0))
 
 
-def load_subject(config: Path, out: Path) -> Subject:
+def load_dataset_run(config: Path, out: Path) -> DatasetRun:
     """The subject of a config file. Raises ConfigError for a config that is not valid."""
-    return Subject(load_config(config, {name: stage.config for name, stage in find_stages().items()}), out)
+    return DatasetRun(load_config(config, {name: stage.config for name, stage in find_stages().items()}), out)

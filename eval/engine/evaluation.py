@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from eval.engine.dataset_run import Subject
+from eval.engine.dataset_run import DatasetRun
 from eval.engine.table import Table
 
 
 @dataclass(frozen=True)
-class Curve:
+class Chart:
     """Lines in one plot. lines: points (x, y) by the name of each line, x ascending; across, up: what x and y are."""
 
     title: str
@@ -22,7 +22,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Strip:
+class ImageRow:
     """Pictures side by side: captions and PNGs."""
 
     title: str
@@ -30,7 +30,7 @@ class Strip:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class Figure:
     """A picture as wide as the page, such as rows of shapes one below the other. name: of its file, in small letters;
     title: what it shows; picture: a PNG."""
 
@@ -40,23 +40,23 @@ class Sheet:
 
 
 @dataclass(frozen=True)
-class Answer:
+class TableResult:
     """tables: at least one, the first under the evaluation's own name; curves and strips for the pages alone; sheets
     for the pages, and as files beside them."""
 
     tables: Sequence[Table]
-    curves: Sequence[Curve] = ()
-    strips: Sequence[Strip] = ()
-    sheets: Sequence[Sheet] = ()
+    curves: Sequence[Chart] = ()
+    strips: Sequence[ImageRow] = ()
+    sheets: Sequence[Figure] = ()
 
 
 @dataclass(frozen=True)
-class Need:
+class Requirement:
     """what: something that must be there, in a few words; missing: empty where it is there, else what is missing and
     what would make it, in words."""
 
     what: str
-    missing: Callable[[Subject], str]
+    missing: Callable[[DatasetRun], str]
 
 
 def _no_options(_: ArgumentParser) -> None:
@@ -74,12 +74,12 @@ class Evaluation:
     """
 
     question: str
-    needs: Sequence[Need]
-    seconds: Callable[[Subject], float]
-    answer: Callable[[Subject, Namespace], Answer]
-    of_files: Callable[[Sequence[Path], Namespace], Answer] | None = None
+    needs: Sequence[Requirement]
+    seconds: Callable[[DatasetRun], float]
+    answer: Callable[[DatasetRun, Namespace], TableResult]
+    of_files: Callable[[Sequence[Path], Namespace], TableResult] | None = None
     options: Callable[[ArgumentParser], None] = field(default=_no_options)
 
-    def missing(self, subject: Subject) -> str:
+    def missing(self, subject: DatasetRun) -> str:
         """What keeps it from being made, or nothing."""
         return next((told for told in (need.missing(subject) for need in self.needs) if told), "")

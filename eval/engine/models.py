@@ -19,7 +19,7 @@ Figures = TypeVar("Figures")
 
 
 @dataclass(frozen=True)
-class Trained(Generic[Model]):
+class TrainedModel(Generic[Model]):
     """A trained model: what it is called in the config, its kit, its seed, and the model itself."""
 
     name: str
@@ -43,7 +43,7 @@ def trained_models(
     kind: str,
     load: Callable[[Path, Mapping[str, Any]], Model],
     kits: Container[str] | None = None,
-) -> list[Trained[Model]]:
+) -> list[TrainedModel[Model]]:
     """The models of a kind in a folder of published models, by kit, name and seed, those of other kits than `kits` left
     out; `load` reads one, of its weights and what they say of themselves. Raises ConfigError for weights that are not
     what they should be."""
@@ -57,7 +57,7 @@ def trained_models(
         except CheckpointError as error:
             raise ConfigError(f"{error}; make train") from error
         name, seed = header["name"].split(f"-{header['kit']}-", 1)
-        found.append(Trained(name, header["kit"], int(seed), model))
+        found.append(TrainedModel(name, header["kit"], int(seed), model))
     return sorted(found, key=lambda each: (each.kit, each.name, each.seed))
 
 
@@ -67,7 +67,7 @@ def training_curve(folder: Path, column: str) -> list[tuple[float, float]]:
         return [(float(row["step"]), float(row[column])) for row in csv.DictReader(stream)]
 
 
-def by_group(found: Iterable[tuple[Trained[Any], Figures]]) -> dict[str, list[Figures]]:
+def by_group(found: Iterable[tuple[TrainedModel[Any], Figures]]) -> dict[str, list[Figures]]:
     """Figures of models that stand beside each other where they differ by their seeds alone."""
     return {group: [each for _, each in of_group] for group, of_group in groupby(found, key=lambda each: each[0].group)}
 

@@ -9,7 +9,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def side_by_side(
+def parallel_map(
     work: Callable[[Item], Result], items: Sequence[Item], workers: int, what: str
 ) -> Iterator[tuple[Item, Result]]:
     """Each item and what comes of it, in the order of the items, whatever the number of workers. what: the items, as a

@@ -8,7 +8,7 @@ from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.shape import Shape
 from stages.shape.views.picture import ABOVE
 
-SIZE = (264, 264)
+PICTURE_SIZE = (264, 264)
 
 
 def shape_picture(shape: Shape) -> bytes:
@@ -24,7 +24,7 @@ def shape_portrait(shape: Shape) -> ByteArray:
     from stages.shape.views.portrait import portrait
     from stages.shape.views.scene import scene_of
 
-    return portrait(scene_of(shape), ABOVE, SIZE, part_paint(shape))
+    return portrait(scene_of(shape), ABOVE, PICTURE_SIZE, part_paint(shape))
 
 
 def cloud_picture(points: FloatArray) -> bytes:
@@ -38,4 +38,4 @@ def cloud_portrait(points: FloatArray) -> ByteArray:
     """A portrait of a cloud (n, 3), y up, uint8 (h, w, 3)."""
     from stages.shape.views.portrait import points_portrait
 
-    return points_portrait(points, np.zeros(len(points), np.int32), ABOVE, SIZE, "y")
+    return points_portrait(points, np.zeros(len(points), np.int32), ABOVE, PICTURE_SIZE, "y")

@@ -20,9 +20,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import eval as tables
-from eval.engine.chart import COLORS, chart_svg
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer
+from eval.engine.chart import NUM_COLORS, chart_svg
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import TableResult
 from eval.engine.table import cell_text
 from stages.package.made_with import code_version, library_versions
 from stages.package.manifest import config_sections
@@ -31,16 +31,16 @@ TEMPLATE = Path(__file__).with_suffix(".html")
 
 
 @dataclass(frozen=True)
-class Made:
+class FinishedTable:
     """A table that was made. seconds: how long it took."""
 
     name: str
     question: str
-    answer: Answer
+    answer: TableResult
     seconds: float
 
 
-def report_html(subject: Subject, made: Sequence[Made], unmade: Mapping[str, str], began: datetime) -> str:
+def report_html(subject: DatasetRun, made: Sequence[FinishedTable], unmade: Mapping[str, str], began: datetime) -> str:
     """The page. unmade: why, of the tables that were not made, by their names; began: when work on the first began."""
     house = Environment(
         loader=FileSystemLoader(TEMPLATE.parent),
@@ -58,11 +58,11 @@ def report_html(subject: Subject, made: Sequence[Made], unmade: Mapping[str, str
         facts=_facts(subject, began),
         libraries=list(library_versions().items()),
         config=config.path.read_text(),
-        colors=COLORS,
+        colors=NUM_COLORS,
     )
 
 
-def _shown(made: Made) -> Mapping[str, object]:
+def _shown(made: FinishedTable) -> Mapping[str, object]:
     answer = made.answer
     curves = [each for each in answer.curves if any(each.lines.values())]
     return {
@@ -84,7 +84,7 @@ def _inlined(png: bytes) -> str:
     return f"data:image/png;base64,{b64encode(png).decode()}"
 
 
-def _subtitle(subject: Subject) -> str:
+def _subtitle(subject: DatasetRun) -> str:
     described = subject.manifest
     if not described:
         return f"{subject.config.name}: no finished dataset yet"
@@ -92,14 +92,14 @@ def _subtitle(subject: Subject) -> str:
     return f"{described['name']} {described['version']}: {described['samples']:,} shapes, {kits}"
 
 
-def _changed_sections(subject: Subject) -> list[str]:
+def _changed_sections(subject: DatasetRun) -> list[str]:
     """The sections of the config that differ from those that the dataset was made with."""
     said = json.loads(json.dumps(config_sections(subject.config)))
     made = subject.manifest.get("config", {})
     return [name for name, section in said.items() if name in made and made[name] != section]
 
 
-def _facts(subject: Subject, began: datetime) -> list[tuple[str, str]]:
+def _facts(subject: DatasetRun, began: datetime) -> list[tuple[str, str]]:
     """What was run, when and on what."""
     described = subject.manifest
     facts = [("Tables made", f"{began:%Y-%m-%d %H:%M} to {datetime.now(UTC):%H:%M} UTC")]

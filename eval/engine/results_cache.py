@@ -14,8 +14,8 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Curve
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Chart, TableResult
 from eval.engine.table import Table
 from pipeline.code import code_digest, reached
 from pipeline.places import file_digest, write_file
@@ -26,7 +26,7 @@ Said = TypeVar("Said")
 
 
 @dataclass(frozen=True)
-class Part:
+class TableSection:
     """A part of a long table, such as the rows of one model.
 
     name: no other part of the table has it; reads: the files that its figures depend on; make: makes it; code: modules
@@ -36,7 +36,7 @@ class Part:
 
     name: str
     reads: Sequence[Path]
-    make: Callable[[], Answer]
+    make: Callable[[], TableResult]
     code: Sequence[str] = ()
     options: Sequence[str] | None = None
 
@@ -44,12 +44,12 @@ class Part:
 class _Kept(BaseModel):
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64", ser_json_inf_nan="constants")
 
-    answer: Answer
+    answer: TableResult
 
 
-def in_parts(
-    parts: Callable[[Subject, Namespace], Iterable[Part]], options: Callable[[ArgumentParser], None]
-) -> Callable[[Subject, Namespace], Answer]:
+def cached_sections(
+    parts: Callable[[DatasetRun, Namespace], Iterable[TableSection]], options: Callable[[ArgumentParser], None]
+) -> Callable[[DatasetRun, Namespace], TableResult]:
     """The `Evaluation.answer` of a table that is made of `parts`, which hang on its `options`.
 
     Each part is kept in `OUT/<dataset>-eval/parts/<table>/<part>.json` when it is made. It is taken from there as long
@@ -58,13 +58,13 @@ def in_parts(
     module = parts.__module__
     table = module.rpartition(".")[2]
 
-    def answer(subject: Subject, asked: Namespace) -> Answer:
+    def answer(subject: DatasetRun, asked: Namespace) -> TableResult:
         own = ArgumentParser()
         options(own)
         digest = cache(file_digest)
         common = {"libraries": library_versions(), "dataset": (subject.config.name, subject.config.seed)}
 
-        def each_part() -> Iterator[Answer]:
+        def each_part() -> Iterator[TableResult]:
             for part in parts(subject, asked):
                 code, read = code_digest(reached([module, *part.code])), [digest(path) for path in part.reads]
                 names = vars(own.parse_args([])) if part.options is None else part.options
@@ -73,12 +73,12 @@ def in_parts(
                 key = hashlib.sha256(json_bytes(described)).hexdigest()
                 yield _answer_of(part, key, subject.results / "parts" / table / f"{part.name}.json")
 
-        return joined(list(each_part()))
+        return join_results(list(each_part()))
 
     return answer
 
 
-def _answer_of(part: Part, key: str, path: Path) -> Answer:
+def _answer_of(part: TableSection, key: str, path: Path) -> TableResult:
     kept = _read(path, key)
     if kept is not None:
         print(f"{part.name}: made before", file=sys.stderr)
@@ -91,7 +91,7 @@ def _answer_of(part: Part, key: str, path: Path) -> Answer:
     return answer
 
 
-def _read(path: Path, key: str) -> Answer | None:
+def _read(path: Path, key: str) -> TableResult | None:
     """The answer with this key in a file; None where there is none, or none any more: the disk has spoilt it."""
     if not path.is_file():
         return None
@@ -103,11 +103,11 @@ def _seal(key: str, written: bytes) -> bytes:
     return hashlib.sha256(key.encode() + written).hexdigest().encode()
 
 
-def joined(answers: Sequence[Answer]) -> Answer:
+def join_results(answers: Sequence[TableResult]) -> TableResult:
     """One answer of several: tables of one title and the same columns become one, and so do curves in one plot; what
     all say in notes and published rows is said once."""
     tables: dict[tuple[str, tuple[str, ...]], Table] = {}
-    curves: dict[tuple[str, str, str], Curve] = {}
+    curves: dict[tuple[str, str, str], Chart] = {}
     for answer in answers:
         for table in answer.tables:
             there = tables.setdefault((table.title, table.columns), replace(table, rows=(), notes=(), published=()))
@@ -120,7 +120,7 @@ def joined(answers: Sequence[Answer]) -> Answer:
         for curve in answer.curves:
             alike = curves.setdefault((curve.title, curve.across, curve.up), replace(curve, lines={}))
             curves[curve.title, curve.across, curve.up] = replace(alike, lines={**alike.lines, **curve.lines})
-    return Answer(
+    return TableResult(
         list(tables.values()),
         list(curves.values()),
         [strip for answer in answers for strip in answer.strips],

@@ -12,7 +12,7 @@ Cell = str | int | float
 
 
 @dataclass(frozen=True)
-class Published:
+class ReferenceRow:
     """A row that others have published. source: paper and table; figures: by column."""
 
     name: str
@@ -32,7 +32,7 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     notes: Sequence[str] = ()
-    published: Sequence[Published] = ()
+    published: Sequence[ReferenceRow] = ()
 
     def __post_init__(self) -> None:
         for each in self.published:

@@ -9,21 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-from eval.engine.dataset_run import Subject
-from eval.engine.models import Trained, by_group, over_seeds, trained_models
-from eval.engine.table import Cell, Published, Table
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.models import TrainedModel, by_group, over_seeds, trained_models
+from eval.engine.table import Cell, ReferenceRow, Table
 from eval.generated.pose_clusters import Clusters
 from pipeline.errors import ConfigError
 from stages.shape.arrays import IntArray
 from stages.shape.collection.declared import producers
 from stages.shape.kit import Assembly, Kit
 from stages.shape.sample import read_samples
-from stages.strings.categories import Labelled, NoCategoryError
+from stages.strings.categories import CategorizedString, NoCategoryError
 from stages.strings.encoder import Encoded, NotConnectedError
 from stages.strings.kit_strings import KitStrings
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
 
-PUBLISHED = (Published("validation samples", "strings, §6", {"tokens %": 90.0}),)
+PUBLISHED = (ReferenceRow("validation samples", "strings, §6", {"tokens %": 90.0}),)
 
 NOTES = (
     "Of shapes whose graphs training has not seen: the canonical string of each and as many random ones as vote. "
@@ -60,7 +60,7 @@ class Judged:
     voted: Shares
 
 
-def category_models(folder: Path, kits: dict[str, Kit]) -> list[Trained[TrainedEdgeCategories]]:
+def category_models(folder: Path, kits: dict[str, Kit]) -> list[TrainedModel[TrainedEdgeCategories]]:
     """The models of edge categories of some kits in a folder of published models. Raises ConfigError for weights that
     are not what they should be."""
     return trained_models(
@@ -68,7 +68,7 @@ def category_models(folder: Path, kits: dict[str, Kit]) -> list[Trained[TrainedE
     )
 
 
-def made_shapes(subject: Subject, kit: str, split: str) -> Iterator[Assembly]:
+def made_shapes(subject: DatasetRun, kit: str, split: str) -> Iterator[Assembly]:
     """The shapes of a kit in a split, out of the mill's folder, one in memory at a time; none with stretched parts.
     Raises ConfigError where the config lets go of them."""
     if subject.config.keep == "dataset":
@@ -87,7 +87,7 @@ def judge(
     strings of each shape beside its canonical one."""
     alone, voted = _Tally(), _Tally()
     asked: list[list[Encoded]] = []
-    labelled: list[list[Labelled]] = []
+    labelled: list[list[CategorizedString]] = []
     for shape in shapes:
         try:
             strings = writer.strings(writer.graph(shape), voters, rng)
@@ -135,7 +135,7 @@ class _Tally:
         self.strings = self.whole = self.closing = 0
         self._tokens, self._open = [0, 0], [0, 0]
 
-    def add(self, model: TrainedEdgeCategories, labelled: Labelled, said: IntArray) -> None:
+    def add(self, model: TrainedEdgeCategories, labelled: CategorizedString, said: IntArray) -> None:
         right = said == labelled.categories
         is_open = model.space.allowed(labelled.string).sum(axis=1) > 1
         self.strings += 1
@@ -159,7 +159,7 @@ def _closes(model: TrainedEdgeCategories, string: str, said: IntArray) -> bool:
     return True
 
 
-def categories_table(found: Sequence[tuple[Trained[TrainedEdgeCategories], str, Judged]]) -> Table:
+def categories_table(found: Sequence[tuple[TrainedModel[TrainedEdgeCategories], str, Judged]]) -> Table:
     """One row for the models of a name and a kit and a split, over their seeds, alone and voted."""
     columns = (
         "model",

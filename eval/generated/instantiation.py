@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from eval.engine.dataset_run import Subject
-from eval.engine.models import Trained, trained_models
-from eval.engine.table import Cell, Published, Table
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.models import TrainedModel, trained_models
+from eval.engine.table import Cell, ReferenceRow, Table
 from pipeline.randomness import decision_rng
 from stages.shape.assembly_faults import assembly_faults
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
-from stages.string_sampling.instantiation.guidance import NO_GUIDE, Guide, guide_of
+from stages.string_sampling.instantiation.guidance import WITHOUT_GUIDE, Guide, guide_of
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import STANDARD, Method
+from stages.string_sampling.instantiation.state import STANDARD_METHOD, SolverMethod
 from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
 from stages.training.checkpoint import weights_header, weights_of_kind
@@ -31,19 +31,23 @@ from stages.variations.settings import VariationsConfig
 DRAWS = 4
 """So many strings are drawn from a model for each graph that is wanted of it."""
 
-METHODS: Mapping[str, Method] = {
-    "all steps": STANDARD,
-    "without looking ahead to where cycles close": STANDARD._replace(closes=False),
-    "without the most constrained part first": STANDARD._replace(constrained=False),
-    "without steps back": STANDARD._replace(backtracks=False),
-    "parts in random order, begun anew at dead ends (§6)": Method(constrained=False, backtracks=False, closes=False),
-    "random dockings, no check until the end (figure 8)": Method(
+METHODS: Mapping[str, SolverMethod] = {
+    "all steps": STANDARD_METHOD,
+    "without looking ahead to where cycles close": STANDARD_METHOD._replace(closes=False),
+    "without the most constrained part first": STANDARD_METHOD._replace(constrained=False),
+    "without steps back": STANDARD_METHOD._replace(backtracks=False),
+    "parts in random order, begun anew at dead ends (§6)": SolverMethod(
+        constrained=False, backtracks=False, closes=False
+    ),
+    "random dockings, no check until the end (figure 8)": SolverMethod(
         checked=False, constrained=False, backtracks=False, closes=False
     ),
 }
 """The ways that are compared: ours, ours without each step beyond the paper, and theirs."""
 
-PUBLISHED = (Published("one shape of 14 uncertain dockings, at random", "strings fig. 8", {"shapes %": 100 / 5**14}),)
+PUBLISHED = (
+    ReferenceRow("one shape of 14 uncertain dockings, at random", "strings fig. 8", {"shapes %": 100 / 5**14}),
+)
 
 RANKS = {"trees %": (0, 0), "1-2 cycles %": (1, 2), "3-5 %": (3, 5), "6+ %": (6, 1 << 30)}
 SIZES = {"to 30 parts %": (1, 30), "31-60 %": (31, 60), "61+ %": (61, 1 << 30)}
@@ -89,12 +93,12 @@ def dream_rng(seed: int, model: str) -> np.random.Generator:
     return decision_rng(seed, "eval", "instantiation", model)
 
 
-def instantiator_of(subject: Subject, kit: Kit) -> Instantiator:
+def instantiator_of(subject: DatasetRun, kit: Kit) -> Instantiator:
     """What puts graphs of a kit together, its parts upright where variants of the config are."""
     return Instantiator(ContactAnswers(kit), subject.config.section(VariationsConfig).search.upright)
 
 
-def edge_categories(folder: Path, kit: Kit) -> list[Trained[TrainedEdgeCategories]]:
+def edge_categories(folder: Path, kit: Kit) -> list[TrainedModel[TrainedEdgeCategories]]:
     """The models of edge categories of a kit among published models, the first seed of each."""
     own = {path for path in weights_of_kind(folder, "edge_categories") if weights_header(path).get("kit") == kit.name}
 
@@ -103,7 +107,7 @@ def edge_categories(folder: Path, kit: Kit) -> list[Trained[TrainedEdgeCategorie
 
     found = trained_models(folder, "edge_categories", load)
     return [
-        Trained(each.name, each.kit, each.seed, each.model)
+        TrainedModel(each.name, each.kit, each.seed, each.model)
         for each in found
         if each.model is not None and not each.seed
     ]
@@ -116,16 +120,16 @@ def guides_of(model: TrainedEdgeCategories, graphs: Sequence[Decoded]) -> list[G
         try:
             found.append(guide_of(model.space, graph, model.scores("".join(graph.texts))))
         except ValueError:  # which a StringError is
-            found.append(NO_GUIDE)
+            found.append(WITHOUT_GUIDE)
     return found
 
 
 def attempts(
-    maker: Instantiator, graphs: Sequence[Decoded], method: Method, seed: int, guides: Sequence[Guide] = ()
+    maker: Instantiator, graphs: Sequence[Decoded], method: SolverMethod, seed: int, guides: Sequence[Guide] = ()
 ) -> list[Attempt]:
     """Put each graph together, and look at what comes out by the means of verification."""
     found = []
-    for place, (graph, guide) in enumerate(zip(graphs, guides or [NO_GUIDE] * len(graphs), strict=True)):
+    for place, (graph, guide) in enumerate(zip(graphs, guides or [WITHOUT_GUIDE] * len(graphs), strict=True)):
         rng = decision_rng(seed, "eval", "instantiation", place)
         begun = time.perf_counter()
         made = maker.instantiate(graph.types, graph.edges, rng, method, guide)

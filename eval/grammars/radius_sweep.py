@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from eval.engine.evaluation import Sheet
+from eval.engine.evaluation import Figure
 from eval.engine.table import Cell, Table
 from pipeline.randomness import decision_rng
 from stages.grammars.distinct_shapes import some_shapes
@@ -47,7 +47,7 @@ def radii_table(found: dict[float, Extraction]) -> Table:
     return Table("What the radius of similarity does", columns, tuple(rows), notes)
 
 
-def radii_sheet(path: Path, found: dict[float, Extraction]) -> Sheet:
+def radii_sheet(path: Path, found: dict[float, Extraction]) -> Figure:
     """For each radius the model with its docking sites, some dockers, and some shapes by rules and by grids."""
     sections = []
     for radius, each in found.items():
@@ -59,4 +59,4 @@ def radii_sheet(path: Path, found: dict[float, Extraction]) -> Sheet:
         sections.append(Section(f"Radius {radius:.1%}", [row], note))
     name = next(iter(found.values())).grammar.name
     title = f"{name}: docking sites, dockers (yellow), shapes"
-    return Sheet(name.lower(), title, picture_png(contact_sheet(sections, title, CELL)))
+    return Figure(name.lower(), title, picture_png(contact_sheet(sections, title, CELL)))

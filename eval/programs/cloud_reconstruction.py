@@ -12,7 +12,7 @@ import torch
 from scipy.spatial import cKDTree
 from torch import nn
 
-from eval.engine.table import Cell, Published, Table
+from eval.engine.table import Cell, ReferenceRow, Table
 from eval.programs.quality import boxes_of_programs, clouds_of, physics_of, shape_of_boxes
 from eval.programs.two_sample_test import POINTS, features_of
 from pipeline.errors import Rejected
@@ -160,7 +160,7 @@ def clouds_table(rows: Mapping[str, Rebuilt]) -> Table:
         "Shapes: those for which it can be had; cuboids without attachments have a program where one can be extracted.",
     )
     published = [
-        Published(f"chair, {name}", "shapeassembly Table 7, of dense meshes", dict(zip(columns, row, strict=True)))
+        ReferenceRow(f"chair, {name}", "shapeassembly Table 7, of dense meshes", dict(zip(columns, row, strict=True)))
         for name, row in figures.items()
     ]
     return Table("From clouds to programs", ("shapes of", "shapes", *columns), tuple(cells), notes, published)

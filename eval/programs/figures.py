@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from eval.engine.evaluation import Sheet
-from eval.engine.models import Trained
-from eval.engine.pictures import SIZE, shape_portrait
-from eval.engine.table import Cell as Figure
+from eval.engine.evaluation import Figure
+from eval.engine.models import TrainedModel
+from eval.engine.pictures import PICTURE_SIZE, shape_portrait
+from eval.engine.table import Cell as TableCell
 from eval.engine.table import Table
 from eval.programs.nearest import nearest_and_which, nearest_programs
 from eval.programs.quality import boxes_of_programs, clouds_of, shape_of_boxes
@@ -36,15 +36,15 @@ STOPS = 5
 """Shapes between the two ends of a way."""
 
 
-def sheet_of(name: str, title: str, rows: Mapping[str, Sequence[tuple[str, ByteArray]]]) -> Sheet:
+def sheet_of(name: str, title: str, rows: Mapping[str, Sequence[tuple[str, ByteArray]]]) -> Figure:
     """Rows of pictures with captions, under their names."""
     sections = [Section(head, [[Cell(picture, caption) for caption, picture in row]]) for head, row in rows.items()]
-    return Sheet(name, title, picture_png(contact_sheet(sections, title, WIDTH)))
+    return Figure(name, title, picture_png(contact_sheet(sections, title, WIDTH)))
 
 
 def neighbours(
     name: str, category: str, programs: Sequence[Program], train: Sequence[Program], clouds: FloatArray
-) -> tuple[Sheet, tuple[Figure, ...]]:
+) -> tuple[Figure, tuple[TableCell, ...]]:
     """Figure 7: programs that a model wrote, above each the shape of train that is nearest by Chamfer distance, below
     the one whose program is. clouds: of train. And what the table says of them."""
     boxes = boxes_of_programs(programs)
@@ -70,7 +70,7 @@ def neighbours(
     return sheet_of(f"figure7_{name}", f"Figure 7, {category}: beside what was learnt", rows), cells
 
 
-def neighbours_table(rows: Sequence[tuple[Figure, ...]]) -> Table:
+def neighbours_table(rows: Sequence[tuple[TableCell, ...]]) -> Table:
     """Of the samples that figure 7 shows."""
     notes = (
         "Means over the samples that are shown: Chamfer distance to the nearest shape of train, words that differ from "
@@ -80,7 +80,7 @@ def neighbours_table(rows: Sequence[tuple[Figure, ...]]) -> Table:
                  tuple(rows), notes)  # fmt: skip
 
 
-def edits_sheet(name: str, category: str, programs: Sequence[Program], rng: np.random.Generator) -> Sheet:
+def edits_sheet(name: str, category: str, programs: Sequence[Program], rng: np.random.Generator) -> Figure:
     """Figure 8: programs that a model wrote, below each a variant with other numbers and the same structure."""
     variants = [edited(each, SPREAD, rng) for each in programs]
     rows = {
@@ -90,13 +90,15 @@ def edits_sheet(name: str, category: str, programs: Sequence[Program], rng: np.r
     return sheet_of(f"figure8_{name}", f"Figure 8, {category}: edits of continuous parameters", rows)
 
 
-def beside_sheet(category: str, samples: Mapping[str, Sequence[Sequence[Box]]]) -> Sheet:
+def beside_sheet(category: str, samples: Mapping[str, Sequence[Sequence[Box]]]) -> Figure:
     """Figure 9: samples of each model, one row a model."""
     rows = {name: [(f"{len(each)} parts", drawn(each)) for each in found] for name, found in samples.items()}
     return sheet_of(f"figure9_{category}", f"Figure 9, {category}: models beside each other, samples not chosen", rows)
 
 
-def journey_sheet(category: str, models: Sequence[Trained[Any]], pairs: Sequence[tuple[Program, Program]]) -> Sheet:
+def journey_sheet(
+    category: str, models: Sequence[TrainedModel[Any]], pairs: Sequence[tuple[Program, Program]]
+) -> Figure:
     """Figure 12: on a straight way through the latent space of each model from one shape to another, each of val."""
     rows = {}
     for number, (first, last) in enumerate(pairs, 1):
@@ -128,4 +130,4 @@ def drawn(boxes: Sequence[Box]) -> ByteArray:
 
 
 def _blank() -> ByteArray:
-    return np.full((*SIZE[::-1], 3), PAPER, np.uint8)
+    return np.full((*PICTURE_SIZE[::-1], 3), PAPER, np.uint8)

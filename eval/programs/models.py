@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from eval.engine.dataset_run import Subject
-from eval.engine.models import Trained, trained_models
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.models import TrainedModel, trained_models
 from pipeline.errors import Rejected
 from stages.shape.sample import read_samples
 from stages.shapeassembly.execution.interpreter import execute
@@ -29,7 +29,7 @@ PROGRAM_KINDS = ("program_vae", "program_lm")
 """The kinds that write whole programs; the others write cuboids."""
 
 
-def program_models(subject: Subject, nucleus: float) -> list[Trained[Any]]:
+def program_models(subject: DatasetRun, nucleus: float) -> list[TrainedModel[Any]]:
     """All of them, category by category. nucleus: as in `shapeassembly.written`."""
     loaders: dict[str, Callable[[Path, Mapping[str, Any]], Any]] = {
         "program_vae": load_program_vae,
@@ -41,23 +41,23 @@ def program_models(subject: Subject, nucleus: float) -> list[Trained[Any]]:
     return sorted(found, key=lambda each: each.kit)
 
 
-def told_without(trained: Trained[Any]) -> str:
+def told_without(trained: TrainedModel[Any]) -> str:
     """The part of the language without which a model tells programs, or `nothing`."""
     return str(trained.model.header["settings"].get("without", "nothing"))
 
 
-def category_programs(subject: Subject, category: str, split: str) -> list[Program]:
+def category_programs(subject: DatasetRun, category: str, split: str) -> list[Program]:
     """The programs of a category in a split of the dataset."""
     shards = program_shards(subject, split)
     return [parse(each.text) for shard in shards for each in read_samples(shard) if each.kit == category]
 
 
-def program_shards(subject: Subject, split: str) -> list[Path]:
+def program_shards(subject: DatasetRun, split: str) -> list[Path]:
     """The files of all programs in a split of the dataset."""
     return sorted(subject.places.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
 
 
-def read_by_all(subject: Subject, category: str, split: str, most: int, rng: np.random.Generator) -> list[Program]:
+def read_by_all(subject: DatasetRun, category: str, split: str, most: int, rng: np.random.Generator) -> list[Program]:
     """At most so many random programs of a category in a split, of those that every kind of model with a latent space
     can read."""
     programs = category_programs(subject, category, split)

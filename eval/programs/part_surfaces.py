@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from eval.engine.evaluation import Sheet
+from eval.engine.evaluation import Figure
 from eval.engine.pictures import cloud_portrait
 from eval.programs.figures import drawn, sheet_of
 from stages.abstraction.hierarchy import WORTH_TURNING
@@ -136,7 +136,7 @@ def surface_of(module: PartSurfaces, boxes: Sequence[Box], rng: np.random.Genera
 
 def surfaces_sheet(
     name: str, category: str, module: PartSurfaces, shapes: Sequence[Sequence[Box]], rng: np.random.Generator
-) -> Sheet:
+) -> Figure:
     """Figure 11: cuboids that a program of a model makes, and surfaces within them."""
     rows = {
         f"Cuboids of programs written by {name}": [(f"{len(each)} parts", drawn(each)) for each in shapes],

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eval.engine.dataset_run import Subject
+from eval.engine.dataset_run import DatasetRun
 from eval.programs.models import category_programs
 from eval.programs.quality import boxes_of_programs, clouds_of
 from eval.programs.two_sample_test import POINTS, features_of
@@ -33,7 +33,7 @@ class Reference:
         return features_of(self.shown)
 
 
-def read_reference(subject: Subject, category: str, judged: int) -> Reference:
+def read_reference(subject: DatasetRun, category: str, judged: int) -> Reference:
     """Of a category of the dataset; judged: how many shapes networks look at."""
     train, val = (category_programs(subject, category, split) for split in ("train", "val"))
     learnt = boxes_of_programs(train)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from eval.engine.table import Cell, Published, Table
+from eval.engine.table import Cell, ReferenceRow, Table
 from eval.programs.quality import POINTS, Physics, Variability
 from eval.programs.two_sample_test import Realism
 from stages.shapeassembly.analysis.statistics import program_statistics
@@ -120,9 +120,9 @@ def _published(
     columns: Sequence[str],
     figures: Mapping[str, Sequence[Sequence[Cell]]],
     methods: Sequence[str] = _METHODS,
-) -> list[Published]:
+) -> list[ReferenceRow]:
     return [
-        Published(f"{category}, {method}", source, dict(zip(columns, row, strict=True)))
+        ReferenceRow(f"{category}, {method}", source, dict(zip(columns, row, strict=True)))
         for category in _CATEGORIES
         for method, row in zip(methods, figures[category], strict=True)
     ]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eval.engine.table import Cell, Published, Table
+from eval.engine.table import Cell, ReferenceRow, Table
 from pipeline.errors import ConfigError
 from stages.programs.movement import STEP, moved
 from stages.programs.program import Program
@@ -35,7 +35,7 @@ NEIGHBORS, GLIMPSE = 1000, 256
 
 PUBLISHED = (
     *(
-        Published(f"{program}, {method}", f"geocode, Table 2, sketch, {angle}", {"chamfer": figure})
+        ReferenceRow(f"{program}, {method}", f"geocode, Table 2, sketch, {angle}", {"chamfer": figure})
         for program, method, trained, novel in (
             ("chair", "Huang et al.", 2.142e-3, 8.030e-3),
             ("chair", "GeoCode", 1.057e-3, 8.075e-3),
@@ -49,7 +49,7 @@ PUBLISHED = (
         for angle, figure in (("trained angles", trained), ("novel angle", novel))
     ),
     *(
-        Published(f"chair, {method}", f"geocode, Table 3, {given}", {"chamfer": figure})
+        ReferenceRow(f"chair, {method}", f"geocode, Table 3, {given}", {"chamfer": figure})
         for method, points, sketch in (("classification", 4.0e-4, 1.06e-3), ("regression", 1.98e-3, 3.64e-3))
         for given, figure in (("point cloud", points), ("sketch", sketch))
     ),

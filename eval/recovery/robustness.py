@@ -98,7 +98,7 @@ def _of_drawing(change: Callable[[BoolArray, np.random.Generator], BoolArray]) -
     return spoil
 
 
-SPOILS: Mapping[str, Mapping[str, Spoil]] = {
+CORRUPTIONS: Mapping[str, Mapping[str, Spoil]] = {
     "points": {
         "noise of 1 %": _of_cloud(_noisy),
         "5 % outliers": _of_cloud(_with_outliers),
@@ -124,7 +124,7 @@ VIEWS: Mapping[str, tuple[float, float]] = {
 
 def ways_to_spoil(kind: str) -> tuple[str, ...]:
     """What `spoilt_inputs` does to inputs of a kind, by name."""
-    return (*SPOILS[kind], *(VIEWS if kind == "sketch" else ()))
+    return (*CORRUPTIONS[kind], *(VIEWS if kind == "sketch" else ()))
 
 
 def spoilt_inputs(
@@ -133,8 +133,8 @@ def spoilt_inputs(
     """All inputs, which are of `shapes`, spoilt in one of the ways of their kind; or drawn from another side than the
     model has learnt."""
     kind = model.entry.input
-    if how in SPOILS[kind]:
-        spoil = SPOILS[kind][how]
+    if how in CORRUPTIONS[kind]:
+        spoil = CORRUPTIONS[kind][how]
         return [spoil(given, np.random.default_rng((seed, place))) for place, given in enumerate(inputs)]
     azimuth, elevation = VIEWS[how]
     side = 1.0 if model.program.elevation > 0 else -1.0

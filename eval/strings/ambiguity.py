@@ -11,8 +11,8 @@ from eval.engine.table import Table
 from stages.shape.arrays import IntArray
 from stages.shape.kit import Assembly
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import STANDARD
-from stages.strings.categories import CategorySpace, Labelled, NoCategoryError
+from stages.string_sampling.instantiation.state import STANDARD_METHOD
+from stages.strings.categories import CategorizedString, CategorySpace, NoCategoryError
 from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded, NotConnectedError
 from stages.strings.kit_strings import KitStrings
@@ -43,7 +43,7 @@ def ambiguity(
 ) -> Ambiguity:
     """Of some shapes of a kit; those without a string or categories are left out."""
     space = CategorySpace(maker.kit)
-    method = STANDARD._replace(whole=writer.edges == "all")
+    method = STANDARD_METHOD._replace(whole=writer.edges == "all")
     right, open_right, counts = [0, 0], [0, 0], list[int]()
     for shape in shapes:
         graph = writer.graph(shape)
@@ -69,7 +69,7 @@ def ambiguity(
     return Ambiguity(len(counts), draws, float(np.mean(counts)) if counts else 0.0, *shares)
 
 
-def _read(space: CategorySpace, made: Assembly, string: Encoded) -> list[Labelled]:
+def _read(space: CategorySpace, made: Assembly, string: Encoded) -> list[CategorizedString]:
     """A shape whose parts stand in the order of a string, along that string; nothing where parts stand as no shape of
     the kit has them."""
     try:

@@ -12,7 +12,7 @@ import numpy as np
 from eval.engine.table import Cell, Table
 from stages.shape.geometry.pose import pose_vectors
 from stages.shape.kit import Assembly, Kit
-from stages.strings.compression import Codebook, describe, pack, restore, unpack
+from stages.strings.compression import Codebook, decode_shape, encode_shape, pack, unpack
 from stages.strings.encoder import Encoded
 from stages.strings.settings import Edges
 
@@ -69,9 +69,9 @@ class Trip:
 def round_trip(book: Codebook, assembly: Assembly) -> Trip:
     """Bring an assembly to bytes and back. Raises NotConnectedError where it has no string."""
     canonical, *_ = book.writer.strings(book.writer.graph(assembly), 0, np.random.default_rng(0))
-    described = describe(book, assembly, canonical)
+    described = encode_shape(book, assembly, canonical)
     packed = pack(book, described)
-    restored = restore(book, unpack(book, packed))
+    restored = decode_shape(book, unpack(book, packed))
     gap = _gap(book.kit, assembly, canonical, restored)
     same = np.array_equal(restored.types, assembly.types[canonical.nodes])
     same = same and _pairs(canonical.nodes[restored.edges]) == _pairs(assembly.edges)

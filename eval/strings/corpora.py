@@ -7,7 +7,7 @@ from statistics import median
 
 import numpy as np
 
-from eval.engine.table import Cell, Published, Table
+from eval.engine.table import Cell, ReferenceRow, Table
 from stages.shape.kit import Assembly, Kit
 from stages.strings.encoder import NotConnectedError
 from stages.strings.kit_strings import KitStrings
@@ -28,7 +28,7 @@ COLUMNS = (
     "most cycles",
 )
 
-PUBLISHED = (Published("all scenes", "strings §6, §7", {"parts": "23 to 70", "canonical": "45 to 85"}),)
+PUBLISHED = (ReferenceRow("all scenes", "strings §6, §7", {"parts": "23 to 70", "canonical": "45 to 85"}),)
 
 NOTES = (
     "Parts and cycle rank of the shapes, medians. Canonical, random: tokens of the canonical string and of a random "

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from eval.engine.evaluation import Strip
+from eval.engine.evaluation import ImageRow
 from eval.engine.pictures import shape_picture
 from eval.generated.instantiation import attempts
 from eval.strings.string_vaes import NODES
@@ -14,7 +14,7 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.shape import kit_shape
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import Method
+from stages.string_sampling.instantiation.state import SolverMethod
 from stages.strings.decoder import Decoded, decode
 from stages.training.string_vae.latent_graph import interpolation, search_graph
 from stages.training.string_vae.latent_sampling import linear_points, path_points
@@ -51,10 +51,10 @@ def journey_strips(
     model: TrainedStringVae,
     strings: Sequence[str],
     maker: Instantiator,
-    method: Method,
+    method: SolverMethod,
     folder: str,
     rng: np.random.Generator,
-) -> Iterator[Strip]:
+) -> Iterator[ImageRow]:
     """A row of pictures for each way; stops of the graph of the stop before are left out, and those that become no
     shape are told in its title."""
     for way, along in journeys(model, strings, rng).items():
@@ -66,7 +66,7 @@ def journey_strips(
             else:
                 failed += 1
         told = f"; {failed} of {len(stops)} stops become no shape" if failed else ""
-        yield Strip(f"{folder}, from one shape to another {way}{told}", pictures)
+        yield ImageRow(f"{folder}, from one shape to another {way}{told}", pictures)
 
 
 def _changing(graphs: Iterator[Decoded]) -> Iterator[Decoded]:

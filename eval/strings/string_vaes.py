@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from eval.engine.models import Trained, by_group, over_seeds, trained_models
-from eval.engine.table import Cell, Published, Table
+from eval.engine.models import TrainedModel, by_group, over_seeds, trained_models
+from eval.engine.table import Cell, ReferenceRow, Table
 from pipeline.randomness import decision_rng
 from stages.shape.graphs.canonical import graph_digest
 from stages.strings.decoder import decode
@@ -24,7 +24,9 @@ NODES = 1000
 """Nodes of the graphs of latent points (strings Table 2)."""
 
 PUBLISHED = tuple(
-    Published(f"{shapes}, {kind}", "strings, Table 2", {"components": components, "mean": mean, "greatest": greatest})
+    ReferenceRow(
+        f"{shapes}, {kind}", "strings, Table 2", {"components": components, "mean": mean, "greatest": greatest}
+    )
     for shapes, kind, components, mean, greatest in (
         ("sand castle", "naive", 102, 4.71, 12.17),
         ("sand castle", "search graph", 1, 0.50, 1.09),
@@ -59,7 +61,7 @@ class Sampling:
     novel: float
 
 
-def string_vaes(folder: Path) -> list[Trained[TrainedStringVae]]:
+def string_vaes(folder: Path) -> list[TrainedModel[TrainedStringVae]]:
     """The string VAEs in a folder of published models, by kit, name and seed. Raises ConfigError for weights that are
     not what they should be."""
     return trained_models(folder, "string_vae", lambda path, _: load_string_vae(path))
@@ -136,7 +138,7 @@ def structure(
     return len(nodes), figures
 
 
-def reconstruction_table(found: Iterable[tuple[Trained[TrainedStringVae], Reconstruction]]) -> Table:
+def reconstruction_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], Reconstruction]]) -> Table:
     """One row for the models of a name and a kit, over their seeds."""
     columns = ("model", "seeds", "strings", "tokens %", "strings %", "graphs %", "valid %")
     rows = [
@@ -151,7 +153,7 @@ def reconstruction_table(found: Iterable[tuple[Trained[TrainedStringVae], Recons
     return Table("String VAE: reconstruction", columns, tuple(rows), notes)
 
 
-def sampling_table(found: Iterable[tuple[Trained[TrainedStringVae], str, Sampling]]) -> Table:
+def sampling_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], str, Sampling]]) -> Table:
     """One row for the models of a name and a kit and a way, over their seeds."""
     columns = ("model", "way", "seeds", "searches", "valid %", "found %", "unique %", "novel %")
     groups: dict[tuple[str, str], list[Sampling]] = {}
@@ -171,7 +173,7 @@ def sampling_table(found: Iterable[tuple[Trained[TrainedStringVae], str, Samplin
     return Table("String VAE: new shapes by way of sampling", columns, tuple(rows), notes)
 
 
-def structure_table(found: Iterable[tuple[Trained[TrainedStringVae], int, Mapping[str, PathFigures]]]) -> Table:
+def structure_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], int, Mapping[str, PathFigures]]]) -> Table:
     """One row for each model and graph; the published rows below."""
     rows: list[tuple[Cell, ...]] = []
     for trained, nodes, figures in found:
@@ -187,7 +189,7 @@ def structure_table(found: Iterable[tuple[Trained[TrainedStringVae], int, Mappin
     return Table("String VAE: shortest paths", columns, tuple(rows), notes, PUBLISHED)
 
 
-def model_rng(seed: int, trained: Trained[TrainedStringVae], decision: str) -> np.random.Generator:
+def model_rng(seed: int, trained: TrainedModel[TrainedStringVae], decision: str) -> np.random.Generator:
     """The random stream of one decision about a model."""
     return decision_rng(seed, "eval", "strings", trained.group, trained.seed, decision)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
 from eval.engine.requirements import EDGE_CATEGORIES, KITS
 from stages.training.checkpoint import weights_of_kind
 
@@ -15,7 +15,7 @@ SHOWN = 3
 """So many shapes are drawn beside what was read of them."""
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from itertools import islice
 
     from eval.engine.models import training_curve
@@ -54,7 +54,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             pictures.append((f"{each.kit}, {len(shape)} parts", shape_picture(kit_shape(kits[each.kit], shape))))
             if found is not None:
                 pictures.append((f"as {each.folder} reads it", shape_picture(kit_shape(kits[each.kit], found))))
-        strips.append(Strip(f"Shapes of test, and what {each.folder} reads from their strings", pictures))
+        strips.append(ImageRow(f"Shapes of test, and what {each.folder} reads from their strings", pictures))
         lines[each.folder] = [
             (step, 100 * share) for step, share in training_curve(subject.models / each.folder, "val_tokens")
         ]
@@ -65,9 +65,9 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         unseen = islice(made_shapes(subject, name, "test"), asked.graphs)
         maker = instantiator_of(subject, kits[name])
         open_graphs.append((name, ambiguity(maker, writers[name], unseen, DRAWS, rng)))
-    return Answer(
+    return TableResult(
         [categories_table(judged), ambiguity_table(open_graphs), clusters_table(clusters)],
-        [Curve("Tokens with the right category, each after the right ones before it", "steps", "% of val", lines)],
+        [Chart("Tokens with the right category, each after the right ones before it", "steps", "% of val", lines)],
         strips,
     )
 

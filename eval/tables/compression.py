@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Strip
-from eval.engine.requirements import FINISHED, KITS
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, ImageRow, TableResult
+from eval.engine.requirements import FINISHED_DATASET, KITS
 from stages.strings.settings import Edges
 
 EDGES: tuple[Edges, ...] = ("all", "tree")
 
 
-def _answer(subject: Subject, _: Namespace) -> Answer:
+def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from eval.engine.pictures import shape_picture
     from eval.strings.compression import Stored, compression_row, compression_table, round_trip
     from pipeline.shards import read_shard
@@ -43,13 +43,13 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
                 pictures.append(
                     (f"{name}, {len(trip.restored)} parts of {len(trip.packed)} bytes", shape_picture(shape))
                 )
-    strip = Strip("The smallest, the median and the largest of each kit, restored from their bytes", pictures)
-    return Answer([compression_table(rows)], strips=[strip])
+    strip = ImageRow("The smallest, the median and the largest of each kit, restored from their bytes", pictures)
+    return TableResult([compression_table(rows)], strips=[strip])
 
 
 TABLE = Evaluation(
     question="How few bytes does a shape take as string and categories, and does it come back exactly?",
-    needs=(FINISHED, KITS),
+    needs=(FINISHED_DATASET, KITS),
     seconds=lambda subject: 10 + 0.025 * subject.samples,
     answer=_answer,
 )

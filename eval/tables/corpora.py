@@ -5,15 +5,15 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import get_args
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.requirements import KITS
 
 MOST = 100
 """So many variants of a kit are measured at most."""
 
 
-def _answer(subject: Subject, _: Namespace) -> Answer:
+def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from eval.strings.corpora import corpora_table, corpus_row
     from eval.strings.growth import read_finds
     from pipeline.randomness import decision_rng
@@ -32,7 +32,7 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
             for edges in get_args(Edges) if shapes else ():
                 rng = decision_rng(subject.config.seed, "corpora", group, edges)
                 rows.append(corpus_row(group, kit, shapes, edges, rng))
-    return Answer([corpora_table(rows)])
+    return TableResult([corpora_table(rows)])
 
 
 TABLE = Evaluation(

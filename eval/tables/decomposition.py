@@ -7,8 +7,8 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Need
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, Requirement, TableResult
 from pipeline.errors import ConfigError
 
 CUTS = ("symmetry", "sections", "components")
@@ -19,11 +19,11 @@ def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--cuts", nargs="+", choices=CUTS, default=["symmetry"], help="how merged models are cut")
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     raise ConfigError(f"this table takes {FILES}")
 
 
-def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
+def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
     from eval.engine.shapes import model_kits
     from eval.grammars.decomposition import decomposition_table
     from eval.grammars.grammar_recall import grammar_table
@@ -34,12 +34,12 @@ def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
             raise ConfigError(f"there is no file {path}")
     kits = [each for path in paths for each in model_kits(path, "y")]
     shapes = [(name, kit_shape(kit, kit.exemplars[0].assembly)) for name, kit in kits]
-    return Answer([decomposition_table(shapes, asked.cuts), grammar_table(kits)])
+    return TableResult([decomposition_table(shapes, asked.cuts), grammar_table(kits)])
 
 
 TABLE = Evaluation(
     question="Are parts found again that were merged to one mesh, and what may be exchanged?",
-    needs=(Need("model files", lambda subject: f"it takes {FILES}"),),  # a minute or two each: no part of `all`
+    needs=(Requirement("model files", lambda subject: f"it takes {FILES}"),),  # a minute or two each: no part of `all`
     seconds=lambda subject: 120.0,
     answer=_answer,
     of_files=_of_files,

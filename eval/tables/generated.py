@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Need, Strip
-from eval.engine.requirements import FINISHED, KITS
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, ImageRow, Requirement, TableResult
+from eval.engine.requirements import FINISHED_DATASET, KITS
 
 SHOWN = 4
 """Pictures of each row."""
 MOST = 1000
 
 
-def _parents(subject: Subject) -> list[str]:
+def _parents(subject: DatasetRun) -> list[str]:
     """The datasets that the models of a config have learnt from, each once."""
-    from stages.string_sampling.settings import SynthesisConfig
+    from stages.string_sampling.settings import StringSamplingConfig
 
-    return sorted({each.dataset for each in subject.config.section(SynthesisConfig).sources})
+    return sorted({each.dataset for each in subject.config.section(StringSamplingConfig).sources})
 
 
-def _dreamt(subject: Subject) -> str:
+def _dreamt(subject: DatasetRun) -> str:
     from stages.package.layout import MANIFEST
 
     parents = _parents(subject)
@@ -30,7 +30,7 @@ def _dreamt(subject: Subject) -> str:
     return f"no finished dataset {gone[0]}, which its models have learnt from; make dataset of it" if gone else ""
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.engine.pictures import shape_picture
     from eval.generated.generated_shapes import Dream, dream_row, dreams_table, finished_shapes
     from pipeline.places import Places
@@ -57,8 +57,8 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
                 pictures = [
                     (f"{len(each.assembly)} parts", shape_picture(kit_shape(kit, each.assembly))) for each in shown
                 ]
-                strips.append(Strip(title, pictures))
-    return Answer([dreams_table(rows)], strips=strips)
+                strips.append(ImageRow(title, pictures))
+    return TableResult([dreams_table(rows)], strips=strips)
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -67,7 +67,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="What is lost and what is won when a network invents shapes, beside those that it has learnt from?",
-    needs=(FINISHED, KITS, Need("dreamt samples and what they were learnt from", _dreamt)),
+    needs=(FINISHED_DATASET, KITS, Requirement("dreamt samples and what they were learnt from", _dreamt)),
     seconds=lambda subject: 20 + 0.01 * subject.samples,
     answer=_answer,
     options=_options,

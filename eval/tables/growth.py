@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
 from eval.engine.requirements import KITS, SEARCH
 from stages.shape.kit import Kit
 
@@ -17,7 +17,7 @@ GENERATIONS = 5
 """So many generations of each kit are drawn at most."""
 
 
-def _answer(subject: Subject, _: Namespace) -> Answer:
+def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from eval.strings.growth import generation_table, grown, growth_table
     from stages.exemplars.language import dataset_kits
     from stages.strings.settings import StringsConfig
@@ -29,14 +29,14 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
         name: [(0.0, float(each.inputs.graphs)), *((float(n), float(s.graphs)) for n, s in each.generations.items())]
         for name, each in found.items()
     }
-    return Answer(
+    return TableResult(
         [growth_table(found), generation_table(found)],
-        [Curve("Distinct graphs, generation by generation", "generation", "graphs", lines)],
+        [Chart("Distinct graphs, generation by generation", "generation", "graphs", lines)],
         [_strip(kit, found[name]) for name, kit in kits.items()],
     )
 
 
-def _strip(kit: Kit, found: Grown) -> Strip:
+def _strip(kit: Kit, found: Grown) -> ImageRow:
     """An input, and the first find of each generation."""
     from eval.engine.pictures import shape_picture
     from stages.shape.shape import kit_shape, upright
@@ -47,7 +47,7 @@ def _strip(kit: Kit, found: Grown) -> Strip:
         first = next(each for each in found.finds if each.generation == number)
         shown.append((f"generation {number}, {len(first.assembly)} parts", first.assembly))
     pictures = [(said, shape_picture(upright(kit_shape(kit, assembly)))) for said, assembly in shown]
-    return Strip(f"{kit.name}: an input, and the first of each generation", pictures)
+    return ImageRow(f"{kit.name}: an input, and the first of each generation", pictures)
 
 
 TABLE = Evaluation(

@@ -7,10 +7,10 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import get_args
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Strip
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, ImageRow, TableResult
 from eval.engine.requirements import CORPUS, KITS
-from stages.string_sampling.settings import Way
+from stages.string_sampling.settings import SamplingMethod
 
 SHOWN = 4
 """Pictures of what each model dreamt."""
@@ -18,7 +18,7 @@ WARMING = 8
 """Graphs that are put together before anybody looks at a clock: contacts are learnt first."""
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.engine.pictures import shape_picture
     from eval.generated.instantiation import (
         DRAWS,
@@ -37,14 +37,14 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.exemplars.language import dataset_kits
     from stages.shape.graphs.canonical import graph_digest
     from stages.shape.shape import kit_shape
-    from stages.string_sampling.mending import mended
+    from stages.string_sampling.repair import repair_strings
     from stages.strings.alphabet import make_alphabet
     from stages.strings.decoder import decode
     from stages.training.string_vae.latent_sampling import sample
 
     outcomes: list[tuple[str, Sequence[Attempt]]] = []
     compared: list[tuple[str, str, Sequence[Attempt]]] = []
-    strips: list[Strip] = []
+    strips: list[ImageRow] = []
     models, seed = [each for each in string_vaes(subject.models) if each.seed == 0], subject.config.seed
     for name, kit in dataset_kits(subject.places).items():
         train, test = (_lines(subject, name, split) for split in ("train", "test"))
@@ -66,11 +66,11 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             learnt_from = [line for line in train if trained.model.is_valid(line)]
             rng = dream_rng(seed, trained.folder)
             drawn = sample(trained.model, asked.way, learnt_from, DRAWS * asked.instantiated, rng)
-            mends = mended(trained.model, drawn[: asked.instantiated], maker, standard, asked.mends, seed)
+            mends = repair_strings(trained.model, drawn[: asked.instantiated], maker, standard, asked.mends, seed)
             tried: list[Attempt] = []
             for title, strings in (
                 ("new graphs of", [each.string for each in drawn]),
-                ("new graphs, mended, of", mends),
+                ("new graphs, repair_strings, of", mends),
             ):
                 written = [each for each in strings if each is not None]
                 dreamt = distinct_graphs(written, alphabet, asked.instantiated, known)
@@ -79,29 +79,31 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
                     outcomes.append((f"{name}, {title} {trained.name}", tried))
             good = [each.assembly for each in tried if each.good and each.assembly is not None]
             pictures = [(f"{len(each)} parts", shape_picture(kit_shape(kit, each))) for each in good[:SHOWN]]
-            strips.append(Strip(f"What {trained.folder} dreamt", pictures))
-    return Answer([outcome_table(outcomes), methods_table(compared)], strips=strips)
+            strips.append(ImageRow(f"What {trained.folder} dreamt", pictures))
+    return TableResult([outcome_table(outcomes), methods_table(compared)], strips=strips)
 
 
-def _lines(subject: Subject, kit: str, split: str) -> list[str]:
+def _lines(subject: DatasetRun, kit: str, split: str) -> list[str]:
     path = subject.corpus / f"{kit}-{split}.txt"
     return path.read_text().splitlines() if path.is_file() else []
 
 
-def _tells_all(subject: Subject, kit: str) -> bool:
+def _tells_all(subject: DatasetRun, kit: str) -> bool:
     """Whether the strings of a kit tell of all contacts."""
     vocabulary = json.loads((subject.corpus / "vocabulary.json").read_bytes())
     return bool(vocabulary[kit]["edges"] == "all")
 
 
-def _seconds(subject: Subject) -> float:
+def _seconds(subject: DatasetRun) -> float:
     kits, models = (len(list(folder)) for folder in (subject.corpus.glob("*-test.txt"), subject.models.glob("*")))
     return 30.0 + 90.0 * kits + 150.0 * models
 
 
 def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--instantiated", type=int, default=100, help="graphs of each kit and each model")
-    parser.add_argument("--way", choices=get_args(Way), default="gaussian", help="as in string_sampling.sources")
+    parser.add_argument(
+        "--way", choices=get_args(SamplingMethod), default="gaussian", help="as in string_sampling.sources"
+    )
     parser.add_argument("--mends", type=int, default=24, help="as in synthesis")
     parser.add_argument("--parts", type=int, default=4000, help="parts put down at most for a graph")
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Sequence
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
-from eval.engine.requirements import FINISHED
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
+from eval.engine.requirements import FINISHED_DATASET
 
 SHOWN = 3
 """So many pairs of nearest shapes are drawn."""
 
 
-def _answer(subject: Subject, _: Namespace) -> Answer:
+def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from eval.dataset.near_duplicates import dataset_clouds, near_twins_table, nearest_by_split
     from eval.engine.pictures import cloud_picture
 
@@ -29,10 +29,10 @@ def _answer(subject: Subject, _: Namespace) -> Answer:
     for distance, kit, split, place, there in pairs:
         pictures.append((f"{kit}, {split}, at {distance:.2f}", cloud_picture(clouds[kit, split][place][0])))
         pictures.append((f"nearest in {kit}, train", cloud_picture(clouds[kit, "train"][there][0])))
-    return Answer(
+    return TableResult(
         [near_twins_table(found)],
-        [Curve("How far the nearest of train is", "resampling distances", "% of shapes at most so far", lines)],
-        [Strip("The nearest pairs, as clouds", pictures)] if pictures else [],
+        [Chart("How far the nearest of train is", "resampling distances", "% of shapes at most so far", lines)],
+        [ImageRow("The nearest pairs, as clouds", pictures)] if pictures else [],
     )
 
 
@@ -44,7 +44,7 @@ def _rising(distances: Sequence[float]) -> list[tuple[float, float]]:
 
 TABLE = Evaluation(
     question="How many shapes of val and test are as near to train as two samplings of one shape?",
-    needs=(FINISHED,),
+    needs=(FINISHED_DATASET,),
     seconds=lambda subject: 10 + 0.05 * subject.samples,
     answer=_answer,
 )

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
-from eval.engine.requirements import FINISHED
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
+from eval.engine.requirements import FINISHED_DATASET
 from pipeline.errors import ConfigError
 from stages.shape.shape import Shape
 
@@ -29,7 +29,7 @@ def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that points up in the files")
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.dataset.physical_validity import PUBLISHED, judged_by_name, physical_table
     from eval.engine.shapes import dataset_shapes
     from stages.shape.physics.settings import PhysicsConfig
@@ -37,10 +37,10 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     config = subject.config.section(PhysicsConfig)
     judged = judged_by_name(dataset_shapes(subject.folder, asked.most), config)
     table = physical_table(judged, config, asked.dry, PUBLISHED)
-    return Answer([table], [_margins(judged)], [Strip("The weakest, by the push they bear", _weakest(judged))])
+    return TableResult([table], [_margins(judged)], [ImageRow("The weakest, by the push they bear", _weakest(judged))])
 
 
-def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
+def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
     from eval.dataset.physical_validity import PUBLISHED, judged_by_name, physical_table
     from eval.engine.shapes import box_shapes, model_shapes
     from stages.shape.physics.settings import PhysicsConfig
@@ -54,17 +54,17 @@ def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
     boxes = [path.stem for path in paths if path.suffix == ".npz"]
     published = [each for each in PUBLISHED if any(each.name.partition(",")[0] in stem for stem in boxes)]
     config = PhysicsConfig()
-    return Answer([physical_table(judged_by_name(shapes(), config), config, asked.dry, published)])
+    return TableResult([physical_table(judged_by_name(shapes(), config), config, asked.dry, published)])
 
 
-def _margins(judged: Mapping[str, Judged]) -> Curve:
+def _margins(judged: Mapping[str, Judged]) -> Chart:
     """The share of shapes that bear a push of so many weights."""
     lines = {}
     for name, each in judged.items():
         margins = [validity.margin for validity in each.rigid]
         steps = sorted({0.0, *(margin for margin in margins if margin >= 0)})
         lines[name] = [(step, 100 * sum(margin >= step for margin in margins) / len(margins)) for step in steps]
-    return Curve("How large a push they bear", "push, in weights", "% that bear it", lines)
+    return Chart("How large a push they bear", "push, in weights", "% that bear it", lines)
 
 
 def _weakest(judged: Mapping[str, Judged]) -> list[tuple[str, bytes]]:
@@ -93,7 +93,7 @@ def _at_least(least: int) -> Callable[[str], int]:
 
 TABLE = Evaluation(
     question="Does what the dataset holds stand, and how large a push does it bear?",
-    needs=(FINISHED,),
+    needs=(FINISHED_DATASET,),
     seconds=lambda subject: 10 + 0.2 * min(subject.samples, MOST),
     answer=_answer,
     of_files=_of_files,

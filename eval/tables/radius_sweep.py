@@ -6,8 +6,8 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Need
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, Requirement, TableResult
 from pipeline.errors import ConfigError
 
 RADII = (0.008, 0.016, 0.032, 0.064)
@@ -18,11 +18,11 @@ def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--radii", nargs="+", type=float, default=RADII, help="of similarity, in longest sides")
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     raise ConfigError(f"this table takes {FILE}")
 
 
-def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
+def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
     from eval.grammars.radius_sweep import extractions, radii_sheet, radii_table
     from stages.grammars.settings import LARGEST_RADIUS, LEAST_RADIUS
 
@@ -33,14 +33,14 @@ def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
         if not LEAST_RADIUS <= radius <= LARGEST_RADIUS:
             raise ConfigError(f"--radii: {radius:g} is not from {LEAST_RADIUS:g} to {LARGEST_RADIUS:g} longest sides")
     found = {path: extractions(path, sorted(asked.radii), asked.up) for path in paths}
-    return Answer(
+    return TableResult(
         [radii_table(each) for each in found.values()], sheets=[radii_sheet(path, each) for path, each in found.items()]
     )
 
 
 TABLE = Evaluation(
     question="What does the radius of similarity do to the grammar of a mesh?",
-    needs=(Need("a model file", lambda subject: f"it takes {FILE}"),),  # a minute or two: no part of `all`
+    needs=(Requirement("a model file", lambda subject: f"it takes {FILE}"),),  # a minute or two: no part of `all`
     seconds=lambda subject: 120.0,
     answer=_answer,
     of_files=_of_files,

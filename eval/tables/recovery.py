@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Strip
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, ImageRow, TableResult
 from eval.engine.requirements import CURVE_PROGRAM
-from eval.engine.results_cache import Part, in_parts
+from eval.engine.results_cache import TableSection, cached_sections
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ LOOKED_AT = 8
 """Shapes whose parameters are changed one by one, to see how much each error is."""
 
 
-def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
     """One for each program and kind of input."""
     from eval.recovery.accuracy import usable_models
     from stages.programs.program import program_module
@@ -32,10 +32,10 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
     for (program, kind), model in sorted(usable_models(subject.models, asked.programs).items()):
         make = partial(_of_model, model, asked, subject.config.seed)
         options = ("shapes", "refined", "budget")
-        yield Part(f"{program}, {kind}", reads, make, (program_module(program),), options)
+        yield TableSection(f"{program}, {kind}", reads, make, (program_module(program),), options)
 
 
-def _of_model(model: TrainedRecovery, asked: Namespace, seed: int) -> Answer:
+def _of_model(model: TrainedRecovery, asked: Namespace, seed: int) -> TableResult:
     from eval.recovery.accuracy import (
         Found,
         accuracy_chart,
@@ -68,16 +68,16 @@ def _of_model(model: TrainedRecovery, asked: Namespace, seed: int) -> Answer:
         guessed, refined = found["network"], found["network, refined"]
         shares[of_input] = guessed, alike(guessed, shapes[:LOOKED_AT])
         chart = accuracy_chart([guessed, refined], shares[of_input][1])
-        strips.append(Strip(f"Parameters that are right, {of_input}", [("", chart)]))
+        strips.append(ImageRow(f"Parameters that are right, {of_input}", [("", chart)]))
         best = [*refined.results, *guessed.results[len(refined.results) :]]
         captions = [f"{each.name}, {'refined' if at < asked.refined else 'network'}" for at, each in enumerate(inputs)]
         pictures = [
             (caption, picture_png(recovery_picture(given, result)))
             for caption, given, result in zip(captions[:SHOWN], inputs, best, strict=False)
         ]
-        strips.append(Strip(f"Input and result, {of_input}", pictures))
+        strips.append(ImageRow(f"Input and result, {of_input}", pictures))
     floors = {f"{model.program.name}, {model.entry.input}: true shape": float(floor(model.program, shapes).mean())}
-    return Answer([recovery_table(rows, floors, asked.budget), parameters_table(shares)], strips=strips)
+    return TableResult([recovery_table(rows, floors, asked.budget), parameters_table(shares)], strips=strips)
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -91,6 +91,6 @@ TABLE = Evaluation(
     question="How near do shapes come that are recovered from clouds and drawings, and which parameters are right?",
     needs=(CURVE_PROGRAM,),
     seconds=lambda subject: 750.0,
-    answer=in_parts(_parts, _options),
+    answer=cached_sections(_parts, _options),
     options=_options,
 )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.requirements import RECOVERY
 from stages.training.checkpoint import weights_of_kind
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.recovery.accuracy import baselines_table, held_out, methods, tried
     from pipeline.randomness import decision_rng
     from stages.training.recovery.trained import load_recovery
@@ -24,7 +24,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             label = f"{path.parent.name}, {name}"
             rows.append(tried(label, model.program, guess, shapes, inputs))
             steps[label] = model.entry.steps * model.entry.rounds
-    return Answer([baselines_table(rows, steps)])
+    return TableResult([baselines_table(rows, steps)])
 
 
 def _options(parser: ArgumentParser) -> None:

@@ -8,10 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Strip
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, ImageRow, TableResult
 from eval.engine.requirements import CURVE_PROGRAM
-from eval.engine.results_cache import Part, in_parts
+from eval.engine.results_cache import TableSection, cached_sections
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ SHOWN = 8
 """Recoveries of each kind that the report shows."""
 
 
-def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
     """One for each program and way to spoil, and one for each program and folder from elsewhere."""
     from eval.recovery.accuracy import usable_models
     from eval.recovery.robustness import foreign_inputs, ways_to_spoil
@@ -37,15 +37,15 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
         code = (program_module(program),)
         for how in ways_to_spoil(kind) if asked.spoilt else ():
             make = partial(_of_spoilt, model, how, asked, seed)
-            yield Part(f"{program}, {kind}, {how}", weights, make, code, ("spoilt", "tries"))
+            yield TableSection(f"{program}, {kind}, {how}", weights, make, code, ("spoilt", "tries"))
         for folder in asked.foreign:
             if brought[folder, kind]:
                 make = partial(_of_folder, model, folder.name, brought[folder, kind], asked, seed)
                 reads = [*weights, *sorted(each for each in (folder, *folder.glob("*")) if each.is_file())]
-                yield Part(f"{program}, {kind}, from {folder.name}", reads, make, code, ("tries",))
+                yield TableSection(f"{program}, {kind}, from {folder.name}", reads, make, code, ("tries",))
 
 
-def _of_spoilt(model: TrainedRecovery, how: str, asked: Namespace, seed: int) -> Answer:
+def _of_spoilt(model: TrainedRecovery, how: str, asked: Namespace, seed: int) -> TableResult:
     from eval.recovery.accuracy import held_out, methods, tried
     from eval.recovery.robustness import WAYS, spoilt_inputs, spoilt_table
     from pipeline.randomness import decision_rng
@@ -56,26 +56,26 @@ def _of_spoilt(model: TrainedRecovery, how: str, asked: Namespace, seed: int) ->
     given = spoilt_inputs(model, how, shapes, inputs, seed)
     label = f"{model.program.name}, {name}, {how}"
     found = [tried(f"{label}: {way}", model.program, ways[way], shapes, given) for way in WAYS]
-    return Answer([spoilt_table(found)], strips=[_strip(label, given, found[-1].results)])
+    return TableResult([spoilt_table(found)], strips=[_strip(label, given, found[-1].results)])
 
 
 def _of_folder(
     model: TrainedRecovery, folder: str, inputs: Sequence[RecoveryInput], asked: Namespace, seed: int
-) -> Answer:
+) -> TableResult:
     from eval.recovery.robustness import foreign_rows, foreign_table
 
     label, found = f"{model.program.name}, {folder}", foreign_rows(model, inputs, asked.tries, seed)
     table = foreign_table([(f"{label}: {way}", distances, results) for way, distances, results in found])
-    return Answer([table], strips=[_strip(label, inputs, found[-1][2])])
+    return TableResult([table], strips=[_strip(label, inputs, found[-1][2])])
 
 
-def _strip(label: str, inputs: Sequence[RecoveryInput], results: Sequence[RecoveryResult]) -> Strip:
+def _strip(label: str, inputs: Sequence[RecoveryInput], results: Sequence[RecoveryResult]) -> ImageRow:
     from stages.recovery.files import recovery_picture
     from stages.shape.views.sheet import picture_png
 
     pairs = list(zip(inputs, results, strict=True))[:SHOWN]
     pictures = [(given.name, picture_png(recovery_picture(given, result))) for given, result in pairs]
-    return Strip(f"Input and result, {label}", pictures)
+    return ImageRow(f"Input and result, {label}", pictures)
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -97,6 +97,6 @@ TABLE = Evaluation(
     question="How near does recovery come where inputs are noisy, torn, drawn otherwise, or of no program at all?",
     needs=(CURVE_PROGRAM,),
     seconds=lambda subject: 900.0,
-    answer=in_parts(_parts, _options),
+    answer=cached_sections(_parts, _options),
     options=_options,
 )

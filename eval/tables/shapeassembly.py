@@ -9,11 +9,11 @@ from functools import lru_cache, partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
-from eval.engine.models import Trained, training_curve
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
+from eval.engine.models import TrainedModel, training_curve
 from eval.engine.requirements import PROGRAM_WRITERS, PROGRAMS
-from eval.engine.results_cache import Part, in_parts
+from eval.engine.results_cache import TableSection, cached_sections
 from stages.shapeassembly.settings import NUCLEUS
 from stages.training.checkpoint import weights_of_kind
 
@@ -29,7 +29,7 @@ SHOWN = 16
 SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part_graph_vae": 120.0}
 
 
-def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
     """One for each model, and one for the shapes of val of each category; what a category's share is read once."""
     from eval.programs.models import program_models, program_shards
     from eval.programs.reference import read_reference
@@ -42,13 +42,13 @@ def _parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
         for each in models:
             folder = subject.models / each.folder
             of_model = partial(_of_model, subject, asked, each, reference)
-            yield Part(each.folder, [folder / "weights.safetensors", folder / "curves.csv", *reads], of_model)
-        yield Part(f"{category}, val", reads, partial(_of_val, subject, asked, category, reference))
+            yield TableSection(each.folder, [folder / "weights.safetensors", folder / "curves.csv", *reads], of_model)
+        yield TableSection(f"{category}, val", reads, partial(_of_val, subject, asked, category, reference))
 
 
 def _of_model(
-    subject: Subject, asked: Namespace, trained: Trained[Any], reference: Callable[[str], Reference]
-) -> Answer:
+    subject: DatasetRun, asked: Namespace, trained: TrainedModel[Any], reference: Callable[[str], Reference]
+) -> TableResult:
     from eval.programs.models import told_without
     from eval.programs.quality import smoothness
     from eval.programs.tables import quality_table, smoothness_table
@@ -58,25 +58,25 @@ def _of_model(
 
     rng = decision_rng(subject.config.seed, "shapeassembly", trained.folder)
     learning = {trained.folder: training_curve(subject.models / trained.folder, "val_loss")}
-    curve = Curve("How well shapes that were not learnt are written", "steps of training", "loss", learning)
+    curve = Chart("How well shapes that were not learnt are written", "steps of training", "loss", learning)
     rows, silent = _written(trained, asked, rng)
     if not rows:
-        return Answer([quality_table({}, {}, {}, silent)], [curve])
+        return TableResult([quality_table({}, {}, {}, silent)], [curve])
     # What is told in another way is new whatever it is.
     whole = told_without(trained) == "nothing"
     tables = _tables(rows, reference(trained.kit), subject.config.seed, silent, novel=whole)
     if isinstance(trained.model, TrainedProgramVae | TrainedPartGraphVae) and whole:
         tables.append(smoothness_table({trained.folder: smoothness(trained.model, asked.sequences, asked.steps, rng)}))
-    strips = [Strip(f"Samples of {row.name}", _pictures(row.samples[:SHOWN])) for row in rows]
-    return Answer(tables, [curve], strips)
+    strips = [ImageRow(f"Samples of {row.name}", _pictures(row.samples[:SHOWN])) for row in rows]
+    return TableResult(tables, [curve], strips)
 
 
-def _of_val(subject: Subject, asked: Namespace, category: str, reference: Callable[[str], Reference]) -> Answer:
+def _of_val(subject: DatasetRun, asked: Namespace, category: str, reference: Callable[[str], Reference]) -> TableResult:
     from eval.programs.quality import boxes_of_programs
 
     programs = reference(category).val[: asked.samples]
     row = Written(f"{category}, val", boxes_of_programs(programs), programs, of_val=True)
-    return Answer(_tables([row], reference(category), subject.config.seed, {}, novel=True))
+    return TableResult(_tables([row], reference(category), subject.config.seed, {}, novel=True))
 
 
 def _tables(
@@ -119,7 +119,9 @@ class Written:
     of_val: bool = False
 
 
-def _written(trained: Trained[Any], asked: Namespace, rng: np.random.Generator) -> tuple[list[Written], dict[str, str]]:
+def _written(
+    trained: TrainedModel[Any], asked: Namespace, rng: np.random.Generator
+) -> tuple[list[Written], dict[str, str]]:
     """What a model writes; and, of one of whole programs, what it writes where nothing is rejected. Beside it why one
     that writes next to nothing is silent, by name."""
     from eval.programs.models import PROGRAM_KINDS, told_without
@@ -175,6 +177,6 @@ TABLE = Evaluation(
     question="Do shapes stand whose programs or cuboids a model writes, how much do they vary, can programs be edited?",
     needs=(PROGRAM_WRITERS, PROGRAMS),
     seconds=lambda subject: sum(each * len(weights_of_kind(subject.models, kind)) for kind, each in SECONDS.items()),
-    answer=in_parts(_parts, _options),
+    answer=cached_sections(_parts, _options),
     options=_options,
 )

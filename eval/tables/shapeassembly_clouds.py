@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Need
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, Requirement, TableResult
 from eval.engine.requirements import PROGRAMS
 from stages.training.checkpoint import weights_of_kind
 
@@ -16,12 +16,12 @@ DRAWN = 5
 """Clouds that figure 13 shows."""
 
 
-def _spaces(subject: Subject) -> str:
+def _spaces(subject: DatasetRun) -> str:
     there = any(weights_of_kind(subject.models, kind) for kind in KINDS)
     return "" if there else f"no trained {' or '.join(KINDS)} in {subject.models}; make train"
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.engine.pictures import cloud_portrait
     from eval.programs.cloud_reconstruction import Rebuilt, clouds_table, described, reconstructions, trained_encoder
     from eval.programs.figures import drawn, sheet_of
@@ -59,7 +59,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
                         shown[number].append((f"{each.folder}{name}", drawn(boxes)))
         title = f"Figure 13, {category}: from clouds to cuboids and programs, shapes not chosen"
         sheets.append(sheet_of(f"figure13_{category}", title, {f"{n}.": row for n, row in enumerate(shown, 1)}))
-    return Answer([clouds_table(rows)], sheets=sheets)
+    return TableResult([clouds_table(rows)], sheets=sheets)
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="What programs do models find of point clouds, and how near do fits of cuboids or of programs come?",
-    needs=(Need("a trained model of programs, or of their cuboids, with a latent space", _spaces), PROGRAMS),
+    needs=(Requirement("a trained model of programs, or of their cuboids, with a latent space", _spaces), PROGRAMS),
     seconds=lambda subject: 1200.0,
     answer=_answer,
     options=_options,

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation, Sheet
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, Figure, TableResult
 from eval.engine.requirements import PROGRAM_WRITERS, PROGRAMS
 from stages.training.checkpoint import weights_of_kind
 
@@ -16,7 +16,7 @@ CURVES = ("chair", "table")
 SECONDS = {"program_vae": 90.0, "program_lm": 60.0, "cuboid_rnn": 20.0, "part_graph_vae": 30.0}
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.programs.figures import beside_sheet, edits_sheet, journey_sheet, neighbours, neighbours_table
     from eval.programs.models import PROGRAM_KINDS, category_programs, program_models, read_by_all, told_without
     from eval.programs.part_surfaces import curve_parts, surfaces_sheet, trained_surfaces
@@ -26,7 +26,7 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
     from stages.training.program_vae.trained import TrainedProgramVae
 
     models = [each for each in program_models(subject, asked.nucleus) if told_without(each) == "nothing"]
-    sheets: list[Sheet] = []
+    sheets: list[Figure] = []
     rows = []
     for category in sorted({each.kit for each in models}):
         train = category_programs(subject, category, "train")
@@ -61,10 +61,10 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
             rng = decision_rng(subject.config.seed, "shapeassembly_figures", category)
             ends = read_by_all(subject, category, "val", 2 * asked.pairs, rng)
             sheets.append(journey_sheet(category, spaces, list(zip(ends[::2], ends[1::2], strict=False))))
-    return Answer([neighbours_table(rows)], sheets=sorted(sheets, key=_number))
+    return TableResult([neighbours_table(rows)], sheets=sorted(sheets, key=_number))
 
 
-def _number(sheet: Sheet) -> int:
+def _number(sheet: Figure) -> int:
     """The number of the figure, as the paper counts."""
     return int(sheet.name.partition("_")[0].removeprefix("figure"))
 

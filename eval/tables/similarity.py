@@ -6,9 +6,9 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Evaluation
-from eval.engine.requirements import EXEMPLARS, FINISHED
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Evaluation, TableResult
+from eval.engine.requirements import EXEMPLARS, FINISHED_DATASET
 from stages.shape.arrays import FloatArray
 
 MOST = 24
@@ -17,7 +17,7 @@ RADIUS = 0.016
 """As published, a share of the longest side."""
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.engine.shapes import dataset_shapes
     from eval.grammars.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.randomness import decision_rng
@@ -30,10 +30,10 @@ def _answer(subject: Subject, asked: Namespace) -> Answer:
         if name in shapes:
             rng = decision_rng(subject.config.seed, "similarity", name)
             rows.append(similarity_row(name, exemplars, shapes[name], asked.radius, asked.probes, rng))
-    return Answer([similarity_table(rows)])
+    return TableResult([similarity_table(rows)])
 
 
-def _exemplars(subject: Subject) -> dict[str, list[FloatArray]]:
+def _exemplars(subject: DatasetRun) -> dict[str, list[FloatArray]]:
     """The triangles of the exemplars of each kit, and of the mesh of each grammar."""
     from eval.grammars.similarity import triangles_of
     from stages.exemplars.language import dataset_kits
@@ -49,7 +49,7 @@ def _exemplars(subject: Subject) -> dict[str, list[FloatArray]]:
     return found
 
 
-def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
+def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
     from eval.engine.shapes import model_shapes
     from eval.grammars.similarity import similarity_row, similarity_table, triangles_of
     from pipeline.errors import ConfigError
@@ -62,7 +62,7 @@ def _of_files(paths: Sequence[Path], asked: Namespace) -> Answer:
         similarity_row(name, [exemplar[1]], [each], asked.radius, asked.probes, decision_rng(0, "similarity", name))
         for name, each in shapes
     ]
-    return Answer([similarity_table(rows)])
+    return TableResult([similarity_table(rows)])
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def _options(parser: ArgumentParser) -> None:
 
 TABLE = Evaluation(
     question="Does each shape look around every point as an exemplar does somewhere?",
-    needs=(FINISHED, EXEMPLARS),
+    needs=(FINISHED_DATASET, EXEMPLARS),
     seconds=lambda subject: 20 + 4 * min(subject.samples, MOST),
     answer=_answer,
     of_files=_of_files,

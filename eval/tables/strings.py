@@ -8,36 +8,36 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from eval.engine.dataset_run import Subject
-from eval.engine.evaluation import Answer, Curve, Evaluation, Strip
+from eval.engine.dataset_run import DatasetRun
+from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
 from eval.engine.requirements import CORPUS, STRING_VAE
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
-    from eval.engine.models import Trained
+    from eval.engine.models import TrainedModel
     from eval.strings.string_vaes import Reconstruction, Sampling
     from stages.training.string_vae.latent_graph import PathFigures
     from stages.training.string_vae.trained import TrainedStringVae
 
 
-def _answer(subject: Subject, asked: Namespace) -> Answer:
+def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.engine.models import training_curve
-    from eval.engine.parallel_map import side_by_side
+    from eval.engine.parallel_map import parallel_map
     from eval.strings.string_vaes import reconstruction_table, sampling_table, string_vaes, structure_table
 
     rebuilt, sampled, joined, lines = [], [], [], {}
-    strips: list[Strip] = []
+    strips: list[ImageRow] = []
     models = string_vaes(subject.models)
-    for each, seen in side_by_side(partial(_look_at, subject, asked.searches), models, asked.workers, "models"):
+    for each, seen in parallel_map(partial(_look_at, subject, asked.searches), models, asked.workers, "models"):
         if seen.rebuilt is not None:
             rebuilt.append((each, seen.rebuilt))
         sampled += [(each, way, figures) for way, figures in seen.sampled.items()]
         joined.append((each, seen.nodes, seen.joined))
         strips += seen.strips
         lines[each.folder] = training_curve(subject.models / each.folder, "val_nats")
-    return Answer(
+    return TableResult(
         [reconstruction_table(rebuilt), sampling_table(sampled), structure_table(joined)],
-        [Curve("What a string that was not learnt takes", "steps of training", "nats a string", lines)],
+        [Chart("What a string that was not learnt takes", "steps of training", "nats a string", lines)],
         strips,
     )
 
@@ -50,24 +50,24 @@ class _Seen:
     sampled: Mapping[str, Sampling]
     nodes: int
     joined: Mapping[str, PathFigures]
-    strips: Sequence[Strip]
+    strips: Sequence[ImageRow]
 
 
-def _look_at(subject: Subject, searches: int, trained: Trained[TrainedStringVae]) -> _Seen:
+def _look_at(subject: DatasetRun, searches: int, trained: TrainedModel[TrainedStringVae]) -> _Seen:
     from eval.generated.instantiation import instantiator_of
     from eval.strings.latent_interpolation import journey_strips
     from eval.strings.string_vaes import corpus_strings, model_rng, reconstruction, sampling, shape_graphs, structure
     from stages.exemplars.language import dataset_kits
-    from stages.string_sampling.instantiation.layout import STANDARD
+    from stages.string_sampling.instantiation.state import STANDARD_METHOD
     from stages.strings.settings import StringsConfig
     from stages.training.string_vae.latent_sampling import WAYS
 
     model, seed, kits = trained.model, subject.config.seed, dataset_kits(subject.places)
     train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))
-    strips: list[Strip] = []
+    strips: list[ImageRow] = []
     if not trained.seed and trained.kit in kits:
         maker = instantiator_of(subject, kits[trained.kit])
-        method = STANDARD._replace(whole=subject.config.section(StringsConfig).edges == "all")
+        method = STANDARD_METHOD._replace(whole=subject.config.section(StringsConfig).edges == "all")
         rng = model_rng(seed, trained, "journeys")
         strips += journey_strips(model, train, maker, method, trained.folder, rng)
     known = shape_graphs(model, train)

@@ -13,7 +13,7 @@ from pipeline.errors import ConfigError, Rejected, ShardFailed
 from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.program_sampling.settings import WritingConfig
+from stages.program_sampling.settings import ProgramSamplingConfig
 from stages.shapeassembly.settings import ShapeAssemblyConfig, WrittenPrograms
 from stages.shapeassembly.syntax.printer import print_program
 
@@ -22,7 +22,7 @@ BYTES_A_PROGRAM = 3_000
 
 def plan(plan: Plan) -> list[Shard]:
     """The shards of every model, in the order of the config. Raises ConfigError where one is not there."""
-    most = plan.config.section(WritingConfig).programs_per_shard
+    most = plan.config.section(ProgramSamplingConfig).programs_per_shard
     shards: list[Shard] = []
     for source in plan.config.section(ShapeAssemblyConfig).written:
         digest = file_digest(_weights(plan, source))
@@ -99,15 +99,15 @@ def estimate_bytes(plan: Plan) -> int:
     return BYTES_A_PROGRAM * sum(each.samples for each in plan.config.section(ShapeAssemblyConfig).written)
 
 
-def trial(config: Config) -> WritingConfig:
+def trial(config: Config) -> ProgramSamplingConfig:
     """The few programs that stage `shapeassembly` asks for in its own."""
-    return config.section(WritingConfig)
+    return config.section(ProgramSamplingConfig)
 
 
 STAGE = Stage(
     name="program_sampling",
     module=__name__,
-    config=WritingConfig,
+    config=ProgramSamplingConfig,
     inputs=(),
     plan=plan,
     run_shard=run_shard,

@@ -13,13 +13,13 @@ from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.shape.collection.assignment import SPLITS, assign_splits, shards_of_split
 from stages.shape.sample import read_samples, write_sample
-from stages.string_sampling.rounds import Dreaming, read_pool
-from stages.string_sampling.settings import DreamSplitConfig, SynthesisConfig
+from stages.string_sampling.rounds import ModelRounds, read_pool
+from stages.string_sampling.settings import DreamSplitConfig, StringSamplingConfig
 
 
-def assignment_shard(plan: Plan, models: Sequence[Dreaming]) -> Shard:
+def assignment_shard(plan: Plan, models: Sequence[ModelRounds]) -> Shard:
     """The shard that shares out what all models have found, once they have ended."""
-    sources = plan.config.section(SynthesisConfig).sources
+    sources = plan.config.section(StringSamplingConfig).sources
     pools = [[shard.name for shard in each.shards if shard.params["job"] == "pool"] for each in models]
     params = {
         "job": "assignment",
@@ -27,7 +27,7 @@ def assignment_shard(plan: Plan, models: Sequence[Dreaming]) -> Shard:
             {"kit": source.kit, "samples": source.samples, "pools": own}
             for source, own in zip(sources, pools, strict=True)
         ],
-        "splits": plan.config.section(SynthesisConfig).splits.model_dump(mode="json"),
+        "splits": plan.config.section(StringSamplingConfig).splits.model_dump(mode="json"),
     }
     return Shard(
         f"{plan.config.name}-assignment", params, tuple(f"string_sampling/{each}" for own in pools for each in own)

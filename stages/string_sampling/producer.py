@@ -11,16 +11,16 @@ from pipeline.stage import Plan
 from stages.exemplars.origins import exemplar_origins
 from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
-from stages.string_sampling.rounds import dreaming
-from stages.string_sampling.settings import SynthesisConfig
+from stages.string_sampling.rounds import model_rounds
+from stages.string_sampling.settings import StringSamplingConfig
 
 
 def _measures(plan: Plan) -> Mapping[str, Any]:
     """For each model what it drew, what of it became shapes, and why the rest did not."""
-    config = plan.config.section(SynthesisConfig)
+    config = plan.config.section(StringSamplingConfig)
     found = {}
     for number, source in enumerate(config.sources):
-        model = dreaming(plan, number, source)
+        model = model_rounds(plan, number, source)
         refused: Counter[str] = Counter()
         for lane in model.lanes:
             refused.update(plan.rejects("string_sampling", lane))
@@ -70,7 +70,7 @@ def _lineage(_: Config) -> Mapping[str, Field]:
 PRODUCER = Producer(
     language="kit",
     keys="string_sampling.sources",
-    asked=lambda config: bool(config.section(SynthesisConfig).sources),
+    asked=lambda config: bool(config.section(StringSamplingConfig).sources),
     sentence="models that have learnt the strings of other shapes write new ones; each is put together part by part at "
     "the dockings of its kit, and kept where the contacts, found anew from the meshes, the neighbourhoods and the "
     "dockings are as the exemplars show them.",

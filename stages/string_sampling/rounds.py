@@ -10,12 +10,12 @@ from typing import Any
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.shape.sample import read_samples
-from stages.string_sampling.settings import SourceConfig, SynthesisConfig
+from stages.string_sampling.settings import SourceConfig, StringSamplingConfig
 from stages.string_sampling.source import source_shard
 
 
 @dataclass(frozen=True)
-class Dreaming:
+class ModelRounds:
     """The rounds of one model as far as they are known. pools: summaries of the finished ones; ended: why there is no
     other round, empty where there is one."""
 
@@ -25,10 +25,10 @@ class Dreaming:
     ended: str
 
 
-def dreaming(plan: Plan, number: int, source: SourceConfig) -> Dreaming:
+def model_rounds(plan: Plan, number: int, source: SourceConfig) -> ModelRounds:
     """The rounds of a model: another one until there are as many shapes as wanted, or `patience` of them in a row were
     in vain, or there were `rounds`. Raises ConfigError where the model is not there."""
-    config = plan.config.section(SynthesisConfig)
+    config = plan.config.section(StringSamplingConfig)
     begun = source_shard(plan, number, source)
     shards = [begun]
     lanes: list[str] = []
@@ -48,12 +48,12 @@ def dreaming(plan: Plan, number: int, source: SourceConfig) -> Dreaming:
         shards.append(Shard(last, pooled, tuple(f"string_sampling/{each}" for each in (*names, *before))))
         summary = plan.summary("string_sampling", last)
         if summary is None:
-            return Dreaming(tuple(shards), tuple(lanes), tuple(pools), "")
+            return ModelRounds(tuple(shards), tuple(lanes), tuple(pools), "")
         pools.append(summary)
         ended = _ended(source.samples, config.patience, pools)
         if ended:
-            return Dreaming(tuple(shards), tuple(lanes), tuple(pools), ended)
-    return Dreaming(tuple(shards), tuple(lanes), tuple(pools), f"{config.rounds} rounds are over")
+            return ModelRounds(tuple(shards), tuple(lanes), tuple(pools), ended)
+    return ModelRounds(tuple(shards), tuple(lanes), tuple(pools), f"{config.rounds} rounds are over")
 
 
 def _ended(wanted: int, patience: int, pools: Sequence[Mapping[str, Any]]) -> str:

@@ -9,7 +9,7 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.physics.settings import Requirements
 
-Way = Literal["gaussian", "prior", "perturbation", "linear", "path"]
+SamplingMethod = Literal["gaussian", "prior", "perturbation", "linear", "path"]
 """How strings are drawn from a string VAE (strings §5.2)."""
 
 
@@ -30,7 +30,7 @@ class SourceConfig(StrictModel):
     seed: int = Field(0, ge=0, lt=100, description="Which of its trainings, if it has several seeds.")
     kit: str = Field(description="The kit that it has learnt; the same must stand under exemplars.kits.")
     samples: int = Field(ge=1, le=1_000_000_000, description="Shapes wanted.")
-    way: Way = Field(
+    way: SamplingMethod = Field(
         "gaussian",
         description="How points of its latent space are found: drawn where the training strings stand, as a Gaussian, "
         "or from the prior, or by a search around training strings, on lines between them or on paths along them "
@@ -54,7 +54,7 @@ class DreamSplitConfig(StrictModel):
     samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 
-class SynthesisConfig(StrictModel):
+class StringSamplingConfig(StrictModel):
     """Shapes that trained models dreamt."""
 
     sources: tuple[SourceConfig, ...] = Field(

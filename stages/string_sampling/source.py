@@ -19,8 +19,8 @@ from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.string_sampling.settings import SourceConfig
 from stages.strings.alphabet import make_alphabet
+from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
-from stages.strings.rules import make_rules, patterns_of
 from stages.strings.settings import Edges
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Source:
+class ModelSource:
     """A model with what it has learnt from. strings: those of training that it can read; known: graphs of training,
     digests of their strings' graphs; edges: which contacts its strings tell of; weights: their sha256."""
 
@@ -109,7 +109,7 @@ def run_source(task: Task) -> Outcome:
     return Outcome(0, {"strings": len(strings), "graphs": len(known), "weights": params["digests"]["weights"]})
 
 
-def read_source(task: Task, shard: str, kit: Kit) -> Source:
+def read_source(task: Task, shard: str, kit: Kit) -> ModelSource:
     """What `run_source` wrote in `shard`, one of the inputs."""
     from stages.training.string_vae.trained import load_string_vae
 
@@ -119,7 +119,7 @@ def read_source(task: Task, shard: str, kit: Kit) -> Source:
     known = np.load(task.input("string_sampling", f"{shard}.known.npy"), allow_pickle=False)
     digests = frozenset(bytes(each) for each in known)
     edges = json.loads(task.input("string_sampling", f"{shard}.json").read_bytes())["edges"]
-    return Source(model, strings, digests, edges, file_digest(path))
+    return ModelSource(model, strings, digests, edges, file_digest(path))
 
 
 def _expected(kit: Kit) -> dict[str, Any]:
@@ -128,6 +128,6 @@ def _expected(kit: Kit) -> dict[str, Any]:
 
 def _check_grammar(kit: Kit, patterns: Mapping[str, Any]) -> None:
     """Raises Rejected for a model whose strings follow another grammar than that of the kit."""
-    own = patterns_of(make_rules(kit.grammar, len(kit.labels), 0, bool(patterns["partial"])))
+    own = patterns_json(compile_grammar(kit.grammar, len(kit.labels), 0, bool(patterns["partial"])))
     if own != {key: patterns[key] for key in own}:
         raise Rejected(f"the model has learnt another grammar than kit {kit.name} has here: give it the same exemplars")

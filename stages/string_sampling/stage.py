@@ -15,10 +15,10 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.assignment import shard_sizes
 from stages.string_sampling.collection import assignment_shard, planned_collection, run_assignment, run_collection
-from stages.string_sampling.lane import run_lane
-from stages.string_sampling.rounds import dreaming, run_pool
-from stages.string_sampling.settings import SynthesisConfig
+from stages.string_sampling.rounds import model_rounds, run_pool
+from stages.string_sampling.settings import StringSamplingConfig
 from stages.string_sampling.source import run_source
+from stages.string_sampling.worker import run_worker
 from stages.variations.settings import VariationsConfig
 
 BYTES_A_SAMPLE = 40_000
@@ -26,7 +26,7 @@ BYTES_A_MODEL = 8_000_000
 
 _JOBS = {
     "source": run_source,
-    "lane": run_lane,
+    "lane": run_worker,
     "pool": run_pool,
     "assignment": run_assignment,
     "collection": run_collection,
@@ -35,8 +35,8 @@ _JOBS = {
 
 def plan(plan: Plan) -> list[Shard]:
     """The rounds of every model as far as they are known, then the assignment and the collection."""
-    sources = plan.config.section(SynthesisConfig).sources
-    models = [dreaming(plan, number, source) for number, source in enumerate(sources)]
+    sources = plan.config.section(StringSamplingConfig).sources
+    models = [model_rounds(plan, number, source) for number, source in enumerate(sources)]
     shards = [shard for each in models for shard in each.shards]
     if not models or not all(each.ended for each in models):
         return shards
@@ -51,10 +51,10 @@ def run_shard(task: Task) -> Outcome:
 
 def report(plan: Plan) -> Sequence[str]:
     """How far each model is, and what became of what it drew."""
-    config = plan.config.section(SynthesisConfig)
+    config = plan.config.section(StringSamplingConfig)
     lines = []
     for number, source in enumerate(config.sources):
-        model = dreaming(plan, number, source)
+        model = model_rounds(plan, number, source)
         if model.pools:
             refused: Counter[str] = Counter()
             for lane in model.lanes:
@@ -72,7 +72,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def check(config: Config) -> None:
     """Raises ConfigError for models of kits that the config has not, and for variations beside them."""
-    sources = config.section(SynthesisConfig).sources
+    sources = config.section(StringSamplingConfig).sources
     kits = [kit.name for kit in config.section(ExemplarsConfig).kits]
     for number, source in enumerate(sources):
         if source.kit not in kits:
@@ -90,15 +90,15 @@ def check(config: Config) -> None:
 
 def asked(config: Config) -> Sequence[int]:
     """The shapes of each shard, if every model finds as many as are wanted."""
-    section = config.section(SynthesisConfig)
+    section = config.section(StringSamplingConfig)
     total = sum(source.samples for source in section.sources)
     val, test = round(section.splits.val * total), round(section.splits.test * total)
     return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
 
 
-def trial(config: Config) -> SynthesisConfig:
+def trial(config: Config) -> StringSamplingConfig:
     """A few shapes of each model."""
-    section = config.section(SynthesisConfig)
+    section = config.section(StringSamplingConfig)
     few = max(32 // max(len(section.sources), 1), 4)
     sources = tuple(source.model_copy(update={"samples": few}) for source in section.sources)
     splits = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
@@ -107,14 +107,14 @@ def trial(config: Config) -> SynthesisConfig:
 
 def estimate_bytes(plan: Plan) -> int:
     """All models, and each shape in its lane and in the collection."""
-    sources = plan.config.section(SynthesisConfig).sources
+    sources = plan.config.section(StringSamplingConfig).sources
     return len(sources) * BYTES_A_MODEL + 2 * BYTES_A_SAMPLE * sum(source.samples for source in sources)
 
 
 STAGE = Stage(
     name="string_sampling",
     module=__name__,
-    config=SynthesisConfig,
+    config=StringSamplingConfig,
     inputs=("exemplars",),
     plan=plan,
     run_shard=run_shard,

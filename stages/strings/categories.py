@@ -35,9 +35,9 @@ from stages.strings.encoder import Encoded
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-DUMMY = 0
+DUMMY_CATEGORY = 0
 """The category of brackets."""
-REACH = 2.0
+MAX_CATEGORY_TOLERANCES = 2.0
 """An edge has the nearest category if that is at most so many tolerances away: images of a docking that are one
 tolerance apart are one category."""
 
@@ -49,7 +49,7 @@ class NoCategoryError(ValueError):
 
 
 @dataclass(frozen=True)
-class Labelled:
+class CategorizedString:
     """A string with categories.
 
     nodes: int64 (n,), the part at each node of the string, those of equal branches in the order of their categories;
@@ -62,7 +62,7 @@ class Labelled:
 
 
 @dataclass(frozen=True)
-class PairPlaces:
+class PairPlacements:
     """How a part of one type, the child, docks to one of another, the parent.
 
     first: the category of the first place; poses: float64 (k, 4, 4), the child's frame in the parent's, one each place;
@@ -89,7 +89,7 @@ class CategorySpace:
     def __init__(self, kit: Kit) -> None:
         self.kit = kit
         self.alphabet: Alphabet = make_alphabet(kit.labels)
-        self.pairs: dict[tuple[int, int], PairPlaces] = {}
+        self.pairs: dict[tuple[int, int], PairPlacements] = {}
         """By the types of parent and child, in the order of the categories."""
         self._lengths = [each.diagonal / 2 for each in kit.types]
         self._groups = [_group(each.symmetries, kit.pose_tolerance, each.diagonal / 2) for each in kit.types]
@@ -117,7 +117,9 @@ class CategorySpace:
     def __len__(self) -> int:
         return len(self.types)
 
-    def label(self, assembly: Assembly, strings: Sequence[Encoded], either_hand: bool = False) -> list[Labelled]:
+    def label(
+        self, assembly: Assembly, strings: Sequence[Encoded], either_hand: bool = False
+    ) -> list[CategorizedString]:
         """Some strings of an assembly with their categories.
 
         With `either_hand`, those of the assembly or of its mirror image, whichever are less, if its parts are their own
@@ -209,7 +211,7 @@ class CategorySpace:
             found.append(turning[0] if len(turning) else None)
         return found
 
-    def _label(self, assembly: Assembly, strings: Sequence[Encoded]) -> list[Labelled]:
+    def _label(self, assembly: Assembly, strings: Sequence[Encoded]) -> list[CategorizedString]:
         edges = np.concatenate([assembly.edges, assembly.edges[:, ::-1]])
         relative = relative_poses(assembly.poses, edges)
         place, symmetry = np.full(len(edges), -1), np.zeros(len(edges), np.int64)
@@ -218,19 +220,21 @@ class CategorySpace:
             rows = np.flatnonzero((ends[:, 0] == a) & (ends[:, 1] == b))
             if (a, b) in self.pairs:
                 found, turn, gap = self.nearest(a, b, relative[rows])
-                place[rows] = np.where(gap <= REACH * self.pairs[a, b].slack[found], found, -1)
+                place[rows] = np.where(gap <= MAX_CATEGORY_TOLERANCES * self.pairs[a, b].slack[found], found, -1)
                 symmetry[rows] = turn
         docked = dict(zip(map(tuple, edges.tolist()), zip(place.tolist(), symmetry.tolist(), strict=True), strict=True))
         return [self._walk(assembly.types, docked, each) for each in strings]
 
-    def _walk(self, types: TypeArray, docked: dict[tuple[int, ...], tuple[int, int]], encoded: Encoded) -> Labelled:
+    def _walk(
+        self, types: TypeArray, docked: dict[tuple[int, ...], tuple[int, int]], encoded: Encoded
+    ) -> CategorizedString:
         """A string with its categories, by the places and symmetries of its edges beside the parts' own poses."""
         decoded, nodes = decode(encoded.string, self.alphabet), encoded.nodes.tolist()
         kinds = types[encoded.nodes].tolist()
         edges = token_edges(decoded)
         # A column for each frame of the first part: the categories, and for each node the symmetry of its frame.
         columns = np.arange(len(self._groups[kinds[0]]))
-        found = np.full((len(edges), len(columns)), DUMMY, dtype=np.int32)
+        found = np.full((len(edges), len(columns)), DUMMY_CATEGORY, dtype=np.int32)
         frames = np.zeros((len(kinds), len(columns)), dtype=np.int16)
         frames[0] = columns
         found[0] = 1 + kinds[0]
@@ -249,9 +253,9 @@ class CategorySpace:
         for branches in _equal_branches(decoded, edges, self.alphabet):
             _sort_branches(found, parts, branches, np.array(decoded.token_nodes))
         least = min(columns.tolist(), key=lambda column: found[:, column].tolist())
-        return Labelled(encoded.string, parts[:, least], found[:, least])
+        return CategorizedString(encoded.string, parts[:, least], found[:, least])
 
-    def _places(self, a: int, b: int, first: int, dockings: list[tuple[FloatArray, float]]) -> PairPlaces:
+    def _places(self, a: int, b: int, first: int, dockings: list[tuple[FloatArray, float]]) -> PairPlacements:
         """The places of a pair of types. All places of one docking are images of its first under symmetries of the
         parent alone, so that, seen from the child's frame, the parent stands in one place for them all."""
         from scipy.spatial import cKDTree
@@ -269,7 +273,7 @@ class CategorySpace:
         seen = invert(self._groups[a])[:, None] @ poses
         _, index = self._images[a, b].query(_vectors(seen, length))
         turned, shifted = np.divmod(index, len(group))
-        places = PairPlaces(first, poses, np.array(slack), turned.astype(np.int16), shifted.astype(np.int16))
+        places = PairPlacements(first, poses, np.array(slack), turned.astype(np.int16), shifted.astype(np.int16))
         self.pairs[a, b] = places
         return places
 

@@ -26,14 +26,14 @@ from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import Edges
 from stages.strings.tokens import number_text, number_value, split_tokens
 
-DUMMY = -1
+NO_CATEGORY = -1
 """The category of what is no part."""
-MOST_TOKENS = 1_000_000
+MAX_TOKENS = 1_000_000
 """No shape has more: bytes that say so are not of one."""
 
 
 @dataclass(frozen=True)
-class Described:
+class ShapeCode:
     """One shape. categories: one for each token of the string; poses: float32 (s, 6), rotation vector and translation
     of the first part and of those that no category places, in order."""
 
@@ -69,7 +69,7 @@ class Codebook:
         return len(self.kinds[label]) + (0 if parent is None else len(self.places(parent, label)[0]))
 
 
-def describe(book: Codebook, assembly: Assembly, encoded: Encoded) -> Described:
+def encode_shape(book: Codebook, assembly: Assembly, encoded: Encoded) -> ShapeCode:
     """The description of an assembly along one of its strings. Raises ValueError for a part that is mirrored."""
     decoded = decode(encoded.string, book.alphabet)
     types, poses = assembly.types[encoded.nodes], assembly.poses[encoded.nodes]
@@ -78,7 +78,7 @@ def describe(book: Codebook, assembly: Assembly, encoded: Encoded) -> Described:
     stored: list[Float32Array] = []
     for token in decoded.tokens:
         if token.kind != "node":
-            categories.append(DUMMY)
+            categories.append(NO_CATEGORY)
             continue
         node, kind = token.node, int(types[token.node])
         label = int(decoded.types[node])
@@ -95,10 +95,10 @@ def describe(book: Codebook, assembly: Assembly, encoded: Encoded) -> Described:
         else:
             back[node] = back[parent] @ places[category]
         categories.append(category)
-    return Described(encoded.string, tuple(categories), np.array(stored, dtype=np.float32))
+    return ShapeCode(encoded.string, tuple(categories), np.array(stored, dtype=np.float32))
 
 
-def restore(book: Codebook, described: Described) -> Assembly:
+def decode_shape(book: Codebook, described: ShapeCode) -> Assembly:
     """The assembly of a description, its parts in the order of the string.
 
     Raises ValueError (StringError) for what is no description of a shape of the kit.
@@ -130,7 +130,7 @@ def restore(book: Codebook, described: Described) -> Assembly:
     return placed if book.edges == "all" else Assembly(types, poses, _docked(book, placed))
 
 
-def pack(book: Codebook, described: Described) -> bytes:
+def pack(book: Codebook, described: ShapeCode) -> bytes:
     """A description as few bytes: its tokens and categories as digits of one number, each in the base of what may stand
     there, then its poses."""
     texts = split_tokens(described.string)
@@ -155,7 +155,7 @@ def pack(book: Codebook, described: Described) -> bytes:
     return header + content + described.poses.astype("<f4").tobytes()
 
 
-def unpack(book: Codebook, content: bytes) -> Described:
+def unpack(book: Codebook, content: bytes) -> ShapeCode:
     """The description that `pack` has written. Raises ValueError for bytes that it has not."""
     place, header = 0, []
     for _ in range(3):
@@ -166,7 +166,7 @@ def unpack(book: Codebook, content: bytes) -> Described:
     if len(body) < size or len(rest) % 24:
         raise ValueError("the bytes of a shape end early")
     whole, labels = int.from_bytes(body, "little"), len(book.kit.labels)
-    if max(count, numbers) > MOST_TOKENS:
+    if max(count, numbers) > MAX_TOKENS:
         raise ValueError(f"the bytes of a shape ask for {max(count, numbers):,} tokens")
     texts: list[str] = []
     categories: list[int] = []
@@ -176,14 +176,14 @@ def unpack(book: Codebook, content: bytes) -> Described:
         texts.append(_text(book, value))
         radix = walk.step(value)
         if radix is None:
-            categories.append(DUMMY)
+            categories.append(NO_CATEGORY)
             continue
         whole, category = divmod(whole, radix)
         categories.append(category)
         walk.put(category)
     if whole:
         raise ValueError("the bytes of a shape hold more than its tokens")
-    return Described("".join(texts), tuple(categories), np.frombuffer(rest, "<f4").reshape(-1, 6).astype(np.float32))
+    return ShapeCode("".join(texts), tuple(categories), np.frombuffer(rest, "<f4").reshape(-1, 6).astype(np.float32))
 
 
 class _Walk:

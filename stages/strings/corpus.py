@@ -14,8 +14,8 @@ from stages.shape.collection.assignment import SPLITS
 from stages.shape.kit_input import input_kits
 from stages.strings.alphabet import make_alphabet
 from stages.strings.members import CORPUS
-from stages.strings.settings import MEANINGS, Edges, StringsConfig
-from stages.strings.statistics import StringStatistics, whole
+from stages.strings.settings import EDGE_DESCRIPTIONS, Edges, StringsConfig
+from stages.strings.statistics import StringStatistics, summarize
 from stages.strings.tokens import number_value
 
 __all__ = ["CORPUS", "compose_corpus"]
@@ -72,7 +72,7 @@ def compose_corpus(task: Task) -> Outcome:
         "elsewhere": sum(each.elsewhere for each in counts),
         "graphs": sum(each.graphs for each in counts),
         "edges": edges,
-        "kits": {kit: whole(of_splits.values()) for kit, of_splits in sorted(statistics.items())},
+        "kits": {kit: summarize(of_splits.values()) for kit, of_splits in sorted(statistics.items())},
     }
     return Outcome(samples=0, summary=summary)
 
@@ -141,7 +141,7 @@ def _vocabulary(task: Task, statistics: dict[str, dict[str, StringStatistics]], 
             seen = {token for counted in statistics[name].values() for token in counted.seen}
             numbers = sorted(seen - set(types) - {"(", ")"}, key=_number)
             tokens = [*types, "(", ")", *numbers]
-            described[name] = {"types": types, "tokens": tokens, "edges": edges, "meaning": MEANINGS[edges]}
+            described[name] = {"types": types, "tokens": tokens, "edges": edges, "meaning": EDGE_DESCRIPTIONS[edges]}
     return described
 
 

@@ -16,7 +16,7 @@ from stages.strings.tokens import number_text
 
 Indices = npt.NDArray[np.int64]
 
-PATIENCE = 5
+REPEATS_PER_KNOWN_STRING = 5
 """A graph counts as having no more strings after so many random walks in a row, for each string it is known to have
 and four besides, that brought nothing new."""
 
@@ -66,12 +66,12 @@ def random_strings(
 ) -> list[Encoded]:
     """`count` distinct random strings of a graph, none of them in `besides`.
 
-    Fewer if `PATIENCE` ends before: small graphs have few strings. Arguments and errors as for `encode`.
+    Fewer if `REPEATS_PER_KNOWN_STRING`: small graphs have few strings. Arguments and errors as for `encode`.
     """
     seen = set(besides)
     found: list[Encoded] = []
     in_vain = 0
-    while len(found) < count and in_vain < PATIENCE * (4 + len(seen)):
+    while len(found) < count and in_vain < REPEATS_PER_KNOWN_STRING * (4 + len(seen)):
         encoded = encode(types, edges, alphabet, rng, cycles)
         if encoded.string in seen:
             in_vain += 1

@@ -49,7 +49,7 @@ class KitStrings:
         others = random_strings(graph.types, graph.edges, self.alphabet, count, rng, {first.string}, cycles)
         return [first, *others]
 
-    def stands_for(self, encoded: Encoded, graph: Assembly) -> bool:
+    def represents(self, encoded: Encoded, graph: Assembly) -> bool:
         """Whether a string, decoded, is what `graph` answered, under the encoder's own matching of their nodes; for
         `tree`, a spanning tree of it."""
         decoded, size = decode(encoded.string, self.alphabet), len(graph)

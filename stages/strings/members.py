@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pipeline.config import Config
 from pipeline.stage import Plan
 from stages.shape.collection.members import TEXT, Member, Members
-from stages.strings.settings import MEANINGS, StringsConfig
+from stages.strings.settings import EDGE_DESCRIPTIONS, StringsConfig
 
 CORPUS = "corpus"
 """Name of the shard that makes the corpus, and stem of its files."""
@@ -34,7 +34,7 @@ def _card(plan: Plan) -> Sequence[str]:
     for kit, figures in summary["kits"].items():
         cells = [f"{figures[name]['median']:,}, at most {figures[name]['most']:,}" for name, _ in COLUMNS]
         rows.append(f"| {kit} | " + " | ".join(cells) + " |")
-    return [f"{MEANINGS[summary['edges']]} Medians of the corpus:", "\n".join(rows)]
+    return [f"{EDGE_DESCRIPTIONS[summary['edges']]} Medians of the corpus:", "\n".join(rows)]
 
 
 MEMBERS = Members(of=_text, card=_card)

@@ -10,7 +10,7 @@ from pipeline.config import StrictModel
 
 Edges = Literal["all", "faces", "tree"]
 
-MEANINGS: dict[Edges, str] = {
+EDGE_DESCRIPTIONS: dict[Edges, str] = {
     "all": "A string is a shape graph: every contact is an edge.",
     "faces": "A string is a shape graph of face contacts, and of as many lines and points besides as hold the shape in "
     "one piece; the other contacts are not in it.",

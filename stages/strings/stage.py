@@ -112,7 +112,7 @@ def _strings(sample: Sample, kit: KitStrings, count: int, rng: np.random.Generat
     graph = kit.graph(sample.assembly)
     encoded = kit.strings(graph, count, rng)
     for each in encoded:
-        if not kit.stands_for(each, graph):
+        if not kit.represents(each, graph):
             raise ShardFailed(f"a string of sample {sample.key} does not stand for its graph: {each.string}")
     return [each.string for each in encoded]
 

@@ -67,7 +67,7 @@ class StringStatistics:
         return described
 
 
-def whole(splits: Iterable[StringStatistics]) -> dict[str, dict[str, int]]:
+def summarize(splits: Iterable[StringStatistics]) -> dict[str, dict[str, int]]:
     """Median and greatest value of each figure over several files together, as JSON."""
     joined: dict[str, Counter[int]] = {}
     for each in splits:

@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.exemplars.build import read_kit
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
-from stages.strings.compression import Codebook, describe, pack, restore, unpack
+from stages.strings.compression import Codebook, decode_shape, encode_shape, pack, unpack
 from tests.bench.measure import Measure, rate
 
 BATCH = 10
@@ -23,13 +23,13 @@ def bench() -> Iterator[Measure]:
     kit = read_kit(KitConfig(name="castle", shapes=shapes).resolve(STRICTEST))
     book, assembly = Codebook(kit, "all"), kit.exemplars[0].assembly
     (encoded,) = book.writer.strings(book.writer.graph(assembly), 0, np.random.default_rng(0))
-    packed = pack(book, describe(book, assembly, encoded))
+    packed = pack(book, encode_shape(book, assembly, encoded))
 
     def packing() -> int:
-        return len([pack(book, describe(book, assembly, encoded)) for _ in range(BATCH)])
+        return len([pack(book, encode_shape(book, assembly, encoded)) for _ in range(BATCH)])
 
     def restoring() -> int:
-        return len([restore(book, unpack(book, packed)) for _ in range(BATCH)])
+        return len([decode_shape(book, unpack(book, packed)) for _ in range(BATCH)])
 
     def zipped() -> bytes:
         arrays = (assembly.types, assembly.poses, assembly.edges)

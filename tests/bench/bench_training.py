@@ -25,9 +25,9 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shapeassembly import parse
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.strings.acceptor import follow
+from stages.strings.compiled_grammar import compile_grammar
+from stages.strings.grammar_mask import masks_along
 from stages.strings.kit_strings import KitStrings
-from stages.strings.rules import make_rules
 from stages.training.loop import LARGEST_GRADIENT, same_arithmetic
 from stages.training.program_vae.batches import Programs
 from stages.training.program_vae.lines import node_lines
@@ -92,9 +92,9 @@ def castle_strings() -> tuple[Strings, Vocabulary, int]:
     writer = KitStrings(kit, "all")
     written = [[each.string for each in writer.strings(writer.graph(new.assembly), 8, rng)] for new in found]
     cycles = 12
-    vocabulary, rules = Vocabulary(writer.alphabet, cycles), make_rules(kit.grammar, len(kit.labels), cycles)
+    vocabulary, rules = Vocabulary(writer.alphabet, cycles), compile_grammar(kit.grammar, len(kit.labels), cycles)
     codes = [np.append(vocabulary.codes(each), END).astype(np.int64) for of_shape in written for each in of_shape]
-    masks = [np.packbits(follow(rules, cycles, each)[0], axis=-1, bitorder="little") for each in codes]
+    masks = [np.packbits(masks_along(rules, cycles, each)[0], axis=-1, bitorder="little") for each in codes]
     types = len(kit.labels)
     strings = Strings(
         tokens=np.concatenate(codes).astype(np.int16),

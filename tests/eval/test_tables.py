@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from eval.__main__ import main
-from eval.engine.dataset_run import Subject, load_subject
+from eval.engine.dataset_run import DatasetRun, load_dataset_run
 from eval.engine.evaluation import Evaluation
 from eval.engine.registry import find_tables
-from eval.engine.requirements import FINISHED, KITS, STRING_VAE
-from eval.engine.table import Published, Table
+from eval.engine.requirements import FINISHED_DATASET, KITS, STRING_VAE
+from eval.engine.table import ReferenceRow, Table
 
 ROOT = Path(__file__).resolve().parents[2]
 DEFAULT, CHAIRS = ROOT / "configs" / "default.yaml", ROOT / "configs" / "chairs.yaml"
@@ -43,20 +43,20 @@ def test_a_module_without_a_table_is_named(tmp_path: Path, monkeypatch: pytest.M
         sys.modules.pop(name, None)
 
 
-def finished(out: Path, config: Path) -> Subject:
+def finished(out: Path, config: Path) -> DatasetRun:
     """The subject of a dataset of which only the manifest is there."""
-    subject = load_subject(config, out)
+    subject = load_dataset_run(config, out)
     subject.folder.mkdir(parents=True)
     (subject.folder / "manifest.json").write_text(json.dumps({"samples": 1200}))
     return subject
 
 
 def test_what_is_missing_is_named_with_what_makes_it(tmp_path: Path) -> None:
-    nothing = load_subject(DEFAULT, tmp_path)
-    assert "make dataset" in FINISHED.missing(nothing)
+    nothing = load_dataset_run(DEFAULT, tmp_path)
+    assert "make dataset" in FINISHED_DATASET.missing(nothing)
     assert "make exemplars" in KITS.missing(nothing)
-    assert "no shape graphs" in KITS.missing(load_subject(CHAIRS, tmp_path))
-    assert FINISHED.missing(finished(tmp_path, DEFAULT)) == ""
+    assert "no shape graphs" in KITS.missing(load_dataset_run(CHAIRS, tmp_path))
+    assert FINISHED_DATASET.missing(finished(tmp_path, DEFAULT)) == ""
     assert "make train" in STRING_VAE.missing(nothing)
     (nothing.models / "masked-castle-0").mkdir(parents=True)
     assert "make train" in STRING_VAE.missing(nothing), "an empty folder is no model"
@@ -91,8 +91,8 @@ def test_a_table_about_datasets_takes_no_files(tmp_path: Path, capsys: pytest.Ca
 
 def test_published_rows_stand_below_ours_with_their_source_in_every_format() -> None:
     published = (
-        Published("sand castle, naive", "strings Table 2", {"average": 4.71, "greatest": 12.17}),
-        Published("chair", "shapeassembly Table 5", {"average": 9.7}),
+        ReferenceRow("sand castle, naive", "strings Table 2", {"average": 4.71, "greatest": 12.17}),
+        ReferenceRow("chair", "shapeassembly Table 5", {"average": 9.7}),
     )
     table = Table("T", ("kit", "components", "average", "greatest"), (("castle", 1, 0.5, 1.1),), (), published)
     rows = list(csv.reader(io.StringIO(table.csv())))
@@ -108,7 +108,7 @@ def test_published_rows_stand_below_ours_with_their_source_in_every_format() -> 
 
 def test_published_figures_must_have_a_column() -> None:
     with pytest.raises(ValueError, match="strings Table 2 has depth, which is no column of T"):
-        Table("T", ("kit", "size"), (), (), (Published("a", "strings Table 2", {"depth": 1}),))
+        Table("T", ("kit", "size"), (), (), (ReferenceRow("a", "strings Table 2", {"depth": 1}),))
 
 
 def test_a_table_that_fails_is_told_and_takes_no_other_with_it(tmp_path: Path) -> None:

@@ -13,13 +13,13 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose_kernels import squared_distance
-from stages.string_sampling.instantiation.motions import compose
+from stages.string_sampling.instantiation.transforms import compose
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import Decoded
 
-REACH = 2.0
+MAX_CATEGORY_TOLERANCES = 2.0
 """A place has the nearest category if that is at most so many pose tolerances away."""
-UNLIKELY = -1e3
+NO_CATEGORY_SCORE = -1e3
 """The score of a place without a category."""
 
 
@@ -41,7 +41,7 @@ class Guide(NamedTuple):
 
 
 _NONE = np.empty((0, 0), dtype=np.int64)
-NO_GUIDE = Guide(
+WITHOUT_GUIDE = Guide(
     np.empty(0, dtype=np.int64), np.empty((0, 0)), _NONE, _NONE, np.empty(0, dtype=np.int64), np.empty((0, 3, 3)),
     np.empty((0, 3)),
 )  # fmt: skip
@@ -54,7 +54,7 @@ def guide_of(space: CategorySpace, decoded: Decoded, scores: FloatArray) -> Guid
     ranges = [[space.beside(each, label) for label in range(labels)] for each in range(types)]
     return Guide(
         parents=np.array([decoded.edges[edge][0] if edge >= 0 else -1 for _, edge in nodes], dtype=np.int64),
-        scores=np.maximum(scores[[token for token, _ in nodes]], UNLIKELY).astype(np.float64),
+        scores=np.maximum(scores[[token for token, _ in nodes]], NO_CATEGORY_SCORE).astype(np.float64),
         begins=np.array([[each.start for each in row] for row in ranges], dtype=np.int64),
         ends=np.array([[each.stop for each in row] for row in ranges], dtype=np.int64),
         types=space.types[:, 1].astype(np.int64),
@@ -64,7 +64,7 @@ def guide_of(space: CategorySpace, decoded: Decoded, scores: FloatArray) -> Guid
 
 
 @numba.njit(cache=True)
-def prefer(kit, guide, graph, s, node):
+def score_by_category(kit, guide, graph, s, node):
     """Score the values of a node by their categories, if it hangs on a part that stands and has a frame."""
     parent = guide.parents[node]
     if parent < 0 or not s.framed[parent]:
@@ -72,11 +72,11 @@ def prefer(kit, guide, graph, s, node):
     for value in range(s.first[node], s.last[node]):
         if s.alive[value]:
             category = _category(kit, guide, graph, s, parent, value)
-            s.scores[value] = guide.scores[node, category] if category >= 0 else UNLIKELY
+            s.scores[value] = guide.scores[node, category] if category >= 0 else NO_CATEGORY_SCORE
 
 
 @numba.njit(cache=True)
-def carry_frames(kit, guide, graph, s, value):
+def propagate_frames(kit, guide, graph, s, value):
     """Give the part that has been put down last its frame, and then those that hang on it and stand already."""
     node = s.nodes[value]
     for each in range(node, len(guide.parents)):
@@ -113,7 +113,7 @@ def _category(kit, guide, graph, s, parent, value):
     kind, label = s.types[value], graph.labels[s.nodes[value]]
     on = s.types[s.at[parent]]
     reach = kit.reach[kind]
-    best, least = -1, (REACH * kit.limits[0]) ** 2
+    best, least = -1, (MAX_CATEGORY_TOLERANCES * kit.limits[0]) ** 2
     rotation, translation = np.empty((3, 3)), np.empty(3)
     for category in range(guide.begins[on, label], guide.ends[on, label]):
         if guide.types[category] != kind:

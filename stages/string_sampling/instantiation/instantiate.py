@@ -13,21 +13,21 @@ from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
 from stages.shape.physics.stability import components
-from stages.string_sampling.instantiation.candidates import find_candidates
-from stages.string_sampling.instantiation.guidance import NO_GUIDE, Guide
-from stages.string_sampling.instantiation.layout import STANDARD, TRIES, Method, graph_tables, solving
+from stages.string_sampling.instantiation.guidance import WITHOUT_GUIDE, Guide
+from stages.string_sampling.instantiation.placements import find_placements
 from stages.string_sampling.instantiation.reach import new_reach
-from stages.string_sampling.instantiation.solve import BUDGET, IMPOSSIBLE, NO_ROOM, SOLVED, solve
-from stages.strings.rules import make_rules
+from stages.string_sampling.instantiation.solver import BUDGET, IMPOSSIBLE, NO_ROOM, SOLVED, solve
+from stages.string_sampling.instantiation.state import STANDARD_METHOD, TRIES, SolverMethod, graph_tables, new_state
+from stages.strings.compiled_grammar import compile_grammar
 from stages.variations.growth.state import Contacts
 from stages.variations.kernels.structs import FORBIDDEN, NONE
 from stages.variations.kernels.tables import kit_tables
 
-FEWEST = 64
+MIN_NODES = 64
 """There is always room for graphs of so many nodes."""
-VALUES_A_NODE = 256
+VALUES_PER_NODE = 256
 """Room for values in the mean; a node has as many as there are places beside one part."""
-SLOT_ATTEMPTS = 16
+MAX_SLOT_ARRANGEMENTS = 16
 """Arrangements at most that are held against a grammar of slots."""
 
 NOT_CONNECTED, NOT_ADMITTED = "not in one piece", "neighbourhood not in the grammar"
@@ -59,17 +59,17 @@ class Instantiator:
     def __init__(self, answers: ContactAnswers, upright: bool = True) -> None:
         kit = answers.kit
         self.kit, self.answers, self.upright = kit, answers, upright
-        self.candidates = find_candidates(kit, upright)
+        self.candidates = find_placements(kit, upright)
         self._tables = kit_tables(kit, upright)
-        self._rules = make_rules(kit.grammar, len(kit.labels), 0, partial=True)
+        self._rules = compile_grammar(kit.grammar, len(kit.labels), 0, partial=True)
         self._reach = new_reach(len(self.candidates.stance_types))
         slotted = kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(kit, answers.dockings, upright) if slotted else None
-        self._room(FEWEST)
+        self._room(MIN_NODES)
 
     def _room(self, nodes: int) -> None:
         """Make room for graphs of so many nodes."""
-        self._s = solving(nodes, len(self.kit.labels), VALUES_A_NODE * nodes)
+        self._s = new_state(nodes, len(self.kit.labels), VALUES_PER_NODE * nodes)
         self._asker = self.answers.asker(self._s.types, self._s.rotations, self._s.translations)
         self._address = int(ctypes.cast(self._asker, ctypes.c_void_p).value or 0)
 
@@ -78,8 +78,8 @@ class Instantiator:
         labels: np.ndarray,
         edges: IntArray,
         rng: np.random.Generator,
-        method: Method = STANDARD,
-        guide: Guide = NO_GUIDE,
+        method: SolverMethod = STANDARD_METHOD,
+        guide: Guide = WITHOUT_GUIDE,
     ) -> Instantiation:
         """Parts of `labels` (n,) whose contacts are `edges` (m, 2), i < j.
 
@@ -93,9 +93,9 @@ class Instantiator:
         if len(labels) > len(self._s.at):
             self._room(2 * len(labels))
         # So many places whatever came before: what is answered must not hang on which graphs a worker has had.
-        within = self._s._replace(types=self._s.types[: VALUES_A_NODE * max(len(labels), FEWEST)])
+        within = self._s._replace(types=self._s.types[: VALUES_PER_NODE * max(len(labels), MIN_NODES)])
         graph, tries = graph_tables(labels, edges), 0
-        for _ in range(SLOT_ATTEMPTS):
+        for _ in range(MAX_SLOT_ARRANGEMENTS):
             table = self.answers.table
             contacts = Contacts(table.keys, table.values, self._address)
             left = method._replace(budget=method.budget - tries)
@@ -137,7 +137,7 @@ class Instantiator:
         edges = np.concatenate(found)
         return Assembly(types, poses, edges[np.lexsort((edges[:, 1], edges[:, 0]))])
 
-    def _wrong(self, assembly: Assembly, labels: np.ndarray, edges: IntArray, method: Method) -> str:
+    def _wrong(self, assembly: Assembly, labels: np.ndarray, edges: IntArray, method: SolverMethod) -> str:
         """Why an arrangement is none of the graph, or nothing."""
         n = len(labels)
         there, asked = assembly.edges @ (n, 1), np.asarray(edges) @ (n, 1)

@@ -14,7 +14,7 @@ import numpy as np
 
 from stages.shape.geometry.contact_lookup import mix
 from stages.shape.geometry.pose_kernels import same_rotation, squared_distance
-from stages.string_sampling.instantiation.motions import compose
+from stages.string_sampling.instantiation.transforms import compose
 
 LONGEST = 24
 """Longer chains are taken to reach anything."""
@@ -32,7 +32,7 @@ ANYTHING = -1
 POSES, NODES = 0, 1
 
 
-class Reach(NamedTuple):
+class ChainReach(NamedTuple):
     """Poses in the order in which they were found, those of a trie node beside each other; a trie node is a stance to
     begin with and labels behind it."""
 
@@ -49,9 +49,9 @@ class Reach(NamedTuple):
     counts: np.ndarray  # int64 (2,)
 
 
-def new_reach(stances: int) -> Reach:
+def new_reach(stances: int) -> ChainReach:
     """Nothing but the stances themselves."""
-    reach = Reach(
+    reach = ChainReach(
         stances=np.zeros(ROOM + stances, dtype=np.int64),
         rotations=np.zeros((ROOM + stances, 3, 3)),
         translations=np.zeros((ROOM + stances, 3)),

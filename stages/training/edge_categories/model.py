@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from stages.strings.categories import DUMMY
+from stages.strings.categories import DUMMY_CATEGORY
 from stages.training.edge_categories.batches import Batch, CategoryTables
 from stages.training.edge_categories.settings import EdgeCategoriesEntry
 from stages.training.transformer import Block
@@ -116,7 +116,7 @@ class Walker(EdgeCategoriesModel):
         other = other.masked_fill((there >= tokens)[..., None, None], 0.0)
         last = _at(frames, before).masked_fill(is_first, 0.0)
         places = torch.cat([each[..., :3, :].flatten(-2) for each in (start, other, last)], dim=-1)
-        choice = batch.categories.gather(1, before).masked_fill(tokens == 0, DUMMY)
+        choice = batch.categories.gather(1, before).masked_fill(tokens == 0, DUMMY_CATEGORY)
         seen: Tensor = self.ends(ends) + self.places(places) + self.choice(choice)
         return seen
 

@@ -15,7 +15,7 @@ from pipeline.shards import json_bytes, read_shard
 from pipeline.stage import Outcome, Task
 from stages.shape.kit_input import input_kit
 from stages.strings.alphabet import make_alphabet
-from stages.strings.rules import Rules, make_rules, patterns_of
+from stages.strings.compiled_grammar import CompiledGrammar, compile_grammar, patterns_json
 from stages.strings.settings import StringsConfig
 from stages.strings.tokens import number_value, split_tokens
 from stages.training.string_vae.batches import Strings
@@ -46,7 +46,7 @@ def prepare_corpus(task: Task) -> Outcome:
         task.progress(done + 1, len(splits))
     vocabulary = Vocabulary(alphabet, _cycles(shapes.get("train", [])))
     edges = task.config.section(StringsConfig).edges
-    rules = make_rules(kit.grammar, len(kit.labels), vocabulary.cycles, edges != "all")
+    rules = compile_grammar(kit.grammar, len(kit.labels), vocabulary.cycles, edges != "all")
     learnt = {each for strings in shapes.get("train", []) for each in strings}
     counts, most = {}, 0
     for split, of_split in sorted(shapes.items()):
@@ -63,7 +63,7 @@ def prepare_corpus(task: Task) -> Outcome:
         "edges": edges,
         "cycles": vocabulary.cycles,
         "most": most,
-        "patterns": patterns_of(rules),
+        "patterns": patterns_json(rules),
         "counts": counts,
     }
     with task.output(f"{task.shard.name}.json") as stream:
@@ -98,18 +98,18 @@ def _cycles(shapes: list[list[str]]) -> int:
     return 1 + max((number for number in numbers if number is not None), default=-1)
 
 
-def _followed(rules: Rules, vocabulary: Vocabulary, codes: npt.NDArray[np.int16]) -> tuple[Masks, int] | None:
-    """`follow` for a string without its end; None where the rules do not admit it."""
-    from stages.strings.acceptor import follow
+def _followed(rules: CompiledGrammar, vocabulary: Vocabulary, codes: npt.NDArray[np.int16]) -> tuple[Masks, int] | None:
+    """`masks_along` for a string without its end; None where the rules do not admit it."""
+    from stages.strings.grammar_mask import masks_along
 
     try:
-        return follow(rules, vocabulary.cycles, np.append(codes, END).astype(np.int64))
+        return masks_along(rules, vocabulary.cycles, np.append(codes, END).astype(np.int64))
     except ValueError:
         return None
 
 
 def _numbered(
-    task: Task, vocabulary: Vocabulary, rules: Rules, shapes: list[list[str]], elsewhere: set[str]
+    task: Task, vocabulary: Vocabulary, rules: CompiledGrammar, shapes: list[list[str]], elsewhere: set[str]
 ) -> tuple[Strings, int]:
     """The strings that are not `elsewhere`, with their masks, and the most tokens that any beginning of them needs."""
     types = len(vocabulary.alphabet.tokens)

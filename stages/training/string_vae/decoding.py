@@ -10,7 +10,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from stages.strings.rules import Rules
+from stages.strings.compiled_grammar import CompiledGrammar
 from stages.training.string_vae.model import StringVae
 from stages.training.string_vae.vocabulary import END
 
@@ -64,7 +64,7 @@ def write_codes(
     module: StringVae,
     points: npt.NDArray[np.float32],
     most: int,
-    rules: Rules | None,
+    rules: CompiledGrammar | None,
     cycles: int,
     rng: np.random.Generator | None,
     temperature: float,
@@ -102,17 +102,17 @@ def _write(
     points: Tensor,
     drafts: list[Draft],
     most: int,
-    rules: Rules | None,
+    rules: CompiledGrammar | None,
     cycles: int,
     rng: np.random.Generator | None,
     temperature: float,
 ) -> list[bool]:
     """Write each draft on from where it was cut; which have come to an end."""
-    from stages.strings.acceptor import NONE, Acceptor
+    from stages.strings.grammar_mask import NO_TOKEN, GrammarMask
 
     device = next(module.parameters()).device
     points = points.to(device)
-    acceptor = None if rules is None else Acceptor(rules, cycles, len(drafts), most)
+    acceptor = None if rules is None else GrammarMask(rules, cycles, len(drafts), most)
     state = module.start(points)
     shown = torch.full((len(drafts),), END, device=device)
     ended, dead = np.zeros(len(drafts), np.bool_), np.zeros(len(drafts), np.bool_)
@@ -126,7 +126,7 @@ def _write(
         if acceptor is None:
             tokens = scores.argmax(axis=1)
         else:
-            kept = np.full(len(drafts), NONE)
+            kept = np.full(len(drafts), NO_TOKEN)
             for row, draft in enumerate(drafts):
                 if place < len(draft.kept):
                     kept[row] = draft.kept[place]
@@ -136,7 +136,7 @@ def _write(
                 if draft.acyclic:
                     scores[row, scores.shape[1] - cycles :] = -np.inf
             tokens = acceptor.choose(scores, kept)
-            dead |= (tokens == NONE) & ~ended
+            dead |= (tokens == NO_TOKEN) & ~ended
         tokens[dead | ended] = END
         for row in np.flatnonzero(~dead & ~ended).tolist():
             if tokens[row] != END:

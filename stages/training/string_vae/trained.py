@@ -12,9 +12,9 @@ import numpy.typing as npt
 import torch
 
 from stages.strings.alphabet import make_alphabet
+from stages.strings.compiled_grammar import CompiledGrammar, compile_patterns
 from stages.strings.decoder import decode
 from stages.strings.encoder import canonical_string
-from stages.strings.rules import Rules, rules_of
 from stages.strings.tokens import StringError
 from stages.training.checkpoint import load_checkpoint
 from stages.training.string_vae.decoding import Draft, write_codes
@@ -34,7 +34,7 @@ class TrainedStringVae:
 
     module: StringVae
     vocabulary: Vocabulary
-    rules: Rules
+    rules: CompiledGrammar
     header: Mapping[str, Any]
 
     @property
@@ -93,13 +93,13 @@ class TrainedStringVae:
 
     def is_valid(self, string: str) -> bool:
         """Whether it is a string of the grammar that the model has learnt from (strings §5.1)."""
-        from stages.strings.acceptor import is_followed
+        from stages.strings.grammar_mask import follows_grammar
 
         try:
             codes = np.append(self.vocabulary.codes(string), END).astype(np.int64)
         except StringError:
             return False
-        return is_followed(self.rules, self.vocabulary.cycles, codes)
+        return follows_grammar(self.rules, self.vocabulary.cycles, codes)
 
 
 def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedStringVae:
@@ -114,4 +114,4 @@ def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> Tr
     entry = StringVaeEntry.model_validate({"name": "trained", "look_back": False, **header["settings"]})
     module = StringVae(entry, len(vocabulary), header["cycles"], header["most"] + 1)
     module.load_state_dict(tensors)
-    return TrainedStringVae(module.eval(), vocabulary, rules_of(header["patterns"], header["cycles"]), header)
+    return TrainedStringVae(module.eval(), vocabulary, compile_patterns(header["patterns"], header["cycles"]), header)

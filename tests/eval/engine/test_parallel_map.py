@@ -6,7 +6,7 @@ import os
 
 import torch
 
-from eval.engine.parallel_map import side_by_side
+from eval.engine.parallel_map import parallel_map
 
 
 def _where(item: int) -> tuple[int, int, int]:
@@ -14,7 +14,7 @@ def _where(item: int) -> tuple[int, int, int]:
 
 
 def test_results_come_in_order_each_from_one_thread_of_another_process() -> None:
-    found = list(side_by_side(_where, [3, 1, 2, 0], 2, "numbers"))
+    found = list(parallel_map(_where, [3, 1, 2, 0], 2, "numbers"))
     assert [item for item, _ in found] == [3, 1, 2, 0]
     assert [square for _, (square, _, _) in found] == [9, 1, 4, 0]
     assert {threads for _, (_, threads, _) in found} == {1}
@@ -22,5 +22,5 @@ def test_results_come_in_order_each_from_one_thread_of_another_process() -> None
 
 
 def test_nothing_to_do_and_more_workers_than_work() -> None:
-    assert list(side_by_side(_where, [], 8, "numbers")) == []
-    assert [square for _, (square, _, _) in side_by_side(_where, [5], 8, "numbers")] == [25]
+    assert list(parallel_map(_where, [], 8, "numbers")) == []
+    assert [square for _, (square, _, _) in parallel_map(_where, [5], 8, "numbers")] == [25]

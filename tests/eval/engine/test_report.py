@@ -13,10 +13,10 @@ import pytest
 from PIL import Image
 
 from eval.engine.chart import chart_svg, ticks
-from eval.engine.dataset_run import load_subject
-from eval.engine.evaluation import Answer, Curve, Sheet, Strip
-from eval.engine.report import Made, report_html
-from eval.engine.table import Published, Table
+from eval.engine.dataset_run import load_dataset_run
+from eval.engine.evaluation import Chart, Figure, ImageRow, TableResult
+from eval.engine.report import FinishedTable, report_html
+from eval.engine.table import ReferenceRow, Table
 from stages.package.manifest import config_sections
 from tests.eval.engine.chromium import Browser, browser, find_chromium
 
@@ -39,16 +39,16 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         columns,
         tuple((name, *range(1000, 1014)) for name in ("castle", HOSTILE, "a_very_long_name_without_any_room" * 3)),
         ("A note.", "another_note_without_any_room_at_all_" * 6),
-        (Published("sand castle, naive", "strings Table 2", {columns[1]: 102, columns[2]: 4.71}),),
+        (ReferenceRow("sand castle, naive", "strings Table 2", {columns[1]: 102, columns[2]: 4.71}),),
     )
     line = [(float(x), float(x * x)) for x in range(30)]
-    curve = Curve("Growth", "round", "shapes", {f"kit {number} {HOSTILE}": line for number in range(10)})
-    strip = Strip("Shapes", [(f"shape {number} {HOSTILE}", png()) for number in range(9)])
-    answer = Answer([table], [curve], [strip], [Sheet("figure7", f"A sheet {HOSTILE}", png())])
-    subject = load_subject(ROOT / "configs" / "default.yaml", tmp_path_factory.mktemp("none"))
+    curve = Chart("Growth", "round", "shapes", {f"kit {number} {HOSTILE}": line for number in range(10)})
+    strip = ImageRow("Shapes", [(f"shape {number} {HOSTILE}", png()) for number in range(9)])
+    answer = TableResult([table], [curve], [strip], [Figure("figure7", f"A sheet {HOSTILE}", png())])
+    subject = load_dataset_run(ROOT / "configs" / "default.yaml", tmp_path_factory.mktemp("none"))
     made = [
-        Made("wide_ones", "How wide?", answer, 1.5),
-        Made("small", "How small?", Answer([Table("S", ("a",), ())]), 0),
+        FinishedTable("wide_ones", "How wide?", answer, 1.5),
+        FinishedTable("small", "How small?", TableResult([Table("S", ("a",), ())]), 0),
     ]
     path = tmp_path_factory.mktemp("report") / "report.html"
     path.write_text(report_html(subject, made, {"strings": "no trained model; make train"}, datetime.now(UTC)))
@@ -71,7 +71,7 @@ def test_report_says_what_was_made_of_what_and_what_was_not(page: Path) -> None:
 
 
 def test_report_tells_of_a_config_that_was_edited_after_the_dataset_was_made(tmp_path: Path) -> None:
-    subject = load_subject(ROOT / "configs" / "default.yaml", tmp_path)
+    subject = load_dataset_run(ROOT / "configs" / "default.yaml", tmp_path)
     subject.folder.mkdir()
     sections = json.loads(json.dumps(config_sections(subject.config)))
     facts = {"name": "d", "version": "1.0.0", "seed": 1, "samples": 3, "kits": {"castle": 3}, "splits": {"train": 3}}
@@ -79,7 +79,7 @@ def test_report_tells_of_a_config_that_was_edited_after_the_dataset_was_made(tmp
         sections["strings"]["edges"] = edges
         manifest = {**facts, "made_with": {"shapemill": "0.1.0+abc"}, "config": sections}
         (subject.folder / "manifest.json").write_text(json.dumps(manifest))
-        page = report_html(load_subject(subject.config.path, tmp_path), [], {}, datetime.now(UTC))
+        page = report_html(load_dataset_run(subject.config.path, tmp_path), [], {}, datetime.now(UTC))
         assert ("say something else now: strings" in page) == told
         assert "3 shapes, 3 of castle" in page
 
@@ -108,7 +108,7 @@ def test_ticks_of_one_value_have_room_around_it() -> None:
 
 
 def test_points_lie_where_their_ticks_are() -> None:
-    svg = chart_svg(Curve("c", "x", "y", {"line": [(0.0, 0.0), (10.0, 100.0)]}))
+    svg = chart_svg(Chart("c", "x", "y", {"line": [(0.0, 0.0), (10.0, 100.0)]}))
     (first, last) = re.search(r'points="(\S+) (\S+)"', svg).groups()  # type: ignore[union-attr]
     labels = dict(re.findall(r'<text x="([\d.]+)" y="[\d.]+" text-anchor="middle">(\d+)<', svg))
     assert (labels[first.split(",")[0]], labels[last.split(",")[0]]) == ("0", "10")

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from eval.engine.dataset_run import Subject, load_subject
-from eval.engine.evaluation import Answer, Curve, Sheet, Strip
-from eval.engine.results_cache import Part, in_parts, joined
-from eval.engine.table import Published, Table
+from eval.engine.dataset_run import DatasetRun, load_dataset_run
+from eval.engine.evaluation import Chart, Figure, ImageRow, TableResult
+from eval.engine.results_cache import TableSection, cached_sections, join_results
+from eval.engine.table import ReferenceRow, Table
 
 ROOT = Path(__file__).resolve().parents[2]
 DEFAULT = ROOT / "configs" / "default.yaml"
@@ -76,21 +76,25 @@ def test_what_was_done_before_a_kill_is_not_made_again(tmp_path: Path) -> None:
     assert made() == "abbabab", "other code"
 
 
-def parts_of(subject: Subject, asked: Namespace) -> Iterator[Part]:
-    def make() -> Answer:
+def parts_of(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
+    def make() -> TableResult:
         asked.made.append(asked.shapes)
-        return Answer(
+        return TableResult(
             [
                 Table(
-                    "T", ("a", "b"), (("x", 1), ("y", 1.0), ("z", float("inf"))), (), [Published("p", "s", {"b": 2.5})]
+                    "T",
+                    ("a", "b"),
+                    (("x", 1), ("y", 1.0), ("z", float("inf"))),
+                    (),
+                    [ReferenceRow("p", "s", {"b": 2.5})],
                 )
             ],
-            [Curve("C", "x", "y", {"line": [(1.0, 0.1)]})],
-            [Strip("S", [("caption", b"\x89PNG\xff")])],
-            [Sheet("drawn", "D", bytes(range(256)))],
+            [Chart("C", "x", "y", {"line": [(1.0, 0.1)]})],
+            [ImageRow("S", [("caption", b"\x89PNG\xff")])],
+            [Figure("drawn", "D", bytes(range(256)))],
         )
 
-    yield Part("one", [subject.out / "weights"], make)
+    yield TableSection("one", [subject.out / "weights"], make)
 
 
 def options_of(parser: ArgumentParser) -> None:
@@ -98,8 +102,8 @@ def options_of(parser: ArgumentParser) -> None:
 
 
 def test_an_answer_comes_back_as_it_was_and_is_made_again_where_it_may_be_another(tmp_path: Path) -> None:
-    subject = load_subject(DEFAULT, tmp_path)
-    answer, asked = in_parts(parts_of, options_of), Namespace(shapes=3, made=[], workers=7)
+    subject = load_dataset_run(DEFAULT, tmp_path)
+    answer, asked = cached_sections(parts_of, options_of), Namespace(shapes=3, made=[], workers=7)
     (tmp_path / "weights").write_bytes(b"learnt")
     first, again = answer(subject, asked), answer(subject, Namespace(**{**vars(asked), "workers": 1}))
     assert asked.made == [3]
@@ -120,32 +124,32 @@ def test_an_answer_comes_back_as_it_was_and_is_made_again_where_it_may_be_anothe
 def test_a_part_hangs_on_the_options_that_it_names(tmp_path: Path) -> None:
     made: list[str] = []
 
-    def parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
+    def parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
         for name, options in (("none", ()), ("shapes", ("shapes",))):
-            yield Part(name, [], lambda name=name: made.append(name) or Answer([]), (), options)  # type: ignore[misc]
+            yield TableSection(name, [], lambda name=name: made.append(name) or TableResult([]), (), options)  # type: ignore[misc]
 
-    answer = in_parts(parts, options_of)
+    answer = cached_sections(parts, options_of)
     for shapes in (1, 2, 2):
-        answer(load_subject(DEFAULT, tmp_path), Namespace(shapes=shapes, folder=Path("elsewhere")))
+        answer(load_dataset_run(DEFAULT, tmp_path), Namespace(shapes=shapes, folder=Path("elsewhere")))
     assert made == ["none", "shapes", "shapes"]
 
 
 def test_rows_and_lines_stand_together_and_what_all_say_is_said_once() -> None:
-    published = [Published("p", "s", {"b": 2.0})]
+    published = [ReferenceRow("p", "s", {"b": 2.0})]
     tables = [Table("T", ("a", "b"), ((name, 1),), ("note", name), published) for name in "xy"]
     other = Table("U", ("a", "c"), ())
-    curves = [Curve("C", "x", "y", {name: [(1.0, 2.0)]}) for name in "xy"]
-    found = joined([Answer([tables[0], other], [curves[0]]), Answer([tables[1]], [curves[1]])])
+    curves = [Chart("C", "x", "y", {name: [(1.0, 2.0)]}) for name in "xy"]
+    found = join_results([TableResult([tables[0], other], [curves[0]]), TableResult([tables[1]], [curves[1]])])
     assert [each.title for each in found.tables] == ["T", "U"]
     assert found.tables[0] == replace(tables[0], rows=(("x", 1), ("y", 1)), notes=["note", "x", "y"])
     assert list(found.curves[0].lines) == ["x", "y"]
 
 
 def test_a_part_that_fails_leaves_nothing(tmp_path: Path) -> None:
-    def parts(subject: Subject, asked: Namespace) -> Iterator[Part]:
-        yield Part("one", [], lambda: Answer([Table("T", ("a",), ((1 / asked.shapes,),))]))
+    def parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
+        yield TableSection("one", [], lambda: TableResult([Table("T", ("a",), ((1 / asked.shapes,),))]))
 
-    subject = load_subject(DEFAULT, tmp_path)
+    subject = load_dataset_run(DEFAULT, tmp_path)
     with pytest.raises(ZeroDivisionError):
-        in_parts(parts, options_of)(subject, Namespace(shapes=0))
+        cached_sections(parts, options_of)(subject, Namespace(shapes=0))
     assert not list(subject.results.rglob("*"))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.engine.models import Trained
+from eval.engine.models import TrainedModel
 from eval.generated.edge_categories import (
     Judged,
     Shares,
@@ -83,7 +83,7 @@ def test_models_are_read_beside_their_kits(tmp_path: Path) -> None:
 def test_a_row_says_what_strings_say_alone_and_one_what_they_vote_for() -> None:
     model = random_model(reader="lstm")
     judged = Judged(5, 20, 91.0, Shares(90.0, 80.0, 10.0, 30.0), Shares(95.0, 85.0, 40.0, 60.0))
-    found = [(Trained("lstm", "toy", 0, model), split, judged) for split in ("val", "test")]
+    found = [(TrainedModel("lstm", "toy", 0, model), split, judged) for split in ("val", "test")]
     table = categories_table(found)
     assert [row[:2] + row[5:] for row in table.rows] == [
         ("lstm-toy", "test", "alone", 91.0, 90.0, 80.0, 10.0, 30.0),

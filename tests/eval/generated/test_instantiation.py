@@ -11,7 +11,7 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
 from stages.string_sampling.instantiation.guidance import guide_of
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import STANDARD
+from stages.string_sampling.instantiation.state import STANDARD_METHOD
 from stages.strings.alphabet import make_alphabet
 from stages.strings.categories import CategorySpace
 from stages.strings.decoder import decode
@@ -56,7 +56,7 @@ def test_with_true_categories_nothing_is_searched(maker: Instantiator) -> None:
             scores = np.full((len(labelled.categories), len(space)), -np.inf)
             scores[np.arange(len(scores)), labelled.categories] = 0.0
             decoded = decode(labelled.string, space.alphabet)
-            found = attempts(maker, [decoded], STANDARD, 5, [guide_of(space, decoded, scores)])
+            found = attempts(maker, [decoded], STANDARD_METHOD, 5, [guide_of(space, decoded, scores)])
             assert found[0].good
             assert found[0].tries == len(decoded.types)
 

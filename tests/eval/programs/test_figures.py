@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from PIL import Image
 
-from eval.engine.evaluation import Sheet
-from eval.engine.models import Trained
+from eval.engine.evaluation import Figure
+from eval.engine.models import TrainedModel
 from eval.programs.figures import WIDTH, beside_sheet, edits_sheet, journey_sheet, neighbours, neighbours_table
 from eval.programs.nearest import nearest, nearest_and_which, nearest_programs
 from eval.programs.part_surfaces import curve_parts, surface_of, surfaces_sheet, trained_surfaces
@@ -30,7 +30,7 @@ BOUNDS = (partial(np.min, axis=0), partial(np.max, axis=0))
 PROGRAMS = [parse(text) for text in (BOX, STOOL)]
 
 
-def _size(sheet: Sheet) -> tuple[int, int]:
+def _size(sheet: Figure) -> tuple[int, int]:
     return Image.open(io.BytesIO(sheet.picture)).size
 
 
@@ -70,7 +70,7 @@ def test_figure_12_goes_from_shape_to_shape_by_every_model() -> None:
     drawn = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
     parts = TrainedPartGraphVae(new_part_graph_vae(drawn, 0).eval(), {"settings": drawn.model_dump()})
     assert parts.encode(execute_all(PROGRAMS)).shape == (2, 8)
-    models = [Trained("tiny", "box", 0, programs), Trained("parts", "box", 0, parts)]
+    models = [TrainedModel("tiny", "box", 0, programs), TrainedModel("parts", "box", 0, parts)]
     both, one = (journey_sheet("box", each, [(PROGRAMS[0], PROGRAMS[1])]) for each in (models, models[:1]))
     assert both.name == "figure12_box"
     assert _size(both)[1] > 1.5 * _size(one)[1]

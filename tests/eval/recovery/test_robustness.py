@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.engine.dataset_run import load_subject
+from eval.engine.dataset_run import load_dataset_run
 from eval.recovery.accuracy import methods, tried
 from eval.recovery.robustness import (
-    SPOILS,
+    CORRUPTIONS,
     foreign_inputs,
     foreign_rows,
     foreign_table,
@@ -38,7 +38,8 @@ def cloud(n: int = 2000) -> np.ndarray:
 def test_clouds_are_spoilt_as_they_are_said_to_be() -> None:
     points = cloud()
     spoilt = {
-        how: spoilt_inputs(model(), how, [], [RecoveryInput("one", points)], 3)[0].points for how in SPOILS["points"]
+        how: spoilt_inputs(model(), how, [], [RecoveryInput("one", points)], 3)[0].points
+        for how in CORRUPTIONS["points"]
     }
     noise = (spoilt["noise of 1 %"] - points) / frame_of(points).size
     assert noise.std() == pytest.approx(0.01, rel=0.1)
@@ -58,7 +59,7 @@ def test_drawings_are_spoilt_as_they_are_said_to_be() -> None:
     ink[100, 20:200] = ink[20:200, 60] = True
     drawer = model(input="sketch")
     spoilt = {
-        how: spoilt_inputs(drawer, how, [], [RecoveryInput("one", ink=ink)], 3)[0].ink for how in SPOILS["sketch"]
+        how: spoilt_inputs(drawer, how, [], [RecoveryInput("one", ink=ink)], 3)[0].ink for how in CORRUPTIONS["sketch"]
     }
     assert 4.0 < spoilt["thick lines"].sum() / ink.sum() < 5.5
     assert (spoilt["thick lines"] & ink).sum() == ink.sum()
@@ -105,7 +106,7 @@ def test_foreign_shapes_are_parts_of_their_own_and_may_stand_alone(tmp_path: Pat
     folder = tmp_path / "scans"
     folder.mkdir()
     np.save(folder / "one.npy", cloud(400))
-    subject = load_subject(CHAIRS, tmp_path)
+    subject = load_dataset_run(CHAIRS, tmp_path)
 
     def named(spoilt: int, foreign: list[Path]) -> list[str]:
         return [each.name for each in _parts(subject, Namespace(programs=["chair"], spoilt=spoilt, foreign=foreign))]

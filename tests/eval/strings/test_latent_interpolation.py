@@ -9,11 +9,11 @@ from eval.strings.latent_interpolation import journey_strips, journeys
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.graphs.canonical import graph_digest
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import STANDARD
+from stages.string_sampling.instantiation.state import STANDARD_METHOD
 from stages.strings.alphabet import make_alphabet
+from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
-from stages.strings.rules import make_rules, patterns_of
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.trained import TrainedStringVae
 from stages.training.string_vae.training import new_model
@@ -38,12 +38,12 @@ def strings(maker: Instantiator) -> list[str]:
 @pytest.fixture(scope="module")
 def model(maker: Instantiator) -> TrainedStringVae:
     vocabulary = Vocabulary(make_alphabet(maker.kit.labels), 2)
-    rules = make_rules(maker.kit.grammar, len(maker.kit.labels), 2)
+    rules = compile_grammar(maker.kit.grammar, len(maker.kit.labels), 2)
     settings = StringVaeEntry(name="tiny", latent=4, embedding=4, hidden=16)
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "most": MOST,
-        "patterns": patterns_of(rules),
+        "patterns": patterns_json(rules),
         "names": list(maker.kit.labels),
         "cycles": 2,
         "canonical": True,
@@ -70,11 +70,13 @@ def test_all_ways_lead_from_one_shape_to_the_one_that_is_least_alike(
 def test_what_stands_side_by_side_differs_and_what_fails_is_told(
     model: TrainedStringVae, strings: list[str], maker: Instantiator
 ) -> None:
-    strips = list(journey_strips(model, strings, maker, STANDARD, "tiny", np.random.default_rng(1)))
+    strips = list(journey_strips(model, strings, maker, STANDARD_METHOD, "tiny", np.random.default_rng(1)))
     through = strips[-1]
     assert len(through.pictures) == 2
     assert "become no shape" not in through.title
     assert all(png.startswith(b"\x89PNG") for each in strips for _, png in each.pictures)
-    nothing = list(journey_strips(model, strings, maker, STANDARD._replace(budget=1), "tiny", np.random.default_rng(1)))
+    nothing = list(
+        journey_strips(model, strings, maker, STANDARD_METHOD._replace(budget=1), "tiny", np.random.default_rng(1))
+    )
     assert not nothing[-1].pictures
     assert "2 of 2 stops become no shape" in nothing[-1].title

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.engine.models import Trained, training_curve
+from eval.engine.models import TrainedModel, training_curve
 from eval.strings.string_vaes import (
     Reconstruction,
     Sampling,
@@ -109,8 +109,8 @@ def test_strings_that_a_model_cannot_read_are_left_out(tmp_path: Path) -> None:
     assert max(map(len, toy_strings())) <= MOST
 
 
-def as_trained(model: TrainedStringVae, seed: int) -> Trained[TrainedStringVae]:
-    return Trained("masked", "toy", seed, model)
+def as_trained(model: TrainedStringVae, seed: int) -> TrainedModel[TrainedStringVae]:
+    return TrainedModel("masked", "toy", seed, model)
 
 
 def test_several_seeds_are_one_row_with_their_spread() -> None:

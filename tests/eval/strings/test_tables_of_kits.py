@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from eval.engine.dataset_run import Subject, load_subject
+from eval.engine.dataset_run import DatasetRun, load_dataset_run
 from eval.engine.registry import find_tables
 from eval.strings.compression import COLUMNS as SIZES
 from eval.strings.compression import Stored, compression_row, round_trip
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+def subject(tmp_path_factory: pytest.TempPathFactory) -> DatasetRun:
     """A few castles and playgrounds with their strings, not packaged."""
     folder = tmp_path_factory.mktemp("small")
     kits = [
@@ -44,7 +44,7 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     for stage in ("autoconfig", "exemplars", "variations", "strings"):
         code, said = mill("run", stage, "--config", folder / "small.yaml", "--out", folder, "--workers", 1)
         assert code == 0, said
-    return load_subject(folder / "small.yaml", folder)
+    return load_dataset_run(folder / "small.yaml", folder)
 
 
 def find(step: int, generation: int, graph: bytes) -> Find:
@@ -62,7 +62,7 @@ def test_a_collection_grows_by_what_is_new_in_each_step() -> None:
     assert sizes_by(finds, lambda each: each.generation, strings)[2] == Size(4, 3, 15, 2)
 
 
-def test_growth_agrees_with_the_records_of_the_search(subject: Subject) -> None:
+def test_growth_agrees_with_the_records_of_the_search(subject: DatasetRun) -> None:
     places = subject.places.stage("variations")
     for name, kit in dataset_kits(subject.places).items():
         found = grown(kit, places.root, StringsConfig(), 3)
@@ -82,7 +82,7 @@ def test_growth_agrees_with_the_records_of_the_search(subject: Subject) -> None:
         )
 
 
-def test_a_shape_is_one_generation_above_the_highest_of_its_parents(subject: Subject) -> None:
+def test_a_shape_is_one_generation_above_the_highest_of_its_parents(subject: DatasetRun) -> None:
     folder = subject.places.stage("variations").root
     parents = {
         f"{path.name.removesuffix('.lineage.jsonl')}-{number}": json.loads(line)["parents"]
@@ -100,10 +100,10 @@ def test_a_shape_is_one_generation_above_the_highest_of_its_parents(subject: Sub
     assert all(np.isfinite(each.assembly.poses).all() for each in finds)
 
 
-def test_growth_is_a_table_of_what_has_been_searched(subject: Subject, tmp_path: Path) -> None:
+def test_growth_is_a_table_of_what_has_been_searched(subject: DatasetRun, tmp_path: Path) -> None:
     table = find_tables()["growth"]
     assert table.missing(subject) == ""
-    assert "make exemplars" in table.missing(load_subject(subject.config.path, tmp_path))
+    assert "make exemplars" in table.missing(load_dataset_run(subject.config.path, tmp_path))
     answer = table.answer(subject, None)  # type: ignore[arg-type]
     assert [row[0] for row in answer.tables[0].rows[:2]] == ["castle, inputs", "castle, iteration 1"]
     generations = answer.tables[1]
@@ -115,7 +115,7 @@ def test_growth_is_a_table_of_what_has_been_searched(subject: Subject, tmp_path:
     assert set(answer.curves[0].lines) == {"castle", "playground"}
 
 
-def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: Subject) -> None:
+def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: DatasetRun) -> None:
     for kit in dataset_kits(subject.places).values():
         for exemplar in kit.exemplars:
             shapes = [exemplar.assembly]
@@ -131,7 +131,7 @@ def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: Su
             assert rows["all"]["parts"] == len(shapes[0])
 
 
-def test_shapes_in_pieces_are_counted_as_without_strings(subject: Subject) -> None:
+def test_shapes_in_pieces_are_counted_as_without_strings(subject: DatasetRun) -> None:
     kit = dataset_kits(subject.places)["castle"]
     whole = kit.exemplars[0].assembly
     apart = Assembly(whole.types, whole.poses, whole.edges[:10])
@@ -140,7 +140,7 @@ def test_shapes_in_pieces_are_counted_as_without_strings(subject: Subject) -> No
     assert corpus_row("none", kit, [apart], "all", np.random.default_rng(1))[2:5] == (0, 1, "")
 
 
-def test_corpora_is_a_table_of_inputs_and_variants(subject: Subject) -> None:
+def test_corpora_is_a_table_of_inputs_and_variants(subject: DatasetRun) -> None:
     table = find_tables()["corpora"].answer(subject, None).tables[0]  # type: ignore[arg-type]
     assert [row[:2] for row in table.rows[:4]] == [
         ("castle, inputs", "all"),
@@ -151,7 +151,7 @@ def test_corpora_is_a_table_of_inputs_and_variants(subject: Subject) -> None:
     assert len(table.rows) == 2 * 2 * 3
 
 
-def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: Subject) -> None:
+def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: DatasetRun) -> None:
     for name, kit in dataset_kits(subject.places).items():
         finds = [each.assembly for each in read_finds(subject.places.stage("variations").root, name)]
         for edges in ("all", "tree"):
@@ -166,7 +166,7 @@ def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: Subject) -> 
             assert row["bytes"] < 200
 
 
-def test_a_shape_that_does_not_come_back_is_told(subject: Subject) -> None:
+def test_a_shape_that_does_not_come_back_is_told(subject: DatasetRun) -> None:
     """A part that touches another in a way that the kit has not seen: a tree cannot find that contact again."""
     kit = dataset_kits(subject.places)["castle"]
     whole = kit.exemplars[0].assembly

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.grammars.cloud_similarity import MATCHED, cloud_similarity
 from pipeline.errors import ConfigError
 from stages.exemplars.read import read_model
 from stages.grammars.description import describe_grammar
@@ -17,6 +16,7 @@ from stages.grammars.files import write_grammar
 from stages.grammars.read_surface import is_cloud, read_cloud, read_surface
 from stages.grammars.scans.scanned_grid import Cloud
 from stages.shape.arrays import FloatArray
+from tests.cloud_similarity import MATCHED_SHARE, cloud_similarity
 from tests.stages.grammars.test_planted import extraction
 from tests.stages.grammars.test_scanned_grid import CELL, SHARE, cloud_of
 from tests.stages.symmetry.planted import wall
@@ -59,13 +59,13 @@ class TestSimilar:
     ) -> None:
         shape = cloud_of_text(found.grammar, text).points
         assert np.ptp(shape[:, 0]) == pytest.approx(5.2 + int(text[3]) - 3, abs=CELL)
-        assert (similarity(cloud.points, shape) >= MATCHED).all()
+        assert (similarity(cloud.points, shape) >= MATCHED_SHARE).all()
 
     def test_a_step_that_no_scan_has_is_found(self, cloud: Cloud) -> None:
         stepped = cloud.points.copy()
         stepped[stepped[:, 0] > 2.6, 1] += 3 * CELL
         here = np.abs(stepped[:, 0] - 2.6) < CELL
-        assert (similarity(cloud.points, stepped, here) < MATCHED).mean() > 0.9
+        assert (similarity(cloud.points, stepped, here) < MATCHED_SHARE).mean() > 0.9
 
 
 def similarity(exemplar: FloatArray, shape: FloatArray, only: np.ndarray | None = None) -> FloatArray:

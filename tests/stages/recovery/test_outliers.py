@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eval.recovery.robustness import SPOILS
+from eval.recovery.robustness import CORRUPTIONS
 from stages.programs.program import find_program
 from stages.recovery.outliers import find_outliers
 from stages.recovery.reading import RecoveryInput
@@ -22,7 +22,7 @@ def cloud_of_chair(n: int, seed: int = 0) -> FloatArray:
 
 
 def spoilt(how: str, cloud: FloatArray) -> FloatArray:
-    points = SPOILS["points"][how](RecoveryInput("cloud", points=cloud), np.random.default_rng(1)).points
+    points = CORRUPTIONS["points"][how](RecoveryInput("cloud", points=cloud), np.random.default_rng(1)).points
     assert points is not None
     return points
 

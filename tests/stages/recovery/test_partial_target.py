@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eval.recovery.robustness import SPOILS
+from eval.recovery.robustness import CORRUPTIONS
 from stages.programs.program import find_program
 from stages.recovery.partial_target import PartialTarget, partial_target
 from stages.recovery.reading import RecoveryInput
@@ -116,7 +116,7 @@ def test_a_network_tells_torn_clouds_from_clouds_that_are_spoilt_otherwise(progr
     given = RecoveryInput("cloud", points=sample_points(shape.parts, 2048, rng))
     clouds = {
         "whole": given,
-        **{how: spoil(given, np.random.default_rng(1)) for how, spoil in SPOILS["points"].items()},
+        **{how: spoil(given, np.random.default_rng(1)) for how, spoil in CORRUPTIONS["points"].items()},
     }
     missing = {
         how: recover_input(each, program, SHIPPED_MODELS, "y", 30, 0, turned=False).missing

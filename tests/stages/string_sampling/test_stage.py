@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from eval.engine.dataset_run import load_subject
+from eval.engine.dataset_run import load_dataset_run
 from eval.engine.registry import find_tables
 from pipeline.places import Places, file_digest
 from stages.exemplars.language import dataset_kits
@@ -19,11 +19,11 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
 from stages.shape.sample import Sample, read_samples
 from stages.strings.alphabet import make_alphabet
+from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
-from stages.strings.rules import make_rules, patterns_of
 from tests.mill import mill
 from tests.pipeline.conftest import made
-from tests.stages.string_sampling.learnt import publish_model
+from tests.stages.string_sampling.trained_model import publish_model
 from tests.stated import stated
 from tests.toy_kits.chains_and_rings import CHAIN, chain, write_model
 
@@ -163,7 +163,7 @@ def test_dreamt_shapes_go_the_whole_way(dreamt: tuple[Path, str], bare: Path) ->
 def test_dreams_stand_in_a_table_beside_what_they_were_learnt_from(dreamt: tuple[Path, str], bare: Path) -> None:
     folder, table = dreamt[0], find_tables()["dreams"]
     assert run(bare / "dreamt.yaml", folder, *SERVED)[0] == 0
-    subject = load_subject(bare / "dreamt.yaml", folder)
+    subject = load_dataset_run(bare / "dreamt.yaml", folder)
     assert "no finished dataset learnt" in table.missing(subject)
     for place in (folder, folder / ".work"):  # as if they had been learnt
         shutil.copytree(place / "dreamt", place / "learnt")
@@ -199,7 +199,7 @@ def test_weights_of_another_kit_are_refused(bare: Path, tmp_path: Path) -> None:
 
 def test_weights_of_another_grammar_are_refused(bare: Path, tmp_path: Path) -> None:
     kit = kit_in(bare)
-    patterns = patterns_of(make_rules(kit.grammar, len(kit.labels), 1))
+    patterns = patterns_json(compile_grammar(kit.grammar, len(kit.labels), 1))
     other = {**patterns, "size": [each + 1 for each in patterns["size"]]}
     assert "another grammar" in refused(bare, tmp_path, {"patterns": other})
 

@@ -15,7 +15,7 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, Kit
-from stages.strings.categories import DUMMY, CategorySpace, NoCategoryError, token_edges
+from stages.strings.categories import DUMMY_CATEGORY, CategorySpace, NoCategoryError, token_edges
 from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded
 from stages.strings.kit_strings import KitStrings
@@ -126,7 +126,7 @@ def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -
         for encoded in strings_of(space, exemplar.assembly, edges, 2, seed):
             categories = assert_comes_back(space, exemplar.assembly, encoded)
             is_bracket = [text in "()" for text in split_tokens(encoded.string)]
-            assert [each == DUMMY for each in categories] == is_bracket
+            assert [each == DUMMY_CATEGORY for each in categories] == is_bracket
 
 
 @settings(max_examples=30)
@@ -157,7 +157,7 @@ def test_categories_are_the_least_of_walks_from_every_frame_of_the_first_part(na
         walk = []
         for text, (here, there) in zip(decoded.texts, token_edges(decoded).tolist(), strict=True):
             if here < 0:
-                walk.append(DUMMY if there < 0 else 1 + int(types[0]))
+                walk.append(DUMMY_CATEGORY if there < 0 else 1 + int(types[0]))
                 continue
             length, symmetries = kit.types[types[there]].diagonal / 2, kit.types[types[there]].symmetries
             ours = np.flatnonzero((space.types == (types[here], types[there])).all(axis=1))
@@ -239,7 +239,7 @@ def test_categories_of_other_tokens_are_refused() -> None:
         (right[:-1], "5 tokens have 4 categories"),
         ([*right[:-1], right[1]], "token 4 has category"),
         ([2, *right[1:]], "token 0 has category 2"),
-        ([*right[:-1], DUMMY], "token 4 has category 0"),
+        ([*right[:-1], DUMMY_CATEGORY], "token 4 has category 0"),
         ([*right[:-1], len(space)], "token 4 has category"),
     ):
         with pytest.raises(ValueError, match=said):

@@ -17,7 +17,7 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.shape.geometry.pose import pose_vectors
 from stages.shape.kit import Assembly, Kit
-from stages.strings.compression import DUMMY, Codebook, Described, describe, pack, restore, unpack
+from stages.strings.compression import NO_CATEGORY, Codebook, ShapeCode, decode_shape, encode_shape, pack, unpack
 from stages.strings.encoder import Encoded
 from stages.strings.settings import Edges
 from stages.strings.tokens import split_tokens
@@ -47,10 +47,10 @@ def gaps(kit: Kit, assembly: Assembly, other: Assembly) -> list[float]:
     return found
 
 
-def assert_comes_back(book: Codebook, assembly: Assembly, encoded: Encoded) -> Described:
+def assert_comes_back(book: Codebook, assembly: Assembly, encoded: Encoded) -> ShapeCode:
     """Through bytes, with its parts in the order of the string: types, poses, contacts."""
-    described = unpack(book, pack(book, describe(book, assembly, encoded)))
-    found = restore(book, described)
+    described = unpack(book, pack(book, encode_shape(book, assembly, encoded)))
+    found = decode_shape(book, described)
     assert found.types.tolist() == assembly.types[encoded.nodes].tolist()
     wanted = replace(assembly, types=found.types, poses=assembly.poses[encoded.nodes])
     assert max(gaps(book.kit, wanted, found)) <= 1.0
@@ -69,7 +69,7 @@ def test_every_exemplar_comes_back_by_whatever_string(name: str, edges: Edges) -
             assert len(described.poses) == 1, "every part but the first stands at a docking of the kit"
             tokens = split_tokens(encoded.string)
             parts = [each in book.alphabet.types for each in tokens]
-            assert [each != DUMMY for each in described.categories] == parts
+            assert [each != NO_CATEGORY for each in described.categories] == parts
 
 
 @pytest.mark.slow
@@ -102,8 +102,8 @@ def test_a_shape_comes_back_wherever_it_stands_and_whatever_part_of_it_was_moved
     slip[:3, 3] = rng.normal(0, 3 * book.kit.pose_tolerance, 3)
     poses[moved] = poses[moved] @ slip
     (encoded, *_) = strings_of(book, assembly, 0, seed)
-    described = describe(book, Assembly(assembly.types, poses, assembly.edges), encoded)
-    found = restore(book, unpack(book, pack(book, described)))
+    described = encode_shape(book, Assembly(assembly.types, poses, assembly.edges), encoded)
+    found = decode_shape(book, unpack(book, pack(book, described)))
     assert max(gaps(book.kit, Assembly(found.types, poses[encoded.nodes], found.edges), found)) <= 1.0
     assert 1 <= len(described.poses) <= 1 + 1 + len(assembly.neighbours()[moved])
 
@@ -122,8 +122,8 @@ def test_errors_of_a_long_chain_do_not_add_up() -> None:
         np.full(count, stairs.types[i], np.int16), poses, np.stack([np.arange(count - 1), np.arange(1, count)], axis=1)
     )
     (encoded, *_) = strings_of(book, row, 0, 0)
-    described = describe(book, row, encoded)
-    found = restore(book, described)
+    described = encode_shape(book, row, encoded)
+    found = decode_shape(book, described)
     wanted = replace(row, poses=row.poses[encoded.nodes])
     assert max(gaps(book.kit, wanted, found)) <= 1.0
     assert 2 <= len(described.poses) <= count // 2, "now and then a part brings a pose of its own, and most do not"
@@ -134,7 +134,7 @@ def test_one_part_takes_three_bytes_of_header_and_its_pose() -> None:
     exemplar = book.kit.exemplars[0].assembly
     alone = exemplar.select(np.array([0]))
     (encoded, *_) = strings_of(book, alone, 0, 0)
-    packed = pack(book, describe(book, alone, encoded))
+    packed = pack(book, encode_shape(book, alone, encoded))
     assert len(packed) in (27, 28)
     assert_comes_back(book, alone, encoded)
 
@@ -144,12 +144,12 @@ def test_one_part_takes_three_bytes_of_header_and_its_pose() -> None:
 def test_spoiled_bytes_are_another_shape_or_refused(seed: int) -> None:
     book, rng = book_of("cubes", "all"), np.random.default_rng(seed)
     (encoded, *_) = strings_of(book, book.kit.exemplars[0].assembly, 0, 0)
-    packed = bytearray(pack(book, describe(book, book.kit.exemplars[0].assembly, encoded)))
+    packed = bytearray(pack(book, encode_shape(book, book.kit.exemplars[0].assembly, encoded)))
     for place in rng.integers(0, len(packed), 2):
         packed[place] = rng.integers(256)
     spoiled = bytes(packed[: rng.integers(1, len(packed) + 1)] if seed % 2 else packed)
     try:
-        found = restore(book, unpack(book, spoiled))
+        found = decode_shape(book, unpack(book, spoiled))
     except ValueError:
         return
     assert len(found) == len(found.poses)
@@ -159,15 +159,15 @@ def test_spoiled_bytes_are_another_shape_or_refused(seed: int) -> None:
 def test_bytes_that_end_early_are_refused(cut: int) -> None:
     book = book_of("cubes", "all")
     assembly = book.kit.exemplars[0].assembly
-    packed = pack(book, describe(book, assembly, strings_of(book, assembly, 0, 0)[0]))
+    packed = pack(book, encode_shape(book, assembly, strings_of(book, assembly, 0, 0)[0]))
     with pytest.raises(ValueError, match=r"end early|no pose|more than"):
-        restore(book, unpack(book, packed[:cut]))
+        decode_shape(book, unpack(book, packed[:cut]))
 
 
 def test_categories_that_the_kit_does_not_have_are_refused() -> None:
     book = book_of("cubes", "all")
     assembly = book.kit.exemplars[0].assembly
-    described = describe(book, assembly, strings_of(book, assembly, 0, 0)[0])
+    described = encode_shape(book, assembly, strings_of(book, assembly, 0, 0)[0])
     for changed, said in (
         (replace(described, categories=(99, *described.categories[1:])), "category 99"),
         (replace(described, categories=described.categories[:-1]), "categories"),
@@ -175,7 +175,7 @@ def test_categories_that_the_kit_does_not_have_are_refused() -> None:
         (replace(described, poses=described.poses[:0]), "no pose"),
     ):
         with pytest.raises(ValueError, match=said):
-            restore(book, changed)
+            decode_shape(book, changed)
 
 
 @pytest.mark.skipif(not (Path(__file__).resolve().parents[4] / "shared").is_dir(), reason="no public models here")

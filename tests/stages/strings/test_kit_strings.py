@@ -109,10 +109,10 @@ def test_strings_stand_for_what_they_tell_of(name: str, edges: str) -> None:
     strings = writer.strings(graph, 5, np.random.default_rng(1))
     assert len({each.string for each in strings}) == 6
     for each in strings:
-        assert writer.stands_for(each, graph)
+        assert writer.represents(each, graph)
         decoded = decode(each.string, writer.alphabet)
         assert len(decoded.edges) == (len(assembly) - 1 if edges == "tree" else len(graph.edges))
     swapped = strings[0].nodes.copy()
     other = next(place for place in range(len(swapped)) if graph.types[swapped[place]] != graph.types[swapped[0]])
     swapped[[0, other]] = swapped[[other, 0]]
-    assert not writer.stands_for(Encoded(strings[0].string, swapped), graph)
+    assert not writer.represents(Encoded(strings[0].string, swapped), graph)

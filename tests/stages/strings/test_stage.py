@@ -24,7 +24,7 @@ from stages.shape.sample import Sample, read_samples, write_sample
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.members import MEMBERS
-from stages.strings.settings import MEANINGS, Edges, StringsConfig
+from stages.strings.settings import EDGE_DESCRIPTIONS, Edges, StringsConfig
 from stages.strings.stage import STAGE
 from stages.strings.statistics import measure_string
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
@@ -289,7 +289,7 @@ def test_strings_of_trees_have_no_cycles_and_say_so(trees: Path) -> None:
                 assert len(decoded.edges) == len(decoded.types) - 1
     vocabulary = json.loads(corpus_file(trees, "vocabulary.json"))
     assert vocabulary["castle"]["tokens"] == ["A", "B", "C", "(", ")"]
-    assert (vocabulary["castle"]["edges"], vocabulary["castle"]["meaning"]) == ("tree", MEANINGS["tree"])
+    assert (vocabulary["castle"]["edges"], vocabulary["castle"]["meaning"]) == ("tree", EDGE_DESCRIPTIONS["tree"])
     statistics = json.loads(corpus_file(trees, "statistics.json"))
     assert statistics["castle"]["train"]["cycles"]["most"] == 0
     assert statistics["castle"]["train"]["cycle_rank"]["histogram"] == {"6": 2, "15": 1, "18": 1}
@@ -311,7 +311,7 @@ def test_a_string_that_several_graphs_share_stands_once_in_a_corpus_of_trees(tmp
 def test_the_card_says_what_strings_stand_for_and_how_long_they_are(trees: Path) -> None:
     survey = Survey(config(edges="tree"), STAGES, Places(trees, "toys"))
     meaning, table = MEMBERS.card(survey.stage("strings").view)
-    assert meaning.startswith(MEANINGS["tree"])
+    assert meaning.startswith(EDGE_DESCRIPTIONS["tree"])
     castle = next(line for line in table.splitlines() if line.startswith("| castle |"))
     assert "| 0, at most 0 | 10, at most 21 |" in castle
     (member,) = MEMBERS.of(config(edges="tree"))

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from stages.strings.statistics import StringFigures, StringStatistics, measure_string, whole
+from stages.strings.statistics import StringFigures, StringStatistics, measure_string, summarize
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_figures_of_several_files_are_joined() -> None:
             statistics.add(string)
         for rank in ranks:
             statistics.add_shape(rank)
-    joined = whole([first, second])
+    joined = summarize([first, second])
     assert (joined["tokens"], joined["cycles"]) == ({"median": 5, "most": 5}, {"median": 0, "most": 1})
     assert joined["cycle_rank"] == {"median": 3, "most": 7}
     assert second.describe()["cycle_rank"]["histogram"] == {"1": 1, "7": 1}

@@ -22,7 +22,7 @@ from stages.shape.sample import Sample
 from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
-from stages.strings.grammar import check
+from stages.strings.grammar_check import check_string
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.program_chairs import write_chairs
@@ -71,5 +71,5 @@ def test_an_independent_look_finds_no_fault_and_strings_are_in_the_grammar(kit: 
         assert geometry_faults(kit, members) == []
         labelled = kit.labelled(each.assembly)
         encoded = canonical_string(labelled.types, labelled.edges, alphabet)
-        decoded = check(encoded.string, alphabet, kit.grammar)
+        decoded = check_string(encoded.string, alphabet, kit.grammar)
         assert graph_digest(decoded.types, decoded.edges) == graph_digest(labelled.types, labelled.edges)

@@ -21,7 +21,7 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.string_sampling.instantiation import instantiate
 from stages.string_sampling.instantiation.instantiate import Instantiation, Instantiator
-from stages.string_sampling.instantiation.layout import STANDARD, Method
+from stages.string_sampling.instantiation.state import STANDARD_METHOD, SolverMethod
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring
@@ -62,7 +62,7 @@ def loop(width: int, depth: int) -> list[str]:
 
 
 def put_together(
-    maker: Instantiator, names: Sequence[str], edges: IntArray, method: Method = STANDARD, seed: int = 0
+    maker: Instantiator, names: Sequence[str], edges: IntArray, method: SolverMethod = STANDARD_METHOD, seed: int = 0
 ) -> Instantiation:
     return maker.instantiate(labels(maker.kit, names), edges, np.random.default_rng(seed), method)
 
@@ -127,7 +127,7 @@ def test_a_graph_in_pieces_and_one_that_the_grammar_refuses_are_named(chains: In
 def test_a_tree_of_a_ring_becomes_the_ring(roads: Instantiator) -> None:
     """A string that tells of no cycle: the contact that it leaves out is found, for without it two tiles lack one."""
     names = loop(2, 1)
-    found = put_together(roads, names, path(len(names)), Method(whole=False))
+    found = put_together(roads, names, path(len(names)), SolverMethod(whole=False))
     assert found.assembly is not None, found.reason
     assert len(found.assembly.edges) == len(names)
     assert assembly_faults(roads.kit, found.assembly) == []
@@ -139,7 +139,9 @@ def test_strings_of_exemplars_become_shapes_whatever_they_tell_of(roads: Instant
         graph = writer.graph(roads.kit.exemplars[1].assembly)
         string = writer.strings(graph, 0, np.random.default_rng(0))[0].string
         decoded = decode(string, writer.alphabet)
-        found = roads.instantiate(decoded.types, decoded.edges, np.random.default_rng(0), Method(whole=edges == "all"))
+        found = roads.instantiate(
+            decoded.types, decoded.edges, np.random.default_rng(0), SolverMethod(whole=edges == "all")
+        )
         assert found.assembly is not None
 
 
@@ -166,7 +168,7 @@ def test_room_for_a_large_graph_is_none_for_a_small_one(roads: Instantiator, mon
 @pytest.mark.parametrize("switch", ["constrained", "backtracks", "closes"])
 def test_each_step_beyond_the_paper_can_be_left_out(roads: Instantiator, switch: str) -> None:
     names = loop(1, 1)
-    found = put_together(roads, names, cycle(len(names)), Method(**{switch: False}, budget=20_000))
+    found = put_together(roads, names, cycle(len(names)), SolverMethod(**{switch: False}, budget=20_000))
     assert found.assembly is not None, found.reason
     assert assembly_faults(roads.kit, found.assembly) == []
 
@@ -197,7 +199,7 @@ def test_looking_ahead_to_where_a_cycle_closes_saves_tries(fences: Instantiator)
     names = ["post", "wall"] * 14
     tries = {
         closes: [
-            put_together(fences, names, cycle(len(names)), Method(closes=closes, budget=20_000), seed).tries
+            put_together(fences, names, cycle(len(names)), SolverMethod(closes=closes, budget=20_000), seed).tries
             for seed in range(5)
         ]
         for closes in (True, False)
@@ -214,7 +216,7 @@ def test_a_fence_of_unit_walls_has_an_even_number_of_them(fences: Instantiator, 
 
 def test_a_random_assembly_is_hardly_ever_a_shape(roads: Instantiator) -> None:
     """Figure 8: the chance that all dockings are right falls with each part."""
-    at_random = Method(checked=False, constrained=False, backtracks=False, closes=False, budget=16)
+    at_random = SolverMethod(checked=False, constrained=False, backtracks=False, closes=False, budget=16)
     names = loop(2, 2)
     found = [put_together(roads, names, cycle(len(names)), at_random, seed) for seed in range(40)]
     assert sum(each.assembly is not None for each in found) <= 4
@@ -223,7 +225,7 @@ def test_a_random_assembly_is_hardly_ever_a_shape(roads: Instantiator) -> None:
 
 
 def test_a_budget_is_kept(roads: Instantiator) -> None:
-    found = put_together(roads, loop(3, 3), cycle(16), Method(budget=7))
+    found = put_together(roads, loop(3, 3), cycle(16), SolverMethod(budget=7))
     assert (found.assembly, found.reason, found.tries) == (None, "budget spent", 7)
 
 

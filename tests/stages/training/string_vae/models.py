@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from stages.strings.acceptor import follow
-from stages.strings.rules import Rules, make_rules, patterns_of
+from stages.strings.compiled_grammar import CompiledGrammar, compile_grammar, patterns_json
+from stages.strings.grammar_mask import masks_along
 from stages.training.loop import Trainee, train
 from stages.training.string_vae.batches import Strings
 from stages.training.string_vae.settings import StringVaeEntry
@@ -23,8 +23,8 @@ MOST = 60
 
 
 @cache
-def rules() -> Rules:
-    return make_rules(toy_training.grammar(), 3, 2)
+def rules() -> CompiledGrammar:
+    return compile_grammar(toy_training.grammar(), 3, 2)
 
 
 def entry(**changes: Any) -> StringVaeEntry:
@@ -45,7 +45,7 @@ def numbered() -> Strings:
     """The strings as a learner takes them."""
     shapes = [strings for shard in toy_training.SPLITS for _, strings in toy_training.strings(shard)]
     codes = [np.append(VOCABULARY.codes(each), np.int16(END)) for each in toy_strings()]
-    masks = [follow(rules(), 2, each.astype(np.int64))[0] for each in codes]
+    masks = [masks_along(rules(), 2, each.astype(np.int64))[0] for each in codes]
     return Strings(
         tokens=np.concatenate(codes),
         first=np.cumsum([0, *map(len, codes)]),
@@ -61,7 +61,7 @@ def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringV
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "most": MOST,
-        "patterns": patterns_of(rules()),
+        "patterns": patterns_json(rules()),
         "names": list(toy_training.LABELS),
         "cycles": 2,
         "canonical": True,

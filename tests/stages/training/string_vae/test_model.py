@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from stages.strings.grammar import check
+from stages.strings.grammar_check import check_string
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.loop import Trainee, train
 from stages.training.string_vae.batches import batches, open_until
@@ -100,7 +100,7 @@ def test_every_string_of_a_masked_decoder_is_one_of_the_grammar(decoder: str, se
     points = (3 * rng.standard_normal((64, 8))).astype(np.float32)
     strings = model.decode(points, rng if drawn else None)
     for each in strings:
-        check(each, toy_training.ALPHABET, toy_training.grammar())
+        check_string(each, toy_training.ALPHABET, toy_training.grammar())
         assert model.is_valid(each)
         assert len(VOCABULARY.codes(each)) <= MOST
     assert len(set(strings)) > 1
@@ -112,7 +112,7 @@ def test_string_that_is_lost_in_cycles_is_ended_without_more() -> None:
         model.module.decoder.logits.bias[-2:] += 50.0
     strings = model.decode(np.random.default_rng(0).standard_normal((64, 8)).astype(np.float32), None)
     for each in strings:
-        check(each, toy_training.ALPHABET, toy_training.grammar())
+        check_string(each, toy_training.ALPHABET, toy_training.grammar())
     assert any(each.count("0") or each.count("1") for each in strings)
 
 

@@ -18,7 +18,7 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
-from stages.strings.grammar import check
+from stages.strings.grammar_check import check_string
 from stages.strings.tokens import StringError
 from stages.variations.requirements.hub_restoration import Backdrop
 from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, kit_of, models_of, pose
@@ -101,10 +101,10 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
         members = {"json": record, CONTACTS: contacts, "glb": glb_bytes(kit_shape(kit, whole))}
         assert geometry_faults(kit, members) == []
         string = canonical_string(whole.types, whole.edges, alphabet).string
-        assert len(check(string, alphabet, kit.grammar).types) == len(whole)
+        assert len(check_string(string, alphabet, kit.grammar).types) == len(whole)
     link, plate = (alphabet.tokens[kit.type_names().index(name)] for name in ("link", "plate"))
     with pytest.raises(StringError, match="never neighbours"):
-        check(f"{link}{plate}", alphabet, kit.grammar)
+        check_string(f"{link}{plate}", alphabet, kit.grammar)
 
 
 def test_hubs_are_required_by_number_or_by_their_share_in_the_exemplars(kit: Kit, backdrop: Backdrop) -> None:

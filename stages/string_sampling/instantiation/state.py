@@ -17,7 +17,7 @@ VALUES, PLACED, TRAIL, TRIES, FAILS = range(5)
 and dead ends."""
 
 
-class Method(NamedTuple):
+class SolverMethod(NamedTuple):
     """How to go about it. checked: parts are checked as they are put down; constrained: the node with fewest values is
     next, and the values of all that may be next are held against every part that stands; else a random one;
     backtracks: dead ends are taken back, step by step; else the shape is begun anew; closes: values from which a cycle
@@ -34,10 +34,10 @@ class Method(NamedTuple):
     budget: int = 4000
 
 
-STANDARD = Method()
+STANDARD_METHOD = SolverMethod()
 
 
-class Graph(NamedTuple):
+class GraphTables(NamedTuple):
     """labels int64 (n,); starts int64 (n + 1,), ends int64 (2 m,): neighbours of each node; rows int32 (n, n): the edge
     between two nodes, or -1; core bool (n,): nodes on cycles or between them.
     """
@@ -49,7 +49,7 @@ class Graph(NamedTuple):
     core: np.ndarray
 
 
-class Solving(NamedTuple):
+class SolverState(NamedTuple):
     """The shape in hand."""
 
     types: np.ndarray  # int64 (v,) of the values
@@ -78,14 +78,14 @@ class Solving(NamedTuple):
     counts: np.ndarray  # int64 (5,)
 
 
-def graph_tables(labels: np.ndarray, edges: IntArray) -> Graph:
+def graph_tables(labels: np.ndarray, edges: IntArray) -> GraphTables:
     """A graph of labels (n,) and edges (m, 2), i < j, for the solver."""
     n, pairs = len(labels), np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((heads, tails))
     rows = np.full((n, n), -1, dtype=np.int32)
     rows[pairs[:, 0], pairs[:, 1]] = rows[pairs[:, 1], pairs[:, 0]] = np.arange(len(pairs))
-    return Graph(
+    return GraphTables(
         labels=np.asarray(labels, dtype=np.int64),
         starts=np.searchsorted(tails[order], np.arange(n + 1)),
         ends=heads[order],
@@ -105,9 +105,9 @@ def _core(rows: np.ndarray) -> np.ndarray:
         core &= ~leaves
 
 
-def solving(nodes: int, labels: int, values: int) -> Solving:
+def new_state(nodes: int, labels: int, values: int) -> SolverState:
     """Room for graphs of so many nodes of a kit with so many labels, and for so many values."""
-    return Solving(
+    return SolverState(
         types=np.zeros(values, dtype=np.int64),
         stances=np.zeros(values, dtype=np.int64),
         rotations=np.zeros((values, 3, 3)),

@@ -18,9 +18,9 @@ from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
 from stages.shape.shape import kit_shape
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import Method
-from stages.string_sampling.settings import SourceConfig, SynthesisConfig
-from stages.string_sampling.source import Source, read_source
+from stages.string_sampling.instantiation.state import SolverMethod
+from stages.string_sampling.settings import SourceConfig, StringSamplingConfig
+from stages.string_sampling.source import ModelSource, read_source
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
@@ -30,7 +30,7 @@ NEW, TRAIN, EXEMPLAR = "new", "train", "exemplar"
 
 
 @dataclass(frozen=True)
-class _Dream:
+class _SampledShape:
     """string: as it was drawn; graph: digest of the shape's graph; tries: parts that were put down."""
 
     assembly: Assembly
@@ -40,7 +40,7 @@ class _Dream:
     tries: int
 
 
-def run_lane(task: Task) -> Outcome:
+def run_worker(task: Task) -> Outcome:
     """Files of the shard: `.tar`, the shapes that it found, as samples without a split, none twice, and none that a
     round before had found. Whatever is refused is counted by its reason.
     """
@@ -48,13 +48,13 @@ def run_lane(task: Task) -> Outcome:
 
     same_arithmetic(1)
     params, name = task.shard.params, task.shard.name
-    config = SynthesisConfig.model_validate_json(json_bytes(params["settings"]))
+    config = StringSamplingConfig.model_validate_json(json_bytes(params["settings"]))
     asked = config.sources[0]
     kit = input_kit(task, asked.kit)
     source = read_source(task, params["from"], kit)
     seen = {each for pool in params["before"] for each in _digests(task, pool)}
     with task.output(f"{name}.tar") as stream, ShardWriter(stream) as writer:
-        for dream in _dreams(task, config, asked, kit, source, seen):
+        for dream in _sampled_shapes(task, config, asked, kit, source, seen):
             lineage = {
                 "method": "string_sampling",
                 "model": f"{asked.dataset}/{asked.model}-{asked.kit}-{asked.seed}",
@@ -73,14 +73,14 @@ def _digests(task: Task, pool: str) -> list[str]:
     return task.input("string_sampling", f"{pool}.graphs.txt").read_text().split()
 
 
-def _dreams(
-    task: Task, config: SynthesisConfig, asked: SourceConfig, kit: Kit, source: Source, seen: set[str]
-) -> Iterator[_Dream]:
+def _sampled_shapes(
+    task: Task, config: StringSamplingConfig, asked: SourceConfig, kit: Kit, source: ModelSource, seen: set[str]
+) -> Iterator[_SampledShape]:
     """The shapes of a lane; adds their graphs to `seen`."""
     instantiator = _instantiator(task, kit, config.upright)
     alphabet, exemplars = make_alphabet(kit.labels), _exemplar_graphs(kit)
     writer = KitStrings(kit, source.edges)
-    method = Method(whole=source.whole, budget=config.tries)
+    method = SolverMethod(whole=source.whole, budget=config.tries)
     for number, string in enumerate(_drawn(task, config, asked, source, instantiator, method)):
         task.progress(number + 1, config.draws)
         item = f"{task.shard.name}/{number}"
@@ -115,21 +115,26 @@ def _dreams(
             task.reject(item, weak, string)
             continue
         seen.add(graph)
-        yield _Dream(found.assembly, string, graph, known, found.tries)
+        yield _SampledShape(found.assembly, string, graph, known, found.tries)
 
 
 def _drawn(
-    task: Task, config: SynthesisConfig, asked: SourceConfig, source: Source, maker: Instantiator, method: Method
+    task: Task,
+    config: StringSamplingConfig,
+    asked: SourceConfig,
+    source: ModelSource,
+    maker: Instantiator,
+    method: SolverMethod,
 ) -> list[str | None]:
     """What each draw of a lane answers: a string of the grammar, or None."""
-    from stages.string_sampling.mending import mended
+    from stages.string_sampling.repair import repair_strings
     from stages.training.string_vae.latent_sampling import sample
 
     found = sample(source.model, asked.way, source.strings, config.draws, task.rng("strings"), asked.temperature)
-    return mended(source.model, found, maker, method, config.mends, int(task.rng("mending").integers(1 << 31)))
+    return repair_strings(source.model, found, maker, method, config.mends, int(task.rng("mending").integers(1 << 31)))
 
 
-def _is_told(writer: KitStrings, assembly: Assembly, source: Source) -> bool:
+def _is_told(writer: KitStrings, assembly: Assembly, source: ModelSource) -> bool:
     """Whether training has a shape by its canonical string, where its strings tell of some contacts only: a shape has
     other such strings besides those in training, and is no new one for it."""
     if source.whole:

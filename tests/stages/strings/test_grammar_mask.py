@@ -11,12 +11,19 @@ from hypothesis import strategies as st
 
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS, admits
 from stages.shape.kit import Docking, Grammar, Strictness
-from stages.strings.acceptor import END, NONE, Acceptor, follow, is_followed, tokens_to_complete
 from stages.strings.alphabet import make_alphabet
+from stages.strings.compiled_grammar import NO_COMPLETION, compile_grammar, compile_patterns, patterns_json
 from stages.strings.decoder import decode
 from stages.strings.encoder import encode
-from stages.strings.grammar import check
-from stages.strings.rules import NEVER, make_rules, patterns_of, rules_of
+from stages.strings.grammar_check import check_string
+from stages.strings.grammar_mask import (
+    END_TOKEN,
+    NO_TOKEN,
+    GrammarMask,
+    follows_grammar,
+    masks_along,
+    tokens_to_complete,
+)
 from stages.strings.tokens import StringError
 from stages.training.string_vae.vocabulary import Vocabulary
 from tests.stages.training import toy_training
@@ -56,10 +63,10 @@ def every_string(vocabulary: Vocabulary, grammar: Grammar, most: int) -> set[tup
     for length in range(1, most + 1):
         for codes in product(range(1, len(vocabulary)), repeat=length):
             try:
-                check(vocabulary.string(codes), vocabulary.alphabet, grammar)
+                check_string(vocabulary.string(codes), vocabulary.alphabet, grammar)
             except StringError:
                 continue
-            found.add((*codes, END))
+            found.add((*codes, END_TOKEN))
     return found
 
 
@@ -72,10 +79,10 @@ def test_allowed_is_what_some_admitted_string_goes_on_with(name: str, cycles: in
     for string in strings:
         for place, code in enumerate(string):
             follows.setdefault(string[:place], set()).add(code)
-    rules = make_rules(grammar, 3, cycles)
+    rules = compile_grammar(grammar, 3, cycles)
     for beginning, wanted in follows.items():
         # Cycles make a string shorter than its subtrees would be, so that it needs more room.
-        acceptor = Acceptor(rules, cycles, 1, most if cycles == 0 else 3 * most)
+        acceptor = GrammarMask(rules, cycles, 1, most if cycles == 0 else 3 * most)
         for code in beginning:
             acceptor.take(np.array([code]))
         allowed = set(np.flatnonzero(acceptor.allowed()[0]).tolist())
@@ -86,14 +93,14 @@ def test_allowed_is_what_some_admitted_string_goes_on_with(name: str, cycles: in
 
 def walk(grammar: Grammar, cycles: int, most: int, rng: np.random.Generator) -> tuple[list[int], bool]:
     """A string of random allowed tokens, and whether it came to its end, not to a dead one."""
-    acceptor = Acceptor(make_rules(grammar, 3, cycles), cycles, 1, most)
+    acceptor = GrammarMask(compile_grammar(grammar, 3, cycles), cycles, 1, most)
     codes: list[int] = []
     while True:
         allowed = np.flatnonzero(acceptor.allowed()[0])
         if not len(allowed):
             return codes, False
         code = int(rng.choice(allowed))
-        if code == END:
+        if code == END_TOKEN:
             return codes, True
         codes.append(code)
         acceptor.take(np.array([code]))
@@ -110,40 +117,40 @@ def test_string_of_allowed_tokens_is_admitted_and_no_longer_than_it_may_be(
         assert cycles or not codes, "without cycles there is always a way to the end"
         return
     assert len(codes) <= 30
-    check(Vocabulary(AB, cycles).string(codes), AB, grammar)
+    check_string(Vocabulary(AB, cycles).string(codes), AB, grammar)
 
 
 @given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.integers(0, 3))
 def test_chosen_is_the_best_of_what_is_allowed(seed: int, name: str, cycles: int) -> None:
     rng = np.random.default_rng(seed)
-    acceptor = Acceptor(make_rules(GRAMMARS[name], 3, cycles), cycles, 4, 12)
+    acceptor = GrammarMask(compile_grammar(GRAMMARS[name], 3, cycles), cycles, 4, 12)
     for _ in range(12):
         allowed = acceptor.allowed()
         scores = np.where(rng.random(allowed.shape) < 0.2, -np.inf, rng.normal(size=allowed.shape))
-        kept = np.array([NONE, NONE, NONE, int(allowed[3].argmax())])
+        kept = np.array([NO_TOKEN, NO_TOKEN, NO_TOKEN, int(allowed[3].argmax())])
         masked = np.where(allowed, scores, -np.inf)
-        wanted = np.where(np.isinf(masked).all(axis=1), NONE, masked.argmax(axis=1))
+        wanted = np.where(np.isinf(masked).all(axis=1), NO_TOKEN, masked.argmax(axis=1))
         wanted[3] = kept[3]
         assert acceptor.choose(scores, kept).tolist() == wanted.tolist()
-        acceptor.take(np.where(wanted == NONE, END, wanted))
+        acceptor.take(np.where(wanted == NO_TOKEN, END_TOKEN, wanted))
 
 
 @given(st.integers(0, 2**32), st.booleans())
 def test_what_is_known_of_open_cycles_changes_no_answer(seed: int, partial: bool) -> None:
     rng = np.random.default_rng(seed)
-    rules = make_rules(grammar_of("A01(A)(AA0)A0(C1)CB0", "A0(C1(C2)(C02CA1)A)C"), 3, 4, partial)
-    knowing, asking = Acceptor(rules, 4, 1, 40), Acceptor(rules, 4, 1, 40)
+    rules = compile_grammar(grammar_of("A01(A)(AA0)A0(C1)CB0", "A0(C1(C2)(C02CA1)A)C"), 3, 4, partial)
+    knowing, asking = GrammarMask(rules, 4, 1, 40), GrammarMask(rules, 4, 1, 40)
     for _ in range(40):
         allowed = knowing.allowed()
-        asking._state.witness[:] = NONE
+        asking._state.witness[:] = NO_TOKEN
         assert (asking.allowed() == allowed).all()
         state = knowing._state
         growing = {int(state.current[0]), *state.stack[0, : state.depth[0]].tolist()}
-        for witness in state.witness[0][state.witness[0] != NONE].tolist():
+        for witness in state.witness[0][state.witness[0] != NO_TOKEN].tolist():
             assert witness in growing
             assert not state.left[0, witness]
         ways = np.flatnonzero(allowed[0])
-        if not len(ways) or ways.tolist() == [END]:
+        if not len(ways) or ways.tolist() == [END_TOKEN]:
             break
         numbers = ways[ways > 5]  # cycles are what this is about
         token = np.array([rng.choice(numbers if len(numbers) and rng.random() < 0.5 else ways)])
@@ -160,14 +167,14 @@ def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, st
     types, edges = toy_training.graphs()[number]
     grammar = Grammar(toy_training.grammar().neighbourhoods, (), {}, strictness)
     string = encode(types, edges, toy_training.ALPHABET, np.random.default_rng(seed)).string
-    check(string, toy_training.ALPHABET, grammar)
+    check_string(string, toy_training.ALPHABET, grammar)
     vocabulary = Vocabulary(toy_training.ALPHABET, 4)
-    codes = np.append(vocabulary.codes(string), END).astype(np.int64)
-    masks, most = follow(make_rules(grammar, 3, 4), 4, codes)
+    codes = np.append(vocabulary.codes(string), END_TOKEN).astype(np.int64)
+    masks, most = masks_along(compile_grammar(grammar, 3, 4), 4, codes)
     assert masks[np.arange(len(codes)), codes].all()
-    assert is_followed(make_rules(grammar, 3, 4), 4, codes)
+    assert follows_grammar(compile_grammar(grammar, 3, 4), 4, codes)
     # With as many tokens as its beginnings need, no token of it is left out for want of room.
-    acceptor = Acceptor(make_rules(grammar, 3, 4), 4, 1, max(most, len(codes) - 1))
+    acceptor = GrammarMask(compile_grammar(grammar, 3, 4), 4, 1, max(most, len(codes) - 1))
     for code in codes:
         assert acceptor.allowed()[0, code]
         acceptor.take(np.array([code]))
@@ -181,38 +188,38 @@ def test_every_string_of_an_admitted_graph_is_reached(seed: int, number: int, st
 def test_what_is_not_admitted_is_refused_at_its_first_wrong_token(string: str, place: int) -> None:
     alphabet = make_alphabet(["a", "b", "c", "d"])
     around = {0: {((1, 2),): 1}, 1: {((0, 2),): 1, ((2, 1),): 1}, 2: {((1, 1),): 1}, 3: {((3, 1),): 1}}
-    rules, vocabulary = make_rules(Grammar(around, (), {}), 4, 1), Vocabulary(alphabet, 1)
-    codes = np.append(vocabulary.codes(string), END).astype(np.int64)
+    rules, vocabulary = compile_grammar(Grammar(around, (), {}), 4, 1), Vocabulary(alphabet, 1)
+    codes = np.append(vocabulary.codes(string), END_TOKEN).astype(np.int64)
     with pytest.raises(ValueError, match=f"token {place} is not allowed"):
-        follow(rules, 1, codes)
-    assert not is_followed(rules, 1, codes)
+        masks_along(rules, 1, codes)
+    assert not follows_grammar(rules, 1, codes)
 
 
 @given(st.integers(0, 2**32), st.sampled_from(sorted(GRAMMARS)), st.sampled_from(ALL_LEVELS))
 def test_partial_rules_admit_what_may_have_more_neighbours(seed: int, name: str, strictness: Strictness) -> None:
     known = GRAMMARS[name]
     grammar = Grammar(known.neighbourhoods, known.dockings, {}, strictness, known.hubs)
-    rules = make_rules(grammar, 3, 1, partial=True)
+    rules = compile_grammar(grammar, 3, 1, partial=True)
     counts = np.random.default_rng(seed).integers(0, 3, 3)
     kind = int(np.random.default_rng(seed).integers(3))
     wider = [counts + more for more in np.ndindex(4, 4, 4)]
     whole = [tuple((other, int(count)) for other, count in enumerate(each) if count) for each in wider]
     docked = all(rules.high[rules.first[kind] : rules.first[kind + 1], other].any() for other in np.flatnonzero(counts))
     wanted = docked and any(admits(grammar, kind, each) for each in whole)
-    assert (tokens_to_complete(rules, kind, counts, 0, True) < NEVER) == wanted
+    assert (tokens_to_complete(rules, kind, counts, 0, True) < NO_COMPLETION) == wanted
 
 
 def test_partial_rules_admit_a_spanning_tree() -> None:
     grammar = grammar_of("A0BAB0")
     vocabulary = Vocabulary(AB, 1)
-    tree = np.append(vocabulary.codes("ABAB"), END).astype(np.int64)
+    tree = np.append(vocabulary.codes("ABAB"), END_TOKEN).astype(np.int64)
     with pytest.raises(ValueError, match="is not allowed"):
-        follow(make_rules(grammar, 3, 1), 1, tree)
-    follow(make_rules(grammar, 3, 1, partial=True), 1, tree)
+        masks_along(compile_grammar(grammar, 3, 1), 1, tree)
+    masks_along(compile_grammar(grammar, 3, 1, partial=True), 1, tree)
 
 
 @pytest.mark.parametrize("name", GRAMMARS)
 def test_rules_come_back_from_their_patterns(name: str) -> None:
-    rules = make_rules(GRAMMARS[name], 3, 1)
-    again = rules_of(patterns_of(rules), 1)
+    rules = compile_grammar(GRAMMARS[name], 3, 1)
+    again = compile_patterns(patterns_json(rules), 1)
     assert all(np.array_equal(one, other) for one, other in zip(rules, again, strict=True))

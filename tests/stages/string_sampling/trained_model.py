@@ -11,7 +11,7 @@ import torch
 from pipeline.shards import json_bytes
 from stages.shape.kit import Kit
 from stages.strings.alphabet import make_alphabet
-from stages.strings.rules import make_rules, patterns_of
+from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.training.checkpoint import checkpoint_bytes
 from stages.training.string_vae.settings import StringVaeEntry
 from stages.training.string_vae.training import new_model
@@ -38,7 +38,7 @@ def publish_model(
         "cycles": vocabulary.cycles,
         "canonical": True,
         "most": MOST,
-        "patterns": patterns_of(make_rules(kit.grammar, len(kit.labels), vocabulary.cycles)),
+        "patterns": patterns_json(compile_grammar(kit.grammar, len(kit.labels), vocabulary.cycles)),
         **(changed or {}),
     }
     with torch.no_grad():

@@ -20,7 +20,7 @@ def compose(rotation, translation, then_rotation, then_translation, out_rotation
 
 
 @numba.njit(cache=True)
-def seen_from(rotation, translation, other_rotation, other_translation, out_rotation, out_translation):
+def relative_transform(rotation, translation, other_rotation, other_translation, out_rotation, out_translation):
     """Put a second pose in the coordinates of a first into the last two arguments."""
     for i in range(3):
         out_translation[i] = 0.0

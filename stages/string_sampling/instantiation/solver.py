@@ -6,10 +6,10 @@ import numba
 import numpy as np
 
 from stages.shape.geometry.contact_lookup import ask, ask_python, hash_key, quantise
-from stages.string_sampling.instantiation.guidance import carry_frames, drop_frames, prefer
-from stages.string_sampling.instantiation.layout import FAILS, PLACED, TRAIL, TRIES, VALUES
-from stages.string_sampling.instantiation.motions import compose, seen_from
+from stages.string_sampling.instantiation.guidance import drop_frames, propagate_frames, score_by_category
 from stages.string_sampling.instantiation.reach import LONGEST, can_reach
+from stages.string_sampling.instantiation.state import FAILS, PLACED, TRAIL, TRIES, VALUES
+from stages.string_sampling.instantiation.transforms import compose, relative_transform
 from stages.variations.kernels.structs import MISSING, NONE
 
 SOLVED, IMPOSSIBLE, BUDGET, NO_ROOM = 0, 1, 2, 3
@@ -69,7 +69,7 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, guide, method, reach,
                     outcome = CONFLICT
                     continue
             if len(guide.parents) > 0:
-                prefer(kit, guide, graph, s, node)
+                score_by_category(kit, guide, graph, s, node)
             if s.counts[TRIES] == method.budget:
                 return BUDGET
             s.counts[TRIES] += 1
@@ -79,7 +79,7 @@ def _attempt(rng, kit, candidates, rules, contacts, graph, guide, method, reach,
             depth += 1
             outcome = _place(kit, candidates, contacts, graph, method, s, value)
             if len(guide.parents) > 0:
-                carry_frames(kit, guide, graph, s, value)
+                propagate_frames(kit, guide, graph, s, value)
             if outcome == NO_ROOM:
                 return NO_ROOM
         else:
@@ -437,7 +437,7 @@ def _close(kit, candidates, graph, reach, s, node):
     for value in range(s.first[node], s.last[node]):
         if not s.alive[value]:
             continue
-        seen_from(
+        relative_transform(
             s.rotations[base], s.translations[base], s.rotations[value], s.translations[value], rotation, translation
         )
         if not can_reach(

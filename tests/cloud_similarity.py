@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
 
-MATCHED = 0.95
+MATCHED_SHARE = 0.95
 """A neighbourhood is matched if this share of its points, and of those that it lies on, have one of the other near."""
 ANCHORS = 5.0
 """So many points of the exemplar along the radius are tried as images of a probe."""

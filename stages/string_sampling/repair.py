@@ -12,18 +12,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import Method
+from stages.string_sampling.instantiation.state import SolverMethod
 from stages.strings.decoder import Decoded, decode
 from stages.training.string_vae.decoding import Draft
 from stages.training.string_vae.latent_sampling import Found
 from stages.training.string_vae.trained import TrainedStringVae
 
-TRIED = 2000
+MAX_PROBE_PLACEMENTS = 2000
 """Parts that are put down at most to learn whether an arrangement is left: most that have none are told by less."""
 
 
-def mended(
-    model: TrainedStringVae, found: Sequence[Found], maker: Instantiator, method: Method, times: int, seed: int
+def repair_strings(
+    model: TrainedStringVae, found: Sequence[Found], maker: Instantiator, method: SolverMethod, times: int, seed: int
 ) -> list[str | None]:
     """The strings of what was found, each written anew at most `times` while no arrangement of its graph is left.
 
@@ -43,7 +43,7 @@ def mended(
             assert string is not None
             codes, before = model.vocabulary.codes(string).tolist(), drafts[number]
             possible = len(before.kept) if codes[: len(before.kept)] == before.kept else 0  # less after a dead end
-            place = first_impossible(maker, decode(string, model.vocabulary.alphabet), method, seed, possible)
+            place = first_impossible_token(maker, decode(string, model.vocabulary.alphabet), method, seed, possible)
             if place is None:
                 continue
             stuck[number] = stuck[number] + 1 if place <= farthest[number] else 0
@@ -62,7 +62,9 @@ def mended(
     return strings
 
 
-def first_impossible(maker: Instantiator, graph: Decoded, method: Method, seed: int, possible: int = 0) -> int | None:
+def first_impossible_token(
+    maker: Instantiator, graph: Decoded, method: SolverMethod, seed: int, possible: int = 0
+) -> int | None:
     """The place of the first token of a string after which no beginning of a shape is left; of one of which nothing
     comes but for its end, the last. None where a shape comes of it, or where TRIED parts do not tell. With the first
     `possible` tokens something is known to be left.
@@ -72,9 +74,9 @@ def first_impossible(maker: Instantiator, graph: Decoded, method: Method, seed: 
     for place, token in enumerate(graph.tokens):
         if token.edge >= 0:
             edge_places[token.edge] = place  # of a cycle the later number
-    brief = method._replace(budget=min(method.budget, TRIED))
+    brief = method._replace(budget=min(method.budget, MAX_PROBE_PLACEMENTS))
 
-    def is_impossible(tokens: int, method: Method) -> bool:
+    def is_impossible(tokens: int, method: SolverMethod) -> bool:
         types, edges = graph.types[: (node_places < tokens).sum()], graph.edges[edge_places < tokens]
         return maker.instantiate(types, edges, np.random.default_rng(seed), method).is_impossible
 

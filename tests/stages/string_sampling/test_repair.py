@@ -9,16 +9,16 @@ import pytest
 
 from stages.shape.geometry.contact_oracle import ContactAnswers
 from stages.string_sampling.instantiation.instantiate import Instantiator
-from stages.string_sampling.instantiation.layout import STANDARD
-from stages.string_sampling.mending import first_impossible, mended
+from stages.string_sampling.instantiation.state import STANDARD_METHOD
+from stages.string_sampling.repair import first_impossible_token, repair_strings
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
 from stages.training.string_vae.latent_sampling import Found, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
-from tests.stages.string_sampling.learnt import publish_model
+from tests.stages.string_sampling.trained_model import publish_model
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
-LOOSE = STANDARD._replace(whole=False)
+LOOSE = STANDARD_METHOD._replace(whole=False)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def place_of(roads: Instantiator, names: str) -> int | None:
     alphabet = make_alphabet(roads.kit.labels)
     tokens = {each[0]: token for each, token in zip(roads.kit.labels, alphabet.tokens, strict=True)}
     string = "".join(tokens.get(each, each) for each in names)
-    return first_impossible(roads, decode(string, alphabet), LOOSE, 0)
+    return first_impossible_token(roads, decode(string, alphabet), LOOSE, 0)
 
 
 @pytest.mark.parametrize(
@@ -60,9 +60,9 @@ def test_what_goes_wrong_goes_on_otherwise_from_its_first_wrong_token(
 ) -> None:
     found = sample(model, "prior", ["AA"], 12, np.random.default_rng(0), 1.0)
     drawn = [each.string or "" for each in found]
-    places = [first_impossible(roads, decode(each, model.vocabulary.alphabet), LOOSE, 0) for each in drawn]
+    places = [first_impossible_token(roads, decode(each, model.vocabulary.alphabet), LOOSE, 0) for each in drawn]
     assert sum(place is not None for place in places) > 6
-    once = [each or "" for each in mended(model, found, roads, LOOSE, 1, 0)]
+    once = [each or "" for each in repair_strings(model, found, roads, LOOSE, 1, 0)]
     kept = 0
     for before, after, place in zip(drawn, once, places, strict=True):
         assert model.is_valid(after)
@@ -71,10 +71,10 @@ def test_what_goes_wrong_goes_on_otherwise_from_its_first_wrong_token(
             one, other = (model.vocabulary.codes(each).tolist() for each in (before, after))
             kept += one[:place] == other[:place] and one[place : place + 1] != other[place : place + 1]
     assert kept > 6  # others came to a dead end and went farther back
-    assert mended(model, found, roads, LOOSE, 1, 0) == once
-    assert mended(model, found, roads, LOOSE, 0, 0) == drawn
-    assert mended(model, [Found(None, 1, 0, found[0].point)], roads, LOOSE, 8, 0) == [None]
+    assert repair_strings(model, found, roads, LOOSE, 1, 0) == once
+    assert repair_strings(model, found, roads, LOOSE, 0, 0) == drawn
+    assert repair_strings(model, [Found(None, 1, 0, found[0].point)], roads, LOOSE, 8, 0) == [None]
     lone = model.vocabulary.alphabet.tokens[0]
-    (other,) = mended(model, [Found(lone, 1, 1, found[0].point)], roads, LOOSE, 1, 0)
+    (other,) = repair_strings(model, [Found(lone, 1, 1, found[0].point)], roads, LOOSE, 1, 0)
     assert other is not None
     assert not other.startswith(lone)

@@ -12,7 +12,7 @@ from stages.strings.settings import Edges
 from stages.strings.tokens import StringError
 
 
-def check(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges = "all") -> Decoded:
+def check_string(string: str, alphabet: Alphabet, grammar: Grammar, edges: Edges = "all") -> Decoded:
     """The graph of `string`, if the grammar admits the neighbours of every node: just these, or, where strings do not
     tell of all contacts (`edges`), these and others besides.
 

@@ -1,7 +1,7 @@
 """Which tokens may follow the beginning of a string, so that a string of the tiling grammar can still come of it.
 
 Tokens are numbers: 0 ends a string; then come the types, `(`, `)`, and the cycle numbers from 0. A token is left out if
-no string that begins so is well-formed (`stages.strings.decoder`) and admitted (`stages.strings.grammar`), as far as
+no string that begins so is well-formed (`stages.strings.decoder`) and admitted (`stages.strings.grammar_check`),
 can be told from each node alone: its neighbours so far fit into a pattern of its type; and a subtree of it can hold the
 other end of each cycle that is open. So no token is left out that an admitted string has, but for want of room: what is
 open must be closed in the tokens that are left, each cycle by a number and each node by subtrees without cycles.
@@ -20,10 +20,10 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from stages.strings.rules import NEVER, Rules
+from stages.strings.compiled_grammar import NO_COMPLETION, CompiledGrammar
 
-END = 0
-NONE = -1
+END_TOKEN = 0
+NO_TOKEN = -1
 """No token, and no node."""
 _AT_CURRENT = -2
 """The current node, at which a cycle can close, but below which it cannot."""
@@ -48,7 +48,7 @@ def tokens_to_complete(rules, kind, counts, pending, left):
 
     counts: int64 (types,), its neighbours; pending: edges of open cycles to come; left: it gets no more children.
     """
-    best = NEVER
+    best = NO_COMPLETION
     types = len(counts)
     for p in range(rules.first[kind], rules.first[kind + 1]):
         total, missing = 0, 0
@@ -88,7 +88,7 @@ def _cheapest(rules, p, kind, counts, missing, room, pending):
     children = max(room - pending, 0)
     if children == 0:
         return 0
-    fill = NEVER
+    fill = NO_COMPLETION
     for t in range(len(counts)):
         if counts[t] < rules.high[p, t] and rules.counted[t]:
             fill = min(fill, rules.cost[kind, t])
@@ -99,7 +99,7 @@ def _cheapest(rules, p, kind, counts, missing, room, pending):
             total += rules.cost[kind, t] * (rules.low[p, t] - counts[t])
     if pending > 0:
         spare = pending
-        last = NEVER + 1
+        last = NO_COMPLETION + 1
         while spare > 0:  # the dearest first
             dearest, number = -1, 0
             if room > missing and fill < last:
@@ -118,7 +118,7 @@ def _cheapest(rules, p, kind, counts, missing, room, pending):
             dearest_total += taken * dearest
             spare -= taken
             last = dearest
-    return min(total - dearest_total + 2 * (children - 1), NEVER)
+    return min(total - dearest_total + 2 * (children - 1), NO_COMPLETION)
 
 
 @numba.njit(cache=True)
@@ -127,7 +127,7 @@ def _update(rules, state, i, node):
         rules, state.kind[i, node], state.counts[i, node], state.pending[i, node], state.left[i, node]
     )
     state.need[i, node] = need
-    return need < NEVER
+    return need < NO_COMPLETION
 
 
 @numba.njit(cache=True)
@@ -192,7 +192,7 @@ def _viable(rules, state, i, tokens, first, second):
         origin, witness = state.opened[i, k], state.witness[i, k]
         if origin < 0 or (witness >= 0 and not _is_either(first, second, origin, witness)):
             continue
-        if _where_closes(rules, state, i, k) == NONE:
+        if _where_closes(rules, state, i, k) == NO_TOKEN:
             return False
     return True
 
@@ -208,7 +208,7 @@ def _find_witnesses(rules, state, i):
     a look at each cycle."""
     for k in range(state.opened.shape[1]):
         if state.opened[i, k] >= 0 and state.witness[i, k] < 0:
-            state.witness[i, k] = max(_where_closes(rules, state, i, k), NONE)
+            state.witness[i, k] = max(_where_closes(rules, state, i, k), NO_TOKEN)
 
 
 @numba.njit(cache=True)
@@ -216,7 +216,7 @@ def _forget_witnesses(state, i, first, second):
     """Of the cycles that begin at one of two nodes, or whose witness is one of them."""
     for k in range(state.opened.shape[1]):
         if state.opened[i, k] < 0 or _is_either(first, second, state.opened[i, k], state.witness[i, k]):
-            state.witness[i, k] = NONE
+            state.witness[i, k] = NO_TOKEN
 
 
 @numba.njit(cache=True)
@@ -226,16 +226,16 @@ def _where_closes(rules, state, i, k):
     origin = state.opened[i, k]
     kind = state.kind[i, origin]
     counts = state.counts[i, origin]
-    found = NONE
+    found = NO_TOKEN
     for other in range(len(counts)):
         goal = rules.arc[kind, other]
         if goal < 0:
             continue
         counts[other] += 1
         state.pending[i, origin] -= 1
-        if tokens_to_complete(rules, kind, counts, state.pending[i, origin], state.left[i, origin]) < NEVER:
+        if tokens_to_complete(rules, kind, counts, state.pending[i, origin], state.left[i, origin]) < NO_COMPLETION:
             place = _where_comes(rules, state, i, origin, other, goal)
-            found = place if place != NONE else found
+            found = place if place != NO_TOKEN else found
         counts[other] -= 1
         state.pending[i, origin] += 1
         if found >= 0:
@@ -258,17 +258,19 @@ def _where_comes(rules, state, i, origin, other, goal):
             if arc < 0 or not (rules.closes_below[arc, goal] if node == origin else rules.closes[arc, goal]):
                 continue
             counts[child] += 1
-            fits = tokens_to_complete(rules, kind, counts, state.pending[i, node], False) < NEVER
+            fits = tokens_to_complete(rules, kind, counts, state.pending[i, node], False) < NO_COMPLETION
             counts[child] -= 1
             if fits:
                 return node
     if state.previous[i] == _NODE and state.kind[i, current] == other and _not_joined(state, i, origin):
         state.counts[i, current, state.kind[i, origin]] += 1
-        fits = tokens_to_complete(rules, other, state.counts[i, current], state.pending[i, current], False) < NEVER
+        fits = (
+            tokens_to_complete(rules, other, state.counts[i, current], state.pending[i, current], False) < NO_COMPLETION
+        )
         state.counts[i, current, state.kind[i, origin]] -= 1
         if fits:
             return _AT_CURRENT
-    return NONE
+    return NO_TOKEN
 
 
 @numba.njit(cache=True)
@@ -327,7 +329,7 @@ def _can_leave(rules, state, i):
     """Whether the current node is complete but for its open cycles."""
     node = state.current[i]
     kind, counts, pending = state.kind[i, node], state.counts[i, node], state.pending[i, node]
-    return tokens_to_complete(rules, kind, counts, pending, True) < NEVER
+    return tokens_to_complete(rules, kind, counts, pending, True) < NO_COMPLETION
 
 
 @numba.njit(cache=True)
@@ -368,13 +370,13 @@ def _may_come(rules, state, i, most, token):
     types = len(rules.counted)
     previous = state.previous[i]
     if previous == _ENDED:
-        return token == END
+        return token == END_TOKEN
     tokens = most - state.length[i] - 1
     if 1 <= token <= types:
         return tokens >= 0 and _viable_node(rules, state, i, token - 1, tokens)
     if previous in (_START, _OPEN):
         return False
-    if token == END:
+    if token == END_TOKEN:
         return state.depth[i] == 0 and _open_cycles(state, i) == 0 and _can_leave(rules, state, i)
     if tokens < 0:
         return False
@@ -416,7 +418,7 @@ def _choose(rules, state, i, most, scores):
     while True:
         token = int(scores.argmax())
         if scores[token] == -np.inf:
-            return NONE
+            return NO_TOKEN
         if _may_come(rules, state, i, most, token):
             return token
         scores[token] = -np.inf
@@ -426,7 +428,7 @@ def _choose(rules, state, i, most, scores):
 def _take(rules, state, i, token):
     """Append an allowed token."""
     types = len(rules.counted)
-    if token == END:
+    if token == END_TOKEN:
         state.previous[i] = _ENDED
         return
     state.length[i] += 1
@@ -466,7 +468,7 @@ def _allow_all(rules, state, most, allowed):
 @numba.njit(cache=True)
 def _choose_all(rules, state, most, scores, kept, tokens):
     for i in range(len(tokens)):
-        tokens[i] = kept[i] if kept[i] != NONE else _choose(rules, state, i, most, scores[i])
+        tokens[i] = kept[i] if kept[i] != NO_TOKEN else _choose(rules, state, i, most, scores[i])
 
 
 @numba.njit(cache=True)
@@ -506,10 +508,10 @@ def _follow(rules, state, i, most, tokens, allowed):
     return needed
 
 
-class Acceptor:
+class GrammarMask:
     """The beginnings of some strings, all of which grow by one token at a time."""
 
-    def __init__(self, rules: Rules, cycles: int, strings: int, most: int) -> None:
+    def __init__(self, rules: CompiledGrammar, cycles: int, strings: int, most: int) -> None:
         """`strings` empty beginnings of strings with the cycle numbers below `cycles` and at most `most` tokens."""
         types = len(rules.counted)
         shape = (strings, most + 1)
@@ -529,7 +531,7 @@ class Acceptor:
             nodes=np.zeros(strings, np.int32),
             length=np.zeros(strings, np.int32),
             opened=np.full((strings, cycles), -1, np.int32),
-            witness=np.full((strings, cycles), NONE, np.int32),
+            witness=np.full((strings, cycles), NO_TOKEN, np.int32),
             partners=np.zeros(shape, np.int32),
             closed=np.zeros(strings, np.int32),
         )
@@ -553,20 +555,22 @@ class Acceptor:
         _take_all(self._rules, self._state, tokens)
 
 
-def is_followed(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> bool:
+def follows_grammar(rules: CompiledGrammar, cycles: int, tokens: npt.NDArray[np.int64]) -> bool:
     """Whether each token of a whole string, int64 (n,), END among them, is allowed after those before it."""
-    return bool(_is_followed(rules, Acceptor(rules, cycles, 1, len(tokens))._state, 0, NEVER, tokens))
+    return bool(_is_followed(rules, GrammarMask(rules, cycles, 1, len(tokens))._state, 0, NO_COMPLETION, tokens))
 
 
-def follow(rules: Rules, cycles: int, tokens: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.bool_], int]:
+def masks_along(
+    rules: CompiledGrammar, cycles: int, tokens: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.bool_], int]:
     """What was allowed at each token of a whole string, END among them, bool (n, tokens); and how many tokens a string
     that begins as this one does at any place may need, if it takes the shortest way to its end from there.
 
     Raises ValueError for a string with a token that is not allowed.
     """
-    beginning = Acceptor(rules, cycles, 1, len(tokens))
+    beginning = GrammarMask(rules, cycles, 1, len(tokens))
     allowed = np.zeros((len(tokens), beginning.tokens), np.bool_)
-    most = int(_follow(rules, beginning._state, 0, NEVER, tokens, allowed))
+    most = int(_follow(rules, beginning._state, 0, NO_COMPLETION, tokens, allowed))
     if most < 0:
         place = int(np.argmax(~allowed.any(axis=1) | ~allowed[np.arange(len(tokens)), tokens]))
         raise ValueError(f"token {place} is not allowed there by the grammar")

@@ -4,7 +4,7 @@ import pytest
 
 from stages.shape.kit import Grammar
 from stages.strings.alphabet import make_alphabet
-from stages.strings.grammar import check
+from stages.strings.grammar_check import check_string
 from stages.strings.settings import Edges
 from stages.strings.tokens import StringError
 
@@ -26,7 +26,7 @@ CASTLE = Grammar(
 
 @pytest.mark.parametrize("string", ["A0DADAD0", "A0(C)DADAD0", "CA0DADBDAD0"])
 def test_rings_that_the_grammar_allows_pass(string: str) -> None:
-    assert len(check(string, ALPHABET, CASTLE).types) == sum(each.isalpha() for each in string)
+    assert len(check_string(string, ALPHABET, CASTLE).types) == sum(each.isalpha() for each in string)
 
 
 @pytest.mark.parametrize(
@@ -43,28 +43,28 @@ def test_rings_that_the_grammar_allows_pass(string: str) -> None:
 )
 def test_the_first_place_that_breaks_the_grammar_is_named(string: str, index: int, reason: str) -> None:
     with pytest.raises(StringError, match=reason) as caught:
-        check(string, ALPHABET, CASTLE)
+        check_string(string, ALPHABET, CASTLE)
     assert caught.value.index == index
 
 
 def test_a_forbidden_cycle_edge_is_named_at_its_number() -> None:
     with pytest.raises(StringError, match="never neighbours") as caught:
-        check("A0DAD(A0)D", ALPHABET, CASTLE)
+        check_string("A0DAD(A0)D", ALPHABET, CASTLE)
     assert caught.value.index == 1
 
 
 def test_a_string_that_cannot_be_read_is_refused_as_such() -> None:
     with pytest.raises(StringError, match="not closed"):
-        check("A(D", ALPHABET, CASTLE)
+        check_string("A(D", ALPHABET, CASTLE)
 
 
 @pytest.mark.parametrize("edges", ["faces", "tree"])
 def test_where_strings_leave_out_contacts_a_part_may_have_fewer_neighbours_than_were_seen(edges: Edges) -> None:
     for string in ("ADADAD", "CADADBDAD", "D(AD)AC"):
         with pytest.raises(StringError):
-            check(string, ALPHABET, CASTLE)
-        check(string, ALPHABET, CASTLE, edges)
+            check_string(string, ALPHABET, CASTLE)
+        check_string(string, ALPHABET, CASTLE, edges)
     for string, index in (("ADADCD", 4), ("A(C)(C)DAD", 0), ("AD(A)AD", 1)):
         with pytest.raises(StringError) as caught:
-            check(string, ALPHABET, CASTLE, edges)
+            check_string(string, ALPHABET, CASTLE, edges)
         assert caught.value.index == index

@@ -16,14 +16,16 @@ import numpy as np
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Grammar, Multiset
 
-ANY = -1
+ANY_SIZE = -1
 """Size of a pattern that any number of neighbours fits."""
-MANY = 1 << 14
+MAX_NEIGHBOURS = 1 << 14
 """As many neighbours of a type as there may be."""
-NEVER = 1 << 28
+NO_COMPLETION = 1 << 28
 """Tokens to the end of what has no end."""
 
-Rules = namedtuple("Rules", "first low high size loose counted partial cost arc closes closes_below")
+CompiledGrammar = namedtuple(
+    "CompiledGrammar", "first low high size loose counted partial cost arc closes closes_below"
+)
 """Arrays, for compiled code.
 
 first: int64 (types + 1,), the patterns of type t are rows first[t] to first[t + 1]; low, high: int64 (patterns, types);
@@ -40,7 +42,7 @@ the second pair's second type where a cycle edge from its first ends; closes_bel
 Pattern = tuple[dict[int, int], dict[int, int], int]
 
 
-def make_rules(grammar: Grammar, types: int, cycles: int, partial: bool = False) -> Rules:
+def compile_grammar(grammar: Grammar, types: int, cycles: int, partial: bool = False) -> CompiledGrammar:
     """The rules of a grammar of so many types, for strings with so many cycle numbers.
 
     `partial`: strings do not tell of all contacts, so that a node may have neighbours besides (`admits_more`).
@@ -55,16 +57,16 @@ def make_rules(grammar: Grammar, types: int, cycles: int, partial: bool = False)
         first.append(len(low))
     counted = [kind not in grammar.hubs for kind in range(types)]
     patterns = {"first": first, "low": low, "high": high, "size": size, "counted": counted, "partial": partial}
-    return rules_of(patterns, cycles)
+    return compile_patterns(patterns, cycles)
 
 
-def rules_of(patterns: Mapping[str, Any], cycles: int) -> Rules:
-    """The rules of what `patterns_of` answers, for strings with so many cycle numbers."""
+def compile_patterns(patterns: Mapping[str, Any], cycles: int) -> CompiledGrammar:
+    """The rules of what `patterns_json` answers, for strings with so many cycle numbers."""
     counted = np.array(patterns["counted"], dtype=np.bool_)
     types = len(counted)
     high = np.array(patterns["high"], dtype=np.int64).reshape(-1, types)
     empty = np.zeros((0, 0), dtype=np.bool_)
-    rules = Rules(
+    rules = CompiledGrammar(
         first=np.array(patterns["first"], dtype=np.int64),
         low=np.array(patterns["low"], dtype=np.int64).reshape(-1, types),
         high=high,
@@ -72,7 +74,7 @@ def rules_of(patterns: Mapping[str, Any], cycles: int) -> Rules:
         loose=(high[:, ~counted] > 0).any(axis=1),
         counted=counted,
         partial=bool(patterns["partial"]),
-        cost=np.full((types, types), NEVER, dtype=np.int64),
+        cost=np.full((types, types), NO_COMPLETION, dtype=np.int64),
         arc=np.full((types, types), -1, dtype=np.int64),
         closes=empty,
         closes_below=empty,
@@ -80,7 +82,7 @@ def rules_of(patterns: Mapping[str, Any], cycles: int) -> Rules:
     return _reached(rules, types, cycles)
 
 
-def patterns_of(rules: Rules) -> dict[str, Any]:
+def patterns_json(rules: CompiledGrammar) -> dict[str, Any]:
     """What rules are made of, as JSON."""
     arrays = {name: getattr(rules, name).tolist() for name in ("first", "low", "high", "size", "counted")}
     return {**arrays, "partial": rules.partial}
@@ -94,9 +96,9 @@ def _beside_hubs(grammar: Grammar) -> set[tuple[int, int]]:
 
 def _patterns(grammar: Grammar, kind: int, beside_hub: set[tuple[int, int]]) -> Iterator[Pattern]:
     """The patterns of a type: least and greatest counts by neighbour type, and the number of neighbours."""
-    hubs = {other: MANY for each, other in sorted(beside_hub) if each == kind}
+    hubs = {other: MAX_NEIGHBOURS for each, other in sorted(beside_hub) if each == kind}
     if kind in grammar.hubs:
-        yield {}, hubs, ANY
+        yield {}, hubs, ANY_SIZE
         return
     observed = list(grammar.neighbourhoods.get(kind, {}))
     around = sorted({other for each in observed for other, _ in each})
@@ -108,7 +110,7 @@ def _patterns(grammar: Grammar, kind: int, beside_hub: set[tuple[int, int]]) -> 
         for each in observed:
             yield {other: 1 for other, _ in each}, {**hubs, **{other: _size(each) for other, _ in each}}, _size(each)
     elif grammar.strictness in SLOT_LEVELS:
-        yield {}, {**hubs, **dict.fromkeys(around, MANY)}, ANY
+        yield {}, {**hubs, **dict.fromkeys(around, MAX_NEIGHBOURS)}, ANY_SIZE
     else:
         together = [around] if grammar.strictness == "count_and_types" else _seen_together(observed, around)
         for size in sizes:
@@ -126,33 +128,35 @@ def _seen_together(observed: list[Multiset], around: list[int]) -> list[list[int
     return sorted(sorted(clique) for clique in nx.find_cliques(together)) if around else [[]]
 
 
-def _reached(rules: Rules, types: int, cycles: int) -> Rules:
+def _reached(rules: CompiledGrammar, types: int, cycles: int) -> CompiledGrammar:
     """The rules with what follows from the patterns: pairs of neighbours, costs, and where cycles can close."""
-    from stages.strings.acceptor import tokens_to_complete
+    from stages.strings.grammar_mask import tokens_to_complete
 
     def completed(kind: int, *neighbours: int) -> int:
         counts = np.bincount(np.array(neighbours, dtype=np.int64), minlength=types)
         return int(tokens_to_complete(rules, kind, counts, 0, False))
 
     rules.cost[:] = 0
-    beside = np.array([[completed(kind, other) < NEVER for other in range(types)] for kind in range(types)], np.bool_)
+    beside = np.array(
+        [[completed(kind, other) < NO_COMPLETION for other in range(types)] for kind in range(types)], np.bool_
+    )
     pairs = [(a, b) for a in range(types) for b in range(types) if beside[a, b] and beside[b, a]]
     for number, (a, b) in enumerate(pairs):
         rules.arc[a, b] = number
     with_both = np.zeros((len(pairs), len(pairs)), dtype=np.bool_)
     for place, (a, b) in enumerate(pairs):
         for other, (c, d) in enumerate(pairs):
-            with_both[place, other] = b == d and completed(b, a, c) < NEVER
+            with_both[place, other] = b == d and completed(b, a, c) < NO_COMPLETION
     # with_both[a -> b, c -> b]: a node of type b may stand beside an a and a c
-    rules.cost[:] = NEVER
+    rules.cost[:] = NO_COMPLETION
     while True:
         before = rules.cost.copy()
         for parent, child in pairs:
-            rules.cost[parent, child] = min(1 + completed(child, parent), NEVER)
+            rules.cost[parent, child] = min(1 + completed(child, parent), NO_COMPLETION)
         if (before == rules.cost).all():
             break
     if cycles:
-        rules.cost[rules.cost >= NEVER] = 1
+        rules.cost[rules.cost >= NO_COMPLETION] = 1
     mirrored = np.array([rules.arc[b, a] for a, b in pairs], dtype=np.int64)
     below = with_both[:, mirrored] if pairs else with_both
     # below[a -> b, b -> c]: a b that hangs on an a may have a child of type c

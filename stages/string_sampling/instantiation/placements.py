@@ -18,7 +18,7 @@ from stages.shape.graphs.patterns import SAME_UP
 from stages.shape.kit import Kit, PartType
 
 
-class Candidates(NamedTuple):
+class DockedPlacements(NamedTuple):
     """Stances, those of one label beside each other, and candidates, those of a stance and a label beside each other.
 
     stance_starts int64 (labels + 1,): where the stances of a label begin; stance_types int64 (s,); rests float64
@@ -36,7 +36,7 @@ class Candidates(NamedTuple):
     translations: np.ndarray
 
 
-class _Stance(NamedTuple):
+class _Orientation(NamedTuple):
     """up: float64 (3,) in part coordinates; rest: float64 (3, 3); turns: float64 (k, 4, 4), symmetries that keep up."""
 
     part_type: int
@@ -45,14 +45,14 @@ class _Stance(NamedTuple):
     turns: FloatArray
 
 
-def find_candidates(kit: Kit, upright: bool) -> Candidates:
+def find_placements(kit: Kit, upright: bool) -> DockedPlacements:
     """The stances and candidates of a kit. With `upright` parts stand as they stood in the exemplars, else however
     dockings turn them."""
     stances = [
         stance
         for label in range(len(kit.labels))
         for part_type in np.flatnonzero(kit.label_of == label).tolist()
-        for stance in _stances(kit, part_type, upright)
+        for stance in _orientations(kit, part_type, upright)
     ]
     of_type: dict[int, list[int]] = {}
     for number, stance in enumerate(stances):
@@ -68,7 +68,7 @@ def find_candidates(kit: Kit, upright: bool) -> Candidates:
                     row.append((place, pose))
     flat = [each for row in found for each in row]
     poses = np.array([pose for _, pose in flat]).reshape(-1, 4, 4)
-    return Candidates(
+    return DockedPlacements(
         stance_starts=np.searchsorted(labels, np.arange(len(kit.labels) + 1)),
         stance_types=np.array([each.part_type for each in stances], dtype=np.int64),
         rests=np.ascontiguousarray([each.rest for each in stances]),
@@ -79,19 +79,19 @@ def find_candidates(kit: Kit, upright: bool) -> Candidates:
     )
 
 
-def _stances(kit: Kit, part_type: int, upright: bool) -> list[_Stance]:
+def _orientations(kit: Kit, part_type: int, upright: bool) -> list[_Orientation]:
     """How parts of a type stood in the exemplars, hubs behind them too, modulo symmetry."""
     axis, turns = {"y": 1, "z": 2}[kit.up], kit.types[part_type].symmetries
-    found: list[_Stance] = []
+    found: list[_Orientation] = []
     for exemplar in kit.exemplars:
         whole = exemplar.whole
         for pose in whole.poses[whole.types == part_type]:
             up = np.ascontiguousarray(pose[axis, :3])
             if not upright:
-                return [_Stance(part_type, up, pose[:3, :3], turns)]
+                return [_Orientation(part_type, up, pose[:3, :3], turns)]
             if not any(_keeping(kit.types[part_type], up, known.up).any() for known in found):
                 kept = turns[_keeping(kit.types[part_type], up, up)]
-                found.append(_Stance(part_type, up, pose[:3, :3], kept))
+                found.append(_Orientation(part_type, up, pose[:3, :3], kept))
     return found
 
 
@@ -113,7 +113,7 @@ def _beside(kit: Kit, part_type: int) -> Iterator[tuple[int, FloatArray]]:
 
 
 def _standing(
-    kit: Kit, stance: _Stance, others: list[tuple[int, _Stance]], poses: FloatArray, upright: bool
+    kit: Kit, stance: _Orientation, others: list[tuple[int, _Orientation]], poses: FloatArray, upright: bool
 ) -> Iterator[tuple[int, FloatArray]]:
     """The stance, one of `others`, and the pose of a part at each of `poses` (k, 4, 4) beside one that stands as
     `stance`, turned by a symmetry so that up is where its stance has it; nothing where no part of its type stood so."""
@@ -130,7 +130,7 @@ def _standing(
                 break
 
 
-def _same_place(kit: Kit, stance: _Stance, pose: FloatArray, other: FloatArray) -> bool:
+def _same_place(kit: Kit, stance: _Orientation, pose: FloatArray, other: FloatArray) -> bool:
     """Whether a part looks the same at two poses."""
     length = kit.types[stance.part_type].diagonal / 2
     gaps = pose_vectors(pose @ stance.turns, length) - pose_vectors(other[None], length)
