@@ -25,7 +25,7 @@ STAGES = ("programs", "points", "sketches", "validity", "package")
 def dataset_of(samples: int, folder: Path) -> tuple[Config, Mapping[str, Stage]]:
     """The config of a sweep of so many chairs."""
     path, stages = folder / "big.yaml", find_stages()
-    programs = {"program": "chair", "mode": "sweep", "sweep": {"samples": samples}}
+    programs = {"program": "chair", "mode": "random", "random": {"samples": samples}}
     path.write_text(yaml.safe_dump({"name": "big", "programs": programs}))
     return load_config(path, {name: stage.config for name, stage in stages.items()}), stages
 

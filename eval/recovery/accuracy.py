@@ -14,7 +14,7 @@ import numpy as np
 
 from eval.engine.table import Cell, ReferenceRow, Table
 from pipeline.errors import ConfigError
-from stages.programs.movement import STEP, moved
+from stages.programs.movement import MIN_CLASS_MOVEMENT, surface_movements
 from stages.programs.program import Program
 from stages.programs.schema import Values
 from stages.recovery.reading import RecoveryInput
@@ -154,7 +154,7 @@ def tried(
             for side, parts in enumerate((shape.parts, program.parts(values)))
         ]
         distances.append(published_chamfer(*clouds))
-        classes.append(program.schema.classes(values))
+        classes.append(program.schema.to_classes(values))
     found, truth = np.array(classes), np.array([each.classes for each in shapes])
     near = (np.abs(found - truth) <= 1) & (found < counts)
     shares = np.array(distances), found == truth, near, truth < counts
@@ -242,7 +242,7 @@ def alike(found: Found, shapes: Sequence[RandomShape]) -> BoolArray:
         asked = np.flatnonzero(found.visible[row] & ~same[row])
         names = [found.program.parameters[place].name for place in asked.tolist()]
         changes = [{name: found.results[row].values[name]} for name in names]
-        same[row, asked] = moved(found.program, shape.values, changes) <= STEP
+        same[row, asked] = surface_movements(found.program, shape.values, changes) <= MIN_CLASS_MOVEMENT
     return same
 
 
@@ -258,7 +258,8 @@ def parameters_table(found: Mapping[str, tuple[Found, BoolArray]]) -> Table:
         rows.append((name, len(same), *shares, ", ".join(worst)))
     notes = (
         "Of the network alone; of the parameters that are seen in the true shape. alike: right, or wrong by so little "
-        f"that in the true shape it moves no point of the surface by more than {STEP:.2%} of the diagonal, which no "
+        f"that in the true shape it moves no point of the surface by more than {MIN_CLASS_MOVEMENT:.2%}"
+        " of the diagonal, which no "
         "cloud or drawing tells. Most often unlike: the parameters of which that is rarest. Inputs have no size: what "
         "makes a shape larger as a whole, its height and widths together, only what does not grow with it tells.",
     )

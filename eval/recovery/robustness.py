@@ -137,7 +137,7 @@ def spoilt_inputs(
         spoil = CORRUPTIONS[kind][how]
         return [spoil(given, np.random.default_rng((seed, place))) for place, given in enumerate(inputs)]
     azimuth, elevation = VIEWS[how]
-    side = 1.0 if model.program.elevation > 0 else -1.0
+    side = 1.0 if model.program.view_elevation > 0 else -1.0
     view = model.sketches.views[0].model_copy(update={"azimuth": azimuth, "elevation": side * elevation})
     rng = np.random.default_rng(seed)
     inks = [draw_fitted(model.program, each.parts, view, model.sketches, rng) for each in shapes]

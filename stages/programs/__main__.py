@@ -14,14 +14,14 @@ from pathlib import Path
 
 from pipeline.errors import ConfigError, ShardFailed
 from pipeline.places import write_file
+from stages.programs.description import program_markdown
 from stages.programs.editing import interpolate, mix
 from stages.programs.files import named_values, random_shapes, shape_glb
 from stages.programs.movement import movement_table, movements
 from stages.programs.parameters import ParameterError
 from stages.programs.program import Program, find_program
-from stages.programs.recipe import recipe_markdown
 from stages.programs.schema import Values
-from stages.programs.sheets import parameter_sheet, row_sheet
+from stages.programs.sheets import parameter_sheet, shape_sheet
 from stages.shape.views.sheet import picture_png
 
 OUT = Path("datasets", "programs")
@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _inspect(program: Program, asked: argparse.Namespace) -> list[Path]:
-    print(recipe_markdown(program))
+    print(program_markdown(program))
     sys.stdout.flush()
     picture = asked.picture or asked.out / f"{program.name}.png"
     return [write_file(picture, picture_png(parameter_sheet(program)))]
@@ -55,7 +55,7 @@ def _movement(program: Program, asked: argparse.Namespace) -> list[Path]:
 
 def _sheet(program: Program, asked: argparse.Namespace) -> list[Path]:
     shapes = random_shapes(program, asked.count, asked.seed)
-    sheet = row_sheet(program, shapes, [""] * len(shapes), f"{program.name}: {asked.count} random shapes")
+    sheet = shape_sheet(program, shapes, [""] * len(shapes), f"{program.name}: {asked.count} random shapes")
     return [write_file(asked.picture or asked.out / f"{program.name}-{asked.seed}.png", picture_png(sheet))]
 
 
@@ -87,9 +87,9 @@ def _written(
     written = []
     for name, values in zip(names, shapes, strict=True):
         written.append(write_file(asked.out / f"{name}.glb", shape_glb(program, values)))
-        text = json.dumps(json.loads(program.schema.text(values)), indent=1, ensure_ascii=False) + "\n"
+        text = json.dumps(json.loads(program.schema.to_text(values)), indent=1, ensure_ascii=False) + "\n"
         written.append(write_file(asked.out / f"{name}.json", text.encode()))
-    sheet = row_sheet(program, shapes, names, title)
+    sheet = shape_sheet(program, shapes, names, title)
     return [*written, write_file(asked.out / "sheet.png", picture_png(sheet))]
 
 

@@ -15,7 +15,7 @@ def _faults(sample: Packaged) -> Iterator[str]:
     record = sample.record
     if record["language"] == LANGUAGE.name:
         program = find_program(record["kit"])
-        if structure_digest(program, program.schema.values(record["text"])) != record["graph"]:
+        if structure_digest(program, program.schema.from_text(record["text"])) != record["graph"]:
             yield "its parameters have another structure than its json names"
 
 

@@ -2,7 +2,7 @@
 
 Every possible shape has a place in [0, 1), a hash of its visible values, and so has every structure, a hash of its
 visible discrete and binary values. Shards own intervals of them that do not meet: so no two shards can make the same
-shape, with no word between them.
+shape, with no word off_grid them.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from stages.shape.arrays import BoolArray, FloatArray
 
 Interval = tuple[float, float]
 
-DECIMALS = 4
-"""Values between those listed have so many decimals: nobody sees more, and texts stay short."""
+OFF_GRID_DECIMALS = 4
+"""Values off_grid those listed have so many decimals: nobody sees more, and texts stay short."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,11 @@ class Draws:
 
 
 def draw(
-    schema: Schema, count: int, rng: np.random.Generator, between: bool, fixed: tuple[str, float] | None = None
+    schema: Schema, count: int, rng: np.random.Generator, off_grid: bool, fixed: tuple[str, float] | None = None
 ) -> Draws:
     """`count` random draws; of `fixed`, a name and a value, all have that value.
 
-    Every value of a parameter is as likely as every other; `between` draws continuous parameters from their whole
+    Every value of a parameter is as likely as every other; `off_grid` draws continuous parameters from their whole
     range instead.
     """
     sizes = np.array([len(each.values) for each in schema.parameters], dtype=np.int64)
@@ -81,14 +81,14 @@ def draw(
     for row, parameter in zip(table, schema.parameters, strict=True):
         row[: len(parameter.values)] = parameter.values
     columns = np.take_along_axis(table, rng.integers(0, sizes[:, None], (len(sizes), count)), axis=1)
-    if between:
+    if off_grid:
         continuous = np.array([each.kind == "continuous" for each in schema.parameters])
         low, high = table[continuous, 0], table[continuous, sizes[continuous] - 1]
         anywhere = rng.uniform(low[:, None], high[:, None], (len(low), count))
-        columns[continuous] = np.clip(anywhere.round(DECIMALS), low[:, None], high[:, None])
+        columns[continuous] = np.clip(anywhere.round(OFF_GRID_DECIMALS), low[:, None], high[:, None])
     if fixed is not None:
         columns[list(schema.by_name).index(fixed[0])] = fixed[1]
-    return Draws(schema, *schema.settled_columns(columns))
+    return Draws(schema, *schema.canonical_columns(columns))
 
 
 def _salt(name: str) -> int:

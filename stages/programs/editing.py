@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from stages.programs.parameters import Parameter, ParameterError, Value
 from stages.programs.program import Program
-from stages.programs.repair import repaired
+from stages.programs.repair import repair
 from stages.programs.schema import Values
 
 
@@ -31,8 +31,8 @@ def interpolate(
     shapes only has the value that it has there. Raises ParameterError for a group that is not there.
     """
     moving = _in_groups(program, groups or program.schema.groups)
-    start, shown_first = program.schema.settled(first)
-    end, shown_last = program.schema.settled(last)
+    start, shown_first = program.schema.canonical(first)
+    end, shown_last = program.schema.canonical(last)
     between: dict[str, Value] = {}
     for name, parameter in program.schema.by_name.items():
         if name not in moving:
@@ -62,9 +62,9 @@ def _between(parameter: Parameter, start: float, end: float, share: float) -> Va
 
 
 def _valid(program: Program, values: Values, keep: Collection[str]) -> dict[str, Value]:
-    found = repaired(program, values, keep)
-    found = repaired(program, values) if found is None else found
+    found = repair(program, values, keep)
+    found = repair(program, values) if found is None else found
     if found is None:
-        broken = ", ".join(each.rule.text for each in program.broken(values))
+        broken = ", ".join(each.condition.text for each in program.violated(values))
         raise ParameterError(f"{program.name}: no values near these keep {broken}")
     return found

@@ -8,10 +8,10 @@ import numpy as np
 
 from stages.programs.curves.part import Part
 from stages.programs.program import Program
-from stages.programs.repair import repaired
+from stages.programs.repair import repair
 from stages.programs.schema import Values
 
-SAME = 1e-6
+MAX_SAME_POSITION_DISTANCE = 1e-6
 """Vertices nearer than this, in the program's units, are at one place."""
 
 
@@ -23,12 +23,12 @@ def has_effect(program: Program, values: Values, name: str, parts: Sequence[Part
     here has no effect.
     """
     parameter = program.schema.by_name[name]
-    _, visible = program.schema.settled(values)
+    _, visible = program.schema.canonical(values)
     place = parameter.class_of(values[name])
     tried = False
     for others in (parameter.values[:place][::-1], parameter.values[place + 1 :]):
         for other in others:
-            changed = repaired(program, {**values, name: other}, visible)
+            changed = repair(program, {**values, name: other}, visible)
             if changed is not None:
                 if same_geometry(parts, program.parts(changed)):
                     return False
@@ -43,6 +43,6 @@ def same_geometry(parts: Sequence[Part], others: Sequence[Part]) -> bool:
         a.label == b.label
         and a.mesh.vertices.shape == b.mesh.vertices.shape
         and a.mesh.quads.shape == b.mesh.quads.shape
-        and bool(np.abs(a.mesh.vertices - b.mesh.vertices).max(initial=0.0) <= SAME)
+        and bool(np.abs(a.mesh.vertices - b.mesh.vertices).max(initial=0.0) <= MAX_SAME_POSITION_DISTANCE)
         for a, b in zip(parts, others, strict=True)
     )

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.errors import ConfigError
 from stages.programs.draws import Share
 from stages.programs.parameters import ParameterError, Value
-from stages.programs.program import Program, shape_of
+from stages.programs.program import Program, build_shape
 from stages.programs.sampling import Sampler
 from stages.programs.schema import Values
 from stages.shape.views.palette import srgb_to_linear
@@ -23,18 +23,18 @@ def named_values(program: Program, name: str) -> dict[str, Value]:
     Raises ConfigError, which names the file and the parameter, for one that is not there or says no shape.
     """
     if name == "base":
-        return program.schema.settled(program.schema.base)[0]
+        return program.schema.canonical(program.schema.base)[0]
     if name.isdecimal():
         return random_shapes(program, 1, int(name))[0]
     try:
-        values = program.schema.values(_parameters(program, Path(name).read_text(encoding="utf-8")))
+        values = program.schema.from_text(_parameters(program, Path(name).read_text(encoding="utf-8")))
     except OSError as error:
         raise ConfigError(f"{name}: {error.strerror}; give a JSON file of parameters, a seed, or base") from error
     except (ParameterError, UnicodeDecodeError) as error:
         raise ConfigError(f"{name}: {error}") from error
-    broken = program.broken(values)
+    broken = program.violated(values)
     if broken:
-        raise ConfigError(f"{name}: a {program.name} needs {broken[0].rule.text}: {broken[0].sentence}")
+        raise ConfigError(f"{name}: a {program.name} needs {broken[0].condition.text}: {broken[0].description}")
     return values
 
 
@@ -53,7 +53,7 @@ def _parameters(program: Program, text: str) -> str:
 
 def random_shapes(program: Program, count: int, seed: int) -> list[dict[str, Value]]:
     """Values of `count` random valid shapes, no two alike."""
-    sampler = Sampler(program, Share(), between=False)
+    sampler = Sampler(program, Share(), off_grid=False)
     rng = np.random.default_rng(seed)
     return [sampler.find(None, rng) for _ in range(count)]
 
@@ -62,7 +62,7 @@ def shape_glb(program: Program, values: Values) -> bytes:
     """The shape at `values` as GLB: a node a part at its pose, named by label and number, in its colour."""
     import trimesh
 
-    shape = shape_of(program, values)
+    shape = build_shape(program, values)
     scene = trimesh.Scene()
     for name, mesh, pose in zip(shape.part_names, shape.meshes, shape.assembly.poses, strict=True):
         color = np.append(srgb_to_linear(mesh.face_colors[0]), 1.0)

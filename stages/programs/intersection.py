@@ -12,18 +12,18 @@ from stages.programs.program import Program
 from stages.shape.arrays import FloatArray
 
 
-def intersecting(program: Program, parts: Sequence[Part]) -> tuple[str, str] | None:
+def intersecting_labels(program: Program, parts: Sequence[Part]) -> tuple[str, str] | None:
     """The first pair of labels that shall stay apart and do not, or None."""
-    for first, second in program.apart:
+    for first, second in program.non_intersecting:
         for i, a in enumerate(parts):
             for j, b in enumerate(parts):
                 wanted = (a.label, b.label) == (first, second)
-                if wanted and (i < j or first != second) and meshes_meet(a.mesh, b.mesh):
+                if wanted and (i < j or first != second) and meshes_intersect(a.mesh, b.mesh):
                     return first, second
     return None
 
 
-def meshes_meet(a: QuadMesh, b: QuadMesh, distance: float = 0.0) -> bool:
+def meshes_intersect(a: QuadMesh, b: QuadMesh, distance: float = 0.0) -> bool:
     """Whether two closed meshes come within `distance` of each other: their surfaces do, or one lies in the other."""
     low = np.maximum(a.bounds[0], b.bounds[0]) - distance
     high = np.minimum(a.bounds[1], b.bounds[1]) + distance

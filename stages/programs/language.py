@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
-from stages.programs.program import find_program, shape_of_text
+from stages.programs.program import find_program, shape_from_text
 from stages.programs.settings import ProgramsConfig
 from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.sample import Sample
@@ -22,7 +22,7 @@ class Parameters:
     def shape(self, sample: Sample) -> Shape:
         """The shape of the program called `sample.kit` at the parameters that `sample.text` says. Raises ParameterError
         for a text that is none of its own."""
-        return shape_of_text(sample.kit, sample.text)
+        return shape_from_text(sample.kit, sample.text)
 
     def shown(self, count: int) -> Sequence[tuple[str, Shape]]:
         """Nothing: a program begins with numbers."""
@@ -38,7 +38,7 @@ def _speaker(task: Task) -> Parameters:
 
 
 def _anew(_: Places) -> Anew:
-    return lambda record, _: upright(shape_of_text(record["kit"], record["text"]))
+    return lambda record, _: upright(shape_from_text(record["kit"], record["text"]))
 
 
 LANGUAGE = Language(

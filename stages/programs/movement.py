@@ -18,12 +18,12 @@ from stages.programs.program import BuildError, Program
 from stages.programs.sampling import NoMoreShapes, Sampler
 from stages.shape.arrays import FloatArray
 
-FAINT, STEP = 0.005, 0.0025
+MIN_RANGE_MOVEMENT, MIN_CLASS_MOVEMENT = 0.005, 0.0025
 """What is moved less by its whole range, and by one class, as shares of the diagonal, is hard to read."""
 
-MOST_BASES = 50
+MAX_BASES_PER_SHAPE = 50
 """So many times as many shapes are drawn as shall show a parameter, and no more."""
-SAMPLES = 4000
+SURFACE_SAMPLES = 4000
 """Points of each surface whose distance from the other is looked up, beside its vertices."""
 
 
@@ -42,12 +42,12 @@ class Movement:
     @property
     def seen(self) -> float:
         """The share of the base shapes whose surface its farthest value moves by more than FAINT."""
-        return float((self.far > FAINT).mean())
+        return float((self.far > MIN_RANGE_MOVEMENT).mean())
 
     @property
     def weak(self) -> bool:
         """Whether a fifth of the base shapes or more do not show it, or half of them do not tell its classes apart."""
-        return self.seen < 0.8 or float(np.median(self.step)) < STEP
+        return self.seen < 0.8 or float(np.median(self.step)) < MIN_CLASS_MOVEMENT
 
 
 def movements(program: Program, count: int, seed: int) -> Iterator[Movement]:
@@ -56,11 +56,11 @@ def movements(program: Program, count: int, seed: int) -> Iterator[Movement]:
 
     Only values that alone keep every constraint are looked at. Raises ValueError for a parameter that no shape shows.
     """
-    sampler, rng = Sampler(program, Share(), between=False), np.random.default_rng(seed)
+    sampler, rng = Sampler(program, Share(), off_grid=False), np.random.default_rng(seed)
     known: list[_Base] = []
     for parameter in program.parameters:
         found: list[tuple[float, float]] = []
-        for base in islice(_bases(known, sampler, rng), MOST_BASES * count):
+        for base in islice(_bases(known, sampler, rng), MAX_BASES_PER_SHAPE * count):
             found += base.moved_by(parameter)
             if len(found) == count:
                 break
@@ -70,7 +70,9 @@ def movements(program: Program, count: int, seed: int) -> Iterator[Movement]:
         yield Movement(parameter, far, step)
 
 
-def moved(program: Program, values: Mapping[str, Value], changes: Sequence[Mapping[str, Value]]) -> FloatArray:
+def surface_movements(
+    program: Program, values: Mapping[str, Value], changes: Sequence[Mapping[str, Value]]
+) -> FloatArray:
     """By how much each of some changes moves the surface of the shape at `values`: the greatest distance of a point of
     either surface from the other, as a share of the shape's diagonal, float64 (changes,).
 
@@ -80,7 +82,7 @@ def moved(program: Program, values: Mapping[str, Value], changes: Sequence[Mappi
     for change in changes:
         changed = {**values, **change}
         try:
-            found.append(float("inf") if program.broken(changed) else own.apart(_surface(program, changed)))
+            found.append(float("inf") if program.violated(changed) else own.apart(_surface(program, changed)))
         except BuildError:
             found.append(float("inf"))
     return np.array(found)
@@ -89,7 +91,8 @@ def moved(program: Program, values: Mapping[str, Value], changes: Sequence[Mappi
 def movement_table(found: Sequence[Movement]) -> str:
     """The movements as a Markdown table, a line a parameter. Ends with a newline."""
     lines = [
-        f"| parameter | shapes whose surface the far end of its range moves by more than {FAINT:.1%} | median, far end "
+        f"| parameter | shapes whose surface the far end of its range moves by more than {MIN_RANGE_MOVEMENT:.1%}"
+        " | median, far end "
         "| median, next class | |",
         "|---|---:|---:|---:|---|",
     ]
@@ -121,12 +124,12 @@ class _Base:
 
     def moved_by(self, parameter: Parameter) -> list[tuple[float, float]]:
         """By how much the farthest and the next other value move the surface; empty where there is none to see."""
-        if parameter.name not in self.program.schema.settled(self.values)[1]:
+        if parameter.name not in self.program.schema.canonical(self.values)[1]:
             return []
         own = float(self.values[parameter.name])
         changed = [{**self.values, parameter.name: value} for value in parameter.values if float(value) != own]
         others = sorted(
-            (each for each in changed if not self.program.broken(each)),
+            (each for each in changed if not self.program.violated(each)),
             key=lambda each: abs(float(each[parameter.name]) - own),
         )
         moved = [self._moved(each) for each in ([others[-1], others[0]] if len(others) > 1 else others)]
@@ -158,7 +161,7 @@ def _surface(program: Program, values: Mapping[str, Value]) -> _Surface:
 
     mesh = QuadMesh.joined(part.mesh for part in program.parts(values))
     # The same numbers for each surface: what does not move is looked at in the same places.
-    points, _, _ = sample_surface(mesh.vertices, mesh.triangles, SAMPLES, np.random.default_rng(0))
+    points, _, _ = sample_surface(mesh.vertices, mesh.triangles, SURFACE_SAMPLES, np.random.default_rng(0))
     casting = o3d.t.geometry.RaycastingScene(nthreads=1)
     casting.add_triangles(
         o3d.core.Tensor(mesh.vertices.astype(np.float32)), o3d.core.Tensor(mesh.triangles.astype(np.uint32))

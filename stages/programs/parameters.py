@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stages.programs.rules import Rule
+from stages.programs.conditions import Condition
 
 Kind = Literal["discrete", "binary", "continuous"]
 
@@ -35,8 +35,8 @@ class Parameter:
     values: tuple[Value, ...]
     base: Value
     group: str
-    sentence: str
-    visible_if: Rule | None = None
+    description: str
+    visible_if: Condition | None = None
 
     def __post_init__(self) -> None:
         if len(self.values) < 2 or any(a >= b for a, b in zip(self.values, self.values[1:], strict=False)):
@@ -99,5 +99,5 @@ def binary(name: str, base: bool, group: str, sentence: str, visible_if: str | N
     return Parameter(name, "binary", (False, True), base, group, sentence, _rule(visible_if))
 
 
-def _rule(text: str | None) -> Rule | None:
-    return None if text is None else Rule(text)
+def _rule(text: str | None) -> Condition | None:
+    return None if text is None else Condition(text)

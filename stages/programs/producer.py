@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.config import Config
 from pipeline.stage import Plan
+from stages.programs.description import program_markdown
 from stages.programs.program import find_program
-from stages.programs.recipe import recipe_markdown
 from stages.programs.settings import ProgramsConfig
 from stages.shape.collection.members import Field
 from stages.shape.collection.producer import Producer
 
 
 def _recipe(plan: Plan) -> Sequence[str]:
-    return [recipe_markdown(find_program(plan.config.section(ProgramsConfig).program)).rstrip()]
+    return [program_markdown(find_program(plan.config.section(ProgramsConfig).program)).rstrip()]
 
 
 def _lineage(config: Config) -> Mapping[str, Field]:
-    if config.section(ProgramsConfig).mode == "sweep":
+    if config.section(ProgramsConfig).mode == "random":
         kept = "what keeps the splits apart: `structure`, the discrete parameters, or `values`, all parameters together"
         return {"apart": Field({"enum": ["structure", "values"], "description": kept})}
     return {

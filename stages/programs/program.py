@@ -14,9 +14,9 @@ import numpy as np
 
 from pipeline.config import nearest
 from pipeline.errors import ConfigError
+from stages.programs.conditions import Condition
 from stages.programs.curves.part import Part
 from stages.programs.parameters import Parameter
-from stages.programs.rules import Rule
 from stages.programs.schema import Schema, Values
 from stages.shape.kit import Assembly
 from stages.shape.shape import Shape
@@ -34,8 +34,8 @@ class Constraint:
     """
 
     name: str
-    rule: Rule
-    sentence: str
+    condition: Condition
+    description: str
 
 
 @dataclass(frozen=True)
@@ -52,20 +52,20 @@ class Program:
     """
 
     name: str
-    sentence: str
+    description: str
     parameters: tuple[Parameter, ...]
     labels: tuple[str, ...]
     build: Callable[[Values], Sequence[Part]]
     constraints: tuple[Constraint, ...] = ()
-    apart: tuple[tuple[str, str], ...] = ()
-    elevation: float = 25.0
+    non_intersecting: tuple[tuple[str, str], ...] = ()
+    view_elevation: float = 25.0
 
     def __post_init__(self) -> None:
         for constraint in self.constraints:
-            for name in constraint.rule.names:
+            for name in constraint.condition.names:
                 if name not in self.schema.by_name:
                     raise ValueError(f"constraint {constraint.name} speaks of {name}, which is not there")
-        for label in (each for pair in self.apart for each in pair):
+        for label in (each for pair in self.non_intersecting for each in pair):
             if label not in self.labels:
                 raise ValueError(f"{self.name}: parts {label!r} shall stay apart; labels are {', '.join(self.labels)}")
 
@@ -74,11 +74,13 @@ class Program:
         """The parameters together."""
         return Schema(self.parameters)
 
-    def broken(self, values: Values) -> tuple[Constraint, ...]:
+    def violated(self, values: Values) -> tuple[Constraint, ...]:
         """The constraints that `values` break."""
-        settled, visible = self.schema.settled(values)
+        settled, visible = self.schema.canonical(values)
         return tuple(
-            each for each in self.constraints if visible.issuperset(each.rule.names) and not each.rule.holds(settled)
+            each
+            for each in self.constraints
+            if visible.issuperset(each.condition.names) and not each.condition.holds(settled)
         )
 
     def parts(self, values: Values) -> Sequence[Part]:
@@ -86,20 +88,20 @@ class Program:
 
         Raises BuildError where `build` raises anything, and says at which values.
         """
-        settled, _ = self.schema.settled(values)
+        settled, _ = self.schema.canonical(values)
         try:
             return self.build(settled)
         except Exception as error:
             why = f"{type(error).__name__}: {error}"
-            raise BuildError(f"program {self.name} fails at {self.schema.text(settled)}: {why}") from error
+            raise BuildError(f"program {self.name} fails at {self.schema.to_text(settled)}: {why}") from error
 
 
-def shape_of(program: Program, values: Values) -> Shape:
+def build_shape(program: Program, values: Values) -> Shape:
     """The shape at `values`: one mesh a part, y up, without contacts."""
-    return shape_of_parts(program, program.parts(values))
+    return shape_from_parts(program, program.parts(values))
 
 
-def shape_of_parts(program: Program, parts: Sequence[Part]) -> Shape:
+def shape_from_parts(program: Program, parts: Sequence[Part]) -> Shape:
     """The shape of parts that `program` has made. The origin of each mesh is the middle of the box around it, and the
     pose says where that is in the world; it turns nothing."""
     placed = [part.part_mesh() for part in parts]
@@ -111,11 +113,11 @@ def shape_of_parts(program: Program, parts: Sequence[Part]) -> Shape:
     return Shape(meshes=meshes, assembly=assembly, up="y", labels=program.labels)
 
 
-def shape_of_text(program: str, text: str) -> Shape:
+def shape_from_text(program: str, text: str) -> Shape:
     """The shape that a sample's text says, of the program called `program`. Raises ConfigError for a program that is
     not there, ParameterError for a text that is none of its own."""
     found = find_program(program)
-    return shape_of(found, found.schema.values(text))
+    return build_shape(found, found.schema.from_text(text))
 
 
 def program_names() -> tuple[str, ...]:

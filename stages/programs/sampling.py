@@ -12,23 +12,23 @@ import numpy as np
 from pipeline.errors import ShardFailed
 from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect
-from stages.programs.intersection import intersecting
+from stages.programs.intersection import intersecting_labels
 from stages.programs.parameters import Value
-from stages.programs.program import BuildError, Program, shape_of_parts
+from stages.programs.program import BuildError, Program, shape_from_parts
 from stages.shape.arrays import FloatArray
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 
-MOST_TRIES = 2000
+MAX_DRAWS_PER_SHAPE = 2000
 """So many draws of a shard's own are tried for one shape."""
-FEWEST_DRAWS, MOST_DRAWS = 32, 8192
+MIN_DRAWS_PER_BATCH, MAX_DRAWS_PER_BATCH = 32, 8192
 """Draws at a time."""
 
-Cell = tuple[str, int]
+ValueIndex = tuple[str, int]
 """A parameter and the index of one of its values."""
 
 
-def cells(program: Program) -> list[Cell]:
+def all_value_indices(program: Program) -> list[ValueIndex]:
     """Every value of every parameter, in order."""
     return [(each.name, index) for each in program.parameters for index in range(len(each.values))]
 
@@ -36,7 +36,7 @@ def cells(program: Program) -> list[Cell]:
 def structure_digest(program: Program, values: dict[str, Value]) -> str:
     """Hex sha256 of what is visible of the discrete and binary parameters: equal for shapes that differ by visible
     continuous values alone."""
-    settled, visible = program.schema.settled(values)
+    settled, visible = program.schema.canonical(values)
     seen = [
         f"{name}={settled[name]}"
         for name, each in program.schema.by_name.items()
@@ -53,21 +53,21 @@ class NoMoreShapes(ShardFailed):
 class Sampler:
     """Finds shapes within one share, no two alike.
 
-    between: whether continuous parameters may have any value of their range; require: what shapes must be physically.
+    off_grid: whether continuous parameters may have any value of their range; require: what shapes must be physically.
     refused: how many draws were refused, by cell's parameter (or `any`) and reason; tried: how many were looked at;
     failure: the last error of the program itself, where its `build` failed.
     """
 
     program: Program
     share: Share
-    between: bool
+    off_grid: bool
     require: Requirements = field(default_factory=Requirements)
     refused: Counter[tuple[str, str]] = field(default_factory=Counter)
     tried: int = 0
     failure: str = ""
     _known: set[str] = field(default_factory=set)
 
-    def find(self, cell: Cell | None, rng: np.random.Generator) -> dict[str, Value]:
+    def find(self, cell: ValueIndex | None, rng: np.random.Generator) -> dict[str, Value]:
         """Settled values of a new shape that keeps every constraint, whose parts stay apart where they should, and in
         which the parameter of `cell` has its value, is visible and takes effect.
 
@@ -77,9 +77,9 @@ class Sampler:
         fixed = None if cell is None else (cell[0], float(schema.by_name[cell[0]].values[cell[1]]))
         item = "any" if cell is None else cell[0]
         before, first = self.refused.copy(), self.tried
-        count = int(np.clip(3 / self.share.size, FEWEST_DRAWS, MOST_DRAWS))
-        for _ in range(1 + round(MOST_TRIES / self.share.size / count)):
-            draws = draw(schema, count, rng, self.between, fixed)
+        count = int(np.clip(3 / self.share.size, MIN_DRAWS_PER_BATCH, MAX_DRAWS_PER_BATCH))
+        for _ in range(1 + round(MAX_DRAWS_PER_SHAPE / self.share.size / count)):
+            draws = draw(schema, count, rng, self.off_grid, fixed)
             for column in draws.owned(self.share).tolist():
                 self.tried += 1
                 if fixed is not None and not draws.visible[list(schema.by_name).index(item), column]:
@@ -107,18 +107,18 @@ class Sampler:
         """What was refused and why, in words."""
         return _reasons(self.refused, self.failure)
 
-    def _accepts(self, values: dict[str, Value], cell: Cell | None) -> bool:
+    def _accepts(self, values: dict[str, Value], cell: ValueIndex | None) -> bool:
         reason = self._refusal(values, cell)
         if reason is not None:
             self.refused["any" if cell is None else cell[0], reason] += 1
         return reason is None
 
-    def _refusal(self, values: dict[str, Value], cell: Cell | None) -> str | None:
+    def _refusal(self, values: dict[str, Value], cell: ValueIndex | None) -> str | None:
         """Why `values` make no sample, or None; what is cheap to ask is asked first."""
-        broken = self.program.broken(values)
+        broken = self.program.violated(values)
         if broken:
             return f"breaks {broken[0].name}"
-        text = self.program.schema.text(values)
+        text = self.program.schema.to_text(values)
         if text in self._known:
             return "alike"
         try:
@@ -128,10 +128,10 @@ class Sampler:
         except BuildError as error:
             self.failure = str(error)
             return "fails"
-        met = intersecting(self.program, parts)
+        met = intersecting_labels(self.program, parts)
         if met is not None:
             return f"{met[0]} meets {met[1]}"
-        weak = unmet(self.require, shape_of_parts(self.program, parts))
+        weak = unmet(self.require, shape_from_parts(self.program, parts))
         if weak is not None:
             return weak
         self._known.add(text)

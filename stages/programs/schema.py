@@ -60,7 +60,7 @@ class Schema:
         except CycleError as error:
             raise ValueError(f"visibility goes round in a circle: {', '.join(error.args[1])}") from error
 
-    def settled(self, values: Values) -> tuple[dict[str, Value], frozenset[str]]:
+    def canonical(self, values: Values) -> tuple[dict[str, Value], frozenset[str]]:
         """`values` with hidden parameters at their base, and the names of the visible parameters.
 
         Visibility is asked of settled values, so that what hides behind a hidden parameter is decided by the base,
@@ -76,7 +76,7 @@ class Schema:
                 settled[parameter.name] = parameter.base
         return {name: settled[name] for name in self.by_name}, frozenset(visible)
 
-    def settled_columns(self, columns: FloatArray) -> tuple[FloatArray, BoolArray]:
+    def canonical_columns(self, columns: FloatArray) -> tuple[FloatArray, BoolArray]:
         """The settled values of many shapes at once, float64 (parameters, n), and what is visible, bool (parameters,
         n), for `columns` (parameters, n) in the parameters' order."""
         settled, visible = columns.copy(), np.ones(columns.shape, dtype=np.bool_)
@@ -101,13 +101,13 @@ class Schema:
             name: each.checked(chosen[name]) if name in chosen else each.base for name, each in self.by_name.items()
         }
 
-    def text(self, values: Values) -> str:
+    def to_text(self, values: Values) -> str:
         """The visible values as canonical JSON on one line: equal exactly for values that look the same."""
-        settled, visible = self.settled(values)
+        settled, visible = self.canonical(values)
         shown = {name: value for name, value in settled.items() if name in visible}
         return json.dumps(shown, ensure_ascii=False, separators=(",", ":"))
 
-    def values(self, text: str) -> dict[str, Value]:
+    def from_text(self, text: str) -> dict[str, Value]:
         """The settled values that `text` of this schema says. Raises ParameterError for anything that is no JSON
         object of parameters, for a parameter not there, out of range, or visible and not said."""
         try:
@@ -116,15 +116,15 @@ class Schema:
             raise ParameterError(f"parameters must be a JSON object: {error}") from error
         if not isinstance(said, dict):
             raise ParameterError(f"parameters must be a JSON object, not {text[:40]!r}")
-        settled, visible = self.settled(self.complete(said))
+        settled, visible = self.canonical(self.complete(said))
         for name in self.by_name:
             if name in visible and name not in said:
                 raise ParameterError(f"parameter {name} is missing; it may be {self.by_name[name].range}")
         return settled
 
-    def vector(self, values: Values) -> FloatArray:
+    def to_vector(self, values: Values) -> FloatArray:
         """The settled values as numbers, float64 (parameters,)."""
-        settled, _ = self.settled(values)
+        settled, _ = self.canonical(values)
         return np.array([float(value) for value in settled.values()])
 
     def from_vector(self, vector: Sequence[float] | FloatArray) -> dict[str, Value]:
@@ -133,10 +133,10 @@ class Schema:
             raise ParameterError(f"a vector of {len(vector)} numbers for {len(self.parameters)} parameters")
         return self.complete(dict(zip(self.by_name, vector, strict=True)))
 
-    def classes(self, values: Values) -> npt.NDArray[np.int64]:
+    def to_classes(self, values: Values) -> npt.NDArray[np.int64]:
         """The class of each parameter, int64 (parameters,): the index of the nearest of its values, or its hidden
         class (geocode §3.3 and App. C)."""
-        settled, visible = self.settled(values)
+        settled, visible = self.canonical(values)
         return np.array(
             [
                 parameter.class_of(settled[name]) if name in visible else len(parameter.values)
@@ -160,4 +160,4 @@ class Schema:
                     f"parameter {parameter.name}: class {number} is not in 0 to {parameter.classes - 1}"
                 )
             values[parameter.name] = parameter.base if number == len(parameter.values) else parameter.values[number]
-        return self.settled(values)[0]
+        return self.canonical(values)[0]

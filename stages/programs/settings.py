@@ -18,7 +18,7 @@ class EachValueConfig(StrictModel):
     test: int = Field(3, ge=1, le=1_000_000, description="Shapes of each value in the test split.")
 
 
-class SweepConfig(StrictModel):
+class RandomSamplingConfig(StrictModel):
     """A plain random sweep: how many shapes, and how they are shared out."""
 
     samples: int = Field(10_000, ge=3, le=1_000_000_000, description="Shapes in all.")
@@ -42,7 +42,7 @@ class ProgramsConfig(StrictModel):
         description="Name of the program, such as chair, or the module that holds one of your own, with dots, such as "
         "furniture.bench; empty for a dataset that is made of exemplars.",
     )
-    mode: Literal["each_value", "sweep"] = Field(
+    mode: Literal["each_value", "random"] = Field(
         "each_value",
         description="What is sampled: every value of every parameter a number of times, that parameter being visible "
         "and effective; or random shapes, with values of continuous parameters anywhere in their range.",
@@ -51,8 +51,8 @@ class ProgramsConfig(StrictModel):
         default_factory=EachValueConfig,
         description="Shapes of each value, for mode each_value. No two shapes are alike; structures recur in splits.",
     )
-    sweep: SweepConfig = Field(
-        default_factory=SweepConfig,
+    random: RandomSamplingConfig = Field(
+        default_factory=RandomSamplingConfig,
         description="Shapes of a sweep, for mode sweep. Shapes that are alike up to their continuous parameters stand "
         "in one split; a program with fewer structures than splits is split by values alone, and one with fewer shapes "
         "than asked gives all it has.",

@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
+from stages.programs.description import parameter_range, value_text
 from stages.programs.parameters import Parameter, Value
-from stages.programs.program import Program, shape_of
-from stages.programs.recipe import parameter_range, value_text
-from stages.programs.repair import repaired
+from stages.programs.program import Program, build_shape
+from stages.programs.repair import repair
 from stages.programs.schema import Values
 from stages.shape.arrays import ByteArray
 from stages.shape.views.camera import Camera
@@ -16,23 +16,23 @@ from stages.shape.views.portrait import portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet
 
-AZIMUTH = 35.0
-CELL = 200
-COLUMNS, WIDE = 8, 15
+VIEW_AZIMUTH = 35.0
+CELL_SIDE_PIXELS = 200
+SHAPES_PER_ROW, VALUES_PER_ROW = 8, 15
 
 
 def shape_picture(program: Program, values: Values, camera: Camera | None = None) -> ByteArray:
     """A portrait of the shape at `values`, uint8 (CELL, CELL, 3), the same bytes on every machine; from half its side
     unless a camera says otherwise."""
-    seen = camera or Camera(azimuth=AZIMUTH, elevation=program.elevation)
-    return portrait(scene_of(shape_of(program, values)), seen, (CELL, CELL))
+    seen = camera or Camera(azimuth=VIEW_AZIMUTH, elevation=program.view_elevation)
+    return portrait(scene_of(build_shape(program, values)), seen, (CELL_SIDE_PIXELS, CELL_SIDE_PIXELS))
 
 
-def row_sheet(program: Program, shapes: Sequence[Values], captions: Sequence[str], title: str) -> ByteArray:
+def shape_sheet(program: Program, shapes: Sequence[Values], captions: Sequence[str], title: str) -> ByteArray:
     """Shapes in rows of eight with a line under each."""
     cells = [Cell(shape_picture(program, values), caption) for values, caption in zip(shapes, captions, strict=True)]
-    rows = [cells[first : first + COLUMNS] for first in range(0, len(cells), COLUMNS)]
-    return contact_sheet([Section("", rows)], title, CELL)
+    rows = [cells[first : first + SHAPES_PER_ROW] for first in range(0, len(cells), SHAPES_PER_ROW)]
+    return contact_sheet([Section("", rows)], title, CELL_SIDE_PIXELS)
 
 
 def parameter_sheet(program: Program) -> ByteArray:
@@ -40,20 +40,20 @@ def parameter_sheet(program: Program) -> ByteArray:
     see the parameter and to keep the constraints."""
     sections = []
     for parameter in program.parameters:
-        shown = reveal(program, parameter)
+        shown = values_showing(program, parameter)
         cells = []
         for value in parameter.values:
-            values = repaired(program, {**shown, parameter.name: value}, {parameter.name})
+            values = repair(program, {**shown, parameter.name: value}, {parameter.name})
             if values is not None:
                 cells.append(Cell(shape_picture(program, values), value_text(value)))
-        rows = [cells[first : first + WIDE] for first in range(0, len(cells), WIDE)]
+        rows = [cells[first : first + VALUES_PER_ROW] for first in range(0, len(cells), VALUES_PER_ROW)]
         visible = f", seen where {parameter.visible_if.text}" if parameter.visible_if else ""
-        note = f"{parameter.sentence} {parameter_range(parameter)}{visible}"
+        note = f"{parameter.description} {parameter_range(parameter)}{visible}"
         sections.append(Section(parameter.name, rows, note))
-    return contact_sheet(sections, f"{program.name}: {len(program.parameters)} parameters", CELL)
+    return contact_sheet(sections, f"{program.name}: {len(program.parameters)} parameters", CELL_SIDE_PIXELS)
 
 
-def reveal(program: Program, parameter: Parameter) -> dict[str, Value]:
+def values_showing(program: Program, parameter: Parameter) -> dict[str, Value]:
     """The base values with the fewest changes by which `parameter` is visible, repaired to the constraints.
 
     Raises ValueError where it never is.
@@ -63,8 +63,8 @@ def reveal(program: Program, parameter: Parameter) -> dict[str, Value]:
     for count in range(len(asked) + 1):
         for names in itertools.combinations(asked, count):
             for values in itertools.product(*(schema.by_name[name].values for name in names)):
-                changed = repaired(program, {**schema.base, **dict(zip(names, values, strict=True))})
-                if changed is not None and parameter.name in schema.settled(changed)[1]:
+                changed = repair(program, {**schema.base, **dict(zip(names, values, strict=True))})
+                if changed is not None and parameter.name in schema.canonical(changed)[1]:
                     return changed
     raise ValueError(f"{program.name}: nothing makes {parameter.name} visible")
 

@@ -18,19 +18,19 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.programs.draws import Interval, Share
 from stages.programs.parameters import Value
 from stages.programs.program import Program, find_program, program_module
-from stages.programs.sampling import NoMoreShapes, Sampler, cells, structure_digest
+from stages.programs.sampling import NoMoreShapes, Sampler, all_value_indices, structure_digest
 from stages.programs.settings import ProgramsConfig
-from stages.programs.sweep import listed_shapes, plan_sweep
+from stages.programs.split_plan import listed_shapes, plan_splits
 from stages.shape.collection.assignment import SPLITS
 from stages.shape.sample import Sample, write_sample
 
-BYTES_A_SAMPLE = 8192
-TRIED = 8
+BYTES_PER_SAMPLE = 8192
+TRIAL_SHARD_SAMPLES = 8
 """Samples of a shard of a trial."""
-LEAST_TRIED = 96
+MIN_TRIAL_SAMPLES = 96
 """Samples of a trial's sweep, where the config asks for so many."""
 
-Found = tuple[dict[str, Value], dict[str, Any]]
+SampledValues = tuple[dict[str, Value], dict[str, Any]]
 """The values of a shape, and its lineage."""
 
 
@@ -44,7 +44,7 @@ def _shards(dataset: Config) -> list[Shard]:
     if not config.program:
         return []
     code = (program_module(config.program),)
-    sweep = plan_sweep(config.program, config.sweep) if config.mode == "sweep" else None
+    sweep = plan_splits(config.program, config.random) if config.mode == "random" else None
     sizes = sweep.sizes if sweep else _each_value_sizes(config)
     shards: list[Shard] = []
     first = 0
@@ -76,8 +76,8 @@ def run_shard(task: Task) -> Outcome:
     program = find_program(config.program)
     structures, shapes = params.get("share", ((0.0, 1.0), (0.0, 1.0)))
     share = Share((structures[0], structures[1]), (shapes[0], shapes[1]), params.get("weight", 1.0))
-    sampler = Sampler(program, share, between=config.mode == "sweep", require=config.require)
-    found = _swept(task, sampler) if config.mode == "sweep" else _each_value(task, sampler)
+    sampler = Sampler(program, share, off_grid=config.mode == "random", require=config.require)
+    found = _swept(task, sampler) if config.mode == "random" else _each_value(task, sampler)
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for values, lineage in found:
             key = f"{program.name}-{params['first_key'] + writer.samples:06d}"
@@ -89,16 +89,16 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(writer.samples, {**summary, "failure": sampler.failure} if sampler.failure else summary)
 
 
-def _each_value(task: Task, sampler: Sampler) -> Iterator[Found]:
+def _each_value(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
     """Shapes with every value of every parameter in turn, in random order."""
-    params, every = task.shard.params, cells(sampler.program)
+    params, every = task.shard.params, all_value_indices(sampler.program)
     for number in task.rng("order").permutation(params["samples"]).tolist():
         cell = every[(params["start"] + number) % len(every)]
         values = sampler.find(cell, task.rng("shape", number))
         yield values, {"method": "each_value", "parameter": cell[0], "class": cell[1]}
 
 
-def _swept(task: Task, sampler: Sampler) -> Iterator[Found]:
+def _swept(task: Task, sampler: Sampler) -> Iterator[SampledValues]:
     """Random shapes of the shard's share: as many as planned, or all that there are."""
     params = task.shard.params
     listed = (
@@ -108,7 +108,7 @@ def _swept(task: Task, sampler: Sampler) -> Iterator[Found]:
     found = 0
     for values in islice(shapes, params["samples"]):
         found += 1
-        yield values, {"method": "sweep", "apart": params["apart"]}
+        yield values, {"method": "random", "apart": params["apart"]}
     if not found:
         # An empty share is no mistake. A program without any shape is one, and here it says why.
         whole = replace(sampler, share=Share(), refused=Counter(), tried=0)
@@ -136,15 +136,15 @@ def _sample(
         kit=kit,
         graph=structure_digest(program, values),
         lineage=lineage,
-        text=program.schema.text(values),
+        text=program.schema.to_text(values),
     )
 
 
 def _each_value_sizes(config: ProgramsConfig) -> dict[str, int]:
     """The samples of each split. Raises ConfigError for a program without parameters, which has no value to show."""
-    count = len(cells(find_program(config.program)))
+    count = len(all_value_indices(find_program(config.program)))
     if not count:
-        raise ConfigError(f"programs.mode: {config.program} has no parameters, and so no values; set it to sweep")
+        raise ConfigError(f"programs.mode: {config.program} has no parameters, and so no values; set it to random")
     return {split: getattr(config.each_value, split) * count for split in SPLITS}
 
 
@@ -174,8 +174,8 @@ def report(plan: Plan) -> Sequence[str]:
     why = ", ".join(f"{100 * count / tried:.1f} % {reason}" for reason, count in counts.most_common())
     told = [f"{sum(made.values()):,} shapes of {tried:,} tries; refused: {why or 'none'}", *failures[:1]]
     config = plan.config.section(ProgramsConfig)
-    if config.mode == "sweep" and all(plan.summary("programs", shard.name) for shard in shards):
-        told += plan_sweep(config.program, config.sweep).told(config.sweep, made)
+    if config.mode == "random" and all(plan.summary("programs", shard.name) for shard in shards):
+        told += plan_splits(config.program, config.random).notes(config.random, made)
     return told
 
 
@@ -188,13 +188,13 @@ def trial(config: Config) -> ProgramsConfig:
     """Few shapes a shard, in about as many shards as the config asks for: each looks through its share of all shapes,
     and of a million shapes in shards of few the plan alone would take a minute."""
     section = config.section(ProgramsConfig)
-    less = min(TRIED / section.splits.samples_per_shard, 1.0)
-    wanted, every = section.sweep.samples, section.each_value
-    sweep = section.sweep.model_copy(update={"samples": max(round(less * wanted), min(wanted, LEAST_TRIED))})
+    less = min(TRIAL_SHARD_SAMPLES / section.splits.samples_per_shard, 1.0)
+    wanted, every = section.random.samples, section.each_value
+    sweep = section.random.model_copy(update={"samples": max(round(less * wanted), min(wanted, MIN_TRIAL_SAMPLES))})
     each = {split: max(round(less * getattr(every, split)), 1) for split in SPLITS}
-    splits = section.splits.model_copy(update={"samples_per_shard": TRIED})
+    splits = section.splits.model_copy(update={"samples_per_shard": TRIAL_SHARD_SAMPLES})
     return section.model_copy(
-        update={"splits": splits, "sweep": sweep, "each_value": every.model_copy(update=each)},
+        update={"splits": splits, "random": sweep, "each_value": every.model_copy(update=each)},
     )
 
 
@@ -205,7 +205,7 @@ STAGE = Stage(
     inputs=(),
     plan=planned_shards,
     run_shard=run_shard,
-    estimate_bytes=lambda plan: sum(BYTES_A_SAMPLE * int(each.params["samples"]) for each in planned_shards(plan)),
+    estimate_bytes=lambda plan: sum(BYTES_PER_SAMPLE * int(each.params["samples"]) for each in planned_shards(plan)),
     report=report,
     asked=asked,
     trial=trial,

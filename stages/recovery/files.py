@@ -36,7 +36,7 @@ def write_recovery(folder: Path, given: RecoveryInput, found: RecoveryResult) ->
 def recovery_picture(given: RecoveryInput, found: RecoveryResult) -> ByteArray:
     """The input beside the shape that was recovered, seen alike; what speaks against it stands below."""
     program = found.program
-    camera = found.camera or Camera(azimuth=35.0, elevation=program.elevation)
+    camera = found.camera or Camera(azimuth=35.0, elevation=program.view_elevation)
     # the input fills the frame, and so does the shape
     shape = shape_picture(program, found.values, replace(camera, distance=None))
     if given.ink is not None:

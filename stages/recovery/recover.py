@@ -64,7 +64,7 @@ class RecoveryResult:
     def described(self) -> dict[str, Any]:
         """All of it as JSON; `parameters` is what `stages.programs make` reads."""
         schema = self.program.schema
-        settled, visible = schema.settled(self.values)
+        settled, visible = schema.canonical(self.values)
         return {
             "program": self.program.name,
             "parameters": {name: value for name, value in settled.items() if name in visible},
@@ -202,7 +202,7 @@ def _told(fit: RecoveryFit, kind: str, strays: int, guessed_program: bool) -> Re
 
 
 def _confidence(program: Program, guess: ParameterEstimate, refined: RefinedShape) -> dict[str, float]:
-    _, visible = program.schema.settled(refined.values)
+    _, visible = program.schema.canonical(refined.values)
     return {
         each.name: round(float(guess.probabilities[each.name][each.class_of(refined.values[each.name])]), 4)
         for each in program.parameters

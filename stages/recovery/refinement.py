@@ -72,7 +72,7 @@ def refine(
         search.between_classes()
         if search.cost >= before:
             break
-    return RefinedShape(search.settled, search.distance, search.target, search.tried)
+    return RefinedShape(search.canonical, search.distance, search.target, search.tried)
 
 
 @dataclass
@@ -88,7 +88,7 @@ class _Search:
     prior: float
     near: float
     wanted: dict[str, Value]
-    settled: dict[str, Value] = field(default_factory=dict)
+    canonical: dict[str, Value] = field(default_factory=dict)
     distance: float = float("inf")
     cost: float = float("inf")
     tried: int = 0
@@ -96,7 +96,7 @@ class _Search:
     _known: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
-        self.settled = nearest_valid_values(self.program, self.wanted)
+        self.canonical = nearest_valid_values(self.program, self.wanted)
         self._align()
 
     def by_classes(self, passes: int | None) -> None:
@@ -124,7 +124,7 @@ class _Search:
                 return
             chances = self.estimate.probabilities[parameter.name]
             for index in np.argsort(-chances, kind="stable")[:OTHERWISE].tolist():
-                if self.tried < self.budget and parameter.values[index] != self.settled[parameter.name]:
+                if self.tried < self.budget and parameter.values[index] != self.canonical[parameter.name]:
                     self._leap(parameter.name, parameter.values[index])
 
     def by_evolution(self, shapes: int) -> None:
@@ -169,7 +169,7 @@ class _Search:
     def _leap(self, name: str, value: Value) -> None:
         if name not in self._visible():
             return
-        before = self.wanted, self.settled, self.distance, self.cost, self.target
+        before = self.wanted, self.canonical, self.distance, self.cost, self.target
         seen, share = self._visible(), self.cost
         self.distance = self.cost = 1e9
         if self._try({name: value}):
@@ -178,7 +178,7 @@ class _Search:
                 for values in self._ways(parameter):
                     self._walk(parameter, values)
         if self.cost >= share:
-            self.wanted, self.settled, self.distance, self.cost, self.target = before
+            self.wanted, self.canonical, self.distance, self.cost, self.target = before
 
     def _walk(self, parameter: Parameter, values: Iterator[Value]) -> bool:
         """Go on while it gets better."""
@@ -195,7 +195,7 @@ class _Search:
             return False
         wanted = {**self.wanted, **change}
         settled = nearest_valid_values(self.program, wanted)
-        text = self.program.schema.text(settled)
+        text = self.program.schema.to_text(settled)
         if text in self._known:
             return False
         self._known.add(text)
@@ -211,25 +211,25 @@ class _Search:
         cost = self._cost(distance, settled)
         if cost >= self.cost:
             return False
-        self.distance, self.cost, self.settled, self.target = distance, cost, settled, target
+        self.distance, self.cost, self.canonical, self.target = distance, cost, settled, target
         self.wanted = {**wanted, **{name: settled[name] for name in self._visible()}}
         return True
 
     def _align(self) -> None:
         """Place the target anew on the best shape, and forget which others were farther."""
-        parts = self.program.parts(self.settled)
+        parts = self.program.parts(self.canonical)
         self.target = self.target.aligned(parts)
         self.distance, self.target = self.target.compared(parts)
-        self.cost = self._cost(self.distance, self.settled)
+        self.cost = self._cost(self.distance, self.canonical)
         self.tried += 1
-        self._known = {self.program.schema.text(self.settled)}
+        self._known = {self.program.schema.to_text(self.canonical)}
 
     def _cost(self, distance: float, settled: Values) -> float:
         surprise = self.estimate.surprise(self.program, settled) if self.prior else 0.0
         return max(distance, self.near) * (1.0 + self.prior * surprise)
 
     def _visible(self) -> frozenset[str]:
-        return self.program.schema.settled(self.settled)[1]
+        return self.program.schema.canonical(self.canonical)[1]
 
     def _unsure_first(self) -> Sequence[Parameter]:
         return sorted(self.program.parameters, key=lambda each: self.estimate.certainty(each.name))

@@ -157,7 +157,7 @@ def drawing_target(program: Program, config: SketchesConfig, ink: BoolArray) -> 
 def _around(program: Program) -> Iterator[SketchView]:
     """Views that people draw from: from the front and both sides, from a little to well above, or below what hangs."""
     for azimuth, elevation in product((-55.0, -35.0, -15.0, 0.0, 15.0, 35.0, 55.0), (12.0, 30.0, 50.0)):
-        yield SketchView(azimuth=azimuth, elevation=elevation if program.elevation > 0 else -elevation)
+        yield SketchView(azimuth=azimuth, elevation=elevation if program.view_elevation > 0 else -elevation)
 
 
 def _moved(view: SketchView, azimuth: float, elevation: float) -> SketchView:

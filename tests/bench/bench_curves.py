@@ -14,7 +14,7 @@ from stages.programs.curves import (
     bezier,
     circle,
     line,
-    mesh_faults,
+    mesh_defects,
     revolve,
     square_circle,
     sweep,
@@ -54,7 +54,7 @@ def bench() -> Iterator[Measure]:
         return int(len(Part("leg", mesh, (150, 105, 70)).part_mesh().faces) > 0)
 
     def checked() -> int:
-        return int(mesh_faults(QuadMesh(horn.vertices, horn.quads)) == [])
+        return int(mesh_defects(QuadMesh(horn.vertices, horn.quads)) == [])
 
     def checked_trimesh() -> int:
         return int(trimesh.Trimesh(horn.vertices, horn.triangles, process=False).is_volume)

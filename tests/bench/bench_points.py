@@ -10,7 +10,7 @@ from stages.points.area_sampling import sample_surface
 from stages.points.cloud import sample_cloud
 from stages.points.farthest import farthest_points
 from stages.programs.files import random_shapes
-from stages.programs.program import find_program, shape_of
+from stages.programs.program import build_shape, find_program
 from tests.bench.measure import Measure, rate
 
 UNIFORM, PICKED, POOL = 2048, 1500, 30_000
@@ -81,7 +81,7 @@ def bench() -> Iterator[Measure]:
 def _visible(rng: np.random.Generator) -> Iterator[Measure]:
     """Clouds of what a scanner sees of ten chairs."""
     chair = find_program("chair")
-    shapes = [shape_of(chair, values) for values in random_shapes(chair, 10, 0)]
+    shapes = [build_shape(chair, values) for values in random_shapes(chair, 10, 0)]
     for uniform, picked, pool in ((UNIFORM, 0, 1), (0, PICKED, POOL)):
 
         def visible(uniform: int = uniform, picked: int = picked, pool: int = pool) -> int:

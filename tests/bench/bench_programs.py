@@ -9,8 +9,8 @@ import numpy as np
 
 from stages.programs.draws import Share
 from stages.programs.parameters import Value
-from stages.programs.program import Program, find_program, program_names, shape_of
-from stages.programs.sampling import Cell, Sampler, cells
+from stages.programs.program import Program, build_shape, find_program, program_names
+from stages.programs.sampling import Sampler, ValueIndex, all_value_indices
 from tests.bench.measure import Measure, rate
 
 SHAPES = 50
@@ -22,17 +22,19 @@ def bench() -> Iterator[Measure]:
     """Random shapes of each program as triangles; then samples of the protocol, each checked for effect."""
     for name in program_names():
         program = find_program(name)
-        sampler, rng = Sampler(program, Share(), between=False), np.random.default_rng(1)
+        sampler, rng = Sampler(program, Share(), off_grid=False), np.random.default_rng(1)
         shapes = [sampler.find(None, rng) for _ in range(SHAPES)]
 
         def build(program: Program = program, shapes: list[dict[str, Value]] = shapes) -> int:
-            return sum(1 for values in shapes if len(shape_of(program, values)))
+            return sum(1 for values in shapes if len(build_shape(program, values)))
 
         peer, theirs = ("Infinigen chair factory", INFINIGEN) if name == "chair" else ("", None)
         yield Measure(f"programs, {name}", "shapes", rate(build), peer, theirs, f"{SHAPES} random shapes, triangulated")
-        every = itertools.cycle(cells(program))
+        every = itertools.cycle(all_value_indices(program))
 
-        def sample(sampler: Sampler = sampler, every: Iterator[Cell] = every, rng: np.random.Generator = rng) -> int:
+        def sample(
+            sampler: Sampler = sampler, every: Iterator[ValueIndex] = every, rng: np.random.Generator = rng
+        ) -> int:
             sampler.find(next(every), rng)
             return 1
 

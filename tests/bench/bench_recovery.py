@@ -73,8 +73,8 @@ def _recoveries() -> float:
 def _clouds(n: int) -> np.ndarray:
     """Clouds float32 (BATCH, n, 3) on the base chair."""
     from stages.points.area_sampling import sample_shape
-    from stages.programs.program import find_program, shape_of
+    from stages.programs.program import build_shape, find_program
 
     chair = find_program("chair")
-    shape, rng = shape_of(chair, chair.schema.base), np.random.default_rng(0)
+    shape, rng = build_shape(chair, chair.schema.base), np.random.default_rng(0)
     return np.stack([sample_shape(shape, n, rng).points for _ in range(BATCH)]).astype(np.float32)

@@ -45,8 +45,8 @@ DATASETS = (
     ),
     Dataset(
         "chairs",
-        {"programs": {"mode": "sweep", "sweep": {"samples": 150}}},
-        {"programs": {"mode": "sweep", "sweep": {"samples": 20}}},
+        {"programs": {"mode": "random", "random": {"samples": 150}}},
+        {"programs": {"mode": "random", "random": {"samples": 20}}},
     ),
     Dataset("shapeassembly", {}, {}),
 )

@@ -73,8 +73,8 @@ ARENAS: dict[str, Datasets] = {
                 {
                     "programs": {
                         "program": "vase",
-                        "mode": "sweep",
-                        "sweep": {"samples": 12, "val": 0.2, "test": 0.2},
+                        "mode": "random",
+                        "random": {"samples": 12, "val": 0.2, "test": 0.2},
                         "splits": {"shards": 2},
                     },
                     **_SMALL,

@@ -40,14 +40,13 @@ ValueError and says the mend.
 
 from __future__ import annotations
 
-from stages.programs.curves.arrays import copies, evenly, linear, radial, symmetric
 from stages.programs.curves.curve import Axis, Curve
 from stages.programs.curves.deform import Deformation, bend, follow, taper, twist
-from stages.programs.curves.faults import mesh_faults
 from stages.programs.curves.mesh import QuadMesh
+from stages.programs.curves.mesh_defects import mesh_defects
 from stages.programs.curves.part import Part, joined
 from stages.programs.curves.paths import arc, bezier, chain, helix, line, polyline, spiral
-from stages.programs.curves.poses import attach, frame, mirroring, rotation, scaling, stretch, translation
+from stages.programs.curves.patterns import copies, evenly, linear, radial, symmetric
 from stages.programs.curves.profile import (
     Profile,
     circle,
@@ -62,6 +61,7 @@ from stages.programs.curves.shell import solidify
 from stages.programs.curves.solids import box, cylinder, ellipsoid, extrude, rounded_box
 from stages.programs.curves.style import Style
 from stages.programs.curves.sweep import loft, loft_rings, sweep
+from stages.programs.curves.transforms import attach, frame, mirroring, rotation, scaling, stretch, translation
 
 __all__ = [
     "Axis",
@@ -92,7 +92,7 @@ __all__ = [
     "linear",
     "loft",
     "loft_rings",
-    "mesh_faults",
+    "mesh_defects",
     "mirroring",
     "polygon",
     "polyline",

@@ -15,13 +15,13 @@ from stages.shape.arrays import BoolArray, FloatArray
 
 Axis = Literal["x", "y", "z"]
 
-CORNER = np.cos(np.radians(30.0))
+MAX_CORNER_COSINE = np.cos(np.radians(30.0))
 """Where a curve turns by more than 30 degrees at a point it has a corner there; else it is smooth."""
 
-TURNS_BACK = 1e-6
+REVERSAL_TOLERANCE = 1e-6
 """Segments that point against each other but for this much (of a dot product) have no plane between them."""
 
-SHARPEST = 4.0
+MAX_MITRE_RATIO = 4.0
 """A mitre reaches this far at most: beyond a turn of 151 degrees the tip of a swept corner is blunt."""
 
 
@@ -83,7 +83,7 @@ class Curve:
             raise ValueError(f"a {kind} distinct points and has {len(given)}: move its points apart")
         curve = Curve(given, closed)
         turns = curve._measured[2]
-        if turns.min() < TURNS_BACK - 1.0:
+        if turns.min() < REVERSAL_TOLERANCE - 1.0:
             where = int(turns.argmin())
             raise ValueError(f"the curve turns back onto itself at point {where}: move that point aside, or end there")
         return curve
@@ -117,7 +117,7 @@ class Curve:
     @cached_property
     def corners(self) -> BoolArray:
         """Whether the curve has a corner (turns by more than 30 degrees) at each point, bool (n,)."""
-        sharp: BoolArray = self._measured[2] < CORNER
+        sharp: BoolArray = self._measured[2] < MAX_CORNER_COSINE
         return sharp if self.closed else np.concatenate([sharp, [False]])
 
     @cached_property
@@ -126,7 +126,7 @@ class Curve:
         from stages.programs.curves.kernels import halve_turns
 
         directions, _, turns = self._measured
-        return Stations(self.positions, self.points, *halve_turns(directions, turns, self.closed, SHARPEST))
+        return Stations(self.positions, self.points, *halve_turns(directions, turns, self.closed, MAX_MITRE_RATIO))
 
     def stations(self, positions: npt.ArrayLike) -> Stations:
         """The stations at relative positions (k,). Between smooth points the tangent turns evenly.

@@ -20,7 +20,7 @@ from stages.shape.arrays import FloatArray
 Caps = Literal["flat", "round"]
 """How a sweep ends: cut off, or with a dome as deep as half the profile's shorter side."""
 
-DOME = 3
+DOME_RINGS = 3
 """Rings of a dome beyond the end, its pole included."""
 
 
@@ -158,7 +158,7 @@ def _dome(
     depth = float((np.ptp(outline, axis=0) * scale).min()) / 2.0
     if depth <= 0.0:
         raise ValueError("an end whose scale is 0 is a point and takes no round cap: make it flat")
-    angles = np.pi / 2.0 * np.arange(1, DOME + 1) / DOME
+    angles = np.pi / 2.0 * np.arange(1, DOME_RINGS + 1) / DOME_RINGS
     shrink = np.cos(angles)
     shrink[-1] = 0.0
     reach = depth * np.sin(angles)[:, None] * outwards

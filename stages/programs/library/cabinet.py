@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from stages.programs.conditions import Condition
 from stages.programs.curves import Part
 from stages.programs.library.cabinet_case import base_parts, case_parts, shelf_parts, top_parts
 from stages.programs.library.cabinet_dimensions import CabinetDimensions
 from stages.programs.library.cabinet_fronts import front_parts
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
-from stages.programs.rules import Rule
 from stages.programs.schema import Values
 
 
@@ -57,7 +57,7 @@ PARAMETERS = (
 
 PROGRAM = Program(
     name="cabinet",
-    sentence="A cabinet of columns with doors and drawers, or open with shelves.",
+    description="A cabinet of columns with doors and drawers, or open with shelves.",
     parameters=PARAMETERS,
     labels=(
         *("side", "bottom", "back", "divider", "shelf", "rail", "top", "crown"),
@@ -66,7 +66,9 @@ PROGRAM = Program(
     build=build,
     constraints=(
         Constraint(
-            "open_of_all", Rule("open_columns <= column_count"), "No more columns can be open than there are columns."
+            "open_of_all",
+            Condition("open_columns <= column_count"),
+            "No more columns can be open than there are columns.",
         ),
     ),
 )

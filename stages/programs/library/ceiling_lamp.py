@@ -127,7 +127,7 @@ def _rail(values: Values, reach: float, girth: float) -> Curve:
 
 PROGRAM = Program(
     name="ceiling_lamp",
-    sentence="A ceiling lamp: a plate from which arms reach out and down, each with a bulb at its end.",
+    description="A ceiling lamp: a plate from which arms reach out and down, each with a bulb at its end.",
     parameters=(
         continuous("base_roundness", 0.0, 1.0, 6, 0.54, "base", "Plate seen from below: from a rectangle to an oval."),
         continuous("base_thickness", 0.01, 0.17, 5, 0.07, "base", "Thickness of the plate."),
@@ -153,6 +153,6 @@ PROGRAM = Program(
     ),
     labels=("base", "light_frame", "lightbulb"),
     build=build,
-    apart=(("lightbulb", "lightbulb"), ("base", "lightbulb")),
-    elevation=-25.0,
+    non_intersecting=(("lightbulb", "lightbulb"), ("base", "lightbulb")),
+    view_elevation=-25.0,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stages.programs.conditions import Condition
 from stages.programs.curves import Part
 from stages.programs.library.chair_arms import arm_parts
 from stages.programs.library.chair_back import back_parts
@@ -12,7 +13,6 @@ from stages.programs.library.chair_dimensions import ChairDimensions
 from stages.programs.library.chair_seat import seat_parts
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
-from stages.programs.rules import Rule
 from stages.programs.schema import Values
 
 
@@ -230,7 +230,8 @@ PARAMETERS = (
 
 PROGRAM = Program(
     name="chair",
-    sentence="A chair with a seat on four legs or one foot, a back of rails or a panel, and cushions and arms or none.",
+    description="A chair with a seat on four legs or one foot,"
+    " a back of rails or a panel, and cushions and arms or none.",
     parameters=PARAMETERS,
     labels=(
         "seat",
@@ -253,14 +254,14 @@ PROGRAM = Program(
     constraints=(
         Constraint(
             "rails_in_order",
-            Rule("cr_offset_top - cr_offset_bottom >= 0.1"),
+            Condition("cr_offset_top - cr_offset_bottom >= 0.1"),
             "The highest cross rail lies above the lowest.",
         ),
         Constraint(
             "foot_stands",
-            Rule("monoleg_bezier_end_x_offset >= monoleg_bezier_start_x_offset"),
+            Condition("monoleg_bezier_end_x_offset >= monoleg_bezier_start_x_offset"),
             "A foot is at least as wide on the ground as at its top.",
         ),
     ),
-    apart=(("arm", "cushion"),),
+    non_intersecting=(("arm", "cushion"),),
 )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from stages.programs.conditions import Condition
 from stages.programs.curves import Part
 from stages.programs.library.table_dimensions import OAK, TableDimensions, upright
 from stages.programs.library.table_legs import leg_parts
 from stages.programs.library.table_pedestal import pedestal_parts
 from stages.programs.parameters import binary, continuous, discrete
 from stages.programs.program import Constraint, Program
-from stages.programs.rules import Rule
 from stages.programs.schema import Values
 
 
@@ -82,14 +82,14 @@ PARAMETERS = (
 
 PROGRAM = Program(
     name="table",
-    sentence="A table on four legs, on a pedestal or on a tent of legs.",
+    description="A table on four legs, on a pedestal or on a tent of legs.",
     parameters=PARAMETERS,
     labels=("top", "leg", "support", "pedestal", "column", "plate", "hub", "glide"),
     build=build,
     constraints=(
         Constraint(
             "foot_below_neck",
-            Rule("monoleg_bezier_end_x_offset >= monoleg_bezier_start_x_offset"),
+            Condition("monoleg_bezier_end_x_offset >= monoleg_bezier_start_x_offset"),
             "A pedestal that is narrower at the ground than at its top would topple.",
         ),
     ),

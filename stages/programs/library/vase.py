@@ -134,7 +134,7 @@ def _lid(values: Values, wall: Wall, section: CrossSection) -> list[Part]:
 
 PROGRAM = Program(
     name="vase",
-    sentence="A hollow vase, round or square, with a wall, and a neck, a foot, handles and a lid where it has them.",
+    description="A hollow vase, round or square, with a wall, and a neck, a foot, handles and a lid where it has them.",
     parameters=(
         continuous("body_height", 0.5, 1.5, 15, 1.2143, "body", "Height of the body."),
         continuous("body_width", 0.1, 0.45, 10, 0.2944, "body", "Width of the body; all radii follow it."),
@@ -278,5 +278,5 @@ PROGRAM = Program(
     ),
     labels=("body", "neck", "base", "handle", "lid", "lid_handle"),
     build=build,
-    apart=(("handle", "handle"), ("handle", "lid"), ("handle", "lid_handle")),
+    non_intersecting=(("handle", "handle"), ("handle", "lid"), ("handle", "lid_handle")),
 )

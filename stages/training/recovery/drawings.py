@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.programs.curves.part import Part
-from stages.programs.program import Program, shape_of_parts
+from stages.programs.program import Program, shape_from_parts
 from stages.shape.arrays import BoolArray, ByteArray
 from stages.shape.views.scene import scene_of
 from stages.sketches.draw import draw_sketch, jittered_camera
@@ -45,7 +45,7 @@ def draw_fitted(
     program: Program, parts: tuple[Part, ...], view: SketchView, config: SketchesConfig, rng: np.random.Generator
 ) -> BoolArray:
     """A shape as stage `sketches` draws it, fitted."""
-    scene = scene_of(shape_of_parts(program, parts))
+    scene = scene_of(shape_from_parts(program, parts))
     camera = jittered_camera(view, rng)
     drawing: ByteArray
     drawing, _ = draw_sketch(scene, camera, config.size, config.supersample, config.strokes, config.backend)

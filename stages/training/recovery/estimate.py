@@ -37,7 +37,7 @@ class ParameterEstimate:
     def surprise(self, program: Program, settled: Values) -> float:
         """How much less likely the visible ones of some values are than the likeliest, in nats; of continuous ones by
         the normal distribution that has the mean and the variance of the probabilities."""
-        _, visible = program.schema.settled(settled)
+        _, visible = program.schema.canonical(settled)
         shown = (each for each in program.parameters if each.name in visible)
         return sum(_surprise(each, self.probabilities[each.name], settled[each.name]) for each in shown)
 

@@ -14,11 +14,11 @@ import numpy.typing as npt
 
 from stages.programs.curves.part import Part
 from stages.programs.draws import Interval, Share, draw
-from stages.programs.intersection import intersecting
+from stages.programs.intersection import intersecting_labels
 from stages.programs.parameters import Value
 from stages.programs.program import BuildError, Program
-from stages.programs.repair import repaired
-from stages.programs.sampling import cells
+from stages.programs.repair import repair
+from stages.programs.sampling import all_value_indices
 from stages.programs.schema import Values
 
 TRAIN_INTERVAL: Interval = (0.0, 0.8)
@@ -44,18 +44,18 @@ def random_shapes(program: Program, interval: Interval, rng: np.random.Generator
     of every parameter is fixed as often (geocode §4). Where the program fails, the next is taken.
 
     Raises BuildError where it fails FAILURES times without a shape between."""
-    schema, every, share = program.schema, cells(program), Share(shapes=interval)
+    schema, every, share = program.schema, all_value_indices(program), Share(shapes=interval)
     rows = {name: row for row, name in enumerate(schema.by_name)}
     failures = 0
     while True:
         name, value = every[int(rng.integers(len(every)))]
         fixed = (name, float(schema.by_name[name].values[value]))
-        draws = draw(schema, AT_ONCE, rng, between=False, fixed=fixed)
+        draws = draw(schema, AT_ONCE, rng, off_grid=False, fixed=fixed)
         for column in draws.owned(share).tolist():
             if not draws.visible[rows[name], column]:
                 continue
             values = schema.from_vector(draws.columns[:, column])
-            if program.broken(values):
+            if program.violated(values):
                 continue
             try:
                 parts = tuple(program.parts(values))
@@ -65,12 +65,12 @@ def random_shapes(program: Program, interval: Interval, rng: np.random.Generator
                     raise
                 continue
             failures = 0
-            if intersecting(program, parts) is None:
-                yield RandomShape(values, schema.classes(values), parts)
+            if intersecting_labels(program, parts) is None:
+                yield RandomShape(values, schema.to_classes(values), parts)
                 break
 
 
 def nearest_valid_values(program: Program, values: Values) -> dict[str, Value]:
     """The nearest values that keep the program's constraints, or, where there are none, its base."""
-    found = repaired(program, values)
-    return program.schema.settled(program.schema.base)[0] if found is None else found
+    found = repair(program, values)
+    return program.schema.canonical(program.schema.base)[0] if found is None else found

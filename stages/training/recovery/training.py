@@ -70,7 +70,7 @@ def prepare(task: Task) -> Outcome:
         else:
             inputs.append(quantized_cloud(sample_points(shape.parts, 2 * settings["points"], rng)))
         classes.append(shape.classes.astype(np.int16))
-        texts.append(program.schema.text(shape.values))
+        texts.append(program.schema.to_text(shape.values))
         task.progress(number + 1, params["shapes"])
     arrays: dict[str, npt.NDArray[Any]] = {"inputs": np.array(inputs), "classes": np.array(classes)}
     with task.output(f"{task.shard.name}.safetensors") as stream:
@@ -187,5 +187,5 @@ class RecoveryLearner:
         recovered = nearest_valid_values(
             self.program, estimate_from_probabilities(self.program, chances).values(self.program)
         )
-        clouds = (shape_points(self.program.parts(each), MEASURED) for each in (recovered, schema.values(text)))
+        clouds = (shape_points(self.program.parts(each), MEASURED) for each in (recovered, schema.from_text(text)))
         return squared_chamfer_distance(*(frame_of(each).normalized(each) for each in clouds))

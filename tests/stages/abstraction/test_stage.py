@@ -14,7 +14,7 @@ from tests.mill import mill
 
 def made(folder: Path, name: str, asked: dict[str, Any], stages: tuple[str, ...]) -> tuple[Path, Path]:
     sections = {
-        "programs": {"program": "table", "mode": "sweep", "sweep": {"samples": 3}},
+        "programs": {"program": "table", "mode": "random", "random": {"samples": 3}},
         "abstraction": asked,
     }
     config = folder / f"{name}.yaml"

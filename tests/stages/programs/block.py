@@ -8,7 +8,7 @@ from stages.programs.program import Program
 
 PROGRAM = Program(
     name="block",
-    sentence="A block.",
+    description="A block.",
     parameters=(
         continuous("width", 1, 2, 2, 1, "size", "Its width."),
         continuous("height", 1, 2, 3, 1, "size", "Its height."),

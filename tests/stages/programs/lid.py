@@ -24,7 +24,7 @@ LID = binary("has_lid", True, "lid", "Whether there is a lid.")
 WIDTH = continuous("width", 0.5, 1.5, 4, 1.0, "case", "How wide it is.")
 
 PROGRAM = Program(
-    name="lid", sentence="A box with or without a lid.", parameters=(LID,), labels=("case", "lid"), build=build
+    name="lid", description="A box with or without a lid.", parameters=(LID,), labels=("case", "lid"), build=build
 )
 WIDE = replace(PROGRAM, parameters=(LID, WIDTH))
 FIXED = replace(PROGRAM, parameters=())

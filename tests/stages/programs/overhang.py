@@ -19,7 +19,7 @@ def build(values: Values) -> Sequence[Part]:
 
 PROGRAM = Program(
     name="overhang",
-    sentence="A plate on a post.",
+    description="A plate on a post.",
     parameters=(
         continuous("reach", 0.0, 1.0, 11, 0.5, "plate", "How far the plate reaches out."),
         continuous("unused", 0.0, 1.0, 11, 0.5, "plate", "Nothing, so that there are many shapes."),

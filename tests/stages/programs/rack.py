@@ -21,7 +21,7 @@ def build(values: Values) -> Sequence[Part]:
 
 PROGRAM = Program(
     name="rack",
-    sentence="A rack of boards.",
+    description="A rack of boards.",
     parameters=(
         discrete("boards", 1, 12, 3, "boards", "Number of boards."),
         continuous("width", 0.5, 2.0, 4, 1.0, "boards", "Width of the boards."),

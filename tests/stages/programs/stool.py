@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stages.programs.conditions import Condition
 from stages.programs.curves import Part, box
 from stages.programs.parameters import binary, continuous
 from stages.programs.program import Constraint, Program
-from stages.programs.rules import Rule
 from stages.programs.schema import Values
 
 GREY = (180, 180, 180)
@@ -25,7 +25,7 @@ def build(values: Values) -> Sequence[Part]:
 
 PROGRAM = Program(
     name="stool",
-    sentence="A stool of boxes, with or without a rail between its legs.",
+    description="A stool of boxes, with or without a rail between its legs.",
     parameters=(
         continuous("height", 0.3, 1.0, 8, 0.6, "seat", "Height of the seat."),
         continuous("scale x", 0.4, 1.1, 8, 0.5, "seat", "Width of the seat."),
@@ -35,7 +35,9 @@ PROGRAM = Program(
     labels=("seat", "leg", "rail"),
     build=build,
     constraints=(
-        Constraint("rail_above_seat", Rule("height >= rail_height"), "A rail above the seat would hang in the air."),
+        Constraint(
+            "rail_above_seat", Condition("height >= rail_height"), "A rail above the seat would hang in the air."
+        ),
     ),
-    apart=(("seat", "rail"),),
+    non_intersecting=(("seat", "rail"),),
 )

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stages.programs.conditions import Condition
 from stages.programs.editing import interpolate, mix
 from stages.programs.parameters import ParameterError, Value
 from stages.programs.program import Constraint
-from stages.programs.rules import Rule
 from tests.stages.programs.rack import PROGRAM as RACK
 from tests.stages.programs.stool import PROGRAM
 
@@ -17,8 +17,8 @@ BASE = PROGRAM.schema.base
 
 valid_values = (
     st.fixed_dictionaries({each.name: st.sampled_from(each.values) for each in PROGRAM.parameters})
-    .map(lambda values: PROGRAM.schema.settled(values)[0])
-    .filter(lambda values: not PROGRAM.broken(values))
+    .map(lambda values: PROGRAM.schema.canonical(values)[0])
+    .filter(lambda values: not PROGRAM.violated(values))
 )
 
 
@@ -28,7 +28,7 @@ class TestMix:
         self, target: dict[str, Value], source: dict[str, Value]
     ) -> None:
         mixed = mix(PROGRAM, target, source, ["seat"])
-        assert not PROGRAM.broken(mixed)
+        assert not PROGRAM.violated(mixed)
         assert (mixed["height"], mixed["scale x"]) == (source["height"], source["scale x"])
         assert mixed["has_rail"] == target["has_rail"]
 
@@ -43,7 +43,7 @@ class TestMix:
 
     def test_what_is_copied_moves_only_where_nothing_else_can(self) -> None:
         # The whole constraint lies inside the copied group, whose source came from elsewhere.
-        tight = replace(PROGRAM, constraints=(Constraint("wide", Rule("height < 0.5"), "."),))
+        tight = replace(PROGRAM, constraints=(Constraint("wide", Condition("height < 0.5"), "."),))
         assert mix(tight, {**BASE, "height": 0.4}, {**BASE, "height": 0.9}, ["seat"])["height"] == 0.4
 
     def test_a_group_that_is_not_there_is_named_with_those_that_are(self) -> None:
@@ -51,7 +51,7 @@ class TestMix:
             mix(PROGRAM, BASE, BASE, ["legs"])
 
     def test_no_way_to_keep_the_constraints_is_said(self) -> None:
-        never = replace(PROGRAM, constraints=(Constraint("never", Rule("height < 0"), "."),))
+        never = replace(PROGRAM, constraints=(Constraint("never", Condition("height < 0"), "."),))
         with pytest.raises(ParameterError, match="stool: no values near these keep height < 0"):
             mix(never, BASE, BASE, ["seat"])
 
@@ -64,7 +64,7 @@ class TestInterpolate:
         text = PROGRAM.schema.text
         assert text(interpolate(PROGRAM, first, last, 0.0)) == text(first)
         assert text(interpolate(PROGRAM, first, last, 1.0)) == text(last)
-        assert not PROGRAM.broken(interpolate(PROGRAM, first, last, share))
+        assert not PROGRAM.violated(interpolate(PROGRAM, first, last, share))
 
     def test_continuous_parameters_move_linearly(self) -> None:
         between = interpolate(PROGRAM, {**BASE, "height": 0.4}, {**BASE, "height": 0.8}, 0.25)

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from stages.programs.curves import Part, QuadMesh, box, mesh_faults
+from stages.programs.curves import Part, QuadMesh, box, mesh_defects
 from stages.programs.draws import Share
 from stages.programs.effect import same_geometry
-from stages.programs.intersection import meshes_meet
+from stages.programs.intersection import meshes_intersect
 from stages.programs.program import Program, find_program, program_names
-from stages.programs.sampling import Sampler, cells
+from stages.programs.sampling import Sampler, all_value_indices
 from stages.programs.schema import Values
 from stages.shape.geometry.triangles import build_tree, near_pairs
 
@@ -36,21 +36,21 @@ def pieces(parts: Sequence[Part]) -> int:
     piece = list(range(len(parts)))
     for i, first in enumerate(parts):
         for j in range(i):
-            if piece[i] != piece[j] and meshes_meet(first.mesh, parts[j].mesh, distance):
+            if piece[i] != piece[j] and meshes_intersect(first.mesh, parts[j].mesh, distance):
                 piece = [piece[i] if each == piece[j] else each for each in piece]
     return len(set(piece))
 
 
-def random_values(program: Program, count: int, between: bool) -> list[Values]:
+def random_values(program: Program, count: int, off_grid: bool) -> list[Values]:
     """Random values that keep the constraints and the parts apart."""
-    sampler = Sampler(program, Share(), between)
+    sampler = Sampler(program, Share(), off_grid)
     rng = np.random.default_rng(11)
     return [sampler.find(None, rng) for _ in range(count)]
 
 
 def holes(parts: Sequence[Part]) -> list[str]:
     """What is wrong with the meshes of parts."""
-    faults = mesh_faults(QuadMesh.joined(part.mesh for part in parts))
+    faults = mesh_defects(QuadMesh.joined(part.mesh for part in parts))
     return [fault for fault in faults if not fault.endswith(FOLDED)]
 
 
@@ -65,7 +65,7 @@ def crossings(mesh: QuadMesh) -> int:
 
 def check(program: Program, every: Sequence[Values]) -> None:
     for start in range(0, len(every), TOGETHER):
-        shapes = [(program.schema.text(each), program.parts(each)) for each in every[start : start + TOGETHER]]
+        shapes = [(program.schema.to_text(each), program.parts(each)) for each in every[start : start + TOGETHER]]
         if holes([part for _, parts in shapes for part in parts]):
             pytest.fail(
                 f"not closed: {[(text, part.label) for text, parts in shapes for part in parts if holes([part])]}"
@@ -79,28 +79,28 @@ def check(program: Program, every: Sequence[Values]) -> None:
 def test_a_program_is_called_as_its_file_and_its_base_is_a_shape(name: str) -> None:
     program = find_program(name)
     assert program.name == name.rpartition(".")[2]
-    check(program, [program.schema.settled(program.schema.base)[0]])
+    check(program, [program.schema.canonical(program.schema.base)[0]])
 
 
 @pytest.mark.parametrize("name", TOYS)
 def test_random_toys_are_closed_and_in_one_piece(name: str) -> None:
     program = find_program(name)
-    check(program, random_values(program, 40, between=False))
+    check(program, random_values(program, 40, off_grid=False))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("between", [False, True])
+@pytest.mark.parametrize("off_grid", [False, True])
 @pytest.mark.parametrize("name", program_names())
-def test_many_random_shapes_are_closed_and_in_one_piece(name: str, between: bool) -> None:
+def test_many_random_shapes_are_closed_and_in_one_piece(name: str, off_grid: bool) -> None:
     program = find_program(name)
-    check(program, random_values(program, 200, between))
+    check(program, random_values(program, 200, off_grid))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_value_of_every_parameter_can_be_told_from_its_neighbours(name: str) -> None:
     program = find_program(name)
-    sampler, rng = Sampler(program, Share(), between=False), np.random.default_rng(12)
-    for cell in cells(program):
+    sampler, rng = Sampler(program, Share(), off_grid=False), np.random.default_rng(12)
+    for cell in all_value_indices(program):
         sampler.find(cell, rng)
 
 
@@ -108,10 +108,10 @@ def test_every_value_of_every_parameter_can_be_told_from_its_neighbours(name: st
 def test_a_shape_depends_on_its_values_alone(name: str) -> None:
     program = find_program(name)
     schema = program.schema
-    shapes = random_values(program, 5, between=True)
+    shapes = random_values(program, 5, off_grid=True)
     first = [program.parts(values) for values in shapes]
     for values, parts in zip(shapes, first, strict=True):
-        again = program.parts(schema.values(schema.text(values)))
+        again = program.parts(schema.from_text(schema.to_text(values)))
         assert same_geometry(parts, again)
         for part, other in zip(parts, again, strict=True):
             np.testing.assert_array_equal(part.mesh.vertices, other.mesh.vertices)
@@ -129,8 +129,8 @@ def test_parts_further_apart_than_a_hundredth_are_pieces() -> None:
 def cut_themselves(program: Program, count: int) -> list[tuple[str, str]]:
     """Parts of random shapes that cut themselves: their labels, and the text of their shapes."""
     return [
-        (part.label, program.schema.text(values))
-        for values in random_values(program, count, between=False)
+        (part.label, program.schema.to_text(values))
+        for values in random_values(program, count, off_grid=False)
         for part in program.parts(values)
         if crossings(part.mesh)
     ]

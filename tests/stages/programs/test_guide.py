@@ -13,7 +13,7 @@ from pipeline.config import load_config
 from pipeline.registry import find_stages
 from stages.programs.draws import Share
 from stages.programs.program import Program
-from stages.programs.sampling import Sampler, cells
+from stages.programs.sampling import Sampler, all_value_indices
 from tests.stages.programs.test_every_program import check
 
 GUIDE = Path(stages.programs.__file__).with_name("GUIDE.md").read_text()
@@ -30,8 +30,8 @@ def test_the_lamp_of_the_guide_keeps_what_programs_promise() -> None:
     exec(compile(block("python"), "GUIDE.md", "exec"), space)
     lamp = space["PROGRAM"]
     assert isinstance(lamp, Program)
-    sampler, rng = Sampler(lamp, Share(), between=False), np.random.default_rng(3)
-    check(lamp, [sampler.find(cell, rng) for cell in cells(lamp)])
+    sampler, rng = Sampler(lamp, Share(), off_grid=False), np.random.default_rng(3)
+    check(lamp, [sampler.find(cell, rng) for cell in all_value_indices(lamp)])
 
 
 def test_the_config_of_the_guide_is_one(tmp_path: Path) -> None:

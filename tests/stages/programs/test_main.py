@@ -11,8 +11,8 @@ import trimesh
 from PIL import Image
 
 from stages.programs.__main__ import main
-from stages.programs.program import shape_of
-from stages.programs.sheets import CELL, reveal
+from stages.programs.program import build_shape
+from stages.programs.sheets import CELL_SIDE_PIXELS, values_showing
 from stages.recovery.recover import RecoveryResult
 from stages.shape.views.portrait import PAPER
 from tests.stages.programs.stool import PROGRAM
@@ -28,7 +28,7 @@ def test_a_mix_is_written_with_its_sources_and_a_sheet(tmp_path: Path) -> None:
     assert main(["mix", STOOL, "1", "base", "--group", "rail", "--out", str(tmp_path)]) == 0
     names = ("target", "source", "mixed")
     assert written(tmp_path) == {f"{name}.{kind}" for name in names for kind in ("glb", "json")} | {"sheet.png"}
-    target, source, mixed = (PROGRAM.schema.values((tmp_path / f"{name}.json").read_text()) for name in names)
+    target, source, mixed = (PROGRAM.schema.from_text((tmp_path / f"{name}.json").read_text()) for name in names)
     assert source == PROGRAM.schema.base
     assert mixed["rail_height"] == source["rail_height"]
     assert mixed["scale x"] == target["scale x"]
@@ -37,7 +37,7 @@ def test_a_mix_is_written_with_its_sources_and_a_sheet(tmp_path: Path) -> None:
 def test_a_glb_has_the_parts_of_the_shape_by_name_in_their_places(tmp_path: Path) -> None:
     assert main(["make", STOOL, "base", "--out", str(tmp_path)]) == 0
     scene = trimesh.load_scene(tmp_path / "base.glb")
-    shape = shape_of(PROGRAM, PROGRAM.schema.base)
+    shape = build_shape(PROGRAM, PROGRAM.schema.base)
     assert set(scene.graph.nodes_geometry) == {"seat.000", "leg.000", "leg.001", "rail.000"}
     for name, mesh, pose in zip(shape.part_names, shape.meshes, shape.assembly.poses, strict=True):
         placed, geometry = scene.graph.get(name)
@@ -50,7 +50,7 @@ def test_a_glb_has_the_parts_of_the_shape_by_name_in_their_places(tmp_path: Path
 def test_steps_lead_from_one_shape_to_the_other(tmp_path: Path) -> None:
     ends = [tmp_path / "a.json", tmp_path / "b.json"]
     for path, height in zip(ends, (0.4, 0.8), strict=True):
-        path.write_text(PROGRAM.schema.text({**PROGRAM.schema.base, "height": height}))
+        path.write_text(PROGRAM.schema.to_text({**PROGRAM.schema.base, "height": height}))
     out = tmp_path / "steps"
     assert main(["interpolate", STOOL, *map(str, ends), "--steps", "3", "--out", str(out)]) == 0
     heights = [json.loads((out / f"step-{number:02d}.json").read_text())["height"] for number in range(3)]
@@ -64,9 +64,9 @@ def test_what_recovery_has_written_is_edited_as_it_is(tmp_path: Path, capsys: py
         (tmp_path / f"{name}.json").write_text(json.dumps({"input": name, **found.described()}))
     ends = [str(tmp_path / f"{name}.json") for name in ("low", "high")]
     assert main(["interpolate", STOOL, *ends, "--steps", "3", "--group", "seat", "--out", str(tmp_path / "way")]) == 0
-    assert PROGRAM.schema.values((tmp_path / "way/step-01.json").read_text())["height"] == pytest.approx(0.6)
+    assert PROGRAM.schema.from_text((tmp_path / "way/step-01.json").read_text())["height"] == pytest.approx(0.6)
     assert main(["mix", STOOL, *ends, "--group", "seat", "--out", str(tmp_path / "mix")]) == 0
-    assert PROGRAM.schema.values((tmp_path / "mix/mixed.json").read_text())["height"] == 0.8
+    assert PROGRAM.schema.from_text((tmp_path / "mix/mixed.json").read_text())["height"] == 0.8
     capsys.readouterr()
     assert main(["make", "chair", ends[0], "--out", str(tmp_path)]) == 2
     assert "low.json: these are parameters of 'stool', not of chair" in capsys.readouterr().err
@@ -80,10 +80,10 @@ def test_inspect_prints_the_table_and_draws_a_row_a_parameter(
     assert "| `height` | continuous | 1 to 2 (3 values) |" in printed
     sheet = np.asarray(Image.open(tmp_path / "block.png")).astype(int)
     # The third and last picture of the second row: the highest block fills the frame, and nothing stands beside it.
-    assert sheet.shape[1] > 3 * CELL
+    assert sheet.shape[1] > 3 * CELL_SIDE_PIXELS
     inked = np.abs(sheet - PAPER).sum(axis=2) > 150
-    assert inked[-CELL:, 2 * CELL : 3 * CELL].any()
-    assert not inked[-CELL:, 3 * CELL + 100 :].any()
+    assert inked[-CELL_SIDE_PIXELS:, 2 * CELL_SIDE_PIXELS : 3 * CELL_SIDE_PIXELS].any()
+    assert not inked[-CELL_SIDE_PIXELS:, 3 * CELL_SIDE_PIXELS + 100 :].any()
 
 
 def test_random_shapes_of_one_seed_are_the_same_sheet(tmp_path: Path) -> None:
@@ -115,5 +115,5 @@ def test_mistakes_are_named_with_the_mend(
 
 
 def test_a_hidden_parameter_is_revealed_by_the_fewest_changes() -> None:
-    assert reveal(PROGRAM, PROGRAM.parameters[0]) == PROGRAM.schema.base
-    assert reveal(PROGRAM, PROGRAM.parameters[3]) == PROGRAM.schema.base
+    assert values_showing(PROGRAM, PROGRAM.parameters[0]) == PROGRAM.schema.base
+    assert values_showing(PROGRAM, PROGRAM.parameters[3]) == PROGRAM.schema.base

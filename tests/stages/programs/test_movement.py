@@ -38,7 +38,7 @@ def lid(values: dict[str, float]) -> list[Part]:
 def test_what_is_hidden_is_not_counted_and_what_hardly_moves_is_weak() -> None:
     chest = Program(
         name="chest",
-        sentence="A chest.",
+        description="A chest.",
         parameters=(
             continuous("thickness", 0.001, 0.003, 3, 0.001, "lid", "Of the lid.", visible_if="has_lid"),
             binary("has_lid", True, "lid", "Whether it has a lid."),

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError
+from stages.programs.conditions import Condition
 from stages.programs.curves import Part, box
 from stages.programs.parameters import ParameterError
-from stages.programs.program import BuildError, Constraint, find_program, shape_of, shape_of_text
-from stages.programs.rules import Rule
+from stages.programs.program import BuildError, Constraint, build_shape, find_program, shape_from_text
 from stages.shape.geometry.pose import transform_points
 from tests.stages.programs.stool import PROGRAM
 
@@ -17,7 +17,7 @@ STOOL = "tests.stages.programs.stool"
 
 
 def test_shape_has_a_mesh_a_part_labelled_by_name() -> None:
-    shape = shape_of(PROGRAM, PROGRAM.schema.base)
+    shape = build_shape(PROGRAM, PROGRAM.schema.base)
     assert [mesh.name for mesh in shape.meshes] == ["seat", "leg", "leg", "rail"]
     assert shape.label_of.tolist() == [0, 1, 1, 2]
     assert shape.assembly.types.tolist() == [0, 1, 2, 3]
@@ -25,7 +25,7 @@ def test_shape_has_a_mesh_a_part_labelled_by_name() -> None:
 
 
 def test_a_pose_says_where_the_middle_of_its_part_is() -> None:
-    shape = shape_of(PROGRAM, PROGRAM.schema.base)
+    shape = build_shape(PROGRAM, PROGRAM.schema.base)
     for part, mesh, pose in zip(PROGRAM.parts(PROGRAM.schema.base), shape.meshes, shape.assembly.poses, strict=True):
         np.testing.assert_allclose(mesh.bounds.sum(axis=0), 0.0, atol=1e-12)
         np.testing.assert_array_equal(pose[:3, :3], np.eye(3))
@@ -41,18 +41,18 @@ def test_hidden_parameters_have_no_say() -> None:
 
 def test_shape_comes_back_from_its_text() -> None:
     values = PROGRAM.schema.complete({"height": 0.77, "rail_height": 0.2})
-    there, back = shape_of(PROGRAM, values), shape_of_text(STOOL, PROGRAM.schema.text(values))
+    there, back = build_shape(PROGRAM, values), shape_from_text(STOOL, PROGRAM.schema.to_text(values))
     for mesh, other in zip(there.meshes, back.meshes, strict=True):
         np.testing.assert_array_equal(mesh.vertices, other.vertices)
     with pytest.raises(ParameterError, match="height: 5 is out of range"):
-        shape_of_text(STOOL, '{"height":5}')
+        shape_from_text(STOOL, '{"height":5}')
 
 
 def test_a_constraint_binds_only_while_all_it_speaks_of_is_visible() -> None:
     low = {**PROGRAM.schema.base, "height": 0.3, "rail_height": 0.6}
-    assert [each.name for each in PROGRAM.broken(low)] == ["rail_above_seat"]
-    assert not PROGRAM.broken({**low, "has_rail": False})
-    assert not PROGRAM.broken({**low, "rail_height": 0.3})
+    assert [each.name for each in PROGRAM.violated(low)] == ["rail_above_seat"]
+    assert not PROGRAM.violated({**low, "has_rail": False})
+    assert not PROGRAM.violated({**low, "rail_height": 0.3})
 
 
 def test_values_at_which_a_program_fails_are_named() -> None:
@@ -69,9 +69,9 @@ def test_whatever_a_program_raises_is_said_with_the_values() -> None:
 
 def test_a_program_that_speaks_of_what_is_not_there_is_refused() -> None:
     with pytest.raises(ValueError, match="constraint wide speaks of width"):
-        replace(PROGRAM, constraints=(Constraint("wide", Rule("width > 1"), "."),))
+        replace(PROGRAM, constraints=(Constraint("wide", Condition("width > 1"), "."),))
     with pytest.raises(ValueError, match="'lid' shall stay apart; labels are seat, leg, rail"):
-        replace(PROGRAM, apart=(("seat", "lid"),))
+        replace(PROGRAM, non_intersecting=(("seat", "lid"),))
 
 
 def test_a_program_is_found_by_its_module_and_a_missing_one_is_named() -> None:
@@ -81,4 +81,4 @@ def test_a_program_is_found_by_its_module_and_a_missing_one_is_named() -> None:
     with pytest.raises(ConfigError, match=r"no\.such"):
         find_program("no.such")
     with pytest.raises(ConfigError, match=r"must hold PROGRAM = Program"):
-        find_program("stages.programs.rules")
+        find_program("stages.programs.conditions")

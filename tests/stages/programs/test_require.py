@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.programs.draws import Share
-from stages.programs.program import find_program, shape_of
+from stages.programs.program import build_shape, find_program
 from stages.programs.sampling import Sampler
 from stages.shape.physics.judge import judge_shape
 from stages.shape.physics.settings import PhysicsConfig, Requirements
@@ -16,17 +16,17 @@ OVERHANG = find_program("tests.stages.programs.overhang")
 
 @pytest.mark.parametrize("physics", [PhysicsConfig(push=0.0), PhysicsConfig(push=0.02)])
 def test_only_shapes_that_stand_are_kept_and_the_others_are_counted(physics: PhysicsConfig) -> None:
-    sampler = Sampler(OVERHANG, Share(), between=False, require=Requirements(stable=True, physics=physics))
+    sampler = Sampler(OVERHANG, Share(), off_grid=False, require=Requirements(stable=True, physics=physics))
     rng = np.random.default_rng(7)
     kept = [sampler.find(None, rng) for _ in range(20)]
-    assert all(judge_shape(shape_of(OVERHANG, values), physics).stable for values in kept)
+    assert all(judge_shape(build_shape(OVERHANG, values), physics).stable for values in kept)
     # the plate weighs as much as the post: together they fall once their middle leaves the post's foot
     assert max(values["reach"] for values in kept) <= 0.4
     assert sampler.refused["any", "not stable"] > 0
 
 
 def test_what_is_not_required_is_not_asked() -> None:
-    sampler = Sampler(OVERHANG, Share(), between=False, require=Requirements(rooted=True))
+    sampler = Sampler(OVERHANG, Share(), off_grid=False, require=Requirements(rooted=True))
     rng = np.random.default_rng(7)
     kept = [sampler.find(None, rng) for _ in range(20)]
     assert max(values["reach"] for values in kept) > 0.4

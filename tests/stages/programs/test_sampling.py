@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ShardFailed
+from stages.programs.conditions import Condition
 from stages.programs.curves import Part, box, ellipsoid
 from stages.programs.draws import Share, draw
 from stages.programs.effect import has_effect, same_geometry
-from stages.programs.intersection import meshes_meet
+from stages.programs.intersection import meshes_intersect
 from stages.programs.program import Constraint, Program
-from stages.programs.repair import repaired
-from stages.programs.rules import Rule
-from stages.programs.sampling import Sampler, cells, structure_digest
+from stages.programs.repair import repair
+from stages.programs.sampling import Sampler, all_value_indices, structure_digest
 from stages.programs.schema import Values
 from tests.stages.programs.block import PROGRAM as BLOCK
 from tests.stages.programs.stool import PROGRAM
@@ -25,14 +25,14 @@ BASE = SCHEMA.base
 
 class TestDraws:
     def test_every_value_of_every_parameter_is_as_likely(self) -> None:
-        draws = draw(SCHEMA, 20_000, np.random.default_rng(1), between=False)
+        draws = draw(SCHEMA, 20_000, np.random.default_rng(1), off_grid=False)
         for parameter, row in zip(PROGRAM.parameters[:3], draws.columns, strict=False):
             found, counts = np.unique(row, return_counts=True)
             np.testing.assert_array_equal(found, np.array(parameter.values, dtype=float))
             assert np.abs(counts * len(found) / 20_000 - 1).max() < 0.1
 
     def test_continuous_values_between_those_listed_fill_the_range(self) -> None:
-        draws = draw(SCHEMA, 5000, np.random.default_rng(1), between=True)
+        draws = draw(SCHEMA, 5000, np.random.default_rng(1), off_grid=True)
         height, _, rail, _ = draws.columns
         assert len(np.unique(height)) > 2000
         assert height.min() >= 0.3
@@ -40,24 +40,24 @@ class TestDraws:
         assert set(rail.tolist()) == {0.0, 1.0}
 
     def test_a_fixed_value_stands_in_every_draw(self) -> None:
-        draws = draw(SCHEMA, 50, np.random.default_rng(1), between=False, fixed=("scale x", 0.5))
+        draws = draw(SCHEMA, 50, np.random.default_rng(1), off_grid=False, fixed=("scale x", 0.5))
         assert set(draws.columns[1].tolist()) == {0.5}
 
     def test_shares_that_make_up_all_own_each_shape_once(self) -> None:
-        draws = draw(SCHEMA, 3000, np.random.default_rng(2), between=False)
+        draws = draw(SCHEMA, 3000, np.random.default_rng(2), off_grid=False)
         cuts = [0.0, 0.1, 0.35, 0.9, 1.0]
         owned = [draws.owned(Share(shapes=each)) for each in itertools.pairwise(cuts)]
         np.testing.assert_array_equal(np.sort(np.concatenate(owned)), np.arange(3000))
-        texts = [{SCHEMA.text(SCHEMA.from_vector(draws.columns[:, k])) for k in each} for each in owned]
+        texts = [{SCHEMA.to_text(SCHEMA.from_vector(draws.columns[:, k])) for k in each} for each in owned]
         assert sum(map(len, texts)) == len(set().union(*texts))
 
     def test_shares_are_as_large_as_they_say(self) -> None:
-        draws = draw(SCHEMA, 50_000, np.random.default_rng(3), between=True)
+        draws = draw(SCHEMA, 50_000, np.random.default_rng(3), off_grid=True)
         share = Share(shapes=(0.2, 0.5))
         assert len(draws.owned(share)) / 50_000 == pytest.approx(share.size, abs=0.01)
 
     def test_shapes_of_one_structure_stand_in_one_share_of_structures(self) -> None:
-        draws = draw(SCHEMA, 500, np.random.default_rng(4), between=True)
+        draws = draw(SCHEMA, 500, np.random.default_rng(4), off_grid=True)
         for share in (Share(structures=(0.0, 0.5)), Share(structures=(0.5, 1.0))):
             owned = draws.owned(share)
             rails = set(draws.columns[2, owned].tolist())
@@ -67,19 +67,19 @@ class TestDraws:
 class TestRepair:
     def test_the_nearest_values_that_keep_the_constraints(self) -> None:
         broken = {**BASE, "height": 0.4, "rail_height": 0.5}
-        assert repaired(PROGRAM, broken, {"height"}) == {**broken, "rail_height": 0.4}
-        assert repaired(PROGRAM, broken, {"rail_height"}) == {**broken, "height": 0.5}
-        assert repaired(PROGRAM, broken, {"height", "rail_height"}) is None
+        assert repair(PROGRAM, broken, {"height"}) == {**broken, "rail_height": 0.4}
+        assert repair(PROGRAM, broken, {"rail_height"}) == {**broken, "height": 0.5}
+        assert repair(PROGRAM, broken, {"height", "rail_height"}) is None
 
     def test_valid_values_stay_as_they_are(self) -> None:
-        assert repaired(PROGRAM, BASE) == BASE
+        assert repair(PROGRAM, BASE) == BASE
 
     def test_several_constraints_at_once(self) -> None:
-        low = Constraint("low", Rule("height + rail_height <= 0.7"), ".")
+        low = Constraint("low", Condition("height + rail_height <= 0.7"), ".")
         program = replace(PROGRAM, constraints=(*PROGRAM.constraints, low))
-        found = repaired(program, {**BASE, "height": 0.5, "rail_height": 0.6})
+        found = repair(program, {**BASE, "height": 0.5, "rail_height": 0.6})
         assert found is not None
-        assert not program.broken(found)
+        assert not program.violated(found)
 
 
 class TestEffect:
@@ -100,10 +100,10 @@ class TestEffect:
         assert not has_effect(deaf, values, "rail_height", deaf.parts(values))
 
     def test_what_comes_into_view_makes_room_for_the_change(self) -> None:
-        low_seat = SCHEMA.settled({**BASE, "height": 0.3, "has_rail": False})[0]
+        low_seat = SCHEMA.canonical({**BASE, "height": 0.3, "has_rail": False})[0]
         high_rail = replace(PROGRAM, parameters=(*PROGRAM.parameters[:3], replace(PROGRAM.parameters[3], base=0.6)))
-        assert high_rail.broken({**low_seat, "has_rail": True, "rail_height": 0.6})
-        assert has_effect(high_rail, high_rail.schema.settled(low_seat)[0], "has_rail", high_rail.parts(low_seat))
+        assert high_rail.violated({**low_seat, "has_rail": True, "rail_height": 0.6})
+        assert has_effect(high_rail, high_rail.schema.canonical(low_seat)[0], "has_rail", high_rail.parts(low_seat))
 
     def test_geometry_is_the_same_only_part_by_part(self) -> None:
         parts = PROGRAM.parts(BASE)
@@ -116,27 +116,27 @@ class TestEffect:
 class TestIntersection:
     @pytest.mark.parametrize(("gap", "met"), [(-0.2, True), (0.01, False), (3.0, False)])
     def test_boxes_side_by_side(self, gap: float, met: bool) -> None:
-        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2))) == met
-        assert meshes_meet(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2)), distance=0.02) == (gap < 0.02)
+        assert meshes_intersect(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2))) == met
+        assert meshes_intersect(box((1, 1, 1)), box((1, 1, 1), (1 + gap, 0.1, 0.2)), distance=0.02) == (gap < 0.02)
 
     def test_a_part_inside_another_meets_it_without_touching_its_surface(self) -> None:
         ball, crumb = ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2))
-        assert meshes_meet(ball, crumb)
-        assert meshes_meet(crumb, ball)
+        assert meshes_intersect(ball, crumb)
+        assert meshes_intersect(crumb, ball)
 
     def test_a_part_in_the_corner_of_a_box_around_another_does_not_meet_it(self) -> None:
-        assert not meshes_meet(ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2), (0.85, 0.85, 0.85)))
+        assert not meshes_intersect(ellipsoid((1, 1, 1)), box((0.2, 0.2, 0.2), (0.85, 0.85, 0.85)))
 
 
 class TestSampler:
-    def sampler(self, program: Program = PROGRAM, between: bool = False) -> Sampler:
-        return Sampler(program, Share(), between)
+    def sampler(self, program: Program = PROGRAM, off_grid: bool = False) -> Sampler:
+        return Sampler(program, Share(), off_grid)
 
     def test_there_is_a_cell_for_every_value(self) -> None:
-        assert len(cells(PROGRAM)) == 8 + 8 + 2 + 6
-        assert cells(PROGRAM)[8:10] == [("scale x", 0), ("scale x", 1)]
+        assert len(all_value_indices(PROGRAM)) == 8 + 8 + 2 + 6
+        assert all_value_indices(PROGRAM)[8:10] == [("scale x", 0), ("scale x", 1)]
 
-    @pytest.mark.parametrize("cell", cells(PROGRAM), ids=str)
+    @pytest.mark.parametrize("cell", all_value_indices(PROGRAM), ids=str)
     def test_a_found_shape_has_the_value_shown_valid_and_effective(self, cell: tuple[str, int]) -> None:
         name, index = cell
         sampler = self.sampler()
@@ -145,12 +145,12 @@ class TestSampler:
         for _ in range(6):
             values = sampler.find(cell, rng)
             assert values[name] == SCHEMA.by_name[name].values[index]
-            assert name in SCHEMA.settled(values)[1]
-            assert not PROGRAM.broken(values)
+            assert name in SCHEMA.canonical(values)[1]
+            assert not PROGRAM.violated(values)
             assert has_effect(PROGRAM, values, name, PROGRAM.parts(values))
             # The rail is half as thick again as it may be under the seat.
             assert not values["has_rail"] or values["height"] > values["rail_height"] + 0.05
-            texts.add(SCHEMA.text(values))
+            texts.add(SCHEMA.to_text(values))
         assert len(texts) == 6
 
     def test_reasons_of_refusal_are_counted_by_parameter(self) -> None:
@@ -163,7 +163,7 @@ class TestSampler:
         assert sampler.tried == 20 + sum(sampler.refused.values())
 
     def test_a_value_that_no_shape_can_have_is_named_with_the_reasons(self) -> None:
-        never = replace(PROGRAM, constraints=(Constraint("never", Rule("height < 0"), "."),))
+        never = replace(PROGRAM, constraints=(Constraint("never", Condition("height < 0"), "."),))
         with pytest.raises(
             ShardFailed, match=r"stool: no shape with height = 0\.4 in 2\d+ tries \(2\d+ breaks never\)"
         ):
@@ -184,7 +184,7 @@ class TestSampler:
     def test_a_finite_program_ends_when_all_its_shapes_are_found(self) -> None:
         sampler = self.sampler(BLOCK)
         rng = np.random.default_rng(1)
-        found = {BLOCK.schema.text(sampler.find(None, rng)) for _ in range(6)}
+        found = {BLOCK.schema.to_text(sampler.find(None, rng)) for _ in range(6)}
         assert len(found) == 6
         with pytest.raises(ShardFailed, match="alike"):
             sampler.find(None, rng)

@@ -26,37 +26,37 @@ any_values = st.fixed_dictionaries(
 
 @given(any_values)
 def test_json_gives_the_settled_values_back(values: dict[str, float]) -> None:
-    settled, _ = SCHEMA.settled(values)
-    assert SCHEMA.values(SCHEMA.text(values)) == settled
+    settled, _ = SCHEMA.canonical(values)
+    assert SCHEMA.from_text(SCHEMA.to_text(values)) == settled
 
 
 @given(any_values)
 def test_vector_gives_the_settled_values_back(values: dict[str, float]) -> None:
-    settled, _ = SCHEMA.settled(values)
-    back = SCHEMA.from_vector(SCHEMA.vector(values))
+    settled, _ = SCHEMA.canonical(values)
+    back = SCHEMA.from_vector(SCHEMA.to_vector(values))
     assert back == settled
     assert [type(each) for each in back.values()] == [float, float, bool, float]
 
 
 @given(grid_values)
 def test_classes_give_the_settled_values_of_the_grid_back(values: dict[str, float]) -> None:
-    settled, _ = SCHEMA.settled(values)
-    classes = SCHEMA.classes(values)
+    settled, _ = SCHEMA.canonical(values)
+    classes = SCHEMA.to_classes(values)
     assert SCHEMA.from_classes(classes) == settled
-    np.testing.assert_array_equal(SCHEMA.classes(SCHEMA.from_classes(classes)), classes)
+    np.testing.assert_array_equal(SCHEMA.to_classes(SCHEMA.from_classes(classes)), classes)
 
 
 @given(st.tuples(*(st.integers(0, each.classes - 1) for each in PROGRAM.parameters)))
 def test_any_classes_make_values_whose_classes_make_the_same_values(classes: tuple[int, ...]) -> None:
     values = SCHEMA.from_classes(classes)
-    assert SCHEMA.from_classes(SCHEMA.classes(values)) == values
+    assert SCHEMA.from_classes(SCHEMA.to_classes(values)) == values
 
 
 def test_a_hidden_parameter_has_the_last_class_its_base_and_no_place_in_the_text() -> None:
     values = {"height": 0.3, "scale x": 0.4, "has_rail": False, "rail_height": 0.6}
-    assert SCHEMA.classes(values).tolist() == [0, 0, 0, 6]
-    assert SCHEMA.settled(values)[0]["rail_height"] == 0.3
-    assert SCHEMA.text(values) == '{"height":0.3,"scale x":0.4,"has_rail":false}'
+    assert SCHEMA.to_classes(values).tolist() == [0, 0, 0, 6]
+    assert SCHEMA.canonical(values)[0]["rail_height"] == 0.3
+    assert SCHEMA.to_text(values) == '{"height":0.3,"scale x":0.4,"has_rail":false}'
 
 
 def test_what_hides_behind_a_hidden_parameter_is_decided_by_its_base() -> None:
@@ -67,25 +67,25 @@ def test_what_hides_behind_a_hidden_parameter_is_decided_by_its_base() -> None:
             binary("outer", True, "g", "."),
         )
     )
-    _, visible = schema.settled({"inner": True, "middle": True, "outer": False})
+    _, visible = schema.canonical({"inner": True, "middle": True, "outer": False})
     assert visible == {"outer"}
-    _, visible = schema.settled({"inner": True, "middle": True, "outer": True})
+    _, visible = schema.canonical({"inner": True, "middle": True, "outer": True})
     assert visible == {"inner", "middle", "outer"}
 
 
 @given(st.lists(any_values, min_size=1, max_size=5))
 def test_many_shapes_settle_as_each_does_alone(shapes: list[dict[str, float]]) -> None:
     columns = np.array([[float(values[name]) for values in shapes] for name in SCHEMA.by_name])
-    settled, visible = SCHEMA.settled_columns(columns)
+    settled, visible = SCHEMA.canonical_columns(columns)
     for place, values in enumerate(shapes):
-        alone, shown = SCHEMA.settled(values)
+        alone, shown = SCHEMA.canonical(values)
         assert SCHEMA.from_vector(settled[:, place]) == alone
         assert {name for name, each in zip(SCHEMA.by_name, visible[:, place], strict=True) if each} == shown
 
 
 def test_a_value_between_two_has_the_class_of_the_nearer() -> None:
-    assert SCHEMA.classes({**SCHEMA.base, "height": 0.44})[0] == 1
-    assert SCHEMA.classes({**SCHEMA.base, "height": 0.46})[0] == 2
+    assert SCHEMA.to_classes({**SCHEMA.base, "height": 0.44})[0] == 1
+    assert SCHEMA.to_classes({**SCHEMA.base, "height": 0.46})[0] == 2
 
 
 @pytest.mark.parametrize(
@@ -104,12 +104,12 @@ def test_a_value_between_two_has_the_class_of_the_nearer() -> None:
 )
 def test_a_wrong_text_is_refused_with_the_parameter_and_its_range(text: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        SCHEMA.values(text)
+        SCHEMA.from_text(text)
 
 
 def test_zero_has_one_text() -> None:
     schema = Schema((continuous("lean", -1, 1, 3, 0, "g", "."),))
-    assert schema.text(schema.values('{"lean": -0.0}')) == '{"lean":0.0}'
+    assert schema.to_text(schema.from_text('{"lean": -0.0}')) == '{"lean":0.0}'
 
 
 def test_wrong_classes_and_vectors_are_refused() -> None:

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from stages.programs.effect import has_effect
-from stages.programs.program import find_program, shape_of_text
+from stages.programs.program import find_program, shape_from_text
 from stages.programs.sampling import structure_digest
 from stages.shape.sample import Sample, read_samples
 from tests.mill import mill
@@ -21,8 +21,8 @@ STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
 EACH_VALUE = {"program": STOOL, "each_value": {"train": 2, "val": 1, "test": 1}, "splits": {"shards": 2}}
 SWEEP = {
     "program": RACK,
-    "mode": "sweep",
-    "sweep": {"samples": 200, "val": 0.2, "test": 0.15},
+    "mode": "random",
+    "random": {"samples": 200, "val": 0.2, "test": 0.15},
     "splits": {"shards": 1, "samples_per_shard": 60},
 }
 
@@ -76,11 +76,11 @@ def test_the_fixed_value_is_visible_and_takes_effect(stools: tuple[Path, str, Pa
     schema = STOOL_PROGRAM.schema
     for samples in shards_of(stools[2]).values():
         for sample in samples:
-            values, name = schema.values(sample.text), sample.lineage["parameter"]
+            values, name = schema.from_text(sample.text), sample.lineage["parameter"]
             assert name in json.loads(sample.text)
-            assert schema.classes(values)[list(schema.by_name).index(name)] == sample.lineage["class"]
+            assert schema.to_classes(values)[list(schema.by_name).index(name)] == sample.lineage["class"]
             assert has_effect(STOOL_PROGRAM, values, name, STOOL_PROGRAM.parts(values))
-            assert not STOOL_PROGRAM.broken(values)
+            assert not STOOL_PROGRAM.violated(values)
 
 
 @pytest.mark.parametrize("made", ["stools", "racks"])
@@ -95,9 +95,9 @@ def test_a_sample_is_its_parameters(stools: tuple[Path, str, Path]) -> None:
     sample = shards_of(stools[2])["toy-train-000000"][0]
     assert (sample.producer, sample.kit) == ("programs", STOOL)
     assert len(sample.assembly) == 0
-    values = STOOL_PROGRAM.schema.values(sample.text)
+    values = STOOL_PROGRAM.schema.from_text(sample.text)
     assert sample.graph == structure_digest(STOOL_PROGRAM, values)
-    assert len(shape_of_text(sample.kit, sample.text)) == len(STOOL_PROGRAM.parts(values))
+    assert len(shape_from_text(sample.kit, sample.text)) == len(STOOL_PROGRAM.parts(values))
 
 
 def test_any_number_of_workers_makes_the_same_bytes(stools: tuple[Path, str, Path]) -> None:

@@ -35,14 +35,14 @@ def test_labels_rules_and_parameters_are_declared_as_they_were(name: str) -> Non
     assert list(found["parameters"]) == list(parameters)
     assert found.pop("parameters") == {each: near(row) for each, row in parameters.items()}
     assert found == expected["declared"]
-    assert program.schema.text(program.schema.base) == expected["shapes"][0]["values"]
+    assert program.schema.to_text(program.schema.base) == expected["shapes"][0]["values"]
 
 
 @pytest.mark.parametrize("place", range(1 + len(SEEDS)))
 @pytest.mark.parametrize("name", program_names())
 def test_each_part_has_its_label_its_colour_its_volume_and_its_bounds(name: str, place: int) -> None:
     program, shape = find_program(name), truth(name)["shapes"][place]
-    found = measured(program.parts(program.schema.values(shape["values"])))
+    found = measured(program.parts(program.schema.from_text(shape["values"])))
     assert found == [near(part) for part in shape["parts"]]
 
 
@@ -50,7 +50,7 @@ def test_each_part_has_its_label_its_colour_its_volume_and_its_bounds(name: str,
 @pytest.mark.parametrize("name", program_names())
 def test_every_value_of_every_parameter_does_what_it_did(name: str, place: int) -> None:
     program, shape = find_program(name), truth(name)["shapes"][place]
-    values = program.schema.values(shape["values"])
+    values = program.schema.from_text(shape["values"])
     for parameter, expected in shape["swept"].items():
         assert swept(program, values, parameter) == [near(each) for each in expected], parameter
 

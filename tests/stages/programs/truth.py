@@ -16,7 +16,7 @@ import numpy as np
 from stages.programs.curves import Part
 from stages.programs.draws import Share
 from stages.programs.program import Program, find_program, program_names
-from stages.programs.repair import repaired
+from stages.programs.repair import repair
 from stages.programs.sampling import Sampler
 from stages.programs.schema import Values
 
@@ -33,9 +33,9 @@ def declared(program: Program) -> dict[str, Any]:
     """What a program says of itself: of each parameter its group, when it is visible, its base and its values."""
     return {
         "labels": list(program.labels),
-        "constraints": {each.name: each.rule.text for each in program.constraints},
+        "constraints": {each.name: each.condition.text for each in program.constraints},
         "apart": [list(pair) for pair in program.apart],
-        "elevation": program.elevation,
+        "elevation": program.view_elevation,
         "parameters": {
             each.name: [each.group, each.visible_if.text if each.visible_if else "", each.base, *each.values]
             for each in program.parameters
@@ -53,7 +53,7 @@ def swept(program: Program, values: Values, name: str) -> list[list[float]]:
     whole and the mean distance of its vertices from a point aside; nothing where no others would do."""
     found = []
     for value in program.schema.by_name[name].values:
-        changed = repaired(program, {**values, name: value}, {name})
+        changed = repair(program, {**values, name: value}, {name})
         meshes = [part.mesh for part in program.parts(changed)] if changed is not None else []
         away = [np.linalg.norm(mesh.vertices - ASIDE, axis=1) for mesh in meshes]
         found.append([sum(mesh.volume for mesh in meshes), float(np.concatenate(away).mean())] if meshes else [])
@@ -63,16 +63,16 @@ def swept(program: Program, values: Values, name: str) -> list[list[float]]:
 def described(program: Program) -> dict[str, Any]:
     """What stands in the program's file."""
     schema = program.schema
-    drawn = [Sampler(program, Share(), between=True).find(None, np.random.default_rng(seed)) for seed in SEEDS]
+    drawn = [Sampler(program, Share(), off_grid=True).find(None, np.random.default_rng(seed)) for seed in SEEDS]
     return {
         "declared": declared(program),
         "shapes": [
             {
-                "values": schema.text(values),
+                "values": schema.to_text(values),
                 "parts": measured(program.parts(values)),
                 "swept": {name: swept(program, values, name) for name in schema.by_name},
             }
-            for values in [schema.settled(schema.base)[0], *drawn]
+            for values in [schema.canonical(schema.base)[0], *drawn]
         ],
     }
 

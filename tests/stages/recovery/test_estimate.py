@@ -23,7 +23,7 @@ def believed() -> ParameterEstimate:
 
 def surprised(**changes: object) -> float:
     height = STOOL.schema.by_name["height"].values
-    settled, _ = STOOL.schema.settled({**TALL, "height": height[2], "has_rail": False, **changes})  # type: ignore[dict-item]
+    settled, _ = STOOL.schema.canonical({**TALL, "height": height[2], "has_rail": False, **changes})  # type: ignore[dict-item]
     flat = STOOL.schema.by_name["scale x"].values
     return believed().surprise(STOOL, {**settled, "scale x": (float(flat[0]) + float(flat[-1])) / 2.0})
 
@@ -45,7 +45,7 @@ def test_a_choice_surprises_by_how_much_less_likely_it_is() -> None:
 
 def test_a_value_that_is_held_impossible_is_only_unlikely() -> None:
     certain = ParameterEstimate({**believed().probabilities, "has_rail": np.array([1.0, 0.0])})
-    settled, _ = STOOL.schema.settled(TALL)
+    settled, _ = STOOL.schema.canonical(TALL)
     assert np.isfinite(certain.surprise(STOOL, settled))
 
 

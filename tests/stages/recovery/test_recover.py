@@ -49,7 +49,7 @@ def off_by(values: Values, truth: Values) -> float:
 
 def test_intervals_share_no_shape() -> None:
     texts = [
-        {STOOL.schema.text(each.values) for each in islice(random_shapes(STOOL, part, np.random.default_rng(0)), 60)}
+        {STOOL.schema.to_text(each.values) for each in islice(random_shapes(STOOL, part, np.random.default_rng(0)), 60)}
         for part in (TRAIN_INTERVAL, VALIDATION_INTERVAL, TEST_INTERVAL)
     ]
     assert not texts[0] & texts[1]
@@ -59,7 +59,7 @@ def test_intervals_share_no_shape() -> None:
 
 def test_random_shapes_are_valid_and_know_what_is_hidden() -> None:
     for each in islice(random_shapes(STOOL, TRAIN_INTERVAL, np.random.default_rng(1)), 40):
-        assert not STOOL.broken(each.values)
+        assert not STOOL.violated(each.values)
         assert (each.classes[3] == 6) == (not each.values["has_rail"])
 
 
@@ -156,7 +156,7 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
     said = json.loads((tmp_path / "recovered/mine.json").read_text())
     assert set(said["confidence"]) == set(said["parameters"])
     assert all(0.0 <= each <= 1.0 for each in said["confidence"].values())
-    assert off_by(STOOL.schema.values(json.dumps(said["parameters"])), STOOL.schema.base) > 0.0
+    assert off_by(STOOL.schema.from_text(json.dumps(said["parameters"])), STOOL.schema.base) > 0.0
     assert said["chamfer"] < said["chamfer_of_base"]
     assert trimesh.load_scene(tmp_path / "recovered/mine.glb").geometry
     assert (tmp_path / "recovered/mine.png").read_bytes().startswith(b"\x89PNG")

@@ -115,7 +115,7 @@ def test_a_sample_without_a_body_is_refused_and_counted(tmp_path: Path) -> None:
 def test_parts_that_a_program_makes_are_asked_whether_they_touch(tmp_path: Path) -> None:
     schema = find_program(STOOL).schema
     found, _ = judged(
-        tmp_path, Sample("stool", "train", "programs", STOOL, "0" * 64, {}, text=schema.text(schema.base))
+        tmp_path, Sample("stool", "train", "programs", STOOL, "0" * 64, {}, text=schema.to_text(schema.base))
     )
     assert found["stool"][CONTACTS] == [[0, 1], [0, 2], [1, 3], [2, 3]]
     assert found["stool"]["physics"]["stable"]

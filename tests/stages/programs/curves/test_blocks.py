@@ -21,7 +21,7 @@ from stages.programs.curves import (
     line,
     loft,
     loft_rings,
-    mesh_faults,
+    mesh_defects,
     polyline,
     rectangle,
     revolve,
@@ -37,7 +37,7 @@ from tests.stages.programs.curves.blocks import BLOCKS, DESIGN, STAR, wavy_grid
 @pytest.mark.parametrize("name", BLOCKS)
 def test_every_block_is_closed_oriented_outwards_and_two_manifold(name: str) -> None:
     mesh = BLOCKS[name]()
-    assert mesh_faults(mesh) == []
+    assert mesh_defects(mesh) == []
     assert mesh.vertices.dtype == np.float64
     assert mesh.quads.dtype == np.int32
 
@@ -91,7 +91,7 @@ def test_a_hollow_vessel_has_the_wall_it_asks_for() -> None:
 
 def test_a_vessel_may_have_its_foot_drawn() -> None:
     bowl = revolve(hollow(polyline([(0, 0), (0.3, 0), (0.35, 0.5)]), 0.02))
-    assert mesh_faults(bowl) == []
+    assert mesh_defects(bowl) == []
     middle = bowl.vertices[np.hypot(bowl.vertices[:, 0], bowl.vertices[:, 2]) < 1e-12]
     assert sorted(middle[:, 1].tolist()) == pytest.approx([0, 0.02])
 
@@ -124,7 +124,7 @@ def test_a_style_scales_where_it_says_and_closes_at_zero() -> None:
     ring = mesh.vertices[np.isclose(mesh.vertices[:, 1], 1.0)]
     assert np.ptp(ring, axis=0).tolist() == pytest.approx([0.4, 0, 0.1])
     assert np.isclose(mesh.vertices[:, 1], 4.0).sum() == 1
-    assert mesh_faults(mesh) == []
+    assert mesh_defects(mesh) == []
 
 
 def test_styles_that_leave_no_solid_are_refused() -> None:
@@ -162,8 +162,8 @@ def test_loft_blends_profiles() -> None:
 
 def test_loft_of_rings_in_space() -> None:
     ring = square_circle(1.0).curve("z").points
-    assert mesh_faults(loft_rings([ring, ring + np.array([0, 0, 1])])) == []
-    assert mesh_faults(loft_rings([ring, ring - np.array([0, 0, 1])])) == [
+    assert mesh_defects(loft_rings([ring, ring + np.array([0, 0, 1])])) == []
+    assert mesh_defects(loft_rings([ring, ring - np.array([0, 0, 1])])) == [
         "1 of 1 surfaces are inside out or enclose nothing"
     ]
 
@@ -206,7 +206,7 @@ def test_any_sweep_is_closed_or_refused(points, roundness, end, turn, cap) -> No
         # What hypothesis finds to refuse: points at one place, curves that turn back, a dome on a point.
         return
     # A rail may turn tighter than its profile is wide, which folds quads; everything else holds.
-    assert [fault for fault in mesh_faults(mesh) if "folded" not in fault] == []
+    assert [fault for fault in mesh_defects(mesh) if "folded" not in fault] == []
 
 
 @pytest.mark.parametrize("first", range(4))

@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from stages.programs.curves import mesh_faults
+from stages.programs.curves import mesh_defects
 from stages.programs.draws import draw
 from stages.programs.library.cabinet import PROGRAM, build
 from stages.programs.library.cabinet_dimensions import CabinetDimensions
@@ -19,8 +19,8 @@ def cabinets(count: int, **fixed: float) -> list[Values]:
     """Random cabinets with some values fixed, all valid."""
     schema = PROGRAM.schema
     columns = draw(schema, 2 * count, np.random.default_rng(4), True).columns
-    found = [schema.settled({**schema.from_vector(column), **fixed})[0] for column in columns.T]
-    return [values for values in found if not PROGRAM.broken(values)][:count]
+    found = [schema.canonical({**schema.from_vector(column), **fixed})[0] for column in columns.T]
+    return [values for values in found if not PROGRAM.violated(values)][:count]
 
 
 def test_the_cabinet_has_as_many_parameters_as_the_paper_says() -> None:
@@ -81,7 +81,7 @@ def test_handles_sit_on_their_fronts() -> None:
             if part.label == "handle":
                 low, high = part.mesh.bounds
                 held = [a for a, b in fronts if (a[:2] < low[:2]).all() and (high[:2] < b[:2]).all()]
-                assert len(held) == 1, PROGRAM.schema.text(values)
+                assert len(held) == 1, PROGRAM.schema.to_text(values)
 
 
 @pytest.mark.parametrize("kind", range(3))
@@ -89,7 +89,7 @@ def test_handles_of_the_lowest_doors_are_sound(kind: int) -> None:
     low = {"height": 0.7, "base_height": 0.24, "drawer_rows": 4, "drawer_share": 1.0, "open_columns": 0}
     for values in cabinets(20, **low, handle_type=kind, handle_size=0.0):
         for part in build(values):
-            assert part.label != "handle" or not mesh_faults(part.mesh), PROGRAM.schema.text(values)
+            assert part.label != "handle" or not mesh_defects(part.mesh), PROGRAM.schema.to_text(values)
 
 
 def test_handles_of_framed_drawers_reach_the_panel() -> None:

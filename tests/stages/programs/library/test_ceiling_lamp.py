@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from stages.programs.draws import draw
-from stages.programs.intersection import intersecting
+from stages.programs.intersection import intersecting_labels
 from stages.programs.library.ceiling_lamp import PROGRAM
 from stages.programs.schema import Values
 
 
 def test_random_lamps_hang_from_the_ceiling_with_a_bulb_on_each_arm() -> None:
-    columns = draw(PROGRAM.schema, 300, np.random.default_rng(22), between=True).columns
+    columns = draw(PROGRAM.schema, 300, np.random.default_rng(22), off_grid=True).columns
     for column in columns.T:
         values: Values = PROGRAM.schema.from_vector(column)
         parts = PROGRAM.parts(values)
@@ -31,4 +31,4 @@ def test_random_lamps_hang_from_the_ceiling_with_a_bulb_on_each_arm() -> None:
 def test_the_largest_bulbs_have_room_beside_each_other_however_short_their_arms() -> None:
     for count in range(1, 9):
         values = {"light_frame_count": count, "lightbulb_ radius": 0.1, "light_frame_end_point_y": 0.0, "base_x": 0.03}
-        assert intersecting(PROGRAM, PROGRAM.parts(PROGRAM.schema.complete(values))) is None
+        assert intersecting_labels(PROGRAM, PROGRAM.parts(PROGRAM.schema.complete(values))) is None

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.programs.curves import QuadMesh, mesh_faults
+from stages.programs.conditions import Condition
+from stages.programs.curves import QuadMesh, mesh_defects
 from stages.programs.draws import draw
 from stages.programs.effect import has_effect, same_geometry
 from stages.programs.library.chair import PROGRAM
 from stages.programs.parameters import Value
-from stages.programs.repair import repaired
-from stages.programs.rules import Rule
-from stages.programs.sheets import reveal
+from stages.programs.repair import repair
+from stages.programs.sheets import values_showing
 from stages.shape.kit import PartMesh
 
 PUBLISHED = Path(__file__).resolve().parents[5] / "shared" / "geocode" / "params_chair.json"
@@ -29,7 +29,7 @@ def random_chairs(count: int, seed: int) -> list[dict[str, Value]]:
     for between in (False, True):
         columns = draw(PROGRAM.schema, 4 * count, rng, between).columns
         every = (PROGRAM.schema.from_vector(column) for column in columns.T)
-        found += [values for values in every if not PROGRAM.broken(values)][: (count + 1) // 2]
+        found += [values for values in every if not PROGRAM.violated(values)][: (count + 1) // 2]
     return found[:count]
 
 
@@ -59,7 +59,7 @@ def check_whole(values: dict[str, Value]) -> None:
     parts = meshes_of(values)
     # Surfaces are looked at one by one; all at once is faster than mesh by mesh.
     meshes = [QuadMesh(part.vertices, np.column_stack([part.faces, part.faces[:, 2]])) for part in parts]
-    assert mesh_faults(QuadMesh.joined(meshes)) == [], values
+    assert mesh_defects(QuadMesh.joined(meshes)) == [], values
     assert {part.name for part in parts} <= set(PROGRAM.labels)
     assert min(part.bounds[0][1] for part in parts) == pytest.approx(0.0, abs=1e-9), values
     assert loose_parts(parts) == [], values
@@ -78,16 +78,16 @@ def test_table_is_the_published_one() -> None:
         kind = {"Boolean": "binary", "Integer": "discrete"}.get(row["type"], "continuous")
         assert (parameter.kind, list(parameter.values), parameter.base) == (kind, row["values"], row["base"])
         assert parameter.classes == row["n_classes"]
-    assert {each.rule.text for each in PROGRAM.constraints} == set(table["constraints"].values())
+    assert {each.condition.text for each in PROGRAM.constraints} == set(table["constraints"].values())
     rng = np.random.default_rng(3)
     for column in draw(PROGRAM.schema, 300, rng, False).columns.T:
         values = PROGRAM.schema.from_vector(column)
         shown = {row["name"] for row in table["params"] if row["visible_if"] is None or _holds(row, values)}
-        assert PROGRAM.schema.settled(values)[1] == shown
+        assert PROGRAM.schema.canonical(values)[1] == shown
 
 
 def _holds(row: dict[str, str], values: dict[str, Value]) -> bool:
-    return bool(Rule(row["visible_if"]).holds(values))
+    return bool(Condition(row["visible_if"]).holds(values))
 
 
 def test_table_has_the_published_size() -> None:
@@ -99,10 +99,10 @@ def test_table_has_the_published_size() -> None:
 @pytest.mark.parametrize("parameter", PROGRAM.parameters, ids=lambda each: each.name)
 def test_every_value_differs_from_every_other_where_it_is_seen(parameter: object) -> None:
     each = PROGRAM.schema.by_name[parameter.name]  # type: ignore[attr-defined]
-    shown = reveal(PROGRAM, each)
+    shown = values_showing(PROGRAM, each)
     made = []
     for value in each.values:
-        values = repaired(PROGRAM, {**shown, each.name: value}, {each.name})
+        values = repair(PROGRAM, {**shown, each.name: value}, {each.name})
         assert values is not None
         assert has_effect(PROGRAM, values, each.name, PROGRAM.parts(values)), (each.name, value)
         made.append(PROGRAM.parts(values))
@@ -113,7 +113,7 @@ def test_every_value_differs_from_every_other_where_it_is_seen(parameter: object
 def test_what_is_seen_takes_effect_in_random_chairs() -> None:
     for values in random_chairs(25, seed=11):
         parts = PROGRAM.parts(values)
-        for name in sorted(PROGRAM.schema.settled(values)[1]):
+        for name in sorted(PROGRAM.schema.canonical(values)[1]):
             assert has_effect(PROGRAM, values, name, parts), (name, values)
 
 
@@ -133,7 +133,7 @@ def test_extreme_chairs_are_whole() -> None:
     rng = np.random.default_rng(8)
     for _ in range(100):
         ends = {each.name: each.values[-int(rng.integers(2))] for each in PROGRAM.parameters}
-        values = repaired(PROGRAM, ends)
+        values = repair(PROGRAM, ends)
         assert values is not None
         check_whole(values)
 

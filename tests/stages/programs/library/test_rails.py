@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.programs.curves import circle, mesh_faults, polyline, sweep
+from stages.programs.curves import circle, mesh_defects, polyline, sweep
 from stages.programs.library.rails import eased
 
 
@@ -18,7 +18,7 @@ def test_a_tight_bend_is_eased_until_its_sweep_does_not_fold() -> None:
     t = np.linspace(-1.0, 1.0, 17)
     rail = np.column_stack([0.3 - t * t * 0.3, 0.05 * np.tanh(8.0 * t), 0.0 * t])
     girth = 0.04
-    assert mesh_faults(sweep(polyline(rail), circle(girth, 12)))
+    assert mesh_defects(sweep(polyline(rail), circle(girth, 12)))
     moved = eased(rail, np.full(17, girth))
     np.testing.assert_array_equal(moved[[0, -1]], rail[[0, -1]])
-    assert not mesh_faults(sweep(polyline(moved), circle(girth, 12)))
+    assert not mesh_defects(sweep(polyline(moved), circle(girth, 12)))

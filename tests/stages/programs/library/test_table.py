@@ -15,8 +15,8 @@ def tables(count: int, **fixed: float) -> list[Values]:
     """Random tables with some values fixed, all valid."""
     schema = PROGRAM.schema
     columns = draw(schema, 2 * count, np.random.default_rng(3), True).columns
-    found = [schema.settled({**schema.from_vector(column), **fixed})[0] for column in columns.T]
-    return [values for values in found if not PROGRAM.broken(values)][:count]
+    found = [schema.canonical({**schema.from_vector(column), **fixed})[0] for column in columns.T]
+    return [values for values in found if not PROGRAM.violated(values)][:count]
 
 
 def test_the_table_has_as_many_parameters_and_values_as_published() -> None:

@@ -15,7 +15,7 @@ from stages.programs.library.vessel import CrossSection, Wall
 
 
 def random_vases(count: int) -> list[dict[str, Any]]:
-    columns = draw(PROGRAM.schema, count, np.random.default_rng(21), between=True).columns
+    columns = draw(PROGRAM.schema, count, np.random.default_rng(21), off_grid=True).columns
     return [PROGRAM.schema.from_vector(column) for column in columns.T]
 
 
@@ -56,7 +56,7 @@ def test_no_handle_reaches_into_a_round_vase() -> None:
             x, y, z = handle.mesh.vertices.T
             within = (y > height[inner].min()) & (y < height[inner].max())
             cavity = np.interp(y, height[inner][order], radius[inner][order])
-            assert (np.hypot(x, z)[within] > cavity[within] - 0.004).all(), PROGRAM.schema.text(values)
+            assert (np.hypot(x, z)[within] > cavity[within] - 0.004).all(), PROGRAM.schema.to_text(values)
 
 
 @pytest.mark.parametrize("thickness", [0.01, 0.04, 0.07])

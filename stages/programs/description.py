@@ -8,7 +8,7 @@ from stages.programs.parameters import Parameter, Value
 from stages.programs.program import Program
 
 
-def recipe_markdown(program: Program) -> str:
+def program_markdown(program: Program) -> str:
     """A section of Markdown: what the program makes, a table of parameters for each group, its constraints, its part
     labels. Ends with a newline."""
     return "\n".join(_lines(program)) + "\n"
@@ -34,7 +34,8 @@ def _lines(program: Program) -> Iterator[str]:
     yield f"### Program `{program.name}`"
     yield ""
     yield (
-        f"{program.sentence} {len(program.parameters)} parameters with {values} values in all; {classes} classes where "
+        f"{program.description} {len(program.parameters)} parameters with {values} values in all; {classes}"
+        " classes where "
         "a hidden parameter counts as one more."
     )
     for group in schema.groups:
@@ -52,7 +53,7 @@ def _lines(program: Program) -> Iterator[str]:
                     parameter_range(each),
                     value_text(each.base),
                     visible,
-                    each.sentence,
+                    each.description,
                 ]
                 yield "| " + " | ".join(column.replace("|", "\\|") for column in columns) + " |"
     if program.constraints:
@@ -60,9 +61,9 @@ def _lines(program: Program) -> Iterator[str]:
         yield "A shape is valid when"
         yield ""
         for constraint in program.constraints:
-            yield f"- `{constraint.rule.text}`: {constraint.sentence}"
-    if program.apart:
+            yield f"- `{constraint.condition.text}`: {constraint.description}"
+    if program.non_intersecting:
         yield ""
-        yield f"Parts that never meet: {', '.join(f'`{a}` and `{b}`' for a, b in program.apart)}."
+        yield f"Parts that never meet: {', '.join(f'`{a}` and `{b}`' for a, b in program.non_intersecting)}."
     yield ""
     yield f"Part labels: {', '.join(f'`{label}`' for label in program.labels)}."

@@ -21,13 +21,13 @@ from pipeline.places import Places
 from pipeline.registry import find_stages
 from pipeline.survey import Survey
 from pipeline.task import Report, make_shard
+from stages.programs.conditions import Condition
 from stages.programs.curves import Part, box
 from stages.programs.parameters import discrete
 from stages.programs.program import Constraint, Program
-from stages.programs.rules import Rule
 from stages.programs.schema import Values
-from stages.programs.settings import SweepConfig
-from stages.programs.sweep import listed_shapes, plan_sweep
+from stages.programs.settings import RandomSamplingConfig
+from stages.programs.split_plan import listed_shapes, plan_splits
 from stages.shape.sample import Sample, read_samples
 from tests.stages.programs.lid import LID, PROGRAM, WIDTH, build
 from tests.stages.programs.rack import PROGRAM as RACK
@@ -47,7 +47,7 @@ def sunk(values: Values) -> Sequence[Part]:
 
 
 SUNK_PART = Part("lid", box((0.5, 0.3, 0.5), (0, 1, 0)), (180, 180, 180))
-SUNK = replace(HEAP, build=sunk, apart=(("case", "lid"),))
+SUNK = replace(HEAP, build=sunk, split_by=(("case", "lid"),))
 """All shapes with a lid are refused, which is known only when they are built."""
 
 Name = Callable[[Program], str]
@@ -74,7 +74,7 @@ def name_of(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Name:
 
 def make(folder: Path, program: str, samples: int, *stages: str) -> tuple[list[Report], list[Sample], list[str]]:
     """Run `stages` on a sweep, here and now: how each shard ended, all samples, and the report of the first stage."""
-    section = {"program": program, "mode": "sweep", "sweep": {"samples": samples}, "splits": {"shards": 2}}
+    section = {"program": program, "mode": "random", "random": {"samples": samples}, "splits": {"shards": 2}}
     small = {"points": {"uniform": 64}, "package": {"previewed": 2}}
     small["sketches"] = {"size": 48, "backend": "raster", "views": [{"name": "front"}]}
     path = folder / "toy.yaml"
@@ -145,8 +145,8 @@ def test_few_structures_are_shared_out_so_that_every_split_has_some(tmp_path: Pa
 
 def test_a_program_of_few_shapes_gives_as_many_as_asked_and_others_with_another_seed(name_of: Name) -> None:
     name = name_of(RACK_OF_ONE_WIDTH)
-    sweep = plan_sweep(name, SweepConfig(samples=10))
-    assert (sweep.sizes, sweep.existing) == ({"train": 8, "val": 1, "test": 1}, 24)
+    sweep = plan_splits(name, RandomSamplingConfig(samples=10))
+    assert (sweep.sizes, sweep.shape_count) == ({"train": 8, "val": 1, "test": 1}, 24)
     owned = [sweep.owned(split, 0, size)["listed"] for split, size in sweep.sizes.items()]
     assert owned == [[0, 19], [19, 21], [21, 24]]
     first, second = listed_shapes(name, 1), listed_shapes(name, 2)
@@ -175,14 +175,14 @@ def test_a_program_whose_shapes_are_all_refused_fails_and_says_why(tmp_path: Pat
 
 
 def test_constraints_that_leave_no_shape_are_told_before_anything_starts(tmp_path: Path, name_of: Name) -> None:
-    never = replace(HEAP, constraints=(Constraint("never", Rule("boxes > 9"), "."),))
+    never = replace(HEAP, constraints=(Constraint("never", Condition("boxes > 9"), "."),))
     with pytest.raises(ConfigError, match="no combination of its parameters keeps all its constraints"):
         make(tmp_path, name_of(never), 100)
 
 
 def test_structures_that_no_valid_shape_has_get_no_split(tmp_path: Path, name_of: Name) -> None:
     # Of three numbers of boxes one is left: a split that owned the others would wait for ever.
-    only = replace(THREE, constraints=(Constraint("one", Rule("boxes < 2"), "."),))
+    only = replace(THREE, constraints=(Constraint("one", Condition("boxes < 2"), "."),))
     _, samples, _ = make(tmp_path, name_of(only), 30)
     assert splits_of(samples) == {"train": 24, "val": 3, "test": 3}
     assert {sample.lineage["apart"] for sample in samples} == {"values"}

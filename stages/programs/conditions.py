@@ -31,7 +31,7 @@ _ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 @dataclass(frozen=True)
-class Rule:
+class Condition:
     """A rule such as `is_monoleg and (not is_monoleg_tent or monoleg_tent_pct < 0.4)`.
 
     Raises ValueError when it is made of anything else than the file's first lines say.

@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from stages.programs.curves.curve import Axis
-from stages.programs.curves.poses import mirroring, rotation, translation
+from stages.programs.curves.transforms import mirroring, rotation, translation
 from stages.shape.arrays import FloatArray
 
 Moved = TypeVar("Moved", bound="Movable")

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from stages.programs.rules import Rule
+from stages.programs.conditions import Condition
 
 TEXTS = [
     "( not a ) and ( not b or not c )",
@@ -20,7 +20,7 @@ TEXTS = [
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_rule_means_what_it_means_in_python(text: str) -> None:
-    rule = Rule(text)
+    rule = Condition(text)
     for a, b, c in itertools.product([0, 1, 2, 0.35], repeat=3):
         values = {"a": a, "b": b, "c": c}
         assert rule.holds(values) == bool(eval(text, {}, values))
@@ -31,11 +31,11 @@ def test_a_rule_asked_of_arrays_answers_for_each_element(text: str) -> None:
     rows = np.array(list(itertools.product([0, 1, 2, 0.35], repeat=3)))
     columns = dict(zip("abc", rows.T, strict=True))
     expected = [bool(eval(text, {}, dict(zip("abc", row, strict=True)))) for row in rows.tolist()]
-    np.testing.assert_array_equal(Rule(text).holds(columns), expected)
+    np.testing.assert_array_equal(Condition(text).holds(columns), expected)
 
 
 def test_names_stand_in_the_order_of_their_first_mention() -> None:
-    assert Rule("b > 1 and (a or b)").names == ("b", "a")
+    assert Condition("b > 1 and (a or b)").names == ("b", "a")
 
 
 @pytest.mark.parametrize(
@@ -43,4 +43,4 @@ def test_names_stand_in_the_order_of_their_first_mention() -> None:
 )
 def test_what_is_no_rule_is_refused_with_its_text(text: str) -> None:
     with pytest.raises(ValueError, match="rule"):
-        Rule(text)
+        Condition(text)

@@ -2,14 +2,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stages.programs.recipe import recipe_markdown
-from stages.programs.rules import Rule
+from stages.programs.conditions import Condition
+from stages.programs.description import program_markdown
 from tests.stages.programs.stool import PROGRAM
 
 
 def test_recipe_tells_every_parameter_constraint_and_label() -> None:
     assert (
-        recipe_markdown(PROGRAM)
+        program_markdown(PROGRAM)
         == """\
 ### Program `stool`
 
@@ -42,12 +42,12 @@ Part labels: `seat`, `leg`, `rail`.
 
 
 def test_a_bar_in_a_sentence_does_not_end_its_column() -> None:
-    barred = replace(PROGRAM.parameters[0], sentence="Low | high.")
-    assert r"| Low \| high. |" in recipe_markdown(replace(PROGRAM, parameters=(barred, *PROGRAM.parameters[1:])))
+    barred = replace(PROGRAM.parameters[0], description="Low | high.")
+    assert r"| Low \| high. |" in program_markdown(replace(PROGRAM, parameters=(barred, *PROGRAM.parameters[1:])))
 
 
 def test_a_program_without_constraints_says_nothing_of_them() -> None:
-    free = recipe_markdown(replace(PROGRAM, constraints=(), apart=()))
+    free = program_markdown(replace(PROGRAM, constraints=(), non_intersecting=()))
     assert "valid when" not in free
     assert "never meet" not in free
-    assert Rule("has_rail").text in free
+    assert Condition("has_rail").text in free

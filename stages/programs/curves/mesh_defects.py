@@ -9,7 +9,7 @@ from stages.programs.curves.vectors import cross, dots
 from stages.shape.arrays import IntArray
 
 
-def mesh_faults(mesh: QuadMesh) -> list[str]:
+def mesh_defects(mesh: QuadMesh) -> list[str]:
     """Every way in which a mesh is not closed, oriented outwards and two-manifold, one sentence each; none is good.
 
     Checks finite numbers, indices, unused vertices, faces without area, folded quads, open edges, edges of more than

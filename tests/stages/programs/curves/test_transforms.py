@@ -19,7 +19,7 @@ from stages.programs.curves import (
     joined,
     line,
     linear,
-    mesh_faults,
+    mesh_defects,
     mirroring,
     polyline,
     radial,
@@ -62,7 +62,7 @@ def test_stretch_spans_two_attachments_and_keeps_the_cross_section() -> None:
     assert moved(matrix, 1, 0, 0) == pytest.approx(end)
     long = rail.transformed(matrix)
     assert long.volume == pytest.approx(rail.volume * np.linalg.norm(end - start))
-    assert mesh_faults(long) == []
+    assert mesh_defects(long) == []
     grown = stretch(((0, 0, 0), (1, 0, 0)), (start, end), uniform=True)
     assert np.linalg.det(grown[:3, :3]) == pytest.approx(np.linalg.norm(end - start) ** 3)
     with pytest.raises(ValueError, match="move the attachments apart"):
@@ -92,7 +92,7 @@ def test_copies_stand_where_they_should_and_keep_label_and_color() -> None:
     assert evenly(1, 0.2, 0.8).tolist() == [0.5]
     for part in symmetric(radial([PEG], 3), "x"):
         assert (part.label, part.color) == ("peg", (1, 2, 3))
-        assert mesh_faults(part.mesh) == []
+        assert mesh_defects(part.mesh) == []
 
 
 def test_a_matrix_that_flattens_is_refused() -> None:
