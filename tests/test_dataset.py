@@ -41,7 +41,7 @@ def write_config(folder: Path) -> Path:
         "seed": 3,
         "license": "MIT",
         "exemplars": {"kits": kits},
-        "variations": {"per_kit": 40, "splits": {"shards": 2}},
+        "variations": {"samples_per_kit": 40, "splits": {"shards": 2}},
         "points": {"uniform": 256},
         "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
         "package": {"previewed": 4},

@@ -21,7 +21,7 @@ from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.kit import Assembly, Kit
-from stages.variations.novelty.copied_pieces import CopyTest
+from stages.variations.novelty.copied_pieces import CopyDetector
 
 COLUMNS = (
     "shapes of",
@@ -79,7 +79,7 @@ def dream_row(name: str, kit: Kit, dreams: Sequence[Dream], learnt: Sequence[Dre
     graphs = [graph_digest(each.types, each.edges) for each in shapes]
     themselves = dreams is learnt
     table = DockingTable.of(kit)
-    test = CopyTest(kit, table)
+    test = CopyDetector(kit, table)
     copied = [test.copied(each, table.label_edges(each.types, each.poses, each.edges)) for each in shapes]
     histograms = _histograms(kit, shapes)
     return (

@@ -16,7 +16,7 @@ from eval.engine.models import TrainedModel, trained_models
 from eval.engine.table import Cell, ReferenceRow, Table
 from pipeline.randomness import decision_rng
 from stages.shape.assembly_faults import assembly_faults
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.string_sampling.instantiation.guidance import WITHOUT_GUIDE, Guide, guide_of
@@ -95,7 +95,7 @@ def dream_rng(seed: int, model: str) -> np.random.Generator:
 
 def instantiator_of(subject: DatasetRun, kit: Kit) -> Instantiator:
     """What puts graphs of a kit together, its parts upright where variants of the config are."""
-    return Instantiator(ContactAnswers(kit), subject.config.section(VariationsConfig).search.upright)
+    return Instantiator(ContactOracle(kit), subject.config.section(VariationsConfig).search.upright)
 
 
 def edge_categories(folder: Path, kit: Kit) -> list[TrainedModel[TrainedEdgeCategories]]:

@@ -10,9 +10,9 @@ import numpy as np
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
-from stages.variations.substructures.alignments import find_moves
+from stages.variations.substructures.alignments import find_region_swaps
 from stages.variations.substructures.docking_sites import contact_graph
-from stages.variations.substructures.region_swaps import Moves
+from stages.variations.substructures.region_swaps import RegionSwaps
 
 LARGEST = 0.5
 """Share of the surface that a piece has at most: to exchange more is to exchange the rest."""
@@ -40,7 +40,7 @@ def known_exchanges(kit: Kit) -> list[Exchange]:
     """
     assembly = kit.exemplars[0].whole
     graph = contact_graph(kit, assembly, np.zeros((len(assembly.edges), 2), dtype=np.int32))
-    moves = find_moves(kit, {"y": 1, "z": 2}[kit.up], (assembly, graph), (assembly, graph))
+    moves = find_region_swaps(kit, {"y": 1, "z": 2}[kit.up], (assembly, graph), (assembly, graph))
     area = _areas(kit, assembly)
     found: dict[frozenset[bytes], Exchange] = {}
     for motion in range(len(moves.motions)):
@@ -62,7 +62,7 @@ def _areas(kit: Kit, assembly: Assembly) -> FloatArray:
     return shares
 
 
-def _elementary(kit: Kit, assembly: Assembly, moves: Moves, motion: int) -> Iterator[BoolArray]:
+def _elementary(kit: Kit, assembly: Assembly, moves: RegionSwaps, motion: int) -> Iterator[BoolArray]:
     """The least sets of regions along a motion that can change places, by their numbers, bool (n + n,)."""
     regions, near = moves.regions[motion], assembly.neighbours()
     count = len(assembly)

@@ -31,8 +31,8 @@ from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import kit_shape
-from stages.variations.novelty.low_diversity import COPIED
-from stages.variations.requirements.required_labels import carcass
+from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
+from stages.variations.requirements.required_labels import spanning_labels
 from stages.variations.settings import CHOSEN_CARCASS, CHOSEN_COPIED, CHOSEN_STABLE
 
 
@@ -141,7 +141,7 @@ def resolve_max_copied(finds: TrialResult | None) -> tuple[float, str]:
     if finds.telling < MIN_NON_COPY_RATE:
         return 1.0, f"only {finds.telling:.0%} of the finds of a short search are no near copies"
     beside = f"{finds.telling:.0%} of the finds of a short search are none"
-    return COPIED, f"refuses copies with little beside them; {beside}"
+    return NEAR_COPY_SHARE, f"refuses copies with little beside them; {beside}"
 
 
 def _required(sight: ContactAnalysis, rungs: Sequence[CandidateSetting]) -> dict[str, tuple[Any, str]]:
@@ -150,7 +150,7 @@ def _required(sight: ContactAnalysis, rungs: Sequence[CandidateSetting]) -> dict
         nothing = "there is nothing to search"
         return {CHOSEN_COPIED: resolve_max_copied(None), CHOSEN_STABLE: (False, nothing), CHOSEN_CARCASS: ((), nothing)}
     kit, finds = sight.kit(rungs[-1].setting), rungs[-1].finds
-    spanning = carcass(kit)
+    spanning = spanning_labels(kit)
     why = (
         "the exemplars have parts of these as large as themselves" if spanning else "no part is as large as an exemplar"
     )

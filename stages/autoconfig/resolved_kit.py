@@ -15,7 +15,7 @@ from stages.exemplars.identify import IdentifiedParts, identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.variations.settings import CHOSEN_COPIED
 
 PARTS_KEY = "parts"
@@ -91,4 +91,4 @@ def _is_dataset(reading: ResolvedKit, tries: int) -> bool:
     if built.refusals:
         return False
     copied = choices.values.get(CHOSEN_COPIED, 1.0)
-    return not estimate_yield(built.kit, ContactAnswers(built.kit), tries, choices.finds.graphs, copied=copied).is_poor
+    return not estimate_yield(built.kit, ContactOracle(built.kit), tries, choices.finds.graphs, copied=copied).is_poor

@@ -11,11 +11,11 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.contact_analysis import ContactAnalysis, Setting
 from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.trial_search import MAX_GROWTH_DEGREE, TrialResult, TrialSearch
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
-from stages.variations.novelty.copied_pieces import CopyTest
-from stages.variations.novelty.low_diversity import COPIED
+from stages.variations.novelty.copied_pieces import CopyDetector
+from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.settings import CHOSEN_HUBS
 
 SUFFICIENT_GRAPHS = 80
@@ -96,7 +96,7 @@ class CandidateSetting:
 def has_low_diversity(finds: TrialResult) -> bool:
     """Whether finds look like an exemplar, or like each other; near copies do no harm where enough are none, for then
     they are refused, nor by meaning."""
-    copies = finds.copied >= COPIED and finds.telling < MIN_NON_COPY_RATE and not finds.by_meaning
+    copies = finds.copied >= NEAR_COPY_SHARE and finds.telling < MIN_NON_COPY_RATE and not finds.by_meaning
     return finds.distance < MIN_EXEMPLAR_DISTANCE or finds.spread < MIN_PAIR_DISTANCE or copies
 
 
@@ -114,8 +114,8 @@ def search_settings(sight: ContactAnalysis, rails: SearchSpace, tries: int) -> l
     one that is tried.
     """
     tried: list[CandidateSetting] = []
-    known: dict[tuple[ContactKind, ...], ContactAnswers] = {}
-    copies: dict[Setting, CopyTest] = {}
+    known: dict[tuple[ContactKind, ...], ContactOracle] = {}
+    copies: dict[Setting, CopyDetector] = {}
     looked: dict[Setting, CandidateSetting | None] = {}
 
     def look(setting: Setting) -> CandidateSetting | None:
@@ -126,11 +126,11 @@ def search_settings(sight: ContactAnalysis, rails: SearchSpace, tries: int) -> l
             return None
         kit = sight.kit(setting)
         if setting.kinds not in known:
-            known[setting.kinds] = ContactAnswers(kit)
+            known[setting.kinds] = ContactOracle(kit)
         answers = known[setting.kinds].under(kit)
         any_grammar = replace(setting, grammar=CANDIDATE_GRAMMARS[0])
         if any_grammar not in copies:
-            copies[any_grammar] = CopyTest(kit, answers.dockings)
+            copies[any_grammar] = CopyDetector(kit, answers.dockings)
         return _rung(answers, setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS, copies[any_grammar])
 
     for setting in _settings(sight, rails):
@@ -157,7 +157,7 @@ def search_settings(sight: ContactAnalysis, rails: SearchSpace, tries: int) -> l
 
 
 def _rung(
-    answers: ContactAnswers, setting: Setting, tries: int, kept: float, required: float, copies: CopyTest
+    answers: ContactOracle, setting: Setting, tries: int, kept: float, required: float, copies: CopyDetector
 ) -> CandidateSetting:
     """The first tries, and more where they found something that differs. Where hubs are left out, finds must get back
     those that are `required` of a variant. `copies`: as for Search."""

@@ -22,7 +22,7 @@ def plan(plan: Plan) -> list[Shard]:
     """One shard for each kit that leaves a key open; its params hold the kit's config, its models' digests, and what
     variants must be that is open, too."""
     variations = plan.config.section(VariationsConfig)
-    left_open = variations.require.auto_keys if variations.per_kit else ()
+    left_open = variations.require.auto_keys if variations.samples_per_kit else ()
     if variations.search.sub_assemblies:  # what is asked for by this name has no carcass
         left_open = tuple(key for key in left_open if key != CHOSEN_CARCASS)
     return [
@@ -44,7 +44,7 @@ def run_shard(task: Task) -> Outcome:
     from stages.autoconfig.resize_fallback import resize_fallback
     from stages.autoconfig.resolved_kit import read_and_resolve
     from stages.inspection.report import foreseen
-    from stages.shape.geometry.contact_oracle import ContactAnswers
+    from stages.shape.geometry.contact_oracle import ContactOracle
 
     config = KitConfig.model_validate_json(json.dumps(task.shard.params["kit"]))
     limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(AutoconfigConfig).max_tries
@@ -53,7 +53,7 @@ def run_shard(task: Task) -> Outcome:
     if task.shard.params["instead"] and not choices.enough:
         built = reading.observe(choices.values)
         if not built.refusals:
-            expected = foreseen(config, reading, ContactAnswers(built.kit), tries)
+            expected = foreseen(config, reading, ContactOracle(built.kit), tries)
             instead = resize_fallback(reading, expected, shown=0)
             choices = choices if instead is None else instead.choices
     made = choices.as_json()

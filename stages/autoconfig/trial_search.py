@@ -10,15 +10,15 @@ from typing import Any, Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
-from stages.variations.novelty.copied_pieces import CopyTest
-from stages.variations.novelty.low_diversity import COPIED
-from stages.variations.requirements.hub_restoration import NO_BACKDROP, Backdrop
-from stages.variations.requirements.required_labels import NO_CARCASS, carcass, carcass_test
+from stages.variations.novelty.copied_pieces import CopyDetector
+from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
+from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, HubRestorer
+from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test, spanning_labels
 from stages.variations.search.search import Search, Variant
 from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig
@@ -84,11 +84,11 @@ class TrialSearch:
 
     def __init__(
         self,
-        answers: ContactAnswers,
+        answers: ContactOracle,
         rng: np.random.Generator,
         hubs: float = 0,
         copied: float = 1.0,
-        copies: CopyTest | None = None,
+        copies: CopyDetector | None = None,
     ) -> None:
         self.kit = answers.kit
         self.variants: list[Variant] = []
@@ -96,15 +96,15 @@ class TrialSearch:
         self._known: set[int] = set()
         self._copied, self._hubs = copied, hubs
         self._refused = Counter[str]()
-        self._has_carcass = carcass_test(self.kit, carcass(self.kit))
-        self._backdrop = Backdrop(answers, upright=True)
+        self._has_carcass = labels_test(self.kit, spanning_labels(self.kit))
+        self._backdrop = HubRestorer(answers, upright=True)
         self._tries = 0
         widest = max(int(np.bincount(each.assembly.edges.ravel(), minlength=1).max()) for each in self.kit.exemplars)
         methods = TRIAL_METHODS if widest <= MAX_GROWTH_DEGREE else TRIAL_METHODS[:1]
         slotted = self.kit.grammar.strictness in SLOT_LEVELS
         self._slots = SlotGrammar(self.kit, answers.dockings, TRIAL_CONFIG.upright) if slotted else None
         same = {"duplicates": "histogram"} if self.kit.by_meaning else {}
-        copies = copies or CopyTest(self.kit, answers.dockings)
+        copies = copies or CopyDetector(self.kit, answers.dockings)
         self._searches = [
             Search(answers, TRIAL_CONFIG.model_copy(update={"method": method, **same}), self._slots, copies)
             for method in methods
@@ -135,7 +135,7 @@ class TrialSearch:
             self._tries += used
             left[number] = left[number] - used if found else 0
             whole = [each for each in found if self._is_whole(each.assembly)]
-            telling = [each for each in whole if each.lineage["copied"]["largest"] <= self._copied]
+            telling = [each for each in whole if each.lineage["copied"]["share"] <= self._copied]
             keys = [search.key(each.assembly.types, each.graph, each.graph) for each in telling]
             self.variants.extend(each for each, key in zip(telling, keys, strict=True) if key not in self._known)
             self._known.update(keys)
@@ -143,10 +143,10 @@ class TrialSearch:
     def _is_whole(self, assembly: Assembly) -> bool:
         """Whether a find has what makes it one; what it lacks is counted."""
         if not self._has_carcass(assembly):
-            self._refused[NO_CARCASS] += 1
+            self._refused[LABELS_MISSING] += 1
             return False
         if self._hubs and not self._backdrop.has_hubs(self._hubs, self._backdrop.fit(assembly)):
-            self._refused[NO_BACKDROP] += 1
+            self._refused[HUBS_NOT_RESTORED] += 1
             return False
         return True
 
@@ -161,7 +161,7 @@ class TrialSearch:
         exemplars = type_counts(self.kit, [each.assembly.types for each in self.kit.exemplars])
         if not self.variants:
             return TrialResult(self._tries, 0, 0, 0.0, 0.0, rejects=dict(rejects.most_common()))
-        whole = np.array([each.lineage["copied"]["largest"] for each in self.variants])
+        whole = np.array([each.lineage["copied"]["share"] for each in self.variants])
         taken = farthest_first(counts, exemplars, min(MAX_MOST_DIFFERENT, len(counts)))
         chosen = counts[taken]
         near = histogram_metric(chosen[:, None], exemplars[None]).min(axis=1)
@@ -173,7 +173,7 @@ class TrialSearch:
             distance=round(float(near.mean()), 4),
             spread=round(float(np.median(apart)), 4) if len(apart) else 0.0,
             copied=round(float(np.median(whole)), 4),
-            telling=round(float(np.mean(whole <= COPIED)), 4),
+            telling=round(float(np.mean(whole <= NEAR_COPY_SHARE)), 4),
             familiar=self._familiar([self.variants[place].assembly for place in taken.tolist()]),
             by_meaning=self.kit.by_meaning,
             most_different=tuple(taken.tolist()),

@@ -11,7 +11,7 @@ from pipeline.randomness import decision_rng
 from stages.autoconfig.lost_support import lost_support
 from stages.autoconfig.setting_search import MIN_USEFUL_GRAPHS, has_low_diversity
 from stages.autoconfig.trial_search import TrialResult, TrialSearch
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns, seen_once
 from stages.shape.kit import Kit
 from stages.variations.report.advice import another_model, what_keeps
@@ -59,7 +59,7 @@ class YieldEstimate:
 
 
 def estimate_yield(
-    kit: Kit, answers: ContactAnswers, tries: int, known: int = 0, hubs: float = 0, copied: float = 1.0
+    kit: Kit, answers: ContactOracle, tries: int, known: int = 0, hubs: float = 0, copied: float = 1.0
 ) -> YieldEstimate:
     """Search a kit for a little while. `answers` are those of `kit`; what is random depends on the kit alone. `known`:
     how many graphs a probe has found in it: where there are any, a first search in vain is no answer; `hubs`, `copied`:

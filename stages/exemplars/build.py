@@ -110,7 +110,7 @@ def observe_parts(config: KitConfig, models: Sequence[Model], identified: Identi
         assemblies, kinds, backdrops = contacts.counted, contacts.kinds, [NOTHING] * len(touching)
     else:
         # Classes of dockings, their order and their poses are those of the parts that are seen.
-        backdrop = hubs if config.hubs.keep == "backdrop" else ()
+        backdrop = hubs if config.hubs.restore else ()
         seen = [with_touching_types(each, keep, backdrop) for each, keep in zip(contacts.counted, kept, strict=True)]
         everything = [each.select(parts) for each, parts in zip(touching, seen, strict=True)]
         used = np.unique(np.concatenate([each.types for each in everything]))

@@ -68,8 +68,8 @@ class HubConfig(StrictModel):
         description="Part types left out of the shape graph of the search: none, a list of type names (in quotes where "
         "they are numbers), or, with `auto`, those of the highest degree, one after another, as far as it helps.",
     )
-    keep: Literal["drop", "backdrop"] = Field(
-        "backdrop",
+    restore: bool = Field(
+        True,
         description="What becomes of hub parts: they are not in the shapes, or every finished variant gets them back "
         "where they fit: where a hub has three quarters of the neighbours that one of its type had in an exemplar, "
         "and touches nothing in a way that no exemplar shows.",

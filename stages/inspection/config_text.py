@@ -93,13 +93,16 @@ def variations_section(
     lines = [
         "variations:",
         _line(
-            1, "per_kit", wanted, "more than there may be" if wanted < MAX_SAMPLES_REQUESTED else "raise it for more"
+            1,
+            "samples_per_kit",
+            wanted,
+            "more than there may be" if wanted < MAX_SAMPLES_REQUESTED else "raise it for more",
         ),
         "  search:",
         _line(2, "duplicates", *_DUPLICATES[config.types == "meaning"]),
         "  require:",
     ]
-    if config.resolved().hubs and config.hubs.keep == "backdrop":
+    if config.resolved().hubs and config.hubs.restore:
         lines.append(
             _line(2, "hubs", CHOSEN_HUBS, "a variant with a smaller share of what the exemplars have is refused")
         )
@@ -115,9 +118,14 @@ def proportions_section(different: int, stable: bool, why: str, layouts: str) ->
     more = "raise it for more" if different >= MAX_SAMPLES_REQUESTED else "that differ by proportions.apart"
     return [
         "variations:",
-        _line(1, "per_kit", 0, f"other layouts: {layouts}"),
+        _line(1, "samples_per_kit", 0, f"other layouts: {layouts}"),
         "proportions:",
-        _line(1, "per_kit", min(different, MAX_SAMPLES_REQUESTED), f"the same parts longer, wider, thicker; {more}"),
+        _line(
+            1,
+            "samples_per_kit",
+            min(different, MAX_SAMPLES_REQUESTED),
+            f"the same parts longer, wider, thicker; {more}",
+        ),
         "  require:",
         _line(2, "stable", stable, why),
     ]

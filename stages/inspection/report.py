@@ -17,12 +17,12 @@ from stages.exemplars.identify import identify_parts
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig, ReadLimits
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import Shape, kit_shape
-from stages.variations.requirements.hub_restoration import Backdrop, hubs_by_choice
-from stages.variations.selection.orientation import Facing
+from stages.variations.requirements.hub_restoration import HubRestorer, auto_min_hubs
+from stages.variations.selection.orientation import OrientationFix
 from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
 
 ACROSS = (
@@ -117,15 +117,15 @@ def inspect_models(
         seen = reading.observe({**choices.values, "hubs.types": "none", "disconnected": "error"})
     expected, assemblies, rate = None, [], 0.0
     if not built.refusals:
-        answers = ContactAnswers(built.kit)
+        answers = ContactOracle(built.kit)
         begun = time.process_time()
         expected = foreseen(config, reading, answers, tries)
         rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
-        backdrop = Backdrop(answers, upright=True)
+        backdrop = HubRestorer(answers, upright=True)
         asked = Requirements(stable=choices.values[CHOSEN_STABLE])
         fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
         kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
-        facing = Facing(built.kit)
+        facing = OrientationFix(built.kit)
         assemblies = [facing.turned_back(each, facing.turn(each)) for each in islice(kept, MAX_SHAPES_SHOWN)]
     shapes = [kit_shape(built.kit, each) for each in assemblies]
     proportioned = None
@@ -140,12 +140,12 @@ def inspect_models(
     )
 
 
-def foreseen(asked: KitConfig, reading: ResolvedKit, answers: ContactAnswers, tries: int) -> YieldEstimate:
+def foreseen(asked: KitConfig, reading: ResolvedKit, answers: ContactOracle, tries: int) -> YieldEstimate:
     """What a short search promises of the layouts of the kit of `answers`, which is built as `reading` has chosen of
     what `asked` leaves open."""
     choices = reading.choices
     known = choices.finds.graphs if choices.finds is not None else 0
-    hubs = hubs_by_choice(asked, answers.kit)
+    hubs = auto_min_hubs(asked, answers.kit)
     return estimate_yield(answers.kit, answers, tries, known, hubs, choices.values.get(CHOSEN_COPIED, 1.0))
 
 

@@ -89,7 +89,7 @@ def _own_fields() -> dict[str, dict[str, Any]]:
                         **_numbers(4, 4),
                         "description": "moves the part's mesh from its own coordinates into those of the shape; a "
                         "4x4 matrix, row by row, for column vectors; rigid, but of a part that was stretched "
-                        "(lineage.bent)",
+                        "(lineage.deformed)",
                     },
                 }
             ),

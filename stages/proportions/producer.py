@@ -9,8 +9,8 @@ from stages.shape.collection.producer import Producer
 
 PRODUCER = Producer(
     language="proportions",
-    keys="proportions.per_kit",
-    asked=lambda config: config.section(ProportionsConfig).per_kit > 0,
+    keys="proportions.samples_per_kit",
+    asked=lambda config: config.section(ProportionsConfig).samples_per_kit > 0,
     sentence="exemplars are made anew in other proportions: along each axis the lengths between the ends of their "
     "parts are multiplied, equal ones alike, by one map of all of space, so that what touches goes on touching; "
     "a shape's factors are its `txt`.",

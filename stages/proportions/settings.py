@@ -23,7 +23,7 @@ class ProportionSplitConfig(StrictModel):
 class ProportionsConfig(StrictModel):
     """The exemplars of all kits in other proportions."""
 
-    per_kit: int = Field(
+    samples_per_kit: int = Field(
         0,
         ge=0,
         le=MOST,

@@ -41,9 +41,9 @@ def plan(plan: Plan) -> list[Shard]:
     """The lanes of all kits; the choice; when that is made, the shards of the collection. What they are to make is in
     their params: it is asked for by the own section, or comes instead of layouts."""
     config = _wanted(plan)
-    if not config.per_kit:
+    if not config.samples_per_kit:
         return []
-    asked = config.model_dump(mode="json", include={"per_kit", "splits", "require"})
+    asked = config.model_dump(mode="json", include={"samples_per_kit", "splits", "require"})
     lanes = [
         Shard(f"{kit}-lane{lane:02}", {"job": "lane", "kit": kit, "lane": lane, "asked": asked}, (f"exemplars/{kit}",))
         for kit in plan.shards("exemplars")
@@ -65,19 +65,21 @@ def _wanted(plan: Plan) -> ProportionsConfig:
     """The section, or where proportions come instead of layouts, with what is asked of these: how many, shared out how,
     and that they stand where the exemplars do."""
     own, chosen = plan.config.section(ProportionsConfig), chosen_instead(plan)
-    if own.per_kit or not chosen:
+    if own.samples_per_kit or not chosen:
         return own
     layouts = plan.config.section(VariationsConfig)
     shared = ProportionSplitConfig(**layouts.splits.model_dump(include=set(ProportionSplitConfig.model_fields)))
     stable = own.require.stable or chosen[CHOSEN_INSTEAD_STABLE]
     require = own.require.model_copy(update={"stable": stable})
-    return own.model_copy(update={"per_kit": min(layouts.per_kit, MOST), "splits": shared, "require": require})
+    return own.model_copy(
+        update={"samples_per_kit": min(layouts.samples_per_kit, MOST), "splits": shared, "require": require}
+    )
 
 
 def _asked(task: Task) -> ProportionsConfig:
     """The section, with what the plan has asked for."""
     asked = ProportionsConfig.model_validate_json(json.dumps(task.shard.params["asked"]))
-    update = {key: getattr(asked, key) for key in ("per_kit", "splits", "require")}
+    update = {key: getattr(asked, key) for key in ("samples_per_kit", "splits", "require")}
     return task.config.section(ProportionsConfig).model_copy(update=update)
 
 
@@ -99,7 +101,7 @@ def run_lane(task: Task) -> Outcome:
     exemplars = [each.whole for each in kit.exemplars]
     lattices = [lattice_of(kit, each) for each in exemplars]
     drawn = [Drawn(each, config.apart) for each in lattices]
-    wanted = -(-OVERSAMPLED * config.per_kit // config.lanes)
+    wanted = -(-OVERSAMPLED * config.samples_per_kit // config.lanes)
     found: list[str] = []
     tries = 0
     while len(found) < wanted and tries < config.tries * wanted:
@@ -143,7 +145,7 @@ def run_choice(task: Task) -> Outcome:
             drawn = Drawn(lattice_of(kit, exemplar.whole), config.apart)
             for text in own:
                 drawn.add(read_proportions(text)[1])
-            share = len(range(number, config.per_kit, len(kit.exemplars)))
+            share = len(range(number, config.samples_per_kit, len(kit.exemplars)))
             graph = kit.labelled(exemplar.assembly)
             digest = graph_digest(graph.types, graph.edges)
             for place in drawn.farthest_first(share):
@@ -155,7 +157,7 @@ def run_choice(task: Task) -> Outcome:
     if not rows:
         raise ShardFailed(
             "no exemplar holds together in other proportions, or none differs enough; set proportions.spread or "
-            "proportions.apart smaller, or require less, or vary the layout: variations.per_kit"
+            "proportions.apart smaller, or require less, or vary the layout: variations.samples_per_kit"
         )
     split_of = assign_splits(
         [[row] for row in range(len(rows))], config.splits.val, config.splits.test, task.rng("splits")
@@ -189,7 +191,7 @@ def run_collection(task: Task) -> Outcome:
 def report(plan: Plan) -> Sequence[str]:
     """How many shapes each kit has, what was refused, and where there are fewer than wanted."""
     config = _wanted(plan)
-    made = plan.summary("proportions", choice_name(plan.config.name)) if config.per_kit else None
+    made = plan.summary("proportions", choice_name(plan.config.name)) if config.samples_per_kit else None
     if made is None:
         return []
     lines = []
@@ -199,8 +201,8 @@ def report(plan: Plan) -> Sequence[str]:
             for reason, number in plan.rejects("proportions", f"{kit}-lane{lane:02}").items():
                 refused[reason] = refused.get(reason, 0) + number
         why = ", ".join(f"{number:,} {reason}" for reason, number in sorted(refused.items()))
-        lines.append(f"{kit}: {count:,} of {config.per_kit:,} shapes; refused: {why or 'none'}")
-        if count < config.per_kit:
+        lines.append(f"{kit}: {count:,} of {config.samples_per_kit:,} shapes; refused: {why or 'none'}")
+        if count < config.samples_per_kit:
             lines.append(
                 f"warning: {kit} has fewer shapes than wanted; set proportions.apart smaller, or proportions.tries or "
                 "spread larger"
@@ -210,14 +212,16 @@ def report(plan: Plan) -> Sequence[str]:
 
 def check(config: Config) -> None:
     """Raises ConfigError where there is nothing that could have other proportions."""
-    if config.section(ProportionsConfig).per_kit and not config.section(ExemplarsConfig).kits:
-        raise ConfigError(f"{config.path}: proportions.per_kit asks for shapes, and there are no exemplars.kits")
+    if config.section(ProportionsConfig).samples_per_kit and not config.section(ExemplarsConfig).kits:
+        raise ConfigError(
+            f"{config.path}: proportions.samples_per_kit asks for shapes, and there are no exemplars.kits"
+        )
 
 
 def asked(config: Config) -> Sequence[int]:
     """The shapes of each shard of the collection, if as many are found as are asked for."""
     section = config.section(ProportionsConfig)
-    total = section.per_kit * len(config.section(ExemplarsConfig).kits)
+    total = section.samples_per_kit * len(config.section(ExemplarsConfig).kits)
     val, test = round(section.splits.val * total), round(section.splits.test * total)
     return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
 
@@ -227,12 +231,14 @@ def trial(config: Config) -> ProportionsConfig:
     section = config.section(ProportionsConfig)
     few = max(32 // max(len(config.section(ExemplarsConfig).kits), 1), 4)
     splits = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
-    return section.model_copy(update={"per_kit": min(section.per_kit, few), "lanes": 1, "splits": splits})
+    return section.model_copy(
+        update={"samples_per_kit": min(section.samples_per_kit, few), "lanes": 1, "splits": splits}
+    )
 
 
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all texts, in their lanes and in the collection."""
-    return 2 * BYTES_A_SAMPLE * _wanted(plan).per_kit * len(plan.shards("exemplars"))
+    return 2 * BYTES_A_SAMPLE * _wanted(plan).samples_per_kit * len(plan.shards("exemplars"))
 
 
 STAGE = Stage(

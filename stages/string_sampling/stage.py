@@ -80,11 +80,11 @@ def check(config: Config) -> None:
                 f"{config.path}: string_sampling.sources.{number}: there is no kit"
                 f" {source.kit}; kits are {', '.join(kits)}"
             )
-    if sources and config.section(VariationsConfig).per_kit:
+    if sources and config.section(VariationsConfig).samples_per_kit:
         raise ConfigError(
             f"{config.path}: string_sampling.sources asks for"
-            f" dreamt shapes, and variations.per_kit for variations of the "
-            "same kits: a dataset is made in one way; set variations.per_kit: 0"
+            f" dreamt shapes, and variations.samples_per_kit for variations of the "
+            "same kits: a dataset is made in one way; set variations.samples_per_kit: 0"
         )
 
 

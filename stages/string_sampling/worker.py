@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.assembly_faults import assembly_faults
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Kit
 from stages.shape.kit_input import input_kit
@@ -156,5 +156,5 @@ def _instantiator(task: Task, kit: Kit, upright: bool) -> Instantiator:
     """That of a kit, kept from shard to shard of one worker: what it remembers changes no result."""
     made_from = str(task.input("exemplars", f"{kit.name}.tar")), upright
     if made_from not in _known:
-        _known[made_from] = Instantiator(ContactAnswers(kit), upright)
+        _known[made_from] = Instantiator(ContactOracle(kit), upright)
     return _known[made_from]

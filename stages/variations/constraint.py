@@ -15,13 +15,13 @@ from pipeline.config import nearest
 from stages.shape.kit import Assembly, Kit
 from stages.variations.requirements.named_labels import named_labels
 from stages.variations.requirements.resizing import Resizer
-from stages.variations.requirements.stretched_contacts import contact_fault
+from stages.variations.requirements.stretched_contacts import broken_contact
 
 Labels = Mapping[str, Sequence[str]]
 """What a config says of a constraint: labels of parts, by what they are to it."""
 Test = Callable[[Assembly], str | None]
 """The reason why an assembly is refused, None if it is not."""
-Mend = Callable[[Assembly], Assembly | None]
+Repair = Callable[[Assembly], Assembly | None]
 """An assembly of which parts are resized so that it is not refused; None where there is none."""
 
 
@@ -34,7 +34,7 @@ class Constraint:
     needs: tuple[str, ...]
     may: tuple[str, ...]
     test: Callable[[Kit, Labels], Test]
-    mend: Callable[[Kit, Labels, Resizer], Mend] | None = None
+    repair: Callable[[Kit, Labels, Resizer], Repair] | None = None
 
 
 def find_constraints(package: str = "stages.variations.constraints") -> dict[str, Constraint]:
@@ -70,7 +70,7 @@ def unknown_in(asked: Mapping[str, Labels]) -> str | None:
     return None
 
 
-def made_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
+def build_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
     """One test of all constraints that are asked for, in their order. Raises ConfigError for labels of parts that the
     kit has not."""
     known = find_constraints()
@@ -85,17 +85,17 @@ def made_test(kit: Kit, asked: Mapping[str, Labels]) -> Test:
     return unmet
 
 
-def made_mend(kit: Kit, asked: Mapping[str, Labels], most: float, rigid: Sequence[str]) -> Mend:
+def build_repair(kit: Kit, asked: Mapping[str, Labels], most: float, rigid: Sequence[str]) -> Repair:
     """What resizes parts of an assembly, each by `most` times at most and those labelled `rigid` never, until it meets
     all constraints that are asked for; None for what cannot be mended so, or whose contacts would not hold."""
-    known, unmet, resizer = find_constraints(), made_test(kit, asked), Resizer(kit, most, rigid)
-    mends = [mend(kit, labels, resizer) for name, labels in asked.items() if (mend := known[name].mend) is not None]
+    known, unmet, resizer = find_constraints(), build_test(kit, asked), Resizer(kit, most, rigid)
+    mends = [mend(kit, labels, resizer) for name, labels in asked.items() if (mend := known[name].repair) is not None]
 
     def mended(assembly: Assembly) -> Assembly | None:
         found: Assembly | None = assembly
         for mend in mends:
             found = None if found is None else mend(found)
-        if found is None or unmet(found) is not None or contact_fault(kit, found) is not None:
+        if found is None or unmet(found) is not None or broken_contact(kit, found) is not None:
             return None
         return found
 

@@ -14,7 +14,7 @@ from stages.variations.settings import CHOSEN_INSTEAD, VariationsConfig
 def comes_instead(config: Config) -> bool:
     """Whether other proportions may come instead of layouts: of a single kit, for a dataset is made in one way."""
     section, kits = config.section(VariationsConfig), config.section(ExemplarsConfig).kits
-    return bool(section.per_kit and section.instead == "auto" and len(kits) == 1 and kits[0].auto_keys())
+    return bool(section.samples_per_kit and section.fallback == "auto" and len(kits) == 1 and kits[0].auto_keys())
 
 
 def chosen_instead(plan: Plan) -> Mapping[str, Any]:

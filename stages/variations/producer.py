@@ -91,7 +91,7 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "substitution, to dock to; of a grown shape the place that its first part has in it",
             }
         ),
-        "motion": Field(
+        "transform": Field(
             {
                 "type": "array",
                 "items": row,
@@ -101,7 +101,7 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "translation, in the coordinates of the model files; a grown shape is not moved",
             }
         ),
-        "times": Field(
+        "repeats": Field(
             {
                 **whole,
                 "minimum": 1,
@@ -109,7 +109,7 @@ def _lineage(_: Config) -> Mapping[str, Field]:
                 "images and motion are then: a recursive rule may be carried out several times",
             }
         ),
-        "bent": Field(
+        "deformed": Field(
             {
                 "type": "boolean",
                 "description": "whether parts of it were moved by themselves, or are no longer as long, wide or high "
@@ -120,18 +120,18 @@ def _lineage(_: Config) -> Mapping[str, Field]:
             {
                 "type": "object",
                 "properties": {
-                    "largest": {**share, "description": "share of the parts, but for the backdrop, in that piece"},
+                    "share": {**share, "description": "share of the parts, but for the backdrop, in that piece"},
                     "pieces": {**whole, "minimum": 1, "description": "such pieces that together have all parts"},
-                    "exemplar": {**share, "description": "share of the parts of that exemplar"},
-                    "of": {"type": "string", "minLength": 1, "description": "the name of that exemplar"},
+                    "exemplar_share": {**share, "description": "share of the parts of that exemplar"},
+                    "exemplar": {"type": "string", "minLength": 1, "description": "the name of that exemplar"},
                 },
-                "required": ["largest", "pieces", "exemplar", "of"],
+                "required": ["share", "pieces", "exemplar_share", "exemplar"],
                 "additionalProperties": False,
                 "description": "the largest connected piece that stands just so, moved as a whole, in one exemplar",
             }
         ),
-        "backdrop": Field({**whole, "description": "parts at the end of the list that were put back behind it"}),
-        "turned": Field(
+        "restored_hubs": Field({**whole, "description": "parts at the end of the list that were put back behind it"}),
+        "turned_degrees": Field(
             {
                 "type": "number",
                 "minimum": 0,
@@ -146,7 +146,9 @@ def _lineage(_: Config) -> Mapping[str, Field]:
 PRODUCER = Producer(
     language="kit",
     keys="exemplars.kits",
-    asked=lambda config: bool(config.section(ExemplarsConfig).kits and config.section(VariationsConfig).per_kit),
+    asked=lambda config: bool(
+        config.section(ExemplarsConfig).kits and config.section(VariationsConfig).samples_per_kit
+    ),
     sentence="exemplar meshes are cut into parts, a tiling grammar is read off their contacts, and new shapes are "
     "made whose every neighbourhood and every docking of two parts was seen in an exemplar. A sample's "
     "`lineage.parents` are samples of its own split, by their keys, and exemplars.",

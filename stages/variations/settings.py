@@ -13,7 +13,7 @@ from stages.variations.novelty.features import Axis
 CHOSEN_HUBS = 0.5
 """What is required of hubs that were chosen and not stated: a mile of rail on which one brick of the road fits is no
 bridge."""
-CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS = "require.copied", "require.stable", "require.carcass"
+CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS = "require.max_copied_share", "require.stable", "require.labels"
 """What these keys of `require` are called among those that are chosen for a kit."""
 CHOSEN_INSTEAD, CHOSEN_INSTEAD_STABLE = "instead", "proportions.require.stable"
 """So are called `proportions`, where they come instead of layouts, and what is required of them."""
@@ -26,7 +26,7 @@ class NoveltyConfig(StrictModel):
         True, description="Whether the archive leads the search; without it parents and cuts are plain random."
     )
     axes: tuple[Axis, ...] = Field(
-        ("parts", "footprint", "height", "cycle_rank", "mixture", "blend", "distance"),
+        ("parts", "footprint", "height", "cycle_rank", "mixture", "neighbourhood_mixture", "distance"),
         min_length=1,
         description="Axes of the archive's grid: number of parts, area seen from above, height, longer by shorter "
         "side, edges beyond a tree, share of parts from other exemplars than the main one, share of "
@@ -36,13 +36,13 @@ class NoveltyConfig(StrictModel):
     resolution: int = Field(
         4, ge=1, le=64, description="Cells along a doubling of a size; a share has four times as many from 0 to 1."
     )
-    quota: int = Field(
+    cell_quota: int = Field(
         8,
         ge=1,
         description="Variants of a cell after which one more of a known histogram is spare: it goes into the pool, but "
         "the search neither counts it nor builds on it.",
     )
-    explore: float = Field(
+    exploration: float = Field(
         0.2,
         ge=0.01,
         le=1,
@@ -65,7 +65,7 @@ class GrownConfig(StrictModel):
 class StretchConfig(StrictModel):
     """How far a part may be made another size than it has in the exemplars."""
 
-    most: float = Field(
+    max_factor: float = Field(
         1.0,
         ge=1,
         le=4,
@@ -95,10 +95,10 @@ class SearchConfig(StrictModel):
         True,
         description="Whether pieces are turned about the vertical only; set it to false for what floats in space.",
     )
-    smallest: float = Field(
+    min_size: float = Field(
         0.5, gt=0, le=1, description="Fewest parts of a variant, as a share of the smallest exemplar's."
     )
-    largest: float = Field(
+    max_size: float = Field(
         2.0,
         ge=1,
         le=20,
@@ -112,7 +112,7 @@ class SearchConfig(StrictModel):
         "by what it finds; by replaceable substructures, where all pieces that can take each other's place are listed, "
         "not drawn by chance; or all three.",
     )
-    dummies: int = Field(
+    dummy_edges: int = Field(
         1,
         ge=0,
         le=3,
@@ -120,14 +120,14 @@ class SearchConfig(StrictModel):
         "a docking site or by an arc of parts between. What is looked at grows exponentially with it, up to a limit in "
         "dense graphs, which status and card then tell.",
     )
-    repeats: int = Field(
+    max_repeats: int = Field(
         3,
         ge=1,
         le=100,
         description="Most times that a recursive rule of replaceable substructures, where one of two pieces is part of "
         "the other, is carried out at once: it lets a row of arches grow or shrink by several.",
     )
-    blend: bool = Field(
+    deform: bool = Field(
         False,
         description="Whether replaceable substructures bend a piece that does not fit as a whole: each of its parts "
         "moves as the boundary near it does. Parts between come out of contact where contacts are as exact as those of "
@@ -151,9 +151,13 @@ class SearchConfig(StrictModel):
         le=1,
         description="Share of the exchange's parents drawn from the exemplars; the rest are earlier variants.",
     )
-    parents: int = Field(2000, ge=1, description="Most earlier variants that one shard of the search holds as parents.")
-    lanes: int = Field(2, ge=1, le=64, description="Shards of the search that run beside each other in a round.")
-    tries: int = Field(20_000, ge=1, description="Most tries of one lane in one round.")
+    max_parents: int = Field(
+        2000, ge=1, description="Most earlier variants that one shard of the search holds as parents."
+    )
+    parallel_searches: int = Field(
+        2, ge=1, le=64, description="Shards of the search that run beside each other in a round."
+    )
+    tries_per_round: int = Field(20_000, ge=1, description="Most tries of one lane in one round.")
     patience: Literal["auto"] | Annotated[int, Field(ge=1)] = Field(
         "auto",
         description="Tries of a kit without a new variant after which its search has ended; `auto`: 200,000, and for "
@@ -161,7 +165,7 @@ class SearchConfig(StrictModel):
         "so many it ends, too, where at the pace of the last round the variants that are missing would take ten times "
         "the tries so far, or what is missing to choose from twice.",
     )
-    rounds: int = Field(200, ge=1, description="Most rounds of a kit's search.")
+    max_rounds: int = Field(200, ge=1, description="Most rounds of a kit's search.")
     novelty: NoveltyConfig = Field(
         default_factory=NoveltyConfig, description="How the search is led to what its pool lacks."
     )
@@ -177,7 +181,7 @@ class SelectionConfig(StrictModel):
         description="Variants that the search looks for, as a multiple of those wanted; those that add nothing "
         "to the archive come on top, up to four times as many in all.",
     )
-    spread: int = Field(
+    max_farthest_first: int = Field(
         10_000,
         ge=1,
         description="Most variants of a kit that are chosen farthest first; the rest are drawn at random.",
@@ -194,7 +198,7 @@ class VariantSplitConfig(StrictModel):
         "splits is let go of, so ask for a larger pool, selection.oversample, where a split comes out short), or "
         "equal graphs and no more.",
     )
-    near: float = Field(
+    min_shared_surface: float = Field(
         0.8,
         ge=0.3,
         le=1,
@@ -221,13 +225,13 @@ class VariantRequirements(StrictModel):
         default_factory=PhysicsConfig,
         description="What they are judged by. Records are judged by the section validity: say the same there.",
     )
-    carcass: Literal["auto"] | tuple[str, ...] = Field(
+    labels: Literal["auto"] | tuple[str, ...] = Field(
         "auto",
         description="Labels of which every variant must have a part, such as the top and the sides of a cabinet. "
         "`auto`: those of which every exemplar has a part about as large as itself (two thirds of its diagonal), for a "
         "kit that leaves a key of its own to be chosen; else none.",
     )
-    hubs: Literal["auto"] | Annotated[int, Field(ge=0)] | Annotated[float, Field(gt=0, lt=1)] = Field(
+    min_hubs: Literal["auto"] | Annotated[int, Field(ge=0)] | Annotated[float, Field(gt=0, lt=1)] = Field(
         "auto",
         description="Fewest hub parts that it must get back as its backdrop: a pile of bricks on which no road fits is "
         "no bridge. Below 1: of the type that touches most, the share of what so many parts have of it in the "
@@ -239,7 +243,7 @@ class VariantRequirements(StrictModel):
         description="Global constraints, by name, with the labels of parts that each speaks of: `support: {}`, "
         "`path: {entries: [...], exits: [...], through: [...]}`, or one in a file of your own.",
     )
-    copied: Literal["auto"] | Annotated[float, Field(gt=0, le=1)] = Field(
+    max_copied_share: Literal["auto"] | Annotated[float, Field(gt=0, le=1)] = Field(
         "auto",
         description="Greatest share of its parts, without its backdrop, that may stand in one piece just so in an "
         "exemplar; 1 refuses none. `auto`: 0.9 for a kit of which a short search finds enough beside such copies, else "
@@ -249,7 +253,7 @@ class VariantRequirements(StrictModel):
     @property
     def auto_keys(self) -> tuple[str, ...]:
         """Those of CHOSEN_COPIED, CHOSEN_STABLE and CHOSEN_CARCASS that are left at `auto`."""
-        said = {CHOSEN_COPIED: self.copied, CHOSEN_STABLE: self.stable, CHOSEN_CARCASS: self.carcass}
+        said = {CHOSEN_COPIED: self.max_copied_share, CHOSEN_STABLE: self.stable, CHOSEN_CARCASS: self.labels}
         return tuple(key for key, each in said.items() if each == "auto")
 
     def physical(self, stable: bool) -> Requirements:
@@ -260,13 +264,13 @@ class VariantRequirements(StrictModel):
 class VariationsConfig(StrictModel):
     """The variations of each kit."""
 
-    per_kit: int = Field(
+    samples_per_kit: int = Field(
         500,
         ge=0,
         le=1_000_000_000,
         description="Variants wanted of each kit; 0 for a dataset of these kits that is made otherwise.",
     )
-    instead: Literal["auto", "nothing"] = Field(
+    fallback: Literal["auto", "nothing"] = Field(
         "auto",
         description="What is made of exemplars of which a short search finds next to no other layouts, or all of them "
         "alike. `auto`: of a single kit that leaves a key of its own to be chosen, as many shapes of the same layout "

@@ -32,7 +32,11 @@ _JOBS = {"lane": run_lane, "pool": run_pool, "assignment": run_assignment, "coll
 
 def plan(plan: Plan) -> list[Shard]:
     """The rounds of every kit as far as they are known, then the assignment and the collection."""
-    if not plan.shards("exemplars") or not plan.config.section(VariationsConfig).per_kit or chosen_instead(plan):
+    if (
+        not plan.shards("exemplars")
+        or not plan.config.section(VariationsConfig).samples_per_kit
+        or chosen_instead(plan)
+    ):
         return []
     search: list[Shard] = []
     ended = True
@@ -53,7 +57,7 @@ def run_shard(task: Task) -> Outcome:
 
 def report(plan: Plan) -> Sequence[str]:
     """How far the search of each kit is, why it ended, and what was chosen from what it found."""
-    wanted = plan.config.section(VariationsConfig).per_kit
+    wanted = plan.config.section(VariationsConfig).samples_per_kit
     lines = []
     for kit in plan.shards("exemplars"):
         state = last_pool(plan, kit)
@@ -80,20 +84,20 @@ def check(config: Config) -> None:
     wrong = unknown_in(config.section(VariationsConfig).require.constraints)
     if wrong:
         raise ConfigError(f"{config.path}: variations.require.constraints: {wrong}")
-    if config.section(VariationsConfig).require.hubs in ("auto", 0):
+    if config.section(VariationsConfig).require.min_hubs in ("auto", 0):
         return
     for kit in config.section(ExemplarsConfig).kits:
-        if kit.hubs.types == "none" or kit.hubs.keep != "backdrop":
+        if kit.hubs.types == "none" or (not (kit.hubs.restore)):
             raise ConfigError(
-                f"{config.path}: variations.require.hubs asks for hubs, and kit {kit.name} puts none back; "
-                "set its hubs.types and hubs.keep: backdrop, or do not require them"
+                f"{config.path}: variations.require.min_hubs asks for hubs, and kit {kit.name} puts none back; "
+                "set its hubs.types and hubs.restore, or do not require them"
             )
 
 
 def asked(config: Config) -> Sequence[int]:
     """The variants of each shard of the collection, if the search finds as many as it is asked for."""
     section = config.section(VariationsConfig)
-    total = section.per_kit * len(config.section(ExemplarsConfig).kits)
+    total = section.samples_per_kit * len(config.section(ExemplarsConfig).kits)
     val, test = round(section.splits.val * total), round(section.splits.test * total)
     return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
 
@@ -101,10 +105,10 @@ def asked(config: Config) -> Sequence[int]:
 def trial(config: Config) -> VariationsConfig:
     """A search for few variants of each kit."""
     section, kits = config.section(VariationsConfig), len(config.section(ExemplarsConfig).kits)
-    if not section.per_kit:
+    if not section.samples_per_kit:
         return section
     few = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
-    return section.model_copy(update={"per_kit": max(32 // max(kits, 1), 4), "splits": few})
+    return section.model_copy(update={"samples_per_kit": max(32 // max(kits, 1), 4), "splits": few})
 
 
 STAGE = Stage(
@@ -117,7 +121,7 @@ STAGE = Stage(
     estimate_bytes=lambda plan: (
         (1 + math.ceil(plan.config.section(VariationsConfig).selection.oversample))
         * BYTES_A_VARIANT
-        * plan.config.section(VariationsConfig).per_kit
+        * plan.config.section(VariationsConfig).samples_per_kit
         * len(plan.shards("exemplars"))
     ),
     report=report,

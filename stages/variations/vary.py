@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 
 
 def vary(kit: Kit, count: int, rng: np.random.Generator, config: SearchConfig | None = None) -> list[Assembly]:
-    """`count` new assemblies of the kit's parts, or fewer where `config.tries` tries find no more.
+    """`count` new assemblies of the kit's parts, or fewer where `config.tries_per_round` tries find no more.
 
     Every neighbourhood and every contact of theirs was seen in the exemplars, by the kit's grammar; no two are the
     same by `config.duplicates`, and none is a piece of an exemplar unless `config.sub_assemblies`. Backdrops are not
     put back.
     """
-    search = Search(ContactAnswers(kit), config or SearchConfig())
-    variants, _ = search.run(rng, search.config.tries, count, kit.name, lambda _: None)
+    search = Search(ContactOracle(kit), config or SearchConfig())
+    variants, _ = search.run(rng, search.config.tries_per_round, count, kit.name, lambda _: None)
     return [variant.assembly for variant in variants[:count]]

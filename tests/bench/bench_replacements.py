@@ -13,13 +13,13 @@ import numpy as np
 from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
-from stages.variations.substructures.alignments import find_moves
+from stages.variations.substructures.alignments import find_region_swaps
 from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import Operations, find_operations
 from stages.variations.substructures.ordered_graph import OrderedGraph
-from stages.variations.substructures.region_swaps import Moves
+from stages.variations.substructures.region_swaps import RegionSwaps
 from tests.bench.measure import Measure
 
 REAL = Path("../shared/exemplars")
@@ -50,11 +50,11 @@ def _operations(dummies: int, crop: Crop) -> Operations:
     return find_operations(crop[1], crop[1], dummies, by_docking=True)
 
 
-def _moves(kit: Kit, crop: Crop) -> Moves:
-    return find_moves(kit, ANY_WAY, crop, crop)
+def _moves(kit: Kit, crop: Crop) -> RegionSwaps:
+    return find_region_swaps(kit, ANY_WAY, crop, crop)
 
 
-def _growth(name: str, crops: Sequence[Crop], listed: Callable[[Crop], Operations | Moves]) -> Measure:
+def _growth(name: str, crops: Sequence[Crop], listed: Callable[[Crop], Operations | RegionSwaps]) -> Measure:
     seconds, is_whole, notes, at_70 = list[float](), list[bool](), list[str](), 0.0
     for crop in crops:
         listed(crop)
@@ -80,5 +80,5 @@ def _crop(kit: Kit, assembly: Assembly, size: int) -> Crop:
         met.update(fresh)
         waiting += fresh
     crop = assembly.select(np.array(sorted(waiting[:size])))
-    labels = ContactAnswers(kit).dockings.label_edges(crop.types, crop.poses, crop.edges)
+    labels = ContactOracle(kit).dockings.label_edges(crop.types, crop.poses, crop.edges)
     return crop, docking_graph(kit, crop, labels)

@@ -22,7 +22,7 @@ from torch.nn.utils.rnn import pack_sequence, pad_packed_sequence
 
 from stages.exemplars.build import read_kit
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shapeassembly import parse
 from stages.shapeassembly.syntax.errors import ProgramError
 from stages.strings.compiled_grammar import compile_grammar
@@ -88,7 +88,7 @@ def castle_strings() -> tuple[Strings, Vocabulary, int]:
     shapes = tuple(ShapeFile(path=path) for path in sorted(Path("datasets/exemplars/castle").glob("*.glb")))
     kit = read_kit(KitConfig(name="castle", shapes=shapes).resolve(STRICTEST))
     rng = np.random.default_rng(0)
-    found, _ = Search(ContactAnswers(kit), SearchConfig()).run(rng, SHAPES, 10**9, "bench", lambda count: None)
+    found, _ = Search(ContactOracle(kit), SearchConfig()).run(rng, SHAPES, 10**9, "bench", lambda count: None)
     writer = KitStrings(kit, "all")
     written = [[each.string for each in writer.strings(writer.graph(new.assembly), 8, rng)] for new in found]
     cycles = 12

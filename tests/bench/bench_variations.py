@@ -14,12 +14,12 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, ContactConfig, KitConfig, ShapeFile
 from stages.shape.geometry.contact import overlapping_boxes, world_boxes
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
 from stages.variations.kernels.checks import validate
 from stages.variations.kernels.structs import TRY, Outcome
 from stages.variations.kernels.variant_graph import place_boxes
-from stages.variations.novelty.copied_pieces import CopyTest
+from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.search.search import Search
 from stages.variations.selection.shared_surface import PackedShapes
 from stages.variations.settings import NoveltyConfig, SearchConfig
@@ -48,7 +48,7 @@ def bench() -> Iterator[Measure]:
         kit = _kit(paths, ("face",) if "race" in name else ("point", "line", "face"))
         for guided in (False, True):
             novelty = NoveltyConfig(guided=guided)
-            line = Search(ContactAnswers(kit), SearchConfig(upright="ring" not in name, novelty=novelty))
+            line = Search(ContactOracle(kit), SearchConfig(upright="ring" not in name, novelty=novelty))
             rng = np.random.default_rng(0)
             line.run(rng, 500, 10**9, "warm", lambda count: None)
             found: list[Assembly] = []
@@ -108,7 +108,7 @@ def _relatives(name: str, kit: Kit, assemblies: list[Assembly]) -> Measure:
 
 def _copied(name: str, line: Search, assemblies: list[Assembly]) -> Measure:
     """Variants of which is told what they have copied whole."""
-    test, table = CopyTest(line.kit, line.answers.dockings), line.answers.dockings
+    test, table = CopyDetector(line.kit, line.answers.dockings), line.answers.dockings
     labelled = cycle([(each, table.label_edges(each.types, each.poses, each.edges)) for each in assemblies])
 
     def variant() -> int:

@@ -36,11 +36,11 @@ class Dataset:
 
 
 DATASETS = (
-    Dataset("default", {"variations": {"per_kit": 40}}, {"variations": {"per_kit": 3}}),
+    Dataset("default", {"variations": {"samples_per_kit": 40}}, {"variations": {"samples_per_kit": 3}}),
     Dataset(
         "castle",
-        {"variations": {"per_kit": 60}},
-        {"variations": {"per_kit": 3}},
+        {"variations": {"samples_per_kit": 60}},
+        {"variations": {"samples_per_kit": 3}},
         "../shared/exemplars/a01_castle_tower",
     ),
     Dataset(

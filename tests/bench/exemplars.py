@@ -44,7 +44,7 @@ exemplars:
       shapes: {shapes}
       credit: {{author: Jane Doe, source: https://example.org, license: CC-BY-4.0}}
 variations:
-  per_kit: 1000
+  samples_per_kit: 1000
 """
 """The README's."""
 

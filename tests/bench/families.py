@@ -24,15 +24,15 @@ from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
 from stages.programs.files import named_values, shape_glb
 from stages.programs.program import find_program
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
-from stages.variations.constraint import made_test
-from stages.variations.novelty.features import AXES, MIXED
+from stages.variations.constraint import build_test
+from stages.variations.novelty.features import AXES, MIN_MIXTURE
 from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig, StretchConfig, VariantRequirements
-from stages.variations.substructures.alignments import find_moves
+from stages.variations.substructures.alignments import find_region_swaps
 from stages.variations.substructures.docking_sites import docking_graph
 from stages.variations.substructures.operations import find_operations
 from tests.bench.furniture import FURNITURE, MEANINGS, side_by_side
@@ -93,7 +93,7 @@ def _furniture() -> Family:
         "disconnected": "largest",
     }
     kit, _ = build_kit(config.resolve(chosen), side_by_side([read_model(path) for path in paths]))
-    return kit, SearchConfig(duplicates="graph", smallest=0.5, stretch=StretchConfig(most=4.0))
+    return kit, SearchConfig(duplicates="graph", min_size=0.5, stretch=StretchConfig(max_factor=4.0))
 
 
 def _chairs() -> Family:
@@ -166,14 +166,16 @@ def _standing(kit: Kit, found: Sequence[Assembly]) -> list[Assembly]:
 
 def _listed(name: str, kit: Kit, config: SearchConfig) -> str:
     """What can be replaced between the exemplars, each with itself too."""
-    up, dockings = {"y": 1, "z": 2}[kit.up] if config.upright else -1, ContactAnswers(kit).dockings
+    up, dockings = {"y": 1, "z": 2}[kit.up] if config.upright else -1, ContactOracle(kit).dockings
     sides = [
         (each, docking_graph(kit, each, dockings.label_edges(each.types, each.poses, each.edges)))
         for each in _exemplars(kit)
     ]
-    moves = [] if kit.by_meaning else [find_moves(kit, up, base, giver) for base, giver in product(sides, repeat=2)]
+    moves = (
+        [] if kit.by_meaning else [find_region_swaps(kit, up, base, giver) for base, giver in product(sides, repeat=2)]
+    )
     operations = [
-        find_operations(a, b, config.dummies, by_docking=not kit.by_meaning)
+        find_operations(a, b, config.dummy_edges, by_docking=not kit.by_meaning)
         for (_, a), (_, b) in combinations_with_replacement(sides, 2)
     ]
     plain = sum(each.plain for each in operations)
@@ -199,11 +201,11 @@ def _found(name: str, how: str, kit: Kit, finds: Finds, standing: int) -> str:
             other += count
         else:
             counts[column] += count
-    fault, asked = made_test(kit, {"support": {}}), finds.kept[:STOOD]
+    fault, asked = build_test(kit, {"support": {}}), finds.kept[:STOOD]
     held = np.mean([fault(each) is None for each in asked]) if asked else 0.0
     features = np.array(finds.features).reshape(-1, len(AXES))
-    mixed = np.mean(features[:, AXES.index("mixture")] >= MIXED) if len(features) else 0.0
-    copied = np.median(features[:, AXES.index("copied")]) if len(features) else 0.0
+    mixed = np.mean(features[:, AXES.index("mixture")] >= MIN_MIXTURE) if len(features) else 0.0
+    copied = np.median(features[:, AXES.index("copied_share")]) if len(features) else 0.0
     found, tried = len(finds.keys), sum(finds.rejects.values()) + len(finds.keys)
     cells = [f"{count:,}" for count in (tried, *counts.values(), other, found)]
     graphs, histograms = ({key[place] for key in finds.keys} for place in (0, 1))

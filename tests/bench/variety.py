@@ -28,11 +28,11 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig
 from stages.inspection.sample_figure import MAX_SHAPES_SHOWN, sample_figure
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
-from stages.variations.novelty.features import AXES, MIXED
+from stages.variations.novelty.features import AXES, MIN_MIXTURE
 from stages.variations.search.search import Search, Variant
 from stages.variations.selection.farthest_first import farthest_first
 from stages.variations.settings import SearchConfig, VariationsConfig
@@ -93,8 +93,8 @@ def configured(name: str, grammar: str | None = None) -> tuple[Kit, SearchConfig
 def explore(kit: Kit, config: SearchConfig, seconds: float, seed: int, shown: bool = False) -> Finds:
     """One worker's search of so many CPU seconds, after a warm-up that is not counted; where they are `shown`, the
     first KEPT variants are kept to choose from."""
-    Search(ContactAnswers(kit), config).run(np.random.default_rng(seed), WARM_UP, 10**9, "warm", lambda count: None)
-    line, rng, finds = Search(ContactAnswers(kit), config), np.random.default_rng(seed), Finds()
+    Search(ContactOracle(kit), config).run(np.random.default_rng(seed), WARM_UP, 10**9, "warm", lambda count: None)
+    line, rng, finds = Search(ContactOracle(kit), config), np.random.default_rng(seed), Finds()
     start, variants = time.process_time(), list[Variant]()
     for quarter in range(1, 5):
         while time.process_time() - start < seconds * quarter / 4:
@@ -119,10 +119,10 @@ def _row(name: str, how: str, workers: Sequence[Finds], seconds: float) -> str:
     features = np.array([each for worker in workers for each in worker.features]).reshape(-1, len(AXES))
     graphs, histograms = len({graph for graph, _ in keys}), len({histogram for _, histogram in keys})
     quarters = [len({key[1] for each in workers for key in each.keys[: each.curve[at]]}) for at in range(4)]
-    mixed = np.mean(features[:, AXES.index("mixture")] >= MIXED) if keys else 0.0
-    blended = np.mean(features[:, AXES.index("blend")] > 0) if keys else 0.0
+    mixed = np.mean(features[:, AXES.index("mixture")] >= MIN_MIXTURE) if keys else 0.0
+    blended = np.mean(features[:, AXES.index("neighbourhood_mixture")] > 0) if keys else 0.0
     distance = features[:, AXES.index("distance")].mean() if keys else 0.0
-    copied = np.median(features[:, AXES.index("copied")]) if keys else 0.0
+    copied = np.median(features[:, AXES.index("copied_share")]) if keys else 0.0
     return (
         f"| {name} | {how} | {sum(each.tries for each in workers):,} | {len(keys):,} | "
         f"{len(keys) / seconds / len(workers):,.0f} | {graphs:,} | {histograms:,} | "

@@ -58,7 +58,7 @@ ARENAS: dict[str, Datasets] = {
                 {
                     "autoconfig": {"max_tries": 100},
                     "exemplars": {"kits": [_OPEN]},
-                    "variations": {"per_kit": 12, "splits": {"shards": 2}},
+                    "variations": {"samples_per_kit": 12, "splits": {"shards": 2}},
                     "abstraction": {"programs": True},
                     **_SMALL,
                 },
@@ -92,7 +92,7 @@ ARENAS: dict[str, Datasets] = {
                 ("exemplars", "variations", "strings", "training"),
                 {
                     "exemplars": {"kits": [stated(_CASTLE)]},
-                    "variations": {"per_kit": 12, "splits": {"shards": 1}},
+                    "variations": {"samples_per_kit": 12, "splits": {"shards": 1}},
                     "training": {"models": [{"name": "tiny", "kind": "string_vae", "embedding": 4, **_TINY}]},
                 },
             ),
@@ -100,7 +100,7 @@ ARENAS: dict[str, Datasets] = {
                 ("exemplars", "string_sampling", "validity"),
                 {
                     "exemplars": {"kits": [stated(_CASTLE)]},
-                    "variations": {"per_kit": 0},
+                    "variations": {"samples_per_kit": 0},
                     "string_sampling": {
                         "sources": [{"dataset": "learnt", "model": "tiny", "kit": "castle", "samples": 4}],
                         "draws": 8,

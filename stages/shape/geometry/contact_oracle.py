@@ -22,7 +22,7 @@ BORDERLINE = 1.06
 """Two parts closer than this many contact tolerances, yet not in contact, are too close to be called apart."""
 
 
-class ContactAnswers:
+class ContactOracle:
     """What happens when a part of one type stands at a relative pose to a part of another.
 
     An answer is NONE (apart), FORBIDDEN (in contact in a way no exemplar shows, nested, or too close to call) or
@@ -36,7 +36,7 @@ class ContactAnswers:
         self.contact = ContactTest(kit.types, kit.contact_tolerance)
         self.dockings = DockingTable.of(kit)
         self.table = Answers(np.zeros(1 << 16, dtype=np.uint64), np.zeros(1 << 16, dtype=np.int64))
-        self.asked = 0
+        self.geometry_queries = 0
         self._broken: BaseException | None = None
         self._size = 0
         self._penetration = PenetrationTest(kit.types)
@@ -44,7 +44,7 @@ class ContactAnswers:
         self._quantum = kit.contact_tolerance * QUANTUM
         self._every_kind = set(kit.contact_kinds) == set(get_args(ContactKind))
 
-    def under(self, kit: Kit) -> ContactAnswers:
+    def under(self, kit: Kit) -> ContactOracle:
         """These answers, with all that is known, for a kit that differs in its exemplars and in which neighbourhoods it
         admits, and in nothing else."""
         other = copy.copy(self)
@@ -65,7 +65,7 @@ class ContactAnswers:
                 return False
         return True
 
-    def asker(self, types: np.ndarray, rotations: np.ndarray, translations: np.ndarray) -> Any:
+    def c_callback(self, types: np.ndarray, rotations: np.ndarray, translations: np.ndarray) -> Any:
         """A C function that answers, and remembers, how the parts at two places of these arrays (n,), (n, 3, 3),
         (n, 3) stand to each other, for kernels that call it by its address. What goes wrong in it is raised by
         `complain`."""
@@ -85,7 +85,7 @@ class ContactAnswers:
 
         return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(answer)
 
-    def complain(self) -> None:
+    def raise_pending(self) -> None:
         """Raise what went wrong in an `asker`, where no exception can pass."""
         if self._broken is not None:
             error, self._broken = self._broken, None
@@ -126,7 +126,7 @@ class ContactAnswers:
         return self._of_geometry[key]
 
     def _ask_geometry(self, a: int, b: int, pose: FloatArray) -> int:
-        self.asked += 1
+        self.geometry_queries += 1
         touching = self.contact.touches(a, b, pose)
         if touching:
             label = int(self.dockings.label(a, b, pose[None])[0])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
@@ -56,7 +56,7 @@ class Instantiation:
 class Instantiator:
     """Puts graphs of one kit together; what it learns of contacts is kept from graph to graph and changes no answer."""
 
-    def __init__(self, answers: ContactAnswers, upright: bool = True) -> None:
+    def __init__(self, answers: ContactOracle, upright: bool = True) -> None:
         kit = answers.kit
         self.kit, self.answers, self.upright = kit, answers, upright
         self.candidates = find_placements(kit, upright)
@@ -70,7 +70,7 @@ class Instantiator:
     def _room(self, nodes: int) -> None:
         """Make room for graphs of so many nodes."""
         self._s = new_state(nodes, len(self.kit.labels), VALUES_PER_NODE * nodes)
-        self._asker = self.answers.asker(self._s.types, self._s.rotations, self._s.translations)
+        self._asker = self.answers.c_callback(self._s.types, self._s.rotations, self._s.translations)
         self._address = int(ctypes.cast(self._asker, ctypes.c_void_p).value or 0)
 
     def instantiate(
@@ -102,7 +102,7 @@ class Instantiator:
             outcome = solve(
                 rng, self._tables, self.candidates, self._rules, contacts, graph, guide, left, self._reach, within
             )
-            self.answers.complain()
+            self.answers.raise_pending()
             tries += int(self._s.counts[TRIES])
             if outcome != SOLVED:
                 return Instantiation(None, REASONS[outcome], tries)

@@ -281,7 +281,7 @@ def _relation(kit, contacts, s, a, b):
     )
     answer = ask(contacts.keys, contacts.values, hash_key(s.types[a], kind, quanta))
     if answer == MISSING:
-        answer = ask_python(contacts.asker, a, b)
+        answer = ask_python(contacts.c_callback, a, b)
     return answer
 
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from stages.shape.kit import Assembly, Kit
-from stages.variations.constraint import Constraint, Labels, Mend, Test
+from stages.variations.constraint import Constraint, Labels, Repair, Test
 from stages.variations.requirements.resizing import Resizer, heights_of, spans_of
 from stages.variations.substitution.ground import GroundTest
 
@@ -70,7 +70,7 @@ def _test(kit: Kit, labels: Labels) -> Test:
     return unmet
 
 
-def _mend(kit: Kit, labels: Labels, resizer: Resizer) -> Mend:
+def _mend(kit: Kit, labels: Labels, resizer: Resizer) -> Repair:
     paths, ground = _Paths(kit, labels), GroundTest(kit, kit.contact_tolerance)
 
     def mended(assembly: Assembly) -> Assembly | None:
@@ -124,7 +124,7 @@ def _lowered(resizer: Resizer, assembly: Assembly, route: Sequence[int]) -> Asse
             low = resizer.meeting(found, part, route[place + 1], HIGH)
         if level - low <= resizer.kit.contact_tolerance:
             continue
-        factor = min(1.0 + missing / (level - low), resizer.most)
+        factor = min(1.0 + missing / (level - low), resizer.max_factor)
         taller = resizer.resized(found, part, factor, before, HIGH)
         if taller is not None:
             found, missing = taller, missing - (factor - 1.0) * (level - low)
@@ -137,4 +137,4 @@ def _named(kit: Kit, names: Sequence[str]) -> np.ndarray:
     return found
 
 
-CONSTRAINT = Constraint(needs=("entries", "exits"), may=("through",), test=_test, mend=_mend)
+CONSTRAINT = Constraint(needs=("entries", "exits"), may=("through",), test=_test, repair=_mend)

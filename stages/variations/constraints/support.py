@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.kit import Assembly, Kit
-from stages.variations.constraint import Constraint, Labels, Mend, Test
+from stages.variations.constraint import Constraint, Labels, Repair, Test
 from stages.variations.requirements.resizing import Resizer, spans_of
 from stages.variations.substitution.ground import GroundTest
 
@@ -32,7 +32,7 @@ def _test(kit: Kit, labels: Labels) -> Test:
     return unmet
 
 
-def _mend(kit: Kit, labels: Labels, resizer: Resizer) -> Mend:
+def _mend(kit: Kit, labels: Labels, resizer: Resizer) -> Repair:
     del labels
     ground = GroundTest(kit, kit.contact_tolerance)
 
@@ -59,4 +59,4 @@ def _supported(kit: Kit, assembly: Assembly) -> np.ndarray:
     return found
 
 
-CONSTRAINT = Constraint(needs=(), may=(), test=_test, mend=_mend)
+CONSTRAINT = Constraint(needs=(), may=(), test=_test, repair=_mend)

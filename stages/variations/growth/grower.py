@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.patterns import observed_patterns
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
@@ -41,7 +41,7 @@ class Grower:
 
     def __init__(
         self,
-        answers: ContactAnswers,
+        answers: ContactOracle,
         tables: KitTables,
         smallest: int,
         largest: int,
@@ -51,12 +51,12 @@ class Grower:
     ) -> None:
         kit = answers.kit
         self.kit, self.answers, self.tables = kit, answers, tables
-        self.smallest, self.largest = smallest, largest
+        self.min_parts, self.max_parts = smallest, largest
         self.parts, self.footprint = parts, footprint
         self.patterns = slots.patterns() if slots else observed_patterns(kit, answers.dockings, tables.up >= 0)
         self._tables = pattern_tables(kit, self.patterns)
         self._g = growing(len(kit.types), largest)
-        self._asker = answers.asker(self._g.spot_types, self._g.spot_rotations, self._g.spot_translations)
+        self._asker = answers.c_callback(self._g.spot_types, self._g.spot_rotations, self._g.spot_translations)
         self._address = int(ctypes.cast(self._asker, ctypes.c_void_p).value or 0)
         self._boxes = [_boxes(kit, each.assembly) for each in kit.exemplars]
         self._corners = [(boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)) for boxes in self._boxes]
@@ -75,7 +75,7 @@ class Grower:
         table = self.answers.table
         contacts = Contacts(table.keys, table.values, self._address)
         grown = grow(rng, self.tables, self._tables, contacts, self._g, field)
-        self.answers.complain()
+        self.answers.raise_pending()
         work = 1.0 + float(self._g.counts[WORK]) / WORK_A_TRY
         if not grown:
             return Outcome.NO_MATCH, work
@@ -92,7 +92,7 @@ class Grower:
         """OK, TOO_SMALL or TOO_LARGE by what was asked for; and what was learnt of it for the next shape."""
         count = int(ws.counts[PARTS])
         self._room = MEMORY * self._room + (1 - MEMORY) * float(np.clip(np.log(field.target / count), -1.0, 1.0))
-        least, most = self.parts or (self.smallest, self.largest)
+        least, most = self.parts or (self.min_parts, self.max_parts)
         if self.parts is not None:
             least, most = round(least * (1 - ROOM)), round(most * (1 + ROOM))
         if count < least:
@@ -117,7 +117,7 @@ class Grower:
         part = min(int(rng.random() * len(assembly)), len(assembly) - 1)
         self.seed = number, part
         low, high = self._corners[number]
-        least, most = self.parts or (self.smallest, self.largest)
+        least, most = self.parts or (self.min_parts, self.max_parts)
         target = round(float(np.exp(np.log(least) + rng.random() * (np.log(most) - np.log(least)))))
         pose = assembly.poses[part]
         box_low, box_high = self._boxes[number][part]
@@ -152,7 +152,7 @@ class Grower:
             np.minimum(field_low, box_low) - hair,
             np.maximum(field_high, box_high) + hair,
             target,
-            self.largest,
+            self.max_parts,
         )
 
 

@@ -40,7 +40,7 @@ class PatternTables(NamedTuple):
 
 class Contacts(NamedTuple):
     """Known contact answers, `keys` and `values` of an `Answers`, and whom to ask for others: the address of a C
-    function of two spots (`ContactAnswers.asker`)."""
+    function of two spots (`ContactOracle.asker`)."""
 
     keys: np.ndarray
     values: np.ndarray

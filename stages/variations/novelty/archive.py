@@ -17,7 +17,7 @@ Cell = tuple[int, ...]
 Place = tuple[int, int]
 """Where a variant stands: the numbers of its cell and of its histogram, in the order in which they were first seen."""
 
-_SHARES = ("mixture", "blend", "distance", "copied")
+_SHARES = ("mixture", "neighbourhood_mixture", "distance", "copied_share")
 
 
 def cell_of(features: Float32Array, axes: Sequence[Axis], resolution: int) -> Cell:
@@ -39,7 +39,7 @@ class Archive:
     """How many variants there are of each cell and of each histogram."""
 
     def __init__(self, quota: int) -> None:
-        self.quota = quota
+        self.cell_quota = quota
         self._cells, self._histograms = _Tally(), _Tally()
 
     def add(self, cell: Cell, histogram: int) -> Place:
@@ -58,7 +58,7 @@ class Archive:
     def is_full(self, cell: Cell, histogram: int) -> bool:
         """Whether the archive has enough of such variants: the histogram is known and the cell has its quota."""
         number = self._cells.numbers.get(cell)
-        return self.has_histogram(histogram) and number is not None and self._cells.counts[number] >= self.quota
+        return self.has_histogram(histogram) and number is not None and self._cells.counts[number] >= self.cell_quota
 
 
 class _Tally:

@@ -21,7 +21,7 @@ beyond it are repetitions of common ones: `largest` may then be too small, and `
 
 
 @dataclass(frozen=True)
-class Copied:
+class CopiedPieces:
     """How much of a shape is copied whole.
 
     A piece is a connected set of parts that stand so in one exemplar: one rigid motion, no reflection, lays each part
@@ -40,14 +40,14 @@ class Copied:
     def described(self) -> dict[str, Any]:
         """The same as JSON, as it stands in a lineage."""
         return {
-            "largest": round(self.largest, 6),
+            "share": round(self.largest, 6),
             "pieces": self.pieces,
-            "exemplar": round(self.exemplar, 6),
-            "of": self.of,
+            "exemplar_share": round(self.exemplar, 6),
+            "exemplar": self.of,
         }
 
 
-class CopyTest:
+class CopyDetector:
     """What assemblies of one kit have copied of its exemplars."""
 
     def __init__(self, kit: Kit, dockings: DockingTable) -> None:
@@ -58,7 +58,7 @@ class CopyTest:
         self._target = self._exemplars(kit, dockings)
         self._has = np.array([np.isin(np.arange(self._types), each.assembly.types) for each in kit.exemplars])
 
-    def copied(self, assembly: Assembly, labels: IntArray) -> Copied:
+    def copied(self, assembly: Assembly, labels: IntArray) -> CopiedPieces:
         """How much of `assembly` is copied. labels: int32 (m, 2), directed docking labels of its edges, as from
         `DockingTable.label_edges`, -1 for contacts that no exemplar shows."""
         shape = shape_tables(assembly, labels, self._types)
@@ -81,7 +81,9 @@ class CopyTest:
             showing = np.flatnonzero(self._has[:, shape.types].any(axis=1))
         smallest = int(showing[self._target.sizes[showing].argmin()])
         share = largest / int(self._target.sizes[smallest])
-        return Copied(largest / len(assembly), int(cover(parts, starts, len(assembly))), share, self._names[smallest])
+        return CopiedPieces(
+            largest / len(assembly), int(cover(parts, starts, len(assembly))), share, self._names[smallest]
+        )
 
     def _joints(self, shape: ShapeTables) -> Joints:
         return Joints(shape.starts, shape.ends, shape.labels, *locate(self._groups, self._dockings, shape))

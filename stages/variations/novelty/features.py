@@ -12,14 +12,23 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.kit import Assembly, Kit
 
 Axis = Literal[
-    "parts", "footprint", "height", "aspect", "cycle_rank", "mixture", "blend", "distance", "copied", "dominant"
+    "parts",
+    "footprint",
+    "height",
+    "aspect",
+    "cycle_rank",
+    "mixture",
+    "neighbourhood_mixture",
+    "distance",
+    "copied_share",
+    "dominant",
 ]
 AXES: tuple[Axis, ...] = get_args(Axis)
-MIXED = 0.1
+MIN_MIXTURE = 0.1
 """Mixture from which on a shape counts as mixed: a tenth of its parts from other exemplars than its main one."""
 
 
-class FeatureTest:
+class FeatureExtractor:
     """The features of assemblies of one kit."""
 
     def __init__(self, kit: Kit) -> None:

@@ -12,7 +12,7 @@ from stages.shape.kit import Kit, Multiset
 Rule = tuple[int, Multiset]
 
 
-def meeting(kit: Kit) -> dict[str, Any]:
+def kit_overlap(kit: Kit) -> dict[str, Any]:
     """What the exemplars of a kit share, as JSON; empty for a kit of one.
 
     types: part types that several exemplars have, of `all_types`; neighbourhoods: types with a multiset of neighbour
@@ -53,8 +53,8 @@ def _fit(one: Rule, other: Rule) -> bool:
     return any(near == other[0] for near, _ in one[1]) and any(near == one[0] for near, _ in other[1])
 
 
-def meeting_words(found: Mapping[str, Any], strictness: str, crossings: Mapping[str, int]) -> str:
-    """`meeting` in words, with what became of the tries to dock pieces of different ancestry, by outcome."""
+def overlap_sentence(found: Mapping[str, Any], strictness: str, crossings: Mapping[str, int]) -> str:
+    """`kit_overlap` in words, with what became of the tries to dock pieces of different ancestry, by outcome."""
     text = (
         f"the exemplars share {found['types']} of {found['all_types']} part types and {found['neighbourhoods']:,} of "
         f"{found['all_neighbourhoods']:,} neighbourhoods; {found['joints']:,} pairs of others might stand side by side"

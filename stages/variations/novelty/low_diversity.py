@@ -11,7 +11,7 @@ from stages.shape.graphs.histograms import histogram_metric
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, STRICTNESS
 from stages.shape.kit import Kit, Strictness
 
-COPIED = 0.9
+NEAR_COPY_SHARE = 0.9
 """Share of parts in the largest copied piece above which a shape is a near copy, and from which on, in the median, a
 pool is dull."""
 NEAR = 0.02
@@ -31,7 +31,7 @@ def mutual_distance(counts: np.ndarray) -> float:
     return float(histogram_metric(chosen[i], chosen[j]).mean())
 
 
-def dullness(kit: Kit, measures: Mapping[str, Any]) -> str:
+def low_diversity(kit: Kit, measures: Mapping[str, Any]) -> str:
     """Why a pool is dull and what would help, in one sentence; empty where it is not dull, or has fewer than two
     shapes.
 
@@ -41,7 +41,7 @@ def dullness(kit: Kit, measures: Mapping[str, Any]) -> str:
     if measures["variants"] < 2:
         return ""
     faults = []
-    if measures["copied"] >= COPIED:
+    if measures["copied"] >= NEAR_COPY_SHARE:
         faults.append(f"half of the shapes have {measures['copied']:.0%} or more of their parts copied whole")
     if measures["distance"] < NEAR:
         faults.append(f"parts lists are almost those of the exemplars (E {measures['distance']:.3f})")
@@ -62,7 +62,7 @@ def _remedies(kit: Kit) -> list[str]:
         remedies.append("neighbours by their faces alone (contact.kinds: [face])")
     if not kit.grammar.hubs and not any(len(each.backdrop) for each in kit.exemplars):
         remedies.append("leaving out parts that touch everything (hubs.types: auto)")
-    return [*remedies, "the same layout in other proportions (proportions.per_kit)"]
+    return [*remedies, "the same layout in other proportions (proportions.samples_per_kit)"]
 
 
 def _looser(strictness: Strictness) -> Strictness | None:

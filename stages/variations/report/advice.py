@@ -8,11 +8,13 @@ import numpy as np
 
 from stages.exemplars.diagnostics import MAX_PARTS_WITHOUT_HUBS, hub_parts
 from stages.shape.kit import Kit
-from stages.variations.requirements.hub_restoration import NO_BACKDROP
-from stages.variations.requirements.required_labels import NO_CARCASS, carcass
+from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED
+from stages.variations.requirements.required_labels import LABELS_MISSING, spanning_labels
 from stages.variations.search.search import DUPLICATE, SUBASSEMBLY
 
-SAME_LAYOUT = "make the same layout in other proportions (`variations.per_kit: 0`, `proportions.per_kit`)"
+SAME_LAYOUT = (
+    "make the same layout in other proportions (`variations.samples_per_kit: 0`, `proportions.samples_per_kit`)"
+)
 """What always helps where there are too few layouts, or all of them alike."""
 REGULAR = 0.01
 """Share of tries that give an exemplar again, or a piece of one, from which on a kit is regular."""
@@ -36,10 +38,10 @@ def what_keeps(kit: Kit, rejects: Mapping[str, int], tries: int) -> str:
         return f"every part is its own type; bring {another}, or name types {fitting}"
     if used == 1:
         return "all parts are of one type, so a variant is only longer or shorter; bring a model with other parts too"
-    if rejects.get(NO_CARCASS, 0):
-        lost = f"all that was found lacks {' or '.join(carcass(kit))}, parts as large as the exemplar"
+    if rejects.get(LABELS_MISSING, 0):
+        lost = f"all that was found lacks {' or '.join(spanning_labels(kit))}, parts as large as the exemplar"
         return f"{lost}, and is a piece of one; bring {another} that has them"
-    if rejects.get(NO_BACKDROP, 0):
+    if rejects.get(HUBS_NOT_RESTORED, 0):
         left_out = " or ".join(kit.types[hub].name for hub in kit.grammar.hubs)
         return f"what was found stands without {left_out}, left out by `hubs.types`; bring {another}"
     pinned = _hub(kit)
@@ -71,7 +73,7 @@ def what_was_left(lists: Mapping[str, int]) -> str:
         return ""
     return (
         f"{short:,} of {short + whole:,} lists of replacements ended at their limit, and what came last is missing; "
-        "a longer search goes on with them, and fewer `variations.search.dummies` leave less out"
+        "a longer search goes on with them, and fewer `variations.search.dummy_edges` leave less out"
     )
 
 

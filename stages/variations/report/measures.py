@@ -10,8 +10,8 @@ import numpy as np
 from stages.shape.kit import Assembly, Kit
 from stages.variations.novelty.archive import cell_of
 from stages.variations.novelty.edit_distance import edit_bounds
-from stages.variations.novelty.features import AXES, MIXED
-from stages.variations.novelty.kit_overlap import meeting_words
+from stages.variations.novelty.features import AXES, MIN_MIXTURE
+from stages.variations.novelty.kit_overlap import overlap_sentence
 from stages.variations.novelty.low_diversity import mutual_distance
 from stages.variations.report.split_report import shortage
 from stages.variations.settings import NoveltyConfig
@@ -39,12 +39,12 @@ def pool_measures(
     return {
         "graphs": len({bytes(each) for each in digests[:, 0]}),
         "histograms": len({bytes(each) for each in counts}),
-        "mixed": _share(features[:, AXES.index("mixture")] >= MIXED),
-        "blended": _share(features[:, AXES.index("blend")] > 0),
+        "mixed": _share(features[:, AXES.index("mixture")] >= MIN_MIXTURE),
+        "blended": _share(features[:, AXES.index("neighbourhood_mixture")] > 0),
         "distance": round(float(distances.mean()), 4) if len(features) else 0.0,
         "distances": _quantiles(distances, 4),
         "apart": round(mutual_distance(counts), 4),
-        "copied": round(float(np.median(features[:, AXES.index("copied")])), 4) if len(features) else 0.0,
+        "copied": round(float(np.median(features[:, AXES.index("copied_share")])), 4) if len(features) else 0.0,
         "parts": _quantiles(parts, 0),
         "cells": len(set(cells)),
         "bins": {axis: len(set(steps)) for axis, steps in zip(novelty.axes, zip(*cells, strict=True), strict=False)},
@@ -128,7 +128,7 @@ def measure_table(measures: Mapping[str, Mapping[str, Any]]) -> str:
 def _met(measures: Mapping[str, Any]) -> str:
     if not measures["meeting"]:
         return ""
-    return meeting_words(measures["meeting"], measures["strictness"], measures["crossings"])
+    return overlap_sentence(measures["meeting"], measures["strictness"], measures["crossings"])
 
 
 def growth(curve: Sequence[Sequence[int]]) -> str:

@@ -49,7 +49,7 @@ def kit_variants_sheet(kit: Kit, samples: Sequence[Sample], dull: str, rng: np.r
     first = [(each.assembly, each.key) for each in samples[:SHOWN]]
     if dull:
         pairs = zip(first[: SHOWN // 2], samples, strict=False)
-        first = [shown for one, each in pairs for shown in (one, exemplars[each.lineage["copied"]["of"]])]
+        first = [shown for one, each in pairs for shown in (one, exemplars[each.lineage["copied"]["exemplar"]])]
     parts = [
         ("Exemplars", list(exemplars.values()), "what goes in"),
         ("Most different", first, f"each beside its exemplar; {dull}" if dull else "chosen first"),

@@ -11,7 +11,7 @@ from pipeline.stage import Task
 from stages.exemplars.settings import KitConfig
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.contact import world_boxes
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 from stages.shape.kit_input import input_kit
@@ -19,7 +19,7 @@ from stages.variations.kernels.structs import FORBIDDEN, NONE
 from stages.variations.requirements.required_labels import spanning_hubs
 from stages.variations.settings import CHOSEN_HUBS, VariationsConfig
 
-NO_BACKDROP = "no backdrop"
+HUBS_NOT_RESTORED = "no backdrop"
 """Why a variant is refused that does not get back the hubs that are required."""
 FIT_SHARE = 0.75
 """A hub fits where it has at least this share of the neighbours that one of its type had in an exemplar."""
@@ -29,14 +29,14 @@ LACKING = 0.05
 """No greater share of a variant's parts may be without a hub that each of their type has in the exemplars."""
 
 
-class Backdrop:
+class HubRestorer:
     """The hubs of a kit, ready to be put behind shapes.
 
     With `upright` a hub stands below a part, above it or beside it as one of its type did in an exemplar; without,
     symmetries of the part may turn it over.
     """
 
-    def __init__(self, answers: ContactAnswers, upright: bool) -> None:
+    def __init__(self, answers: ContactOracle, upright: bool) -> None:
         self.answers = answers
         self.kit = answers.kit
         self._up = np.array({"y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}[self.kit.up]) if upright else np.zeros(3)
@@ -192,16 +192,16 @@ class Backdrop:
         return touched
 
 
-_known: dict[tuple[str, bool], Backdrop] = {}
+_known: dict[tuple[str, bool], HubRestorer] = {}
 
 
-def backdrop_of(task: Task, kit: str) -> Backdrop:
+def hub_restorer(task: Task, kit: str) -> HubRestorer:
     """The backdrop of a kit, kept from shard to shard of one worker: what it remembers never changes a result."""
     upright = task.config.section(VariationsConfig).search.upright
     read = input_kit(task, kit)  # by every shard, so that its record does not depend on what its worker made before
     made_from = str(task.input("exemplars", f"{kit}.tar")), upright
     if made_from not in _known:
-        _known[made_from] = Backdrop(ContactAnswers(read), upright)
+        _known[made_from] = HubRestorer(ContactOracle(read), upright)
     return _known[made_from]
 
 
@@ -215,10 +215,10 @@ def _with_part(assembly: Assembly, part_type: int, place: FloatArray, touched: l
     )
 
 
-def hubs_by_choice(asked: KitConfig, kit: Kit) -> float:
+def auto_min_hubs(asked: KitConfig, kit: Kit) -> float:
     """The share of what exemplars have of hub parts that a variant of `kit` must get back, where nobody states it: of a
     kit whose hubs were chosen, and are put back."""
-    chosen = asked.hubs.types == "auto" and asked.hubs.keep == "backdrop" and bool(kit.grammar.hubs)
+    chosen = asked.hubs.types == "auto" and asked.hubs.restore and bool(kit.grammar.hubs)
     return CHOSEN_HUBS if chosen else 0
 
 

@@ -18,20 +18,20 @@ from stages.variations.requirements.named_labels import named_labels
 
 SPAN = 2 / 3
 """A part belongs to the carcass if the diagonal of its box is so much of the exemplar's."""
-NO_CARCASS = "without its carcass"
+LABELS_MISSING = "without its carcass"
 """Why a variant is refused that lacks a part of the carcass."""
 
 
-def carcass(kit: Kit) -> tuple[str, ...]:
+def spanning_labels(kit: Kit) -> tuple[str, ...]:
     """The labels of the carcass, in the order of the kit's: of each, every exemplar has a part that spans it. Hubs are
     none of it, for they are put back behind finished shapes."""
     spanning = [_spanning(kit, each) for each in kit.exemplars]
     return tuple(name for label, name in enumerate(kit.labels) if all(label in each for each in spanning))
 
 
-def carcass_test(kit: Kit, required: Sequence[str]) -> Callable[[Assembly], bool]:
+def labels_test(kit: Kit, required: Sequence[str]) -> Callable[[Assembly], bool]:
     """Whether an assembly has a part of each of the labels `required`. Raises ConfigError for one that no part has."""
-    asked = set(np.flatnonzero(named_labels(kit, required, "variations.require.carcass")).tolist())
+    asked = set(np.flatnonzero(named_labels(kit, required, "variations.require.labels")).tolist())
     return lambda assembly: asked <= set(kit.label_of[assembly.types].tolist())
 
 

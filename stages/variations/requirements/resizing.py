@@ -43,14 +43,14 @@ class Resizer:
     """Resizes the parts of a kit's assemblies in height, each by `most` at most, those of labels `rigid` never."""
 
     def __init__(self, kit: Kit, most: float, rigid: Sequence[str]) -> None:
-        self.kit, self.most = kit, most
+        self.kit, self.max_factor = kit, most
         self._rigid = rigid_types(kit, rigid)
 
     def may(self, assembly: Assembly, part: int, factor: float) -> bool:
         """Whether a part may be made so many times taller."""
         up = UP[self.kit.up]
         made = factor * np.linalg.norm(assembly.placements[part, up, :3])
-        return bool(1 / self.most <= made <= self.most and not self._rigid[assembly.types[part]])
+        return bool(1 / self.max_factor <= made <= self.max_factor and not self._rigid[assembly.types[part]])
 
     def meeting(self, assembly: Assembly, part: int, other: int, end: int) -> float:
         """The height at which two parts meet: the lower (0) or the upper (1) end of what their spans have in common."""

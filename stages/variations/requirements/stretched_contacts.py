@@ -14,7 +14,7 @@ NEAR = 1.1
 """Parts nearer to each other than so many contact tolerances are held against the record, as when it is verified."""
 
 
-def contact_fault(kit: Kit, assembly: Assembly) -> str | None:
+def broken_contact(kit: Kit, assembly: Assembly) -> str | None:
     """Why an assembly is none, or None: `contact lost`, `touches what it should not`, or `parts clash`, where a pair of
     parts reaches deeper into each other than in the exemplars by more than STRETCHED_DEPTH of the smaller one."""
     shape = kit_shape(kit, assembly)

@@ -48,7 +48,7 @@ PARTNERS = 4
 
 
 @dataclass(frozen=True)
-class Choice:
+class PlannedTry:
     """One try: its number among the choices, the parents, the way of cutting and whether the piece must be large."""
 
     number: int
@@ -58,7 +58,7 @@ class Choice:
     large: bool
 
 
-class Steering:
+class OperatorSelector:
     """Plans tries in batches and learns from what they brought."""
 
     def __init__(self, config: SearchConfig, by_meaning: bool = False) -> None:
@@ -75,7 +75,7 @@ class Steering:
         self._work = np.zeros(len(self.choices))
         self._grown_work, self._grown, self._grown_gain = FIRST_GUESS, 1, 0.0
 
-    def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[Choice]:
+    def plan(self, rng: np.random.Generator, parents: Parents, archive: Archive, count: int) -> list[PlannedTry]:
         """The next `count` tries."""
         if self.config.novelty.guided:
             odds = self._odds(len(parents.exemplars)).cumsum()
@@ -92,11 +92,11 @@ class Steering:
         self._gains *= np.exp(-count / MEMORY)
         self._work *= np.exp(-count / MEMORY)
         return [
-            Choice(number, a, a if self.choices[number][1] == UNITS else b, *self.choices[number][1:])
+            PlannedTry(number, a, a if self.choices[number][1] == UNITS else b, *self.choices[number][1:])
             for number, a, b in zip(numbers.tolist(), first, second, strict=True)
         ]
 
-    def learn(self, choice: Choice, gain: float, work: float) -> None:
+    def learn(self, choice: PlannedTry, gain: float, work: float) -> None:
         """What a try has brought, and what it cost."""
         self._gains[choice.number] += gain
         self._work[choice.number] += work
@@ -113,8 +113,8 @@ class Steering:
             return only
         possible = np.array([exemplars > 1 or draw in (PLAIN, RARE) for draw, *_ in self.choices[:end]])
         rates = np.where(possible, (self._gains[:end] + 1.0) / (self._work[:end] + 50.0), 0.0) ** 2
-        explored: FloatArray = self.config.novelty.explore * possible / possible.sum()
-        chances: FloatArray = explored + (1.0 - self.config.novelty.explore) * rates / rates.sum()
+        explored: FloatArray = self.config.novelty.exploration * possible / possible.sum()
+        chances: FloatArray = explored + (1.0 - self.config.novelty.exploration) * rates / rates.sum()
         if not self._grows:
             return chances
         share = self._grown_share()

@@ -11,7 +11,7 @@ from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.kit import Assembly
 from stages.variations.kernels.structs import ShapeTables
 from stages.variations.novelty.archive import Archive, Place
-from stages.variations.novelty.features import MIXED
+from stages.variations.novelty.features import MIN_MIXTURE
 
 RIVALS = 6
 """Of so many variants of the largest family the most crowded makes room for another."""
@@ -58,7 +58,7 @@ class Parents:
         else:
             self.variants.append(parent)
         self.places[place] = parent.place
-        mixed = 1.0 - parent.shares.max() >= MIXED
+        mixed = 1.0 - parent.shares.max() >= MIN_MIXTURE
         self.families[place] = len(self.exemplars) if mixed else parent.shares.argmax()
         self.shares[place] = parent.shares
 

@@ -18,17 +18,17 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.shape import kit_shape
-from stages.variations.constraint import made_mend, made_test, module_of
+from stages.variations.constraint import build_repair, build_test, module_of
 from stages.variations.novelty.archive import cell_of
 from stages.variations.report.advice import SAME_LAYOUT, what_keeps, what_was_left
 from stages.variations.report.measures import pool_measures
-from stages.variations.requirements.hub_restoration import NO_BACKDROP, backdrop_of, hubs_by_choice
-from stages.variations.requirements.required_labels import NO_CARCASS, carcass_test
+from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, auto_min_hubs, hub_restorer
+from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test
 from stages.variations.search.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search.search import SPARE, Search, Variant
 from stages.variations.settings import (
@@ -60,11 +60,11 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
     shards: list[Shard] = []
     found: list[str] = []
     state: Mapping[str, Any] = {"telling": 0, "tries": 0, "idle": 0, "curve": [], **{key: {} for key in COUNTED}}
-    target, required = math.ceil(config.selection.oversample * config.per_kit), _chosen(plan, kit)
-    for number in range(config.search.rounds):
+    target, required = math.ceil(config.selection.oversample * config.samples_per_kit), _chosen(plan, kit)
+    for number in range(config.search.max_rounds):
         name = f"{kit}-r{number:03d}"
-        wanted = max(FEWEST, -(-(target - state["telling"]) * 11 // (10 * config.search.lanes)))
-        wanted = min(wanted, max(ROUND_FIND, target // (ROUND_SHARE * config.search.lanes)))
+        wanted = max(FEWEST, -(-(target - state["telling"]) * 11 // (10 * config.search.parallel_searches)))
+        wanted = min(wanted, max(ROUND_FIND, target // (ROUND_SHARE * config.search.parallel_searches)))
         lanes = [
             Shard(
                 f"{name}-lane{lane:02d}",
@@ -72,7 +72,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
                 (f"exemplars/{kit}", *found),
                 code=tuple(module_of(each) for each in config.require.constraints),
             )
-            for lane in range(config.search.lanes)
+            for lane in range(config.search.parallel_searches)
         ]
         shards.extend(lanes)
         found.extend(f"variations/{lane.name}" for lane in lanes)
@@ -86,7 +86,7 @@ def search_shards(plan: Plan, kit: str) -> tuple[list[Shard], bool]:
             "tried": sum(each["tries"] for each in done),
             "spares": sum(each["spares"] for each in done),
             "counted": {key: _added(*(each[key] for each in done)) for key in COUNTED},
-            "last": number == config.search.rounds - 1,
+            "last": number == config.search.max_rounds - 1,
             **{key: state[key] for key in ("telling", "tries", "idle", "curve", *COUNTED)},
         }
         pool = Shard(f"{name}-pool", params, (f"exemplars/{kit}", *found))
@@ -117,18 +117,20 @@ def run_lane(task: Task) -> Outcome:
     rng = task.rng("tries")
     pool = PoolIndex.of(task, kit.name, len(kit.types))
     places = _archive(pool, search)
-    chosen = _parents(rng, search.archive.crowds(places), config.parents, config.novelty.guided)
+    chosen = _parents(rng, search.archive.crowds(places), config.max_parents, config.novelty.guided)
     for place, (found, index) in zip(places[chosen].tolist(), pool.variants(task, chosen), strict=True):
         (assembly, labels), origins = found.assembly(index), found.origins_of(index)
         if assembly.stretches is not None:  # how stretched parts dock nobody has seen
             continue
         search.adopt(rng, search.parent(f"{found.name}-{index}", assembly, origins, (place[0], place[1]), labels))
     wanted = task.shard.params["wanted"]
-    variants, tries = search.run(rng, config.tries, wanted, task.shard.name, lambda count: task.progress(count, wanted))
-    is_whole = carcass_test(kit, task.shard.params["carcass"])
+    variants, tries = search.run(
+        rng, config.tries_per_round, wanted, task.shard.name, lambda count: task.progress(count, wanted)
+    )
+    is_whole = labels_test(kit, task.shard.params["labels"])
     whole = [each for each in variants if is_whole(each.assembly)]
     if len(whole) < len(variants):
-        search.rejects[NO_CARCASS] += len(variants) - len(whole)
+        search.rejects[LABELS_MISSING] += len(variants) - len(whole)
     kept, resized = _required(task, kit, section, whole, search.rejects)
     write_variants(task, kit, kept)
     rejects = dict(sorted(search.rejects.items()))
@@ -146,17 +148,17 @@ def _required(
     """The variants that are, with their backdrop, what the config requires, the others being added to `rejects` by
     reason; and how many of them were resized so that they are, by the reason for which they would have been refused."""
     params = task.shard.params
-    telling = [each for each in variants if each.lineage["copied"]["largest"] <= params["copied"]]
+    telling = [each for each in variants if each.lineage["copied"]["share"] <= params["max_copied_share"]]
     if len(telling) < len(variants):
         rejects["too much copied whole"] += len(variants) - len(telling)
     telling, resized = _constrained(kit, section, telling, rejects)
     hubs, physical = _hubs_required(task.config, kit), section.require.physical(params["stable"])
     if not (physical.rooted or physical.stable or hubs):
         return telling, resized
-    backdrop, kept = backdrop_of(task, kit.name), []
+    backdrop, kept = hub_restorer(task, kit.name), []
     for variant in telling:
         whole = backdrop.fit(variant.assembly)
-        weak = unmet(physical, kit_shape(kit, whole)) if backdrop.has_hubs(hubs, whole) else NO_BACKDROP
+        weak = unmet(physical, kit_shape(kit, whole)) if backdrop.has_hubs(hubs, whole) else HUBS_NOT_RESTORED
         if weak is None:
             kept.append(variant)
         else:
@@ -172,8 +174,8 @@ def _constrained(
     asked, stretch, resized = section.require.constraints, section.search.stretch, Counter[str]()
     if not asked:
         return variants, resized
-    test, kept = made_test(kit, asked), []
-    mend = made_mend(kit, asked, stretch.most, stretch.rigid) if stretch.most > 1 else None
+    test, kept = build_test(kit, asked), []
+    mend = build_repair(kit, asked, stretch.max_factor, stretch.rigid) if stretch.max_factor > 1 else None
     for variant in variants:
         reason = test(variant.assembly)
         if reason is None:
@@ -183,7 +185,7 @@ def _constrained(
         if mended is None:
             rejects[reason] += 1
             continue
-        kept.append(replace(variant, assembly=mended, lineage={**variant.lineage, "bent": True}))
+        kept.append(replace(variant, assembly=mended, lineage={**variant.lineage, "deformed": True}))
         resized[reason] += 1
     return kept, resized
 
@@ -194,9 +196,9 @@ def _chosen(plan: Plan, kit: str) -> dict[str, Any]:
     built = plan.summary("exemplars", kit) or {"chosen": {}}
     found: dict[str, Any] = {}
     for key, said, otherwise in (
-        (CHOSEN_COPIED, require.copied, 1.0),
+        (CHOSEN_COPIED, require.max_copied_share, 1.0),
         (CHOSEN_STABLE, require.stable, False),
-        (CHOSEN_CARCASS, require.carcass, ()),
+        (CHOSEN_CARCASS, require.labels, ()),
     ):
         value = built["chosen"].get(key, otherwise) if said == "auto" else said
         found[key.removeprefix("require.")] = list(value) if isinstance(value, tuple) else value
@@ -205,10 +207,10 @@ def _chosen(plan: Plan, kit: str) -> dict[str, Any]:
 
 def _hubs_required(config: Config, kit: Kit) -> float:
     """How many hub parts a variant of `kit` must get back, or, below 1, the share of what exemplars have."""
-    said = config.section(VariationsConfig).require.hubs
+    said = config.section(VariationsConfig).require.min_hubs
     if said != "auto":
         return said
-    return hubs_by_choice(next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name), kit)
+    return auto_min_hubs(next(each for each in config.section(ExemplarsConfig).kits if each.name == kit.name), kit)
 
 
 def _archive(pool: PoolIndex, search: Search) -> np.ndarray:
@@ -240,7 +242,7 @@ def run_pool(task: Task) -> Outcome:
     kept: list[tuple[int, int]] = []
     doubles = 0
     stem = task.shard.name.removesuffix("pool")
-    lanes = [FoundVariants.of(task, f"{stem}lane{lane:02d}") for lane in range(config.search.lanes)]
+    lanes = [FoundVariants.of(task, f"{stem}lane{lane:02d}") for lane in range(config.search.parallel_searches)]
     for lane, found in enumerate(lanes):
         for index in range(len(found)):
             identity = _identity(found.counts(index, len(kit.types)), found.digests[index], duplicates)
@@ -259,13 +261,13 @@ def run_pool(task: Task) -> Outcome:
     tries = params["tries"] + params["tried"]
     idle = 0 if kept else params["idle"] + params["tried"]
     telling = params["telling"] + max(len(kept) - params["spares"], 0)
-    target = math.ceil(config.selection.oversample * config.per_kit)
-    left = target - telling if total >= config.per_kit else config.per_kit - total
+    target = math.ceil(config.selection.oversample * config.samples_per_kit)
+    left = target - telling if total >= config.samples_per_kit else config.samples_per_kit - total
     pace = len(kept) / params["tried"]
     slow = tries >= _patience(kit, config) and 0 < pace * _slowest(total, config) * tries < left
     ended = telling >= target or total >= SPARE * target or idle >= _patience(kit, config) or params["last"] or slow
     counted = {key: _added(params[key], params["counted"][key]) for key in COUNTED}
-    poor = ended and total < config.per_kit
+    poor = ended and total < config.samples_per_kit
     return Outcome(
         0,
         {
@@ -294,21 +296,21 @@ def _added(*counts: Mapping[str, int]) -> dict[str, int]:
 
 def _slowest(found: int, config: VariationsConfig) -> int:
     """So many times the tries so far the rest may take, at the pace of the last round."""
-    return SLOW_CHOICE if found >= config.per_kit else SLOW
+    return SLOW_CHOICE if found >= config.samples_per_kit else SLOW
 
 
 def _why(kit: Kit, config: VariationsConfig, found: int, tries: int, idle: int, slow: int) -> str:
     """slow: tries of the last round, where its pace was too slow to go on."""
-    start = f"{kit.name}: {min(found, config.per_kit):,} of {config.per_kit:,}"
-    if found >= config.selection.oversample * config.per_kit:
+    start = f"{kit.name}: {min(found, config.samples_per_kit):,} of {config.samples_per_kit:,}"
+    if found >= config.selection.oversample * config.samples_per_kit:
         return f"{start} variants, chosen from {found:,} after {tries:,} tries"
-    chosen = f", chosen from {found:,}" if found > config.per_kit else ""
+    chosen = f", chosen from {found:,}" if found > config.samples_per_kit else ""
     if idle >= _patience(kit, config):
         return f"{start}{chosen}: no new variant in the last {idle:,} tries"
     if slow:
         longer = f"{_slowest(found, config)} times as long as all {tries:,} so far"
         return f"{start}{chosen}: at the pace of the last {slow:,} tries the rest would take more than {longer}"
-    return f"{start}{chosen}: the search ended after {config.search.rounds} rounds"
+    return f"{start}{chosen}: the search ended after {config.search.max_rounds} rounds"
 
 
 def _patience(kit: Kit, config: VariationsConfig) -> int:
@@ -325,12 +327,12 @@ def _identity(counts: np.ndarray, digests: np.ndarray, duplicates: str) -> bytes
     return bytes(counts if duplicates == "histogram" else digests[int(duplicates == "docking")])
 
 
-_known_answers: dict[str, ContactAnswers] = {}
+_known_answers: dict[str, ContactOracle] = {}
 
 
-def _answers(kit: Kit, task: Task) -> ContactAnswers:
+def _answers(kit: Kit, task: Task) -> ContactOracle:
     """The contact answers of a kit, kept from shard to shard of one worker: what they hold never changes a result."""
     made_from = str(task.input("exemplars", f"{kit.name}.tar"))
     if made_from not in _known_answers:
-        _known_answers[made_from] = ContactAnswers(kit)
+        _known_answers[made_from] = ContactOracle(kit)
     return _known_answers[made_from]

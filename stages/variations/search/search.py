@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stages.shape.arrays import Float32Array, FloatArray, IntArray
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly
@@ -35,10 +35,10 @@ from stages.variations.kernels.structs import (
 )
 from stages.variations.kernels.tables import kit_tables, multiset_weights, shape_tables, workspace
 from stages.variations.novelty.archive import Archive, Cell, Place, cell_of
-from stages.variations.novelty.copied_pieces import CopyTest
-from stages.variations.novelty.features import FeatureTest, material_shares
-from stages.variations.requirements.stretched_contacts import contact_fault
-from stages.variations.search.operator_selection import BATCH, TRY_WORK, Choice, Steering
+from stages.variations.novelty.copied_pieces import CopyDetector
+from stages.variations.novelty.features import FeatureExtractor, material_shares
+from stages.variations.requirements.stretched_contacts import broken_contact
+from stages.variations.search.operator_selection import BATCH, TRY_WORK, OperatorSelector, PlannedTry
 from stages.variations.search.parents import Parent, Parents
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.attachment import HoldTest
@@ -112,36 +112,36 @@ class Search:
 
     def __init__(
         self,
-        answers: ContactAnswers,
+        answers: ContactOracle,
         config: SearchConfig,
         slots: SlotGrammar | None = None,
-        copies: CopyTest | None = None,
+        copies: CopyDetector | None = None,
     ) -> None:
         kit = answers.kit
         self.kit = kit
         self.answers = answers
         self.config = config
         sizes = [len(each.assembly) for each in kit.exemplars]
-        self.smallest = max(2, round(config.smallest * min(sizes)))
-        self.largest = max(3, round(config.largest * max(sizes)))
+        self.min_parts = max(2, round(config.min_size * min(sizes)))
+        self.max_parts = max(3, round(config.max_size * max(sizes)))
         self._sizes = np.array(sizes)
         self._has = np.array([np.isin(np.arange(len(kit.types)), each.assembly.types) for each in kit.exemplars])
         self.tables = kit_tables(kit, config.upright)
         self._histogram_weights = multiset_weights(len(kit.types))
-        self._ws = workspace(max(self.largest, *sizes))
+        self._ws = workspace(max(self.max_parts, *sizes))
         self._stretches: FloatArray | None = None
         slotted = kit.grammar.strictness in SLOT_LEVELS
         self._slots = (slots or SlotGrammar(kit, answers.dockings, config.upright)) if slotted else None
         self._grower = self._made_grower() if config.method in ("both", "growth", "all") else None
         self._replacer = self._made_replacer() if config.method in ("substructures", "all") else None
-        self.archive = Archive(config.novelty.quota)
+        self.archive = Archive(config.novelty.cell_quota)
         by_meaning = kit.by_meaning
-        self.steering = Steering(config, by_meaning)
+        self.operators = OperatorSelector(config, by_meaning)
         self._ground = GroundTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
         self._holds = HoldTest(kit, answers.dockings.reach / 2) if by_meaning and config.upright else None
-        self._features = FeatureTest(kit)
-        self._copies = copies or CopyTest(kit, answers.dockings)
-        self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.parents)
+        self._features = FeatureExtractor(kit)
+        self._copies = copies or CopyDetector(kit, answers.dockings)
+        self.parents = Parents([self._exemplar(number) for number in range(len(sizes))], config.max_parents)
         self.seen: set[int] = set()
         for each in self.parents.exemplars:
             self.remember(each.assembly.types, *self.keys_of(each))
@@ -189,7 +189,7 @@ class Search:
         found: list[Variant] = []
         telling, number = 0, 0
         while number < tries and telling < wanted and len(found) < SPARE * wanted:
-            batch = self.steering.plan(rng, self.parents, self.archive, min(BATCH, tries - number))
+            batch = self.operators.plan(rng, self.parents, self.archive, min(BATCH, tries - number))
             for choice in batch:
                 if number >= tries:  # what is grown takes many
                     break
@@ -207,7 +207,7 @@ class Search:
                         self.crossings[variant if isinstance(variant, str) else NEW] += 1
                 if isinstance(variant, str):
                     self.rejects[variant] += 1
-                    self.steering.learn(choice, 0.0, work)
+                    self.operators.learn(choice, 0.0, work)
                     continue
                 found.append(variant)
                 if self._keep(rng, variant, choice, work, f"{name}-{len(found) - 1}"):
@@ -217,12 +217,12 @@ class Search:
                     break
         return found, number
 
-    def _keep(self, rng: np.random.Generator, variant: Variant, choice: Choice, work: float, name: str) -> bool:
+    def _keep(self, rng: np.random.Generator, variant: Variant, choice: PlannedTry, work: float, name: str) -> bool:
         """Count a find, and make it a parent where it adds to the archive; whether it does."""
         self.remember(variant.assembly.types, variant.graph, variant.docked)
         spare = self.archive.is_full(variant.cell, variant.histogram)
         gain = KNOWN_GAIN if self.archive.has_histogram(variant.histogram) else 1.0
-        self.steering.learn(choice, 0.0 if spare else gain, work)
+        self.operators.learn(choice, 0.0 if spare else gain, work)
         place = self.archive.add(variant.cell, variant.histogram)
         if spare and self.config.novelty.guided:
             self.spares += 1
@@ -235,11 +235,11 @@ class Search:
         """Add a parent."""
         self.parents.adopt(rng, parent, self.archive)
 
-    def _attempt(self, rng: np.random.Generator, choice: Choice) -> Variant | str:
+    def _attempt(self, rng: np.random.Generator, choice: PlannedTry) -> Variant | str:
         """One try: a new variant, or the reason why there is none."""
         a, b, ws, kit = choice.a, choice.b, self._ws, self.tables
         with_labels = self.config.duplicates == "docking"
-        limits = self.smallest, self.largest
+        limits = self.min_parts, self.max_parts
         known = self.answers.table
         if choice.way == MEANINGS:
             outcome, key = substitute(rng, self.kit, kit, self.answers.dockings, a, b, ws, *limits), 0
@@ -276,7 +276,7 @@ class Search:
             outcome, key = complete(self.tables, self.answers.table, self._ws, with_labels)
         return outcome, key
 
-    def _replace(self, rng: np.random.Generator, choice: Choice) -> tuple[Variant | str, float, Choice]:
+    def _replace(self, rng: np.random.Generator, choice: PlannedTry) -> tuple[Variant | str, float, PlannedTry]:
         """One replacement: a new variant, or the reason why there is none; what it cost; and the choice to which it is
         owed, an earlier one while operations of its pair are left."""
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
@@ -286,7 +286,7 @@ class Search:
         self._stretches = None
         return found, work, used
 
-    def _replaced(self, choice: Choice) -> Variant | str:
+    def _replaced(self, choice: PlannedTry) -> Variant | str:
         """What was put together by replacement, as a new variant, or the reason why it is none."""
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
         ws = self._ws
@@ -304,7 +304,7 @@ class Search:
             return f"{how}: contact lost"
         return self._replacement(int(key), choice)
 
-    def _stretched(self, choice: Choice) -> Variant | str:
+    def _stretched(self, choice: PlannedTry) -> Variant | str:
         """The same where the piece was stretched: its contacts are those that the operation says, which are held
         against the meshes in the end."""
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
@@ -315,12 +315,12 @@ class Search:
             return f"stretched: {REASONS[Outcome.GRAMMAR]}"
         return self._replacement(self._graph_keys()[int(self.config.duplicates == "docking")], choice)
 
-    def _replacement(self, key: int, choice: Choice) -> Variant | str:
+    def _replacement(self, key: int, choice: PlannedTry) -> Variant | str:
         assert self._replacer is not None, "no choice is to replace where the method forbids it"
         if not self._is_connected():
             return APART
         origins, lineage = self._descent("substructures", choice.a, self._replacer.base)
-        lineage |= {"times": self._replacer.times, "bent": self._replacer.is_bent}
+        lineage |= {"repeats": self._replacer.times, "deformed": self._replacer.is_bent}
         return self._finished(key, origins, lineage)
 
     def _descent(self, method: str, a: Parent, b: Parent) -> tuple[np.ndarray, dict[str, Any]]:
@@ -334,9 +334,9 @@ class Search:
             "parts_from": [int(ws.counts[PARTS]) - from_b, from_b],
             "boundary": ws.boundary[: ws.counts[BOUNDARY]].tolist(),
             "images": ws.images[: ws.counts[BOUNDARY]].tolist(),
-            "motion": np.round(ws.motion, 9).tolist(),
-            "times": 1,
-            "bent": False,
+            "transform": np.round(ws.motion, 9).tolist(),
+            "repeats": 1,
+            "deformed": False,
         }
         origins = np.empty(int(ws.counts[PARTS]), dtype=np.int8)
         for parent, placed in ((b, ws.from_b), (a, ws.from_a)):
@@ -345,10 +345,10 @@ class Search:
         return origins, lineage
 
     def _made_replacer(self) -> Replacer:
-        return Replacer(self.answers, self.tables, self.smallest, self.largest, self.config)
+        return Replacer(self.answers, self.tables, self.min_parts, self.max_parts, self.config)
 
     def _made_grower(self) -> Grower:
-        grown, limits = self.config.grown, (self.smallest, self.largest)
+        grown, limits = self.config.grown, (self.min_parts, self.max_parts)
         return Grower(self.answers, self.tables, *limits, self._slots, grown.parts, grown.footprint)
 
     def _grow(self, rng: np.random.Generator) -> tuple[Variant | str, float]:
@@ -372,9 +372,9 @@ class Search:
             "parts_from": counts[used].tolist(),
             "boundary": [part],
             "images": [0],
-            "motion": [*np.eye(3).tolist(), [0.0, 0.0, 0.0]],
-            "times": 1,
-            "bent": False,
+            "transform": [*np.eye(3).tolist(), [0.0, 0.0, 0.0]],
+            "repeats": 1,
+            "deformed": False,
         }
         return self._finished(int(key), origins, lineage), work
 
@@ -394,7 +394,7 @@ class Search:
             return LIFTED
         if self._holds is not None and self._holds.is_loose(self._assembly()):
             return LOOSE
-        fault = None if self._stretches is None else contact_fault(self.kit, self._assembly())
+        fault = None if self._stretches is None else broken_contact(self.kit, self._assembly())
         if fault is not None:
             return f"stretched: {fault}"
         outcome = self._answered_by(validate) if self._stretches is None else Outcome.OK
@@ -408,7 +408,7 @@ class Search:
         """The most parts of a shape of parts of the types (n,): what the largest exemplar sets that has all of them,
         for a row of one exemplar's parts looks no better for another that is large; where none has, `largest`."""
         whole = self._has[:, np.unique(types)].all(axis=1)
-        return max(3, round(self.config.largest * self._sizes[whole].max())) if whole.any() else self.largest
+        return max(3, round(self.config.max_size * self._sizes[whole].max())) if whole.any() else self.max_parts
 
     def remember(self, types: np.ndarray, graph: int, docked: int) -> None:
         """Let a shape of these types and keys be known, so that it is a duplicate when it is found again."""

@@ -17,17 +17,17 @@ from stages.shape.collection.shards import planned_collection
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.sample import Sample, write_sample
-from stages.variations.novelty.kit_overlap import meeting
-from stages.variations.novelty.low_diversity import dullness
+from stages.variations.novelty.kit_overlap import kit_overlap
+from stages.variations.novelty.low_diversity import low_diversity
 from stages.variations.report.measures import SAMPLE, edit_measures, pool_measures
-from stages.variations.requirements.hub_restoration import Backdrop, backdrop_of
+from stages.variations.requirements.hub_restoration import HubRestorer, hub_restorer
 from stages.variations.search.pool import FoundVariants, PoolIndex
 from stages.variations.search.rounds import last_pool
 from stages.variations.selection.ancestry import Ancestry, read_ancestry
-from stages.variations.selection.farthest_first import select
-from stages.variations.selection.orientation import Facing
+from stages.variations.selection.farthest_first import select_diverse
+from stages.variations.selection.orientation import OrientationFix
 from stages.variations.selection.partition import (
-    Chosen,
+    SelectedSamples,
     candidates,
     choose_by_family,
     nearness_of,
@@ -110,20 +110,22 @@ def run_assignment(task: Task) -> Outcome:
     return Outcome(0, {"shards": shards, "variants": total, "graphs": graphs, "kits": measures})
 
 
-def _by_family(task: Task, name: str, pool: PoolIndex, ancestry: Ancestry) -> Chosen:
+def _by_family(task: Task, name: str, pool: PoolIndex, ancestry: Ancestry) -> SelectedSamples:
     kit, config, rng = input_kit(task, name), task.config.section(VariationsConfig), task.rng("selection", name)
     held = candidates(kit, pool, config, rng)
     return choose_by_family(kit, pool, ancestry, held, packed_shapes(task, kit, pool, held), config, rng)
 
 
-def _by_graph(task: Task, kits: list[str], pools: list[PoolIndex]) -> list[Chosen]:
+def _by_graph(task: Task, kits: list[str], pools: list[PoolIndex]) -> list[SelectedSamples]:
     """The variants of each kit that differ most; those of one kit with equal canonical graphs stand in one split."""
     config = task.config.section(VariationsConfig)
     taken: list[np.ndarray] = []
     groups: dict[tuple[int, bytes], list[int]] = {}
     for number, (name, pool) in enumerate(zip(kits, pools, strict=True)):
         rng = task.rng("selection", name)
-        chosen = select(input_kit(task, name), pool.counts, pool.features, config.per_kit, config.selection, rng)
+        chosen = select_diverse(
+            input_kit(task, name), pool.counts, pool.features, config.samples_per_kit, config.selection, rng
+        )
         first = sum(len(each) for each in taken)
         for row, variant in enumerate(chosen.tolist(), start=first):
             groups.setdefault((number, bytes(pool.digests[variant, 0])), []).append(row)
@@ -133,16 +135,16 @@ def _by_graph(task: Task, kits: list[str], pools: list[PoolIndex]) -> list[Chose
     found = []
     for name, pool, own, splits in zip(kits, pools, taken, np.split(split_of, ends), strict=True):
         shapes = packed_shapes(task, input_kit(task, name), pool, own)
-        found.append(Chosen(own, splits, 0, nearness_of(shapes, np.arange(len(own)), splits)))
+        found.append(SelectedSamples(own, splits, 0, nearness_of(shapes, np.arange(len(own)), splits)))
     return found
 
 
-def _measures(task: Task, name: str, pool: PoolIndex, chosen: Chosen) -> dict[str, Any]:
+def _measures(task: Task, name: str, pool: PoolIndex, chosen: SelectedSamples) -> dict[str, Any]:
     """What there is to say of the samples of a kit, as JSON."""
     config, kit, variants = task.config.section(VariationsConfig), input_kit(task, name), chosen.variants
     taken = pool.counts[variants], pool.features[variants], pool.digests[variants]
     sample = task.rng("edits", name).permutation(variants)[:SAMPLE].tolist()
-    wanted = wanted_sizes(config.per_kit, config.splits)
+    wanted = wanted_sizes(config.samples_per_kit, config.splits)
     splits = {
         split: {
             "wanted": wanted[split],
@@ -157,15 +159,15 @@ def _measures(task: Task, name: str, pool: PoolIndex, chosen: Chosen) -> dict[st
         "pool": len(pool),
         **worth,
         "pieces": float(np.median(pieces)) if pieces else 0.0,
-        "dull": dullness(kit, worth),
+        "dull": low_diversity(kit, worth),
         "edits": edit_measures(kit, [found.assembly(at)[0] for found, at in pool.variants(task, sample)]),
         **task.shard.params["searched"][name],
         "strictness": kit.grammar.strictness,
-        "meeting": meeting(kit),
+        "kit_overlap": kit_overlap(kit),
         "splits": splits,
         "split_by": config.splits.by,
-        "split_near": config.splits.near,
-        "let_go": chosen.let_go,
+        "split_near": config.splits.min_shared_surface,
+        "let_go": chosen.discarded,
     }
 
 
@@ -184,7 +186,7 @@ def run_collection(task: Task) -> Outcome:
     split: str = task.shard.params["split"]
     mine = np.flatnonzero((rows[:, 4] == SPLITS.index(split)) & (rows[:, 5] == task.shard.params["number"]))
     found: dict[int, FoundVariants] = {}
-    facing: dict[str, Facing] = {}
+    facing: dict[str, OrientationFix] = {}
     counts: Counter[str] = Counter()
     with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
         for row in mine.tolist():
@@ -192,9 +194,9 @@ def run_collection(task: Task) -> Outcome:
             if lane not in found:
                 found[lane] = FoundVariants.of(task, lanes[lane])
             named = json.loads(parents[row])
-            behind = backdrop_of(task, kits[kit])
+            behind = hub_restorer(task, kits[kit])
             if kits[kit] not in facing:
-                facing[kits[kit]] = Facing(behind.kit)
+                facing[kits[kit]] = OrientationFix(behind.kit)
             write_sample(writer, _sample(behind, facing[kits[kit]], place, split, found[lane], index, named))
             counts[kits[kit]] += 1
     summary: dict[str, Any] = {"split": split, "samples": len(mine), "kits": dict(sorted(counts.items()))}
@@ -202,8 +204,8 @@ def run_collection(task: Task) -> Outcome:
 
 
 def _sample(
-    backdrop: Backdrop,
-    facing: Facing,
+    backdrop: HubRestorer,
+    facing: OrientationFix,
     place: int,
     split: str,
     found: FoundVariants,
@@ -234,7 +236,7 @@ def _sample(
             **described,
             "parents": parents,
             "made_of": described["parents"],
-            "backdrop": added,
-            "turned": round(-turn % 360, 6),
+            "restored_hubs": added,
+            "turned_degrees": round(-turn % 360, 6),
         },
     )

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from stages.shape.collection.assignment import SPLITS
 
-LET_GO = -1
+DISCARDED = -1
 REGIONS = (16, 8, 4, 2, 1)
 """Regions of a split, tried in turn until enough is left for train: many small regions show more of the pool, few large
 ones have less around them."""
@@ -160,7 +160,7 @@ def _grow(
             member = _cheapest(ground, rng.permutation(family)[:RIVALS], touched[split], 0.0)
         grown += 1
         rest = int((~np.any([split_of > 0, *touched.values()], axis=0)).sum())
-    split_of[(split_of == 0) & np.any(list(touched.values()), axis=0)] = LET_GO
+    split_of[(split_of == 0) & np.any(list(touched.values()), axis=0)] = DISCARDED
     return Cut(split_of, grown)
 
 

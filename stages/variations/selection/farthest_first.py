@@ -7,29 +7,30 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import Kit
-from stages.variations.novelty.features import AXES, FeatureTest
+from stages.variations.novelty.features import AXES, FeatureExtractor
 from stages.variations.settings import SelectionConfig
 
 _SIZES = ("parts", "footprint", "height", "aspect")
 _SKIPPED = "dominant"
 
 
-def select(
+def select_diverse(
     kit: Kit, counts: np.ndarray, features: np.ndarray, wanted: int, config: SelectionConfig, rng: np.random.Generator
 ) -> np.ndarray:
     """Which of k variants are taken, int64 (min(wanted, k),), the most telling first.
 
     Each is the one farthest from the kit's exemplars and from all taken before (greedy k-centre). When more than
-    `config.spread` are wanted the rest are drawn at random. counts: int32 (k, types); features: float32 (k, 10).
+    `config.max_farthest_first` are wanted the rest are drawn at random.
+    counts: int32 (k, types); features: float32 (k, 10).
     """
     exemplars = [each.assembly for each in kit.exemplars]
-    test = FeatureTest(kit)
+    test = FeatureExtractor(kit)
     pure = np.ones(1)
     known = [test.features(each, pure, test.marks(each), 1.0) for each in exemplars]
     all_features = np.concatenate([features, known])
     all_counts = np.concatenate([counts, [np.bincount(each.types, minlength=len(kit.types)) for each in exemplars]])
     space = selection_space(all_counts, all_features)
-    near = min(wanted, config.spread, len(counts))
+    near = min(wanted, config.max_farthest_first, len(counts))
     taken = farthest_first(space[: len(counts)], space[len(counts) :], near)
     left = np.setdiff1d(np.arange(len(counts)), taken)
     return np.concatenate([taken, rng.permutation(left)[: max(wanted - near, 0)]])

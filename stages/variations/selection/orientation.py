@@ -21,7 +21,7 @@ EXACT = 0.05
 """A turn that differs from quarter turns by less is taken for one; unit: degrees."""
 
 
-class Facing:
+class OrientationFix:
     """In which directions parts touch each other in the exemplars of a kit."""
 
     def __init__(self, kit: Kit) -> None:

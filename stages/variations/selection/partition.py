@@ -11,11 +11,11 @@ import numpy.typing as npt
 from pipeline.stage import Task
 from stages.shape.collection.assignment import SPLITS
 from stages.shape.kit import Kit
-from stages.variations.requirements.hub_restoration import backdrop_of
+from stages.variations.requirements.hub_restoration import hub_restorer
 from stages.variations.search.pool import PoolIndex
 from stages.variations.selection.ancestry import Ancestry
-from stages.variations.selection.families import LET_GO, Near, cut_families
-from stages.variations.selection.farthest_first import select
+from stages.variations.selection.families import DISCARDED, Near, cut_families
+from stages.variations.selection.farthest_first import select_diverse
 from stages.variations.selection.shared_surface import PackedShapes
 from stages.variations.settings import VariantSplitConfig, VariationsConfig
 
@@ -26,14 +26,14 @@ Indices = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Chosen:
+class SelectedSamples:
     """The samples of a kit: variants int64 (k,), places in the pool, the most telling first; split_of int64 (k,),
     counted as in SPLITS; let_go: variants of the pool that stand too near to others for any split; nearness: how near
     val and test are to train, as `nearness_of` tells."""
 
     variants: Indices
     split_of: Indices
-    let_go: int
+    discarded: int
     nearness: dict[str, dict[str, float]]
 
 
@@ -45,7 +45,7 @@ def wanted_sizes(count: int, splits: VariantSplitConfig) -> dict[str, int]:
 
 def packed_shapes(task: Task, kit: Kit, pool: PoolIndex, variants: Indices) -> PackedShapes:
     """Some variants of a pool with their backdrops, ready to be laid upon each other."""
-    backdrop = backdrop_of(task, kit.name)
+    backdrop = hub_restorer(task, kit.name)
     assemblies = (backdrop.fit(found.assembly(at)[0]) for found, at in pool.variants(task, variants.tolist()))
     return PackedShapes(kit, assemblies, task.config.section(VariationsConfig).search.upright)
 
@@ -54,33 +54,34 @@ def candidates(kit: Kit, pool: PoolIndex, config: VariationsConfig, rng: np.rand
     """The variants of a pool that are cut into families: all; but of a pool that spares have made larger than was asked
     for, those that differ most, since all are laid upon each other, which takes time by the square of their number.
     """
-    most = min(math.ceil(config.selection.oversample * config.per_kit), len(pool))
+    most = min(math.ceil(config.selection.oversample * config.samples_per_kit), len(pool))
     if most == len(pool):
         return np.arange(most)
-    chosen: Indices = np.sort(select(kit, pool.counts, pool.features, most, config.selection, rng))
+    chosen: Indices = np.sort(select_diverse(kit, pool.counts, pool.features, most, config.selection, rng))
     return chosen
 
 
 def choose_by_family(
     kit: Kit, pool: PoolIndex, ancestry: Ancestry, held: Indices, shapes: PackedShapes, config: VariationsConfig,
     rng: np.random.Generator,
-) -> Chosen:  # fmt: skip
+) -> SelectedSamples:  # fmt: skip
     """The samples of a kit, no two of different splits near: alike in graph, parent and child, siblings of one cut, or
-    sharing `config.splits.near` of their surface or more. Train is what differs most among what may stand there.
+    sharing `config.splits.min_shared_surface` of their surface or more.
+    Train is what differs most among what may stand there.
 
     held: int64 (n,), the variants of the pool that are cut, as `candidates` gives them; shapes: theirs, in that order.
     """
-    wanted = wanted_sizes(min(config.per_kit, len(pool)), config.splits)
-    cut = cut_families(_near(pool, ancestry, held, shapes, config.splits.near), len(held), wanted, rng)
+    wanted = wanted_sizes(min(config.samples_per_kit, len(pool)), config.splits)
+    cut = cut_families(_near(pool, ancestry, held, shapes, config.splits.min_shared_surface), len(held), wanted, rng)
     taken = [held[cut.split_of == SPLITS.index(split)] for split in SPLITS]
     able = taken[0]
-    taken[0] = able[select(kit, pool.counts[able], pool.features[able], wanted["train"], config.selection, rng)]
+    taken[0] = able[select_diverse(kit, pool.counts[able], pool.features[able], wanted["train"], config.selection, rng)]
     variants = np.concatenate(taken)
     split_of = np.repeat(np.arange(len(SPLITS)), [len(each) for each in taken])
-    order = select(kit, pool.counts[variants], pool.features[variants], len(variants), config.selection, rng)
+    order = select_diverse(kit, pool.counts[variants], pool.features[variants], len(variants), config.selection, rng)
     variants, split_of = variants[order], split_of[order]
     nearness = nearness_of(shapes, np.searchsorted(held, variants), split_of)
-    return Chosen(variants, split_of, int((cut.split_of == LET_GO).sum()), nearness)
+    return SelectedSamples(variants, split_of, int((cut.split_of == DISCARDED).sum()), nearness)
 
 
 def _near(pool: PoolIndex, ancestry: Ancestry, held: Indices, shapes: PackedShapes, least: float) -> Near:

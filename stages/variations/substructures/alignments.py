@@ -21,7 +21,7 @@ from stages.variations.kernels.structs import UPRIGHT
 from stages.variations.substructures.keys import grown, holds, with_key
 from stages.variations.substructures.ordered_graph import OrderedGraph
 from stages.variations.substructures.partial_symmetry import pair_hash
-from stages.variations.substructures.region_swaps import Moves
+from stages.variations.substructures.region_swaps import RegionSwaps
 
 MOST_MOVES = 1 << 13
 """Replacements along motions that are listed between two shapes at most: what bounds memory."""
@@ -48,13 +48,13 @@ class _Placed(NamedTuple):
     firsts: np.ndarray
 
 
-def find_moves(
+def find_region_swaps(
     kit: Kit,
     up: int,
     base: tuple[Assembly, OrderedGraph],
     giver: tuple[Assembly, OrderedGraph],
     most_work: int = MOST_WORK,
-) -> Moves:
+) -> RegionSwaps:
     """All replacements of a piece of the base by one of the giver, which may be the same, that are a region of what two
     greatest pieces that coincide leave over, where they leave several: of one the result is the giver.
 
@@ -70,7 +70,7 @@ def find_moves(
     turns, shifts, regions, images, listed, meetings, work, is_whole = found
     motions = np.tile(np.eye(4), (len(turns), 1, 1))
     motions[:, :3, :3], motions[:, :3, 3] = turns, shifts
-    return Moves(
+    return RegionSwaps(
         np.array([invert(each) for each in motions]).reshape(-1, 4, 4),
         regions,
         images,

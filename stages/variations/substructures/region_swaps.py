@@ -21,7 +21,7 @@ COMPOSED = 16
 """Compositions that are drawn along a motion for each region that it leaves over, if there are so many."""
 
 
-class Move(NamedTuple):
+class RegionSwap(NamedTuple):
     """One replacement: what leaves the base, bool (n,); what comes of the giver, bool (m,); the part of the base that
     each part of the giver coincides with, int16 (m,), or -1; and what brings the giver there, float64 (4, 4)."""
 
@@ -48,7 +48,7 @@ class Move(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Moves:
+class RegionSwaps:
     """Replacements of a piece of a base by one of a giver along q rigid motions.
 
     motions: float64 (q, 4, 4), bring the giver into the base; regions: int16 (q, n + m), for each part of the base and
@@ -71,7 +71,7 @@ class Moves:
     def __len__(self) -> int:
         return len(self.listed)
 
-    def __getitem__(self, number: int) -> Move:
+    def __getitem__(self, number: int) -> RegionSwap:
         motion, region = self.listed[number].tolist()
         return self.along(motion, np.arange(self.regions.shape[1]) == region)
 
@@ -93,8 +93,8 @@ class Moves:
         motion, region = self.listed[number].tolist()
         return motion, np.equal(np.arange(parts), region)
 
-    def along(self, motion: int, chosen: np.ndarray) -> Move:
+    def along(self, motion: int, chosen: np.ndarray) -> RegionSwap:
         """The replacement of the chosen regions, bool (n + m,), along a motion; it may be of none or of all."""
         regions, parts = self.regions[motion], self.regions.shape[1] - self.images.shape[1]
         inside: np.ndarray = (regions >= 0) & chosen[regions]
-        return Move(inside[:parts], inside[parts:], self.images[motion], self.motions[motion])
+        return RegionSwap(inside[:parts], inside[parts:], self.images[motion], self.motions[motion])

@@ -75,13 +75,13 @@ def replacement_of(kit: Kit, sample: Sample, known: Mapping[str, Named]) -> Repl
     """What took the place of what in a sample that was made of `known` shapes, once and rigidly, the base being the one
     of which more is in it; None of others, and where what stayed of the base moved to make room."""
     lineage = sample.lineage
-    if lineage["method"] != "substructures" or lineage["times"] > 1 or lineage["bent"]:
+    if lineage["method"] != "substructures" or lineage["repeats"] > 1 or lineage["deformed"]:
         return None
     if any(name not in known for name in lineage["made_of"]):
         return None
     giver, base = (known[name] for name in lineage["made_of"])
     motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = lineage["motion"][:3], lineage["motion"][3]
+    motion[:3, :3], motion[:3, 3] = lineage["transform"][:3], lineage["transform"][3]
     result, (come, stay) = _as_made(kit, sample), lineage["parts_from"]
     piece = _found(kit, giver[1], motion @ giver[1].poses, result.select(np.arange(come)))
     stays = _found(kit, base[1], base[1].poses, result.select(np.arange(come, come + stay)))
@@ -96,8 +96,8 @@ def replacement_of(kit: Kit, sample: Sample, known: Mapping[str, Named]) -> Repl
 
 def _as_made(kit: Kit, sample: Sample) -> Assembly:
     """The parts that the search put together, as it placed them: before the shape was turned, without its backdrop."""
-    turn = vertical_turn({"y": 1, "z": 2}[kit.up], sample.lineage["turned"])
-    bare = sample.assembly.select(np.arange(len(sample.assembly) - sample.lineage["backdrop"]))
+    turn = vertical_turn({"y": 1, "z": 2}[kit.up], sample.lineage["turned_degrees"])
+    bare = sample.assembly.select(np.arange(len(sample.assembly) - sample.lineage["restored_hubs"]))
     return replace(bare, poses=turn.T @ bare.poses)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import split
@@ -17,12 +17,12 @@ from stages.variations.kernels.structs import TRY, UPRIGHT, KitTables, Outcome, 
 from stages.variations.kernels.tables import shape_tables
 from stages.variations.kernels.variant_graph import set_edge
 from stages.variations.requirements.resizing import rigid_types
-from stages.variations.search.operator_selection import Choice
+from stages.variations.search.operator_selection import PlannedTry
 from stages.variations.search.parents import Parent
 from stages.variations.settings import SearchConfig
 from stages.variations.substitution.pieces import Exchanged
 from stages.variations.substitution.substitute import Docked, find_motion, put_together
-from stages.variations.substructures.alignments import MOST_WORK, find_moves
+from stages.variations.substructures.alignments import MOST_WORK, find_region_swaps
 from stages.variations.substructures.consistency import make_consistent
 from stages.variations.substructures.deformation import blend, is_oriented_alike
 from stages.variations.substructures.docking_sites import contact_graph, docking_graph
@@ -30,7 +30,7 @@ from stages.variations.substructures.embedding import Side, embed, pieces
 from stages.variations.substructures.operations import Operations, find_operations
 from stages.variations.substructures.ordered_graph import OrderedGraph
 from stages.variations.substructures.recursive_rules import cut_again, cut_farther, growth_of
-from stages.variations.substructures.region_swaps import Moves
+from stages.variations.substructures.region_swaps import RegionSwaps
 from stages.variations.substructures.replacement import replace_piece
 from stages.variations.substructures.result_key import moved_key, result_key
 from stages.variations.substructures.stretching import stretch_onto
@@ -67,10 +67,10 @@ class Pair:
     once operations are listed, which is when no move is left, of these, of one shape the second half of them the other
     way round; `reach`: how many parts were laid upon others at most where moves were listed."""
 
-    choice: Choice
+    choice: PlannedTry
     sides: tuple[Side, Side]
     left: list[int]
-    moves: Moves | None = None
+    moves: RegionSwaps | None = None
     reach: int = FIRST_WORK // DEEPER
     operations: Operations | None = None
 
@@ -101,12 +101,12 @@ class Replacer:
     stretches: FloatArray | None = None
 
     def __init__(
-        self, answers: ContactAnswers, tables: KitTables, smallest: int, largest: int, config: SearchConfig
+        self, answers: ContactOracle, tables: KitTables, smallest: int, largest: int, config: SearchConfig
     ) -> None:
         self.answers, self.tables = answers, tables
-        self.smallest, self.largest = smallest, largest
-        self.dummies, self.repeats = config.dummies, config.repeats
-        self.blends, self.most = config.blend, config.stretch.most
+        self.min_parts, self.max_parts = smallest, largest
+        self.dummy_edges, self.max_repeats = config.dummy_edges, config.max_repeats
+        self.blends, self.most = config.deform, config.stretch.max_factor
         kit = answers.kit
         self._rigid = rigid_types(kit, config.stretch.rigid)
         self._by_meaning = kit.by_meaning
@@ -124,12 +124,12 @@ class Replacer:
         self._cut: tuple[Side, Side, np.ndarray] | None = None
 
     @property
-    def choice(self) -> Choice:
+    def choice(self) -> PlannedTry:
         """What was chosen when the pair of the last try was, of which `a` was the giver and `b` the base."""
         assert self._pair is not None, "nothing was tried yet"
         return self._pair.choice
 
-    def replace(self, rng: np.random.Generator, choice: Choice, ws: Workspace) -> tuple[int, float]:
+    def replace(self, rng: np.random.Generator, choice: PlannedTry, ws: Workspace) -> tuple[int, float]:
         """Carry out one more operation of the pair in hand, or one between the two shapes that are chosen where nothing
         is left of it, in the workspace: the outcome and the work. After OK the contacts between the two are to be found
         by `connect`."""
@@ -139,7 +139,7 @@ class Replacer:
             self._ordered += work
         return outcome, work
 
-    def _turn(self, rng: np.random.Generator, choice: Choice, ws: Workspace) -> tuple[int, float]:
+    def _turn(self, rng: np.random.Generator, choice: PlannedTry, ws: Workspace) -> tuple[int, float]:
         work = 1.0
         if self._pair is None or self._turns <= 0 or not self._pair.left:
             self._pair, cost = self._opened(rng, choice)
@@ -168,8 +168,8 @@ class Replacer:
             work += EMBEDDING_WORK * (self.times - 1)
         taken, piece = pieces(side, pair.sides[1], boundary)
         parts = int(piece.sum() + (~taken).sum())
-        if not self.smallest <= parts <= self.largest:
-            return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, work
+        if not self.min_parts <= parts <= self.max_parts:
+            return Outcome.TOO_SMALL if parts < self.min_parts else Outcome.TOO_LARGE, work
         if not piece.any() or taken.all():
             return Outcome.NOTHING_ATTACHED, work
         self._turns -= 1
@@ -220,8 +220,8 @@ class Replacer:
             return Outcome.KNOWN, 0.0
         self.base, self.times = pair.base, 1
         parts = int(move.piece.sum() + (~move.taken).sum())
-        if not self.smallest <= parts <= self.largest:
-            return Outcome.TOO_SMALL if parts < self.smallest else Outcome.TOO_LARGE, 0.0
+        if not self.min_parts <= parts <= self.max_parts:
+            return Outcome.TOO_SMALL if parts < self.min_parts else Outcome.TOO_LARGE, 0.0
         key = int(moved_key(base, giver, move.taken, move.piece, move.image))
         if key in self.known:
             return Outcome.KNOWN, 0.0
@@ -236,11 +236,11 @@ class Replacer:
 
     def _times(self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray) -> int:
         """How often to carry out an operation: a recursive rule at random, as often as limits allow; others once."""
-        if self.repeats == 1 or self._by_meaning or pair.giver is not pair.base:
+        if self.max_repeats == 1 or self._by_meaning or pair.giver is not pair.base:
             return 1
         parts, growth = len(pair.base.assembly), growth_of(pair.sides[0].graph, boundary)
-        room = self.largest - parts if growth > 0 else parts - self.smallest
-        return 1 + int(rng.random() * min(self.repeats, room // abs(growth))) if growth else 1
+        room = self.max_parts - parts if growth > 0 else parts - self.min_parts
+        return 1 + int(rng.random() * min(self.max_repeats, room // abs(growth))) if growth else 1
 
     def _repeated(
         self, rng: np.random.Generator, pair: Pair, boundary: np.ndarray, times: int
@@ -336,7 +336,7 @@ class Replacer:
             ends += ws.from_a[edges[np.isin(edges, self._bent).all(axis=1)]].tolist()
         return all(ws.stamp[i, j] == ws.counts[TRY] for i, j in ends)
 
-    def _opened(self, rng: np.random.Generator, choice: Choice) -> tuple[Pair, float]:
+    def _opened(self, rng: np.random.Generator, choice: PlannedTry) -> tuple[Pair, float]:
         """Two shapes, or the first twice, with some of what can be replaced between them in random order; what is left
         of it where the pair was drawn before, or more of it where nothing is; and what that cost."""
         if rng.random() < WITHIN:
@@ -363,18 +363,20 @@ class Replacer:
         kit, (base, giver) = self.answers.kit, pair.sides
         if self._moves and (pair.moves is None or not pair.moves.is_whole) and pair.reach < MOST_WORK:
             reach = min(DEEPER * pair.reach, MOST_WORK)
-            moves = find_moves(kit, self.tables.up, (base.assembly, base.graph), (giver.assembly, giver.graph), reach)
+            moves = find_region_swaps(
+                kit, self.tables.up, (base.assembly, base.graph), (giver.assembly, giver.graph), reach
+            )
             return replace(pair, moves=moves, reach=reach, left=moves.order(rng)), self._listing(moves)
         if pair.operations is not None or (self._moves and self._ordered > self._share * self._work):
             return pair, 0.0
         if self._moves:
             base = _side(kit, pair.base, docking_graph)
             giver = base if pair.giver is pair.base else _side(kit, pair.giver, docking_graph)
-        operations = find_operations(base.graph, giver.graph, self.dummies, self._by_docking)
+        operations = find_operations(base.graph, giver.graph, self.dummy_edges, self._by_docking)
         left = _order(rng, operations, len(operations) * (2 if base is giver else 1))
         return replace(pair, sides=(base, giver), operations=operations, left=left), self._listing(operations)
 
-    def _listing(self, found: Operations | Moves) -> float:
+    def _listing(self, found: Operations | RegionSwaps) -> float:
         """What a list cost; as much time is given to what it has."""
         work = found.work / DARTS_A_TRY
         self.lists["whole" if found.is_whole else "cut short"] += 1

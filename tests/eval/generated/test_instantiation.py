@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eval.generated.instantiation import METHODS, Attempt, attempts, distinct_graphs, methods_table, outcome_table
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
 from stages.string_sampling.instantiation.guidance import guide_of
@@ -21,7 +21,7 @@ from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
 
 @pytest.fixture(scope="module")
 def maker() -> Instantiator:
-    return Instantiator(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
+    return Instantiator(ContactOracle(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
 
 
 def strings(maker: Instantiator) -> list[str]:

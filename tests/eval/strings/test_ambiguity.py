@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eval.strings.ambiguity import Ambiguity, ambiguity, ambiguity_table
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from tests.stages.training.edge_categories.networks import kit, network, writer
@@ -14,7 +14,7 @@ from tests.stages.training.edge_categories.networks import kit, network, writer
 
 @pytest.fixture(scope="module")
 def maker() -> Instantiator:
-    return Instantiator(ContactAnswers(kit()))
+    return Instantiator(ContactOracle(kit()))
 
 
 def looked_at(maker: Instantiator, *shapes: Assembly) -> Ambiguity:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eval.strings.latent_interpolation import journey_strips, journeys
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import STANDARD_METHOD
@@ -25,7 +25,7 @@ MOST = 40
 
 @pytest.fixture(scope="module")
 def maker() -> Instantiator:
-    return Instantiator(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
+    return Instantiator(ContactOracle(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
 
 
 @pytest.fixture(scope="module")

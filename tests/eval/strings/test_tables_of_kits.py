@@ -38,7 +38,11 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> DatasetRun:
         stated({"name": name, "shapes": [str(path) for path in sorted((ROOT / "datasets/exemplars" / name).glob("*"))]})
         for name in ("castle", "playground")
     ]
-    variations = {"per_kit": 6, "splits": {"shards": 1}, "search": {"duplicates": "graph", "tries": 100, "rounds": 3}}
+    variations = {
+        "samples_per_kit": 6,
+        "splits": {"shards": 1},
+        "search": {"duplicates": "graph", "tries_per_round": 100, "max_rounds": 3},
+    }
     config = {"name": "small", "seed": 3, "exemplars": {"kits": kits}, "variations": variations}
     (folder / "small.yaml").write_text(yaml.safe_dump(config))
     for stage in ("autoconfig", "exemplars", "variations", "strings"):

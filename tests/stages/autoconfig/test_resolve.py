@@ -22,7 +22,7 @@ from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, HubConfig, KitConfig
 from stages.inspection.report import inspect_models
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import ContactKind
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, config_of, kit_of, models_of, pose, ring
 from tests.toy_kits.tables import ROUND, SQUARE, THICK, THIN, table
@@ -103,7 +103,7 @@ class TestLadder:
         config = KitConfig(name="playground", shapes=tuple(paths))
         models = [read_model(path) for path in paths]
         made = resolve_settings(config, models, identify_parts(models, config), 2500)
-        unasked = {"require.copied": 0.9, "require.stable": False, "require.carcass": ()}
+        unasked = {"require.max_copied_share": 0.9, "require.stable": False, "require.labels": ()}
         assert (dict(made.values), made.settings, made.enough) == ({**STRICTEST, **unasked}, 1, True)
 
     def test_what_the_config_states_is_obeyed_and_not_chosen(self) -> None:
@@ -185,10 +185,10 @@ class TestCopies:
 
     def test_finds_tell_something_unless_they_are_copied_but_for_a_tenth(self) -> None:
         kit, _ = build_kit(config_of([chain(3), chain(5)]), models_of(CHAIN, [chain(3), chain(5)]))
-        probe = TrialSearch(ContactAnswers(kit), np.random.default_rng(1))
+        probe = TrialSearch(ContactOracle(kit), np.random.default_rng(1))
         assert probe.go_on(TRIES, 4).telling == 1.0
         shares = [0.5, 0.9, 0.95, 1.0]
-        probe.variants[:] = [replace(probe.variants[0], lineage={"copied": {"largest": each}}) for each in shares]
+        probe.variants[:] = [replace(probe.variants[0], lineage={"copied": {"share": each}}) for each in shares]
         assert probe.finds().telling == 0.5
 
 
@@ -221,14 +221,14 @@ class TestForecast:
 
     def test_chains_are_as_many_as_there_are_lengths(self) -> None:
         kit = self.kit([chain(3), chain(5)], CHAIN)
-        found = estimate_yield(kit, ContactAnswers(kit), 2000)
+        found = estimate_yield(kit, ContactOracle(kit), 2000)
         # 2.5 to 14 parts, the exemplars' 5 and 7 aside, and no link without a cap: 1 to 12 links
         assert found.finds.graphs == found.finds.histograms == found.layouts
         assert found.sentence.startswith(f"about {found.layouts} layouts, no dataset")
 
     def test_as_many_as_are_in_sight_are_said_to_be_no_more_than_the_fewest(self) -> None:
         kit = self.kit([chain(13), chain(15)], CHAIN)
-        found = estimate_yield(kit, ContactAnswers(kit), 2000)
+        found = estimate_yield(kit, ContactOracle(kit), 2000)
         assert found.layouts is not None
         assert 20 <= found.finds.graphs <= found.layouts <= 32
         assert re.match(
@@ -241,20 +241,20 @@ class TestForecast:
     ) -> None:
         monkeypatch.setattr("stages.autoconfig.yield_estimate.bared", lambda *_: ("link", "cap", "ring"))
         kit = self.kit([chain(13), chain(15)], CHAIN)
-        found = estimate_yield(kit, ContactAnswers(kit), 2000)
+        found = estimate_yield(kit, ContactOracle(kit), 2000)
         assert found.is_poor
         assert "look broken, for nothing stands close above or below link and cap and others" in found.sentence
 
     def test_what_will_be_refused_for_what_it_copies_does_not_count(self) -> None:
         kit = self.kit([ring(1, 1), ring(2, 3)], ROAD)
-        found = [estimate_yield(kit, ContactAnswers(kit), TRIES, copied=most) for most in (1.0, 0.6)]
-        copied = [[each.lineage["copied"]["largest"] for each in one.variants] for one in found]
+        found = [estimate_yield(kit, ContactOracle(kit), TRIES, copied=most) for most in (1.0, 0.6)]
+        copied = [[each.lineage["copied"]["share"] for each in one.variants] for one in found]
         assert max(copied[0]) > 0.6 >= max(copied[1]) > 0.0
 
     def test_every_part_its_own_type_is_said_with_the_mend(self) -> None:
         meshes = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
         kit = self.kit([[("a", pose(0, 0, 0)), ("b", pose(1, 0, 0)), ("c", pose(2, 0, 0))]], meshes)
-        found = estimate_yield(kit, ContactAnswers(kit), TRIES)
+        found = estimate_yield(kit, ContactOracle(kit), TRIES)
         assert (found.finds.graphs, found.layouts) == (0, 0)
         assert "every part is its own type; bring a second model" in found.sentence
 

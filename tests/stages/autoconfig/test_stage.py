@@ -73,20 +73,20 @@ def test_people_are_told_what_was_chosen(made: tuple[Path, str]) -> None:
 def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_path: Path) -> None:
     shapes = sorted(map(str, (ROOT / "datasets" / "exemplars" / "playground").glob("*.glb")))
     kit = stated({"name": "open", "shapes": shapes, "disconnected": "auto"})
-    variations = {"per_kit": 24, "search": {"tries": 2000}, "splits": {"by": "graph", "shards": 1}}
+    variations = {"samples_per_kit": 24, "search": {"tries": 2000}, "splits": {"by": "graph", "shards": 1}}
     config = {"name": "toy", "exemplars": {"kits": [kit]}, "variations": variations}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
-    unasked = {"require.stable": False, "require.carcass": []}
+    unasked = {"require.stable": False, "require.labels": []}
     chosen = record(tmp_path, "autoconfig", "open")["summary"]["chosen"]
-    assert chosen == {"disconnected": "error", "require.copied": 0.9, **unasked}
+    assert chosen == {"disconnected": "error", "require.max_copied_share": 0.9, **unasked}
     samples = [
         sample
         for shard in (tmp_path / "out" / ".work" / "toy" / "variations").glob("toy-t*.tar")
         for sample in read_samples(shard)
     ]
     assert samples
-    assert max(sample.lineage["copied"]["largest"] for sample in samples) <= 0.9
+    assert max(sample.lineage["copied"]["share"] for sample in samples) <= 0.9
     assert record(tmp_path, "variations", "open-r000-lane00")["rejects"]["too much copied whole"] > 0
 
 
@@ -98,7 +98,7 @@ def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretel
         "name": "toy",
         "autoconfig": {"max_tries": 200},
         "exemplars": {"kits": [{"name": "rings", "shapes": paths}]},
-        "variations": {"per_kit": 12, "splits": {"by": "graph", "val": 0.25, "shards": 1}},
+        "variations": {"samples_per_kit": 12, "splits": {"by": "graph", "val": 0.25, "shards": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     said = run(tmp_path, ("autoconfig", "exemplars", "variations", "proportions"))
@@ -113,7 +113,7 @@ def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretel
     found = json.loads(capsys.readouterr().out)
     assert found["autoconfig"]["chosen"] == record(tmp_path, "autoconfig", "rings")["summary"]["chosen"]
     assert found["autoconfig"]["chosen"]["proportions.require.stable"] is True
-    config["variations"] |= {"instead": "nothing"}
+    config["variations"] |= {"fallback": "nothing"}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("autoconfig",))
     assert "instead" not in record(tmp_path, "autoconfig", "rings")["summary"]["chosen"]
@@ -125,15 +125,15 @@ def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path)
     assert main([*paths, "--tries", "200", "--out", str(tmp_path)]) == 0
     written = yaml.safe_load((tmp_path / "ring0.yaml").read_text())
     written["name"] = "toy"
-    assert written["variations"] == {"per_kit": 0}
-    written["proportions"] |= {"per_kit": 8}
+    assert written["variations"] == {"samples_per_kit": 0}
+    written["proportions"] |= {"samples_per_kit": 8}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
     run(tmp_path, ("autoconfig", "exemplars", "proportions"))
     work = tmp_path / "out" / ".work" / "toy"
     assert not list((work / "autoconfig").glob("*.json"))
     assert list((work / "proportions").glob("toy-train-*.tar"))
     del written["proportions"]
-    written["variations"] = {"per_kit": 8, "search": {"duplicates": "graph", "tries": 400, "patience": 800}}
+    written["variations"] = {"samples_per_kit": 8, "search": {"duplicates": "graph", "tries": 400, "patience": 800}}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(written))
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
     assert list((work / "variations").glob("toy-train-*.tar"))

@@ -30,7 +30,7 @@ def observe(shapes: list[list[Placed]], meshes: dict[str, trimesh.Trimesh] = MES
 
 def test_dropped_hubs_are_neither_in_the_exemplars_nor_among_the_types() -> None:
     with_plate, without = on_plate(3), chain(3)
-    seen = observe([with_plate], hubs=HubConfig(types=("plate",), keep="drop"))
+    seen = observe([with_plate], hubs=HubConfig(types=("plate",), restore=False))
     plain = observe([without])
     assert not seen.refusals
     assert seen.kit.type_names() == plain.kit.type_names() == ("cap", "link")
@@ -42,7 +42,7 @@ def test_dropped_hubs_are_neither_in_the_exemplars_nor_among_the_types() -> None
 
 
 def test_a_backdrop_hub_is_a_type_whose_dockings_are_known_and_that_no_neighbourhood_counts() -> None:
-    seen = observe([on_plate(3)], hubs=HubConfig(types=("plate",), keep="backdrop"))
+    seen = observe([on_plate(3)], hubs=HubConfig(types=("plate",), restore=True))
     kit = seen.kit
     cap, link, plate = (kit.type_names().index(name) for name in ("cap", "link", "plate"))
     assert kit.grammar.hubs == (plate,)
@@ -54,7 +54,7 @@ def test_a_backdrop_hub_is_a_type_whose_dockings_are_known_and_that_no_neighbour
 
 
 def test_a_kit_with_hubs_and_a_loose_grammar_is_the_same_after_a_round_through_files(tmp_path: Any) -> None:
-    kit = observe([on_plate(3)], hubs=HubConfig(types=("plate",), keep="backdrop"), grammar="count_and_pairs").kit
+    kit = observe([on_plate(3)], hubs=HubConfig(types=("plate",), restore=True), grammar="count_and_pairs").kit
     with (tmp_path / "k.json").open("wb") as text, (tmp_path / "k.tar").open("wb") as arrays:
         write_kit(kit, text, arrays)
     read = load_kit(tmp_path / "k.json", tmp_path / "k.tar").grammar
@@ -65,13 +65,13 @@ def test_a_kit_with_hubs_and_a_loose_grammar_is_the_same_after_a_round_through_f
 def test_without_its_hub_an_exemplar_may_fall_apart_and_the_message_says_so() -> None:
     legs = [("cap", pose(-2, 0, 0)), ("cap", pose(2, 0, 0)), ("link", pose(-1.25, 0, 0))]
     legs.append(("plate", pose(0, -0.55, 0)))
-    hubs = HubConfig(types=("plate",), keep="drop")
+    hubs = HubConfig(types=("plate",), restore=False)
     (refusal,) = observe([legs], hubs=hubs).refusals
     assert "the exemplar without its hubs plate falls into 2 pieces of 2, 1 parts" in refusal
     kept = observe([legs], hubs=hubs, disconnected="largest")
     assert not kept.refusals
     assert kept.kit.exemplars[0].part_names == ("cap.000", "link.002")
-    behind = observe([legs], hubs=HubConfig(types=("plate",), keep="backdrop"), disconnected="largest")
+    behind = observe([legs], hubs=HubConfig(types=("plate",), restore=True), disconnected="largest")
     assert behind.kit.exemplars[0].part_names == ("cap.000", "link.002")
     assert behind.kit.grammar.neighbourhoods[behind.kit.type_names().index("plate")] == {((0, 1),): 1}
 

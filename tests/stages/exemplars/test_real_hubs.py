@@ -13,9 +13,9 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Kit
-from stages.variations.requirements.hub_restoration import Backdrop
+from stages.variations.requirements.hub_restoration import HubRestorer
 
 ROOT = Path(__file__).resolve().parents[3]
 EXEMPLARS = ROOT.parent / "shared" / "exemplars"
@@ -54,7 +54,7 @@ def test_a_real_exemplar_gets_its_hubs_back(
 ) -> None:
     config = loaded(ROOT / "configs" / f"{name}.yaml", monkeypatch)
     kit = kit_of(config.section(ExemplarsConfig).kits[0])
-    whole = Backdrop(ContactAnswers(kit), upright=True).fit(kit.exemplars[0].assembly)
+    whole = HubRestorer(ContactOracle(kit), upright=True).fit(kit.exemplars[0].assembly)
     assert (len(whole), len(whole.edges)) == (parts, contacts)
     anew = ContactTest(kit.types, kit.contact_tolerance).contacts(whole.types, whole.poses)
     np.testing.assert_array_equal(whole.edges, anew)

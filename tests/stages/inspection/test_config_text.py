@@ -12,8 +12,8 @@ from tests.toy_kits.chains_and_rings import ROAD, config_of, models_of, ring
 @pytest.mark.parametrize(("copied", "carcass"), [(0.9, ("side", "4")), (1.0, ())])
 def test_what_variants_must_be_is_typed_out_with_its_reasons(copied: float, carcass: tuple[str, ...]) -> None:
     shapes = [ring(1, 1), ring(2, 3)]
-    require = {"require.copied": copied, "require.stable": True, "require.carcass": carcass}
-    reasons = {"require.copied": "because", "require.stable": "some fall"}
+    require = {"require.max_copied_share": copied, "require.stable": True, "require.labels": carcass}
+    reasons = {"require.max_copied_share": "because", "require.stable": "some fall"}
     asked = variations_section(config_of(shapes), reasons, require, None)
     text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), reasons, asked, "hundreds")
     said = {"copied": copied, "stable": True, "carcass": list(carcass)}
@@ -36,6 +36,6 @@ def test_a_config_of_other_proportions_varies_no_layouts_and_says_why() -> None:
     lines = proportions_section(90, True, "it does", "nothing: every part is its own type")
     text = config_text("toy", config_of(shapes), models_of(ROAD, shapes), {}, lines, "hundreds")
     said = yaml.safe_load(text)
-    assert said["variations"] == {"per_kit": 0}
-    assert said["proportions"] == {"per_kit": 90, "require": {"stable": True}}
-    assert "per_kit: 0   # other layouts: nothing: every part is its own type" in text
+    assert said["variations"] == {"samples_per_kit": 0}
+    assert said["proportions"] == {"samples_per_kit": 90, "require": {"stable": True}}
+    assert "samples_per_kit: 0   # other layouts: nothing: every part is its own type" in text

@@ -96,12 +96,12 @@ def toy_samples(split: str, index: int, count: int) -> list[Sample]:
             "parts_from": [1, len(assembly) - 1],
             "boundary": [0],
             "images": [0],
-            "motion": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]],
-            "times": 1,
-            "bent": False,
-            "turned": 0.0,
-            "copied": {"largest": 1.0, "pieces": 1, "exemplar": 0.5, "of": "row"},
-            "backdrop": 0,
+            "transform": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]],
+            "repeats": 1,
+            "deformed": False,
+            "turned_degrees": 0.0,
+            "copied": {"share": 1.0, "pieces": 1, "exemplar_share": 0.5, "exemplar": "row"},
+            "restored_hubs": 0,
         }
         graph = graph_digest(assembly.types, assembly.edges)
         samples.append(Sample(f"{kit}-{number:05d}", split, "variations", kit, graph, lineage, assembly))

@@ -25,8 +25,8 @@ def write_config(folder: Path, **section: object) -> Path:
         "seed": 3,
         "license": "MIT",
         "exemplars": {"kits": [stated({"name": "stool", "shapes": paths})]},
-        "variations": {"per_kit": 0},
-        "proportions": {"per_kit": 9, "splits": {"val": 0.2, "test": 0.2, "shards": 2}, **section},
+        "variations": {"samples_per_kit": 0},
+        "proportions": {"samples_per_kit": 9, "splits": {"val": 0.2, "test": 0.2, "shards": 2}, **section},
         "points": {"uniform": 64},
         "sketches": {"size": 32, "views": [{"name": "front", "azimuth": 0.0, "elevation": 10.0}]},
     }
@@ -76,7 +76,7 @@ def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
 
 def test_no_proportions_without_exemplars(tmp_path: Path) -> None:
     path = tmp_path / "stools.yaml"
-    path.write_text(yaml.safe_dump({"name": "stools", "seed": 1, "proportions": {"per_kit": 3}}))
+    path.write_text(yaml.safe_dump({"name": "stools", "seed": 1, "proportions": {"samples_per_kit": 3}}))
     code, said = mill("plan", "--config", path, "--out", tmp_path / "out")
     assert code == 2
     assert "exemplars.kits" in said

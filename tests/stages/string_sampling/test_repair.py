@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import STANDARD_METHOD
 from stages.string_sampling.repair import first_impossible_token, repair_strings
@@ -23,7 +23,7 @@ LOOSE = STANDARD_METHOD._replace(whole=False)
 
 @pytest.fixture(scope="module")
 def roads() -> Instantiator:
-    return Instantiator(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
+    return Instantiator(ContactOracle(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ STAGES = ("autoconfig", "exemplars", "variations", "programs", "shapeassembly", 
 SERVED = ("validity", "strings", "points", "sketches", "package")
 
 
-def write_config(folder: Path, per_kit: int = 0, **string_sampling: Any) -> Path:
+def write_config(folder: Path, samples_per_kit: int = 0, **string_sampling: Any) -> Path:
     """The config of a dataset of dreamt chains; the exemplars have two links and three."""
     paths = [write_model(folder / f"chain{links}.glb", CHAIN, chain(links)) for links in (2, 3)]
     kit = stated({"name": "chain", "shapes": paths, "contact": {"kinds": ["face"]}, "parts": "nodes"})
@@ -45,7 +45,7 @@ def write_config(folder: Path, per_kit: int = 0, **string_sampling: Any) -> Path
         "seed": 3,
         "license": "MIT",
         "exemplars": {"kits": [kit]},
-        "variations": {"per_kit": per_kit},
+        "variations": {"samples_per_kit": samples_per_kit},
         "string_sampling": settings,
         "points": {"uniform": 64},
         "sketches": {"size": 64, "backend": "raster", "views": [{"name": "front"}]},
@@ -209,9 +209,9 @@ def test_a_pickle_in_place_of_weights_is_refused(bare: Path, tmp_path: Path) -> 
 
 
 def test_variations_and_dreams_do_not_go_together(tmp_path: Path) -> None:
-    code, said = run(write_config(tmp_path, per_kit=5), tmp_path, "string_sampling")
+    code, said = run(write_config(tmp_path, samples_per_kit=5), tmp_path, "string_sampling")
     assert code == 2
-    assert "variations.per_kit: 0" in said
+    assert "variations.samples_per_kit: 0" in said
 
 
 @pytest.mark.parametrize("dataset", ["../elsewhere", "/etc", ".work", "a/b"])

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from stages.exemplars.build import read_kit
 from stages.exemplars.settings import STRICTEST, KitConfig, ShapeFile
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.pose import pose_vectors
 from stages.shape.kit import Assembly, Kit
 from stages.strings.compression import NO_CATEGORY, Codebook, ShapeCode, decode_shape, encode_shape, pack, unpack
@@ -80,7 +80,7 @@ def test_parts_of_one_label_keep_the_surface_that_they_have(edges: Edges, tmp_pa
     kit = read_kit(KitConfig(name="chairs", shapes=shapes, types="meaning").resolve(STRICTEST))
     book = Codebook(kit, edges)
     assert len(kit.labels) < len(kit.types)
-    search = Search(ContactAnswers(kit), SearchConfig())
+    search = Search(ContactOracle(kit), SearchConfig())
     found, _ = search.run(np.random.default_rng(0), 1000, 12, "test", lambda count: None)
     assert any(set(each.assembly.types.tolist()) - set(kit.exemplars[0].assembly.types.tolist()) for each in found)
     for assembly in (*(each.assembly for each in kit.exemplars), *(each.assembly for each in found)):

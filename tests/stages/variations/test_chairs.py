@@ -13,7 +13,7 @@ from stages.package.glb import glb_bytes
 from stages.package.record import describe_sample
 from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import judge_shape
@@ -38,7 +38,7 @@ def kit(tmp_path_factory: pytest.TempPathFactory) -> Kit:
 
 @pytest.fixture(scope="module")
 def found(kit: Kit) -> list[Variant]:
-    line = Search(ContactAnswers(kit), SearchConfig())
+    line = Search(ContactOracle(kit), SearchConfig())
     return line.run(np.random.default_rng(0), 4000, 60, "test", lambda count: None)[0]
 
 

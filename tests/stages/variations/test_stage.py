@@ -50,8 +50,8 @@ def collection(folder: Path, out: str) -> list[Path]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("toy")
-    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}
-    return folder, make(folder, "one", 1, per_kit=2000, search=search)
+    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
+    return folder, make(folder, "one", 1, samples_per_kit=2000, search=search)
 
 
 def test_a_kit_with_a_finite_language_ends_and_says_so(made: tuple[Path, str]) -> None:
@@ -79,7 +79,7 @@ def test_every_sample_is_whole_and_equal_graphs_stand_in_one_split(made: tuple[P
             assert sample.graph == graph_digest(sample.assembly.types, sample.assembly.edges)
             assert split_of.setdefault((sample.kit, sample.graph), sample.split) == sample.split
             assert np.allclose(np.linalg.det(sample.assembly.poses[:, :3, :3]), 1.0)
-            assert {"parents", "boundary", "motion", "name"} <= set(sample.lineage)
+            assert {"parents", "boundary", "transform", "name"} <= set(sample.lineage)
     assert len(keys) >= 20
     assert set(split_of.values()) == {"train", "val", "test"}
 
@@ -113,8 +113,8 @@ def test_parents_are_samples_of_the_same_split_or_exemplars_and_no_two_splits_sh
 
 
 def test_by_graph_everything_found_is_shared_out_by_equal_graphs_alone(tmp_path: Path) -> None:
-    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}
-    make(tmp_path, "one", 1, per_kit=2000, search=search, splits={"by": "graph", "val": 0.2, "test": 0.3})
+    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
+    make(tmp_path, "one", 1, samples_per_kit=2000, search=search, splits={"by": "graph", "val": 0.2, "test": 0.3})
     root = tmp_path / "one" / ".work" / "toy" / "variations"
     kits = json.loads((root / "records" / "toy-assignment.json").read_text())["summary"]["kits"]
     by_key = {sample.key: sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)}
@@ -129,11 +129,11 @@ def test_by_graph_everything_found_is_shared_out_by_equal_graphs_alone(tmp_path:
 
 
 def test_what_is_copied_beyond_the_limit_is_refused_and_counted(tmp_path: Path) -> None:
-    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}
-    make(tmp_path, "one", 1, per_kit=2000, search=search, require={"copied": 0.6})
+    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
+    make(tmp_path, "one", 1, samples_per_kit=2000, search=search, require={"max_copied_share": 0.6})
     samples = [sample for shard in collection(tmp_path, "one") for sample in read_samples(shard)]
     assert samples
-    assert max(sample.lineage["copied"]["largest"] for sample in samples) <= 0.6
+    assert max(sample.lineage["copied"]["share"] for sample in samples) <= 0.6
     records = (tmp_path / "one" / ".work" / "toy" / "variations" / "records").glob("*-lane*.json")
     assert sum(json.loads(each.read_text())["rejects"].get("too much copied whole", 0) for each in records) > 0
 
@@ -153,15 +153,15 @@ def test_a_shard_of_the_collection_notes_both_files_of_each_kit_that_it_was_made
 
 def test_two_workers_make_the_same_bytes(made: tuple[Path, str]) -> None:
     folder, _ = made
-    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 1.0}
-    make(folder, "two", 2, per_kit=2000, search=search)
+    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 1.0}
+    make(folder, "two", 2, samples_per_kit=2000, search=search)
     assert digests(folder, "one") == digests(folder, "two")
 
 
 def test_two_workers_make_the_same_bytes_by_replacement(tmp_path: Path) -> None:
     search = {"method": "substructures", "tries": 300, "rounds": 2}
     for out, workers in (("one", 1), ("two", 2)):
-        make(tmp_path, out, workers, per_kit=40, search=search)
+        make(tmp_path, out, workers, samples_per_kit=40, search=search)
     assert digests(tmp_path, "one") == digests(tmp_path, "two")
     methods = {each.lineage["method"] for shard in collection(tmp_path, "one") for each in read_samples(shard)}
     assert methods == {"substructures"}
@@ -179,16 +179,16 @@ def test_only_towers_that_bear_the_required_push_and_have_their_storey_are_kept(
     towers = [[(name, upright @ at) for name, at in chain(links)] for links in (3, 5)]
     towers[1][3] = ("storey", towers[1][3][1])  # so that some variants have none
     paths = [write_model(tmp_path / f"tower{k}.glb", meshes, tower) for k, tower in enumerate(towers)]
-    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 0.1, "rounds": 20}
+    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 0.1, "max_rounds": 20}
     config = {
         "name": "toy",
         "seed": 5,
         "exemplars": {"kits": [stated({"name": "tower", "shapes": paths, "parts": "nodes"})]},
         # a tower of n links is n + 1 high and one wide: it tips at a push of 1 / (n + 1) of its weight
         "variations": {
-            "per_kit": 50,
+            "samples_per_kit": 50,
             "search": search,
-            "require": {"stable": True, "physics": {"push": 0.135}, "carcass": ["storey"]},
+            "require": {"stable": True, "physics": {"push": 0.135}, "labels": ["storey"]},
         },
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
@@ -212,13 +212,13 @@ def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: P
         write_model(tmp_path / "three.glb", meshes, [*chain(3), plate]),
         write_model(tmp_path / "five.glb", meshes, chain(5)),
     ]
-    search = {"largest": 2.0, "tries": 400, "patience": 2500, "smallest": 0.1, "rounds": 20}
-    kit = {"name": "chain", "shapes": paths, "parts": "nodes", "hubs": {"types": ["plate"], "keep": "backdrop"}}
+    search = {"max_size": 2.0, "tries_per_round": 400, "patience": 2500, "min_size": 0.1, "max_rounds": 20}
+    kit = {"name": "chain", "shapes": paths, "parts": "nodes", "hubs": {"types": ["plate"], "restore": True}}
     config = {
         "name": "toy",
         "seed": 5,
         "exemplars": {"kits": [stated(kit)]},
-        "variations": {"per_kit": 50, "search": search, "require": {"hubs": 1}},
+        "variations": {"samples_per_kit": 50, "search": search, "require": {"hubs": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     for stage in ("exemplars", "variations"):

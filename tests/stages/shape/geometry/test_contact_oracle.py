@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.variations.kernels.structs import FORBIDDEN, LABELS
 from tests.toy_kits.chains_and_rings import box, kit_of, pose, with_arrow
 
@@ -16,7 +16,7 @@ def test_a_contact_that_is_a_docking_from_one_side_alone_is_refused() -> None:
     kit = kit_of(MESHES, [[("plate", pose(0, 0, 0)), ("stud", pose(2.0, -0.2, 1.0)), ("plate", pose(0, -0.4, 0))]])
     names = [each.name for each in kit.types]
     plate, stud = names.index("plate"), names.index("stud")
-    answers, seen = ContactAnswers(kit), kit.exemplars[0].assembly
+    answers, seen = ContactOracle(kit), kit.exemplars[0].assembly
     at = {each: seen.poses[seen.types.tolist().index(each)] for each in (plate, stud)}
     answered = set()
     hair = kit.pose_tolerance / kit.types[stud].diagonal

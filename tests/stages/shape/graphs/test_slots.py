@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS, admits
 from stages.shape.graphs.slots import SlotGrammar
@@ -99,7 +99,7 @@ def test_levels_grow_and_growth_keeps_to_each(folder: Path) -> None:
         assert grammar.familiar(observed.exemplars[0].assembly) == 1.0
     for place, level in enumerate(SLOT_LEVELS):
         kit = replace(observed, grammar=replace(observed.grammar, strictness=level))
-        line = Search(ContactAnswers(kit), SearchConfig(method="growth"))
+        line = Search(ContactOracle(kit), SearchConfig(method="growth"))
         found, _ = line.run(np.random.default_rng(4), 4000, 4, "test", lambda count: None)
         assert found
         for variant in found[:4]:
@@ -112,7 +112,7 @@ def test_levels_grow_and_growth_keeps_to_each(folder: Path) -> None:
 def test_exchange_keeps_to_slots_too() -> None:
     observed = shipped_kit(next(each for each in SHIPPED if each.name == "castle"))
     kit = replace(observed, grammar=replace(observed.grammar, strictness="slot_fillings"))
-    line = Search(ContactAnswers(kit), SearchConfig(method="exchange"))
+    line = Search(ContactOracle(kit), SearchConfig(method="exchange"))
     found, _ = line.run(np.random.default_rng(4), 1500, 20, "test", lambda count: None)
     assert found
     assert all(SlotGrammar(kit, DockingTable.of(kit), True).misfits(each.assembly) == [] for each in found)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from stages.shape.arrays import IntArray
 from stages.shape.assembly_faults import assembly_faults
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.pose import invert
 from stages.shape.graphs.canonical import graph_digest
@@ -29,19 +29,19 @@ from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit
 
 @pytest.fixture(scope="module")
 def roads() -> Instantiator:
-    return Instantiator(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
+    return Instantiator(ContactOracle(kit_of(ROAD, [ring(1, 1), ring(2, 3)])))
 
 
 @pytest.fixture(scope="module")
 def chains() -> Instantiator:
-    return Instantiator(ContactAnswers(kit_of(CHAIN, [chain(2), chain(3)])))
+    return Instantiator(ContactOracle(kit_of(CHAIN, [chain(2), chain(3)])))
 
 
 @pytest.fixture(scope="module")
 def ungoverned(roads: Instantiator) -> Instantiator:
     """A kit whose parts may have any neighbours, as hubs may."""
     grammar = replace(roads.kit.grammar, hubs=tuple(range(len(roads.kit.types))))
-    return Instantiator(ContactAnswers(replace(roads.kit, grammar=grammar)))
+    return Instantiator(ContactOracle(replace(roads.kit, grammar=grammar)))
 
 
 def labels(kit: Kit, names: Sequence[str]) -> np.ndarray:
@@ -146,7 +146,7 @@ def test_strings_of_exemplars_become_shapes_whatever_they_tell_of(roads: Instant
 
 
 def test_what_was_asked_before_changes_no_answer(roads: Instantiator) -> None:
-    fresh = Instantiator(ContactAnswers(roads.kit))
+    fresh = Instantiator(ContactOracle(roads.kit))
     names = loop(3, 2)
     one, other = (put_together(each, names, cycle(len(names)), seed=3) for each in (roads, fresh))
     assert one.tries == other.tries
@@ -158,7 +158,7 @@ def test_what_was_asked_before_changes_no_answer(roads: Instantiator) -> None:
 def test_room_for_a_large_graph_is_none_for_a_small_one(roads: Instantiator, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(instantiate, "VALUES_A_NODE", 1)
     monkeypatch.setattr(instantiate, "FEWEST", 1)
-    fresh, used = (Instantiator(ContactAnswers(roads.kit)) for _ in range(2))
+    fresh, used = (Instantiator(ContactOracle(roads.kit)) for _ in range(2))
     used._room(400)
     names = loop(3, 2)
     reasons = {put_together(each, names, cycle(len(names)), seed=3).reason for each in (fresh, used)}
@@ -192,7 +192,7 @@ def fence(width: int, depth: int) -> list[Placed]:
 @pytest.fixture(scope="module")
 def fences() -> Instantiator:
     """Walls leave a post on any of its sides: a graph does not say where a ring turns."""
-    return Instantiator(ContactAnswers(kit_of(FENCE, [fence(1, 1), fence(2, 1)])))
+    return Instantiator(ContactOracle(kit_of(FENCE, [fence(1, 1), fence(2, 1)])))
 
 
 def test_looking_ahead_to_where_a_cycle_closes_saves_tries(fences: Instantiator) -> None:

@@ -14,7 +14,7 @@ import pytest
 from pipeline.errors import ConfigError
 from stages.shape.kit import Assembly, Kit
 from stages.shape.stretch import moved_by
-from stages.variations.constraint import made_mend, made_test, unknown_in
+from stages.variations.constraint import build_repair, build_test, unknown_in
 from stages.variations.requirements.resizing import heights_of, spans_of
 from tests.stages.variations.substructures.test_replacing import replaced
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose
@@ -59,12 +59,12 @@ def place_of(kit: Kit, assembly: Assembly, name: str) -> int:
 
 
 def test_an_exemplar_meets_its_constraints(kit: Kit) -> None:
-    unmet = made_test(kit, {"support": {}, "path": LABELS})
+    unmet = build_test(kit, {"support": {}, "path": LABELS})
     assert unmet(kit.exemplars[0].assembly) is None
 
 
 def test_a_path_must_reach_an_exit_and_never_rise(kit: Kit) -> None:
-    unmet = made_test(kit, {"path": LABELS})
+    unmet = build_test(kit, {"path": LABELS})
     assembly = kit.exemplars[0].assembly
     parts = np.arange(len(assembly))
     end = place_of(kit, assembly, "end")
@@ -73,16 +73,16 @@ def test_a_path_must_reach_an_exit_and_never_rise(kit: Kit) -> None:
     assert unmet(assembly.select(parts[parts != end])) == "no exit"
     assert unmet(assembly.select(parts[parts != slide])) == "no path from an entry to an exit"
     assert unmet(changed(assembly, slide, 0.3)) == "a path leads upwards"
-    assert made_test(kit, {"path": {"entries": ("top",), "exits": ("end",)}})(assembly) is None
+    assert build_test(kit, {"path": {"entries": ("top",), "exits": ("end",)}})(assembly) is None
 
 
 def test_labels_that_a_kit_has_not_are_told(kit: Kit) -> None:
     with pytest.raises(ConfigError, match="no parts called slyde; did you mean slide"):
-        made_test(kit, {"path": {**LABELS, "through": ("slyde",)}})
+        build_test(kit, {"path": {**LABELS, "through": ("slyde",)}})
 
 
 def test_what_was_always_borne_must_be(kit: Kit) -> None:
-    unmet = made_test(kit, {"support": {}})
+    unmet = build_test(kit, {"support": {}})
     assembly = kit.exemplars[0].assembly
     pillar, top = (place_of(kit, assembly, name) for name in ("pillar", "top"))
     parts = np.arange(len(assembly))
@@ -98,7 +98,7 @@ def test_a_pillar_that_always_stood_on_the_ground_is_not_lifted(kit: Kit) -> Non
         np.concatenate([assembly.poses, changed(assembly, pillar, 0.5).poses[[pillar]]]),
         assembly.edges,
     )
-    assert made_test(kit, {"support": {}})(twice) == "lifted off the ground"
+    assert build_test(kit, {"support": {}})(twice) == "lifted off the ground"
 
 
 @pytest.mark.parametrize(
@@ -146,10 +146,10 @@ def dropped(kit: Kit, *, bump: float = 0.0, lift: float = 0.0) -> Assembly:
 def test_a_path_that_rises_is_made_lower_where_it_does_and_what_hangs_on_it_moves_along(kit: Kit) -> None:
     asked = {"path": LABELS}
     risen = dropped(kit, bump=0.15)
-    assert made_test(kit, asked)(risen) == "a path leads upwards"
-    mended = made_mend(kit, asked, 3.0, ())(risen)
+    assert build_test(kit, asked)(risen) == "a path leads upwards"
+    mended = build_repair(kit, asked, 3.0, ())(risen)
     assert mended is not None
-    assert made_test(kit, asked)(mended) is None
+    assert build_test(kit, asked)(mended) is None
     assert mended.stretches is not None
     bent = np.flatnonzero(np.abs(mended.stretches - np.eye(3)).max(axis=(1, 2)) > 1e-6)
     assert [kit.type_names()[each] for each in mended.types[bent]] == ["slide"]
@@ -157,8 +157,8 @@ def test_a_path_that_rises_is_made_lower_where_it_does_and_what_hangs_on_it_move
     others = [place for place in range(len(mended)) if place not in bent]
     kept = [place for place in others if kit.type_names()[mended.types[place]] != "end"]
     np.testing.assert_allclose(heights[kept], heights_of(kit, risen)[kept], atol=1e-9)
-    assert made_mend(kit, asked, 1.05, ())(risen) is None
-    assert made_mend(kit, asked, 3.0, ("slide",))(risen) is None
+    assert build_repair(kit, asked, 1.05, ())(risen) is None
+    assert build_repair(kit, asked, 3.0, ("slide",))(risen) is None
 
 
 def test_an_exit_over_the_ground_is_lowered_along_its_path(kit: Kit) -> None:
@@ -169,7 +169,7 @@ def test_an_exit_over_the_ground_is_lowered_along_its_path(kit: Kit) -> None:
     hung = Assembly(np.append(assembly.types, assembly.types[place_of(low, assembly, "end")]), poses, assembly.edges)
     hung.poses[-1, 1, 3] -= 0.3
     asked = {"path": {**LABELS, "entries": ("top",)}}
-    mended = made_mend(low, asked, 3.0, ())(hung)
+    mended = build_repair(low, asked, 3.0, ())(hung)
     assert mended is not None
     end = place_of(low, assembly, "end")
     spans = spans_of(low, mended)
@@ -190,13 +190,13 @@ def test_a_leg_is_made_longer_until_it_reaches_the_ground(kit: Kit) -> None:
     short[[leg, plate], 1, 3] += 0.4
     uneven = moved_leg(replace(assembly, poses=short), lower, 1.4)
     asked: dict[str, dict[str, tuple[str, ...]]] = {"support": {}}
-    assert made_test(table, asked)(uneven) == "lifted off the ground"
-    mended = made_mend(table, asked, 1.5, ())(uneven)
+    assert build_test(table, asked)(uneven) == "lifted off the ground"
+    mended = build_repair(table, asked, 1.5, ())(uneven)
     assert mended is not None
     np.testing.assert_allclose(spans_of(table, mended)[[leg, lower]], [[0, 1.4], [0, 1.4]], atol=1e-9)
-    assert made_mend(table, asked, 1.3, ())(uneven) is None
+    assert build_repair(table, asked, 1.3, ())(uneven) is None
     with pytest.raises(ConfigError, match="no parts called legg; did you mean leg"):
-        made_mend(table, asked, 1.5, ("legg",))
+        build_repair(table, asked, 1.5, ("legg",))
 
 
 def moved_leg(assembly: Assembly, part: int, factor: float) -> Assembly:
@@ -232,8 +232,12 @@ def test_of_towers_on_feet_of_two_heights_those_that_mix_them_are_refused_or_get
     kit = kit_of(
         TOWERS, [towers("plinth", "roof", "tank", "roof"), towers("kerb", "tank", "roof")], grammar="count_and_pairs"
     )
-    _, found = replaced(kit, 400, stretch={"most": 2.0})
-    unmet, mend, less = made_test(kit, SUPPORT), made_mend(kit, SUPPORT, 2.0, ()), made_mend(kit, SUPPORT, 1.5, ())
+    _, found = replaced(kit, 400, stretch={"max_factor": 2.0})
+    unmet, mend, less = (
+        build_test(kit, SUPPORT),
+        build_repair(kit, SUPPORT, 2.0, ()),
+        build_repair(kit, SUPPORT, 1.5, ()),
+    )
     lifted = [each.assembly for each in found if unmet(each.assembly) == "lifted off the ground"]
     assert 0 < len(lifted) < len(found)
     kerb = kit.type_names().index("kerb")

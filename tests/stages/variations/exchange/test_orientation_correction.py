@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.variations.exchange.orientation_correction import correct_orientations
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
@@ -13,7 +13,7 @@ from tests.toy_kits.chains_and_rings import ROAD, kit_of, pose, ring
 
 def loaded() -> Search:
     """A search whose workspace holds the ring of its first exemplar."""
-    line = Search(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])), SearchConfig())
+    line = Search(ContactOracle(kit_of(ROAD, [ring(1, 1), ring(2, 3)])), SearchConfig())
     shape = line.parents.exemplars[0]
     line._load(shape)
     ws, n = line._ws, len(shape.assembly)

@@ -7,18 +7,18 @@ import pytest
 import trimesh
 
 from stages.shape.assembly_faults import assembly_faults
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
 from stages.variations.exchange.repeated_units import shift
 from stages.variations.kernels.structs import BOUNDARY, PLANES, UNITS, Outcome
-from stages.variations.search.operator_selection import Choice
+from stages.variations.search.operator_selection import PlannedTry
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, chain, kit_of, ring
 
 
 def line_of(kit: Kit) -> Search:
-    return Search(ContactAnswers(kit), SearchConfig(method="exchange", duplicates="graph"))
+    return Search(ContactOracle(kit), SearchConfig(method="exchange", duplicates="graph"))
 
 
 def made_by(line: Search, way: int, tries: int) -> list[Variant]:
@@ -26,7 +26,7 @@ def made_by(line: Search, way: int, tries: int) -> list[Variant]:
     rng, found = np.random.default_rng(0), []
     for number in range(tries):
         a = line.parents.exemplars[number % len(line.parents.exemplars)]
-        variant = line._attempt(rng, Choice(0, a, a, way, False))
+        variant = line._attempt(rng, PlannedTry(0, a, a, way, False))
         if isinstance(variant, Variant):
             line.seen.add(line.key(variant.assembly.types, variant.graph, variant.docked))
             found.append(variant)

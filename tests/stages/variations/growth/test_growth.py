@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.graphs.patterns import observed_patterns
 from stages.shape.kit import Exemplar, Kit
@@ -20,20 +20,20 @@ from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, ring
 
 
 def grown(kit: Kit, tries: int = 20_000, wanted: int = 10**9, **settings: object) -> tuple[Search, list[Variant]]:
-    line = Search(ContactAnswers(kit), SearchConfig.model_validate({"method": "growth", **settings}))
+    line = Search(ContactOracle(kit), SearchConfig.model_validate({"method": "growth", **settings}))
     found, _ = line.run(np.random.default_rng(5), tries, wanted, "test", lambda count: None)
     return line, found
 
 
 def test_every_chain_within_the_limits_is_grown() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
-    _, found = grown(kit, smallest=0.5, largest=2.0)
+    _, found = grown(kit, min_size=0.5, max_size=2.0)
     assert sorted(len(each.assembly) - 2 for each in found) == [2, 4, *range(6, 13)]
 
 
 def test_every_rectangle_of_one_way_road_is_grown_and_nothing_but_closed_rings() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = grown(kit, tries=60_000, smallest=1.0, largest=1.6)
+    _, found = grown(kit, tries=60_000, min_size=1.0, max_size=1.6)
     sides = Counter()
     for variant in found:
         degrees = np.bincount(variant.assembly.edges.ravel(), minlength=len(variant.assembly))
@@ -66,7 +66,7 @@ def test_size_and_footprint_are_met_within_a_quarter() -> None:
     _, found = grown(kit, wanted=10, grown={"parts": (40, 60)})
     assert len(found) >= 10
     assert all(30 <= len(each.assembly) <= 75 for each in found)
-    _, found = grown(kit, wanted=10, smallest=0.1, grown={"footprint": (14.0, 20.0)})
+    _, found = grown(kit, wanted=10, min_size=0.1, grown={"footprint": (14.0, 20.0)})
     assert len(found) >= 10
     for variant in found:
         area = float(variant.features[1])
@@ -75,9 +75,9 @@ def test_size_and_footprint_are_met_within_a_quarter() -> None:
 
 def test_growth_is_the_same_every_time_whatever_is_known_of_contacts() -> None:
     kit = shipped_kit(SHIPPED[0])
-    answers = ContactAnswers(kit)
+    answers = ContactOracle(kit)
     runs = []
-    for given in (answers, answers, ContactAnswers(kit)):
+    for given in (answers, answers, ContactOracle(kit)):
         line = Search(given, SearchConfig(method="growth"))
         found, tries = line.run(np.random.default_rng(2), 3000, 10**9, "test", lambda count: None)
         runs.append((tries, [each.assembly.poses.tobytes() for each in found], line.rejects))
@@ -85,7 +85,7 @@ def test_growth_is_the_same_every_time_whatever_is_known_of_contacts() -> None:
 
 
 def test_what_goes_wrong_while_a_kernel_asks_is_raised() -> None:
-    line = Search(ContactAnswers(kit_of(CHAIN, [chain(3)])), SearchConfig(method="growth"))
+    line = Search(ContactOracle(kit_of(CHAIN, [chain(3)])), SearchConfig(method="growth"))
     line.answers.contact.touches = None  # type: ignore[assignment,method-assign]
     with pytest.raises(TypeError):
         line.run(np.random.default_rng(0), 100, 1, "test", lambda count: None)

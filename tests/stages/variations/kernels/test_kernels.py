@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.shape.geometry.contact_lookup import ask, hash_key, quantise
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
 from stages.variations.exchange.cuts import cut
@@ -21,11 +21,11 @@ from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, pose, ri
 
 @pytest.fixture(scope="module")
 def chains() -> Search:
-    return Search(ContactAnswers(kit_of(CHAIN, [chain(3), chain(5)])), SearchConfig(smallest=0.1))
+    return Search(ContactOracle(kit_of(CHAIN, [chain(3), chain(5)])), SearchConfig(min_size=0.1))
 
 
 def test_a_cut_is_connected_and_its_boundary_are_the_parts_with_a_neighbour_outside() -> None:
-    line = Search(ContactAnswers(kit_of(ROAD, [ring(1, 1), ring(2, 3)])), SearchConfig())
+    line = Search(ContactOracle(kit_of(ROAD, [ring(1, 1), ring(2, 3)])), SearchConfig())
     shape = line.parents.exemplars[1].tables
     ws, rng = line._ws, np.random.default_rng(0)
     sizes = set()
@@ -59,7 +59,7 @@ def test_contact_answers_do_not_depend_on_what_was_asked_before(chains: Search) 
     }
     answers = []
     for order in (list(cases), list(reversed(cases))):
-        fresh = ContactAnswers(kit)
+        fresh = ContactOracle(kit)
         given = {}
         for name in order:
             first, second, _ = cases[name]

@@ -15,7 +15,7 @@ from stages.exemplars.observed_grammar import observe_dockings
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.docking import DockingTable
 from stages.shape.kit import Assembly, Exemplar, Grammar, Kit, PartType
-from stages.variations.novelty.copied_pieces import Copied, CopyTest
+from stages.variations.novelty.copied_pieces import CopiedPieces, CopyDetector
 from tests.toy_kits.chains_and_rings import box
 
 TURNS = np.array(
@@ -69,9 +69,9 @@ def kit(*exemplars: Assembly) -> Kit:
     return Kit("cubes", TYPES, named, Grammar({}, dockings, {}), 1e-3, 1e-3, ("face",), "y")
 
 
-def copied(own: Kit, shape: Assembly) -> Copied:
+def copied(own: Kit, shape: Assembly) -> CopiedPieces:
     table = DockingTable.of(own)
-    return CopyTest(own, table).copied(shape, table.label_edges(shape.types, shape.poses, shape.edges))
+    return CopyDetector(own, table).copied(shape, table.label_edges(shape.types, shape.poses, shape.edges))
 
 
 def moved(shape: Assembly, turn: int, x: float, y: float, z: float) -> Assembly:
@@ -86,42 +86,42 @@ SCREW = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1))
 def test_an_exemplar_is_one_copy_of_itself_wherever_it_stands() -> None:
     shape = blocks(SCREW, (ANY, ONE, POST, RING), (3, 7, 11, 19))
     for turn in range(len(TURNS)):
-        assert copied(kit(shape), moved(shape, turn, 0.3, -2.0, 5.5)) == Copied(1.0, 1, 1.0, "e0")
+        assert copied(kit(shape), moved(shape, turn, 0.3, -2.0, 5.5)) == CopiedPieces(1.0, 1, 1.0, "e0")
 
 
 def test_two_exemplars_glued_together_are_two_pieces() -> None:
     plate = blocks([(0, 0, 0), (1, 0, 0), (0, 0, 1)], ONE)
     glued = blocks([(0, 0, 0), (1, 0, 0), (0, 0, 1), (0, 1, 0), (0, 1, 1), (1, 1, 0)], ONE)
-    assert copied(kit(plate), glued) == Copied(0.5, 2, 1.0, "e0")
+    assert copied(kit(plate), glued) == CopiedPieces(0.5, 2, 1.0, "e0")
 
 
 def test_a_mirror_image_is_no_copy() -> None:
     mirrored = [(x, y, -z) for x, y, z in SCREW]
-    assert copied(kit(blocks(SCREW)), blocks(mirrored)) == Copied(0.75, 2, 0.75, "e0")
+    assert copied(kit(blocks(SCREW)), blocks(mirrored)) == CopiedPieces(0.75, 2, 0.75, "e0")
 
 
 def test_equal_dockings_that_curl_otherwise_are_no_copy() -> None:
     row = blocks([(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)])
-    assert copied(kit(row), blocks([(0, 0, 0), (1, 0, 0), (1, 0, 1), (2, 0, 1)])) == Copied(0.5, 2, 0.5, "e0")
+    assert copied(kit(row), blocks([(0, 0, 0), (1, 0, 0), (1, 0, 1), (2, 0, 1)])) == CopiedPieces(0.5, 2, 0.5, "e0")
 
 
 def test_a_longer_ring_is_one_end_and_both_its_sides_of_a_shorter_one() -> None:
     def ring(length: int) -> Assembly:
         return blocks([(x, 0, z) for x in range(length) for z in range(3) if x in (0, length - 1) or z != 1])
 
-    assert copied(kit(ring(3)), ring(4)) == Copied(0.7, 2, 7 / 8, "e0")
+    assert copied(kit(ring(3)), ring(4)) == CopiedPieces(0.7, 2, 7 / 8, "e0")
 
 
 def test_a_part_alone_is_a_piece_of_the_smallest_exemplar_that_has_one() -> None:
     large, small = blocks([(0, 0, 0), (1, 0, 0), (2, 0, 0)]), blocks([(0, 0, 0), (1, 0, 0)])
-    assert copied(kit(large, small), blocks([(4, 4, 4)], turns=5)) == Copied(1.0, 1, 0.5, "e1")
+    assert copied(kit(large, small), blocks([(4, 4, 4)], turns=5)) == CopiedPieces(1.0, 1, 0.5, "e1")
 
 
 def test_what_cannot_all_be_looked_at_is_still_found_by_its_rarest_docking(monkeypatch: pytest.MonkeyPatch) -> None:
     cells = [(x, 0, z) for x in range(8) for z in range(8)]
     floor = blocks([*cells, (3, 1, 3)], [*[ANY] * len(cells), ONE])
     monkeypatch.setattr("stages.variations.novelty.copied_pieces.BUDGET", 2)
-    assert copied(kit(floor), floor) == Copied(1.0, 1, 1.0, "e0")
+    assert copied(kit(floor), floor) == CopiedPieces(1.0, 1, 1.0, "e0")
 
 
 @cache

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from stages.variations.novelty.kit_overlap import meeting, meeting_words
+from stages.variations.novelty.kit_overlap import kit_overlap, overlap_sentence
 from tests.stages.variations.search.test_search import search
 from tests.toy_kits.chains_and_rings import CHAIN, box, chain, kit_of, pose, with_arrow
 
 
 def test_a_kit_of_one_exemplar_has_none_to_meet() -> None:
-    assert meeting(kit_of(CHAIN, [chain(3)])) == {}
+    assert kit_overlap(kit_of(CHAIN, [chain(3)])) == {}
 
 
 def test_chains_share_what_stands_inside_them() -> None:
-    found = meeting(kit_of(CHAIN, [chain(3), chain(5)]))
+    found = kit_overlap(kit_of(CHAIN, [chain(3), chain(5)]))
     # The cap beside a link, a link beside a cap and a link, a link between links.
     assert (found["types"], found["neighbourhoods"], found["all_neighbourhoods"]) == (2, 3, 3)
     assert found["joints"] == 0
@@ -23,15 +23,17 @@ def test_exemplars_that_share_a_type_but_no_neighbourhood_are_proved_never_to_me
     meshes = {**CHAIN, "stone": with_arrow(box(1.0, 0.5, 0.8)), "end": box(0.3, 1.0, 0.9)}
     stones = [("end", pose(-0.65, 0, 0)), *(("stone", pose(x, 0, 0)) for x in range(3)), ("cap", pose(2.75, 0, 0))]
     kit = kit_of(meshes, [chain(3), stones])
-    found = meeting(kit)
+    found = kit_overlap(kit)
     assert (found["types"], found["neighbourhoods"], found["joints"], found["meets"]) == (1, 0, 0, False)
-    assert "no variant can show both" in meeting_words(found, "multiset", {})
-    assert "no variant" not in meeting_words(found, "count_and_pairs", {})
+    assert "no variant can show both" in overlap_sentence(found, "multiset", {})
+    assert "no variant" not in overlap_sentence(found, "count_and_pairs", {})
     _, variants = search(kit, tries=2000)
     assert variants
     assert all(len(set(each.origins.tolist())) == 1 for each in variants)
 
 
 def test_tries_across_exemplars_are_told_by_outcome_the_commonest_first() -> None:
-    words = meeting_words(meeting(kit_of(CHAIN, [chain(3), chain(5)])), "multiset", {"new": 2, "not matched": 30})
+    words = overlap_sentence(
+        kit_overlap(kit_of(CHAIN, [chain(3), chain(5)])), "multiset", {"new": 2, "not matched": 30}
+    )
     assert words.endswith("32 tries across them: 30 not matched, 2 new")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stages.shape.kit import Kit, Strictness
-from stages.variations.novelty.low_diversity import dullness, mutual_distance
+from stages.variations.novelty.low_diversity import low_diversity, mutual_distance
 from tests.toy_kits.chains_and_rings import CHAIN, chain, kit_of
 
 LIVELY = {"variants": 200, "copied": 0.6, "distance": 0.2, "apart": 0.3}
@@ -37,20 +37,20 @@ def test_shapes_are_as_far_apart_as_their_parts_lists() -> None:
     ],
 )
 def test_each_fault_makes_a_pool_dull_and_is_named(changed: dict[str, float], said: str) -> None:
-    assert dullness(one_chain(), LIVELY) == ""
-    assert said in dullness(one_chain(), {**LIVELY, **changed})
-    assert dullness(one_chain(), {**LIVELY, **changed, "variants": 1}) == ""
+    assert low_diversity(one_chain(), LIVELY) == ""
+    assert said in low_diversity(one_chain(), {**LIVELY, **changed})
+    assert low_diversity(one_chain(), {**LIVELY, **changed, "variants": 1}) == ""
 
 
 def test_what_would_help_is_what_the_kit_has_not_done_already() -> None:
     dull = {**LIVELY, "copied": 1.0}
-    said = dullness(one_chain(), dull)
+    said = low_diversity(one_chain(), dull)
     for remedy in ("a second model", "grammar: count_and_pairs", "contact.kinds: [face]", "hubs.types: auto"):
         assert remedy in said
     loosest = replace(one_chain().grammar, strictness="count_and_types", hubs=(0,))
     kit = replace(kit_of(CHAIN, [chain(3), chain(5)]), grammar=loosest)
-    always = "the same layout in other proportions (proportions.per_kit)"
-    assert dullness(kit, dull).endswith(f"what would help: one more model of the same parts, or {always}")
+    always = "the same layout in other proportions (proportions.samples_per_kit)"
+    assert low_diversity(kit, dull).endswith(f"what would help: one more model of the same parts, or {always}")
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_what_would_help_is_what_the_kit_has_not_done_already() -> None:
 )
 def test_a_looser_grammar_would_help_where_there_is_one_of_its_kind(strictness: Strictness, looser: str | None) -> None:
     kit = one_chain()
-    said = dullness(replace(kit, grammar=replace(kit.grammar, strictness=strictness)), {**LIVELY, "copied": 1.0})
+    said = low_diversity(replace(kit, grammar=replace(kit.grammar, strictness=strictness)), {**LIVELY, "copied": 1.0})
     assert said.startswith("dull: ")
     assert ("a looser grammar" in said) == (looser is not None)
     assert looser is None or f"(grammar: {looser})" in said

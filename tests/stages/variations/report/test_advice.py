@@ -11,7 +11,7 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.settings import HubConfig
 from stages.shape.kit import Kit
 from stages.variations.report.advice import what_keeps
-from stages.variations.requirements.hub_restoration import NO_BACKDROP
+from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED
 from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, config_of, kit_of, models_of, pose
 
 BLOCKS = {"a": box(1.0, 1.0, 1.0), "b": box(1.0, 1.0, 2.0), "c": box(1.0, 1.0, 3.0)}
@@ -49,8 +49,8 @@ def test_models_that_are_there_already_are_not_asked_for(shapes: list[list[Place
 def test_what_stands_without_the_hubs_that_were_left_out_is_said_to() -> None:
     plate: Placed = ("plate", pose(1, -0.55, 0))
     meshes = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
-    kit = kit_of(meshes, [[*chain(3), plate]], hubs=HubConfig(types=("plate",), keep="backdrop"))
-    said = what_keeps(kit, {NO_BACKDROP: 3}, 100)
+    kit = kit_of(meshes, [[*chain(3), plate]], hubs=HubConfig(types=("plate",), restore=True))
+    said = what_keeps(kit, {HUBS_NOT_RESTORED: 3}, 100)
     assert (
         said == "what was found stands without plate, left out by `hubs.types`; bring a second model of the same parts"
     )

@@ -13,14 +13,14 @@ from stages.exemplars.settings import HubConfig
 from stages.package.glb import glb_bytes
 from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Assembly, Kit
 from stages.shape.shape import kit_shape
 from stages.strings.alphabet import make_alphabet
 from stages.strings.encoder import canonical_string
 from stages.strings.grammar_check import check_string
 from stages.strings.tokens import StringError
-from stages.variations.requirements.hub_restoration import Backdrop
+from stages.variations.requirements.hub_restoration import HubRestorer
 from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, kit_of, models_of, pose
 
 MESHES = {**CHAIN, "plate": box(4.5, 0.1, 3.0)}
@@ -30,21 +30,21 @@ PLATE: Placed = ("plate", pose(1, -0.55, 0))
 @pytest.fixture(scope="module")
 def kit() -> Kit:
     """A chain of three links between two caps on a plate that only the caps touch."""
-    hubs = HubConfig(types=("plate",), keep="backdrop")
+    hubs = HubConfig(types=("plate",), restore=True)
     return kit_of(MESHES, [[*chain(3), PLATE]], hubs=hubs)
 
 
 @pytest.fixture(scope="module")
-def answers(kit: Kit) -> ContactAnswers:
-    return ContactAnswers(kit)
+def answers(kit: Kit) -> ContactOracle:
+    return ContactOracle(kit)
 
 
 @pytest.fixture(scope="module")
-def backdrop(answers: ContactAnswers) -> Backdrop:
-    return Backdrop(answers, upright=True)
+def backdrop(answers: ContactOracle) -> HubRestorer:
+    return HubRestorer(answers, upright=True)
 
 
-def placed(kit: Kit, shape: list[Placed], answers: ContactAnswers) -> Assembly:
+def placed(kit: Kit, shape: list[Placed], answers: ContactOracle) -> Assembly:
     """A shape of the kit's parts with its true contacts."""
     (model,) = models_of(MESHES, [shape])
     types = np.array([kit.type_names().index(part.mesh_name) for part in model.parts], dtype=np.int16)
@@ -53,7 +53,7 @@ def placed(kit: Kit, shape: list[Placed], answers: ContactAnswers) -> Assembly:
 
 
 def test_an_exemplar_gets_its_hubs_back_with_all_their_contacts(
-    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+    kit: Kit, answers: ContactOracle, backdrop: HubRestorer
 ) -> None:
     whole = backdrop.fit(kit.exemplars[0].assembly)
     expected = placed(kit, [*chain(3), PLATE], answers)
@@ -62,7 +62,7 @@ def test_an_exemplar_gets_its_hubs_back_with_all_their_contacts(
     np.testing.assert_allclose(whole.poses[-1][:3, 3], expected.poses[-1][:3, 3], atol=1e-6)
 
 
-def test_a_shape_far_away_and_turned_gets_the_hub_too(kit: Kit, answers: ContactAnswers, backdrop: Backdrop) -> None:
+def test_a_shape_far_away_and_turned_gets_the_hub_too(kit: Kit, answers: ContactOracle, backdrop: HubRestorer) -> None:
     bare = kit.exemplars[0].assembly
     motion = pose(7, 8, 9, 1)
     moved = backdrop.fit(Assembly(bare.types, motion @ bare.poses, bare.edges))
@@ -70,25 +70,25 @@ def test_a_shape_far_away_and_turned_gets_the_hub_too(kit: Kit, answers: Contact
 
 
 def test_a_hub_is_left_out_where_too_few_of_its_neighbours_stand(
-    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+    kit: Kit, answers: ContactOracle, backdrop: HubRestorer
 ) -> None:
     assert backdrop.fit(placed(kit, chain(3)[1:], answers)).types.tolist() == [1, 1, 1, 0], "one cap of two"
 
 
 def test_a_hub_is_left_out_where_something_stands_in_its_way(
-    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+    kit: Kit, answers: ContactOracle, backdrop: HubRestorer
 ) -> None:
     blocked = placed(kit, [*chain(3), ("link", pose(1, -0.55, 0))], answers)
     assert len(backdrop.fit(blocked)) == len(blocked)
 
 
-def test_only_without_upright_may_a_hub_stand_above_what_it_stood_below(kit: Kit, answers: ContactAnswers) -> None:
-    free = Backdrop(answers, upright=False).fit(kit.exemplars[0].assembly)
+def test_only_without_upright_may_a_hub_stand_above_what_it_stood_below(kit: Kit, answers: ContactOracle) -> None:
+    free = HubRestorer(answers, upright=False).fit(kit.exemplars[0].assembly)
     assert sorted(np.round(free.poses[5:, 1, 3], 3).tolist()) == [-0.55, 0.55]
 
 
 def test_verification_and_strings_take_shapes_with_their_backdrop(
-    kit: Kit, answers: ContactAnswers, backdrop: Backdrop
+    kit: Kit, answers: ContactOracle, backdrop: HubRestorer
 ) -> None:
     alphabet = make_alphabet(kit.type_names())
     for exemplar in kit.exemplars:
@@ -107,7 +107,7 @@ def test_verification_and_strings_take_shapes_with_their_backdrop(
         check_string(f"{link}{plate}", alphabet, kit.grammar)
 
 
-def test_hubs_are_required_by_number_or_by_their_share_in_the_exemplars(kit: Kit, backdrop: Backdrop) -> None:
+def test_hubs_are_required_by_number_or_by_their_share_in_the_exemplars(kit: Kit, backdrop: HubRestorer) -> None:
     (plate,), link = kit.grammar.hubs, kit.type_names().index("link")
 
     def has(required: float, hubs: int, others: int) -> bool:
@@ -152,8 +152,6 @@ def test_rails_go_no_farther_than_the_road_that_they_stand_on() -> None:
     assert found == {10: True, 11: False, 15: False}
 
 
-def cut_out(meshes: dict[str, trimesh.Trimesh], shape: list[Placed], hub: str) -> Backdrop:
+def cut_out(meshes: dict[str, trimesh.Trimesh], shape: list[Placed], hub: str) -> HubRestorer:
     """The backdrop of a kit of one shape from which a type is left out."""
-    return Backdrop(
-        ContactAnswers(kit_of(meshes, [shape], hubs=HubConfig(types=(hub,), keep="backdrop"))), upright=True
-    )
+    return HubRestorer(ContactOracle(kit_of(meshes, [shape], hubs=HubConfig(types=(hub,), restore=True))), upright=True)

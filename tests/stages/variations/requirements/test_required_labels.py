@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.errors import ConfigError
 from stages.exemplars.settings import HubConfig
-from stages.variations.requirements.required_labels import carcass, carcass_test, spanning_hubs
+from stages.variations.requirements.required_labels import labels_test, spanning_hubs, spanning_labels
 from tests.toy_kits.chains_and_rings import CHAIN, Placed, box, chain, kit_of, pose
 
 MESHES = {"top": box(4.0, 0.2, 2.0), "leg": box(0.2, 2.0, 0.2), "shelf": box(3.2, 0.2, 1.5)}
@@ -21,23 +21,23 @@ FOUR = stand((-1.5, -0.5), (1.5, -0.5), (-1.5, 0.5), (1.5, 0.5))
 
 
 def test_what_spans_an_exemplar_is_its_carcass_and_what_is_small_is_not() -> None:
-    assert carcass(kit_of(MESHES, [FOUR])) == ("top",)
-    assert carcass(kit_of(CHAIN, [chain(5)])) == ()
+    assert spanning_labels(kit_of(MESHES, [FOUR])) == ("top",)
+    assert spanning_labels(kit_of(CHAIN, [chain(5)])) == ()
 
 
 def test_of_a_part_of_the_carcass_every_exemplar_has_one_that_spans_it() -> None:
     shelf = ("shelf", pose(0, -1.1, 0))  # on the ground below the legs: 3.54 of 5.07 across
     both = kit_of(MESHES, [[*FOUR, shelf], FOUR])
-    assert carcass(kit_of(MESHES, [[*FOUR, shelf]])) == ("top", "shelf")
-    assert carcass(both) == ("top",)
+    assert spanning_labels(kit_of(MESHES, [[*FOUR, shelf]])) == ("top", "shelf")
+    assert spanning_labels(both) == ("top",)
 
 
 def test_hubs_are_put_back_and_are_none_of_it() -> None:
     table = [*FOUR, ("shelf", pose(0, -1.1, 0))]
     kit = kit_of(MESHES, [table])
     hub = kit_of(MESHES, [table], hubs=HubConfig(types=("top",)))
-    assert carcass(kit) == ("top", "shelf")
-    assert carcass(hub) == ("shelf",)
+    assert spanning_labels(kit) == ("top", "shelf")
+    assert spanning_labels(hub) == ("shelf",)
     assert spanning_hubs(hub) == {hub.type_names().index("top"): 1}
     assert spanning_hubs(kit) == {}
 
@@ -55,7 +55,7 @@ def test_an_assembly_has_it_or_not_and_a_wrong_name_is_named() -> None:
     kit = kit_of(MESHES, [FOUR])
     whole = kit.exemplars[0].assembly
     legs = whole.select([part for part in range(len(whole)) if kit.types[whole.types[part]].name == "leg"])
-    asked = carcass_test(kit, ("top",))
-    assert (asked(whole), asked(legs), carcass_test(kit, ())(legs)) == (True, False, True)
-    with pytest.raises(ConfigError, match=r"require\.carcass: kit toy has no parts called tap; did you mean top\?"):
-        carcass_test(kit, ("top", "tap"))
+    asked = labels_test(kit, ("top",))
+    assert (asked(whole), asked(legs), labels_test(kit, ())(legs)) == (True, False, True)
+    with pytest.raises(ConfigError, match=r"require\.labels: kit toy has no parts called tap; did you mean top\?"):
+        labels_test(kit, ("top", "tap"))

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.variations.kernels.structs import NOTHING
 from stages.variations.search.operator_selection import CHOICES, PLAIN, RARE
 from stages.variations.search.search import Search
@@ -17,19 +17,19 @@ from tests.toy_kits.chains_and_rings import CHAIN, chain, kit_of
 
 def line_of(exemplars: int, **novelty: float) -> Search:
     kit = kit_of(CHAIN, [chain(3 + 2 * number) for number in range(exemplars)])
-    return Search(ContactAnswers(kit), SearchConfig(method="exchange", novelty=NoveltyConfig.model_validate(novelty)))
+    return Search(ContactOracle(kit), SearchConfig(method="exchange", novelty=NoveltyConfig.model_validate(novelty)))
 
 
 def planned(line: Search, count: int = 4000) -> Counter[int]:
-    choices = line.steering.plan(np.random.default_rng(0), line.parents, line.archive, count)
+    choices = line.operators.plan(np.random.default_rng(0), line.parents, line.archive, count)
     assert all(each.a in line.parents.exemplars and each.b in line.parents.exemplars for each in choices)
     return Counter(each.number for each in choices)
 
 
 def test_every_choice_is_tried_and_those_that_find_most_for_their_work_most_often() -> None:
-    line = line_of(2, explore=0.2)
-    for choice in line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 2000):
-        line.steering.learn(choice, float(choice.number == 5), 1.0)
+    line = line_of(2, exploration=0.2)
+    for choice in line.operators.plan(np.random.default_rng(1), line.parents, line.archive, 2000):
+        line.operators.learn(choice, float(choice.number == 5), 1.0)
     tried = planned(line)
     assert set(tried) == set(range(len(CHOICES)))
     assert tried[5] > 2000
@@ -38,8 +38,8 @@ def test_every_choice_is_tried_and_those_that_find_most_for_their_work_most_ofte
 
 def test_the_same_finds_for_more_work_are_worth_less() -> None:
     line = line_of(2)
-    for choice in line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 4000):
-        line.steering.learn(choice, float(choice.number in (2, 9)), 3.0 if choice.number == 2 else 1.0)
+    for choice in line.operators.plan(np.random.default_rng(1), line.parents, line.archive, 4000):
+        line.operators.learn(choice, float(choice.number in (2, 9)), 3.0 if choice.number == 2 else 1.0)
     tried = planned(line)
     assert tried[9] > 3 * tried[2]
 
@@ -60,11 +60,11 @@ def test_without_guidance_parents_are_plain_and_cuts_as_the_config_says(growth_s
 def test_growth_gets_the_share_of_the_work_that_its_finds_earn(guided: bool) -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
     config = SearchConfig(method="both", novelty=NoveltyConfig(guided=guided))
-    line, shares = Search(ContactAnswers(kit), config), []
+    line, shares = Search(ContactOracle(kit), config), []
     for worth in (0.0, 1.0):
-        for choice in line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 4000):
+        for choice in line.operators.plan(np.random.default_rng(1), line.parents, line.archive, 4000):
             grown = choice.way == NOTHING
-            line.steering.learn(choice, worth * 60.0 if grown else 0.2, 60.0 if grown else 1.5)
+            line.operators.learn(choice, worth * 60.0 if grown else 0.2, 60.0 if grown else 1.5)
         tried = planned(line, 20_000)
         shares.append(60.0 * tried[len(CHOICES)] / (60.0 * tried[len(CHOICES)] + 1.5 * (20_000 - tried[len(CHOICES)])))
     if guided:
@@ -77,13 +77,13 @@ def test_growth_gets_the_share_of_the_work_that_its_finds_earn(guided: bool) -> 
 def test_growth_in_vain_gets_the_least_share_until_it_brings_something() -> None:
     """Exchange has brought nothing either, so that both are worth the same but for what was forgotten."""
     line, shares = Search(line_of(2).answers, SearchConfig(method="both")), []
-    choices = line.steering.plan(np.random.default_rng(1), line.parents, line.archive, 1000)
+    choices = line.operators.plan(np.random.default_rng(1), line.parents, line.archive, 1000)
     exchanged, growth = (next(each for each in choices if (each.way == NOTHING) == grown) for grown in (False, True))
     for gain in (0.0, 1.0):
         for _ in range(100):
-            line.steering.learn(growth, gain, 60.0)
+            line.operators.learn(growth, gain, 60.0)
         for _ in range(4000):
-            line.steering.learn(exchanged, 0.0, 1.5)
+            line.operators.learn(exchanged, 0.0, 1.5)
         tried = planned(line, 10_000)  # and what is planned is forgotten
         shares.append(60.0 * tried[len(CHOICES)] / (60.0 * tried[len(CHOICES)] + 1.5 * (10_000 - tried[len(CHOICES)])))
     assert shares[0] == pytest.approx(0.2, abs=0.06)

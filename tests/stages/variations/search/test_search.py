@@ -13,7 +13,7 @@ from stages.exemplars.build import build_kit
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import docking_digest, graph_digest
 from stages.shape.kit import Kit
 from stages.variations.search.search import Search, Variant
@@ -27,7 +27,7 @@ SHIPPED = sorted(
 
 
 def search(kit: Kit, seed: int = 0, tries: int = 3000, **settings: object) -> tuple[Search, list[Variant]]:
-    line = Search(ContactAnswers(kit), SearchConfig.model_validate({"method": "exchange", **settings}))
+    line = Search(ContactOracle(kit), SearchConfig.model_validate({"method": "exchange", **settings}))
     found, _ = line.run(np.random.default_rng(seed), tries, 10**9, "test", lambda count: None)
     return line, found
 
@@ -49,8 +49,8 @@ def shipped_kit(folder: Path) -> Kit:
 @pytest.mark.parametrize("matching", ["pose", "centroid"])
 def test_search_finds_every_chain_within_the_size_limits(matching: str) -> None:
     kit = kit_of(CHAIN, [chain(3), chain(5)])
-    line, found = search(kit, smallest=0.5, largest=2.0, matching=matching)
-    assert (line.smallest, line.largest) == (2, 14)
+    line, found = search(kit, min_size=0.5, max_size=2.0, matching=matching)
+    assert (line.min_parts, line.max_parts) == (2, 14)
     lengths = sorted(len(each.assembly) - 2 for each in found)
     # Two links are the fewest with which both caps keep a link; three and five are the exemplars themselves.
     assert lengths == [2, 4, *range(6, 13)]
@@ -58,7 +58,7 @@ def test_search_finds_every_chain_within_the_size_limits(matching: str) -> None:
 
 def test_search_finds_every_rectangle_within_the_size_limits() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=120_000, smallest=1.0, largest=1.6)
+    _, found = search(kit, tries=120_000, min_size=1.0, max_size=1.6)
     rectangles = {
         tuple(sorted((width, depth))): 4 + 2 * (width + depth) for width in range(1, 10) for depth in range(1, 10)
     }
@@ -75,7 +75,7 @@ def test_search_finds_every_rectangle_within_the_size_limits() -> None:
 
 def test_variants_of_a_one_way_ring_are_closed_rings() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=3000, largest=1.6)
+    _, found = search(kit, tries=3000, max_size=1.6)
     for variant in found:
         degrees = np.bincount(variant.assembly.edges.ravel(), minlength=len(variant.assembly))
         assert (degrees == 2).all()
@@ -83,23 +83,23 @@ def test_variants_of_a_one_way_ring_are_closed_rings() -> None:
 
 def test_nothing_is_found_where_the_exemplar_says_all_there_is() -> None:
     kit = kit_of(CHAIN, [chain(1)])
-    line, found = search(kit, tries=500, largest=3.0)
+    line, found = search(kit, tries=500, max_size=3.0)
     assert found == []
     assert sum(line.rejects.values()) == 500
 
 
 def test_pieces_are_turned_about_the_vertical_only_unless_the_config_lets_them() -> None:
     kit = kit_of(ROAD, [ring(1, 2), ring(2, 2)])
-    _, found = search(kit, tries=3000, largest=1.5, upright=True)
+    _, found = search(kit, tries=3000, max_size=1.5, upright=True)
     assert found
     for variant in found:
-        assert np.abs(np.array(variant.lineage["motion"])[1, 1]) > 0.999
+        assert np.abs(np.array(variant.lineage["transform"])[1, 1]) > 0.999
         assert (variant.assembly.poses[:, 1, 1] > 0.999).all()
 
 
 def test_the_histogram_rule_keeps_one_shape_for_each_histogram() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    _, found = search(kit, tries=6000, smallest=1.0, largest=1.6, duplicates="histogram")
+    _, found = search(kit, tries=6000, min_size=1.0, max_size=1.6, duplicates="histogram")
     histograms = [histogram(kit, each) for each in found]
     assert len(set(histograms)) == len(histograms)
     # Rings of one perimeter share a histogram: 4 corners and 4, 6, ... straights, without the exemplars' own.
@@ -109,7 +109,7 @@ def test_the_histogram_rule_keeps_one_shape_for_each_histogram() -> None:
 def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_changes_nothing() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     _, first = search(kit, seed=3, tries=800)
-    warm = ContactAnswers(kit)
+    warm = ContactOracle(kit)
     other = Search(warm, SearchConfig(method="exchange"))
     other.run(np.random.default_rng(99), 800, 10**9, "other", lambda count: None)
     line = Search(warm, SearchConfig(method="exchange"))
@@ -125,7 +125,7 @@ def test_the_same_seed_finds_the_same_variants_and_what_is_known_of_contacts_cha
 def test_neither_variants_nor_reasons_depend_on_which_contacts_are_known(folder: Path) -> None:
     kit = shipped_kit(folder)
     cold, first = search(kit, seed=3, tries=700, method="both")
-    warm = ContactAnswers(kit)
+    warm = ContactOracle(kit)
     for seed in (99, 3):
         line = Search(warm, SearchConfig(method="both"))
         again, _ = line.run(np.random.default_rng(seed), 700, 10**9, "test", lambda count: None)
@@ -143,7 +143,7 @@ def test_every_variant_of_a_shipped_kit_stands_up_to_a_fresh_look(folder: Path, 
     digests = set()
     for variant in found[::7]:
         assembly = variant.assembly
-        assert line.smallest <= len(assembly) <= line.largest
+        assert line.min_parts <= len(assembly) <= line.max_parts
         assert np.array_equal(contact.contacts(assembly.types, assembly.poses), assembly.edges)
         labels = line.answers.dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
         assert np.array_equal(labels, variant.labels)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from stages.variations.report.split_report import shortage, splits_table
 from stages.variations.selection.ancestry import Ancestry
-from stages.variations.selection.families import LET_GO, Cut, Near, cut_families
+from stages.variations.selection.families import DISCARDED, Cut, Near, cut_families
 
 
 def near_by(matrix: np.ndarray) -> Near:
@@ -22,7 +22,7 @@ def crossings(matrix: np.ndarray, cut: Cut) -> int:
     """How many near pairs stand in two splits."""
     i, j = np.nonzero(matrix)
     a, b = cut.split_of[i], cut.split_of[j]
-    return int(((a != b) & (a != LET_GO) & (b != LET_GO)).sum())
+    return int(((a != b) & (a != DISCARDED) & (b != DISCARDED)).sum())
 
 
 def test_clusters_are_not_divided_and_every_split_has_its_size() -> None:
@@ -33,7 +33,7 @@ def test_clusters_are_not_divided_and_every_split_has_its_size() -> None:
     assert cut.sizes(wanted) == wanted
     assert crossings(matrix, cut) == 0
     for number in range(20):
-        assert len(set(cut.split_of[cluster == number].tolist()) - {LET_GO}) <= 1
+        assert len(set(cut.split_of[cluster == number].tolist()) - {DISCARDED}) <= 1
 
 
 def test_a_chain_of_cousins_is_cut_with_a_gap_between_splits() -> None:
@@ -44,9 +44,9 @@ def test_a_chain_of_cousins_is_cut_with_a_gap_between_splits() -> None:
     assert cut.sizes(wanted) == wanted
     assert cut.regions > 1
     for split in (1, 2):
-        own, others = np.flatnonzero(cut.split_of == split), np.flatnonzero(~np.isin(cut.split_of, (split, LET_GO)))
+        own, others = np.flatnonzero(cut.split_of == split), np.flatnonzero(~np.isin(cut.split_of, (split, DISCARDED)))
         assert np.abs(own[:, None] - others[None]).min() > 4
-    assert (cut.split_of == LET_GO).any()
+    assert (cut.split_of == DISCARDED).any()
 
 
 def test_of_a_large_pool_no_pair_is_asked_about_twice_and_a_few_tell_what_it_allows() -> None:

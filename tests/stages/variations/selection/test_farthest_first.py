@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.variations.novelty.features import AXES, FeatureTest, material_shares
+from stages.variations.novelty.features import AXES, FeatureExtractor, material_shares
 from stages.variations.report.measures import growth, pool_measures
-from stages.variations.selection.farthest_first import farthest_first, select, selection_space
+from stages.variations.selection.farthest_first import farthest_first, select_diverse, selection_space
 from stages.variations.settings import NoveltyConfig, SelectionConfig
 from tests.stages.variations.search.test_search import search
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
@@ -28,8 +28,8 @@ def test_the_selection_spreads_wider_than_first_come_and_is_the_same_every_time(
     _, found = search(kit, tries=3000, largest=3.0)
     counts = np.array([np.bincount(each.assembly.types, minlength=len(kit.types)) for each in found])
     features = np.array([each.features for each in found])
-    taken = select(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
-    again = select(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
+    taken = select_diverse(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
+    again = select_diverse(kit, counts, features, 12, SelectionConfig(), np.random.default_rng(0))
     assert taken.tolist() == again.tolist()
     space = selection_space(counts, features)
 
@@ -47,16 +47,16 @@ def test_the_selection_spreads_wider_than_first_come_and_is_the_same_every_time(
 
 def test_what_is_wanted_beyond_the_spread_is_drawn_without_doubles() -> None:
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
-    test = FeatureTest(kit)
+    test = FeatureExtractor(kit)
     shape = kit.exemplars[0].assembly
     pure = test.features(shape, material_shares(np.zeros(len(shape), int), 2), test.marks(shape), 1.0)
     features = np.tile(pure, (20, 1))
     features[:, AXES.index("parts")] += np.arange(20)
     counts = np.tile(np.bincount(shape.types, minlength=2), (20, 1))
-    chosen = select(kit, counts, features, 15, SelectionConfig(spread=4), np.random.default_rng(1))
+    chosen = select_diverse(kit, counts, features, 15, SelectionConfig(max_farthest_first=4), np.random.default_rng(1))
     assert len(set(chosen.tolist())) == 15
     assert chosen[0] == 19
-    everything = select(kit, counts, features, 50, SelectionConfig(), np.random.default_rng(1))
+    everything = select_diverse(kit, counts, features, 50, SelectionConfig(), np.random.default_rng(1))
     assert sorted(everything.tolist()) == list(range(20))
 
 
@@ -65,9 +65,9 @@ def test_measures_of_a_set_that_can_be_counted_by_hand() -> None:
     features = np.zeros((3, len(AXES)), dtype=np.float32)
     features[:, AXES.index("parts")] = 3
     features[:, AXES.index("mixture")] = [0.0, 0.05, 0.5]
-    features[:, AXES.index("blend")] = [0.0, 0.01, 0.0]
+    features[:, AXES.index("neighbourhood_mixture")] = [0.0, 0.01, 0.0]
     features[:, AXES.index("distance")] = [0.0, 0.5, 0.25]
-    features[:, AXES.index("copied")] = [0.25, 1.0, 0.5]
+    features[:, AXES.index("copied_share")] = [0.25, 1.0, 0.5]
     digests = np.zeros((3, 2, 32), dtype=np.uint8)
     digests[2] = 1
     measures = pool_measures(counts, features, digests, NoveltyConfig(axes=("mixture",)))

@@ -9,7 +9,7 @@ import pytest
 from trimesh.transformations import rotation_matrix, translation_matrix
 
 from stages.shape.kit import Assembly, Kit
-from stages.variations.selection.orientation import Facing
+from stages.variations.selection.orientation import OrientationFix
 from tests.toy_kits.chains_and_rings import box, kit_of, pose
 
 MESHES = {"seat": box(2.0, 0.2, 2.0), "leg": box(0.2, 1.0, 0.2), "back": box(1.6, 1.5, 0.1)}
@@ -23,7 +23,7 @@ def chair_kit() -> Kit:
 
 
 def facing_of(kit: Kit, assembly: Assembly) -> Assembly:
-    facing = Facing(kit)
+    facing = OrientationFix(kit)
     return facing.turned_back(assembly, facing.turn(assembly))
 
 

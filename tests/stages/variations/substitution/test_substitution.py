@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit
 from stages.variations.kernels.structs import MEANINGS
@@ -24,7 +24,7 @@ def kit() -> Kit:
 
 
 def search(kit: Kit, seed: int = 0, tries: int = 3000) -> tuple[Search, list[Variant]]:
-    line = Search(ContactAnswers(kit), SearchConfig())
+    line = Search(ContactOracle(kit), SearchConfig())
     found, _ = line.run(np.random.default_rng(seed), tries, 10**9, "test", lambda count: None)
     return line, found
 
@@ -47,7 +47,7 @@ def test_every_top_stands_on_every_mixture_of_legs_once(found: list[Variant]) ->
 def test_without_meanings_nothing_can_be_exchanged() -> None:
     line, found = search(table_kit(table(THIN, SQUARE), table(THIN, ROUND), types="labels"), tries=1000)
     assert not found
-    assert not any(way == MEANINGS for _, way, _ in line.steering.choices)
+    assert not any(way == MEANINGS for _, way, _ in line.operators.choices)
 
 
 def test_what_is_found_touches_as_it_says_and_is_admitted_by_label(kit: Kit, found: list[Variant]) -> None:

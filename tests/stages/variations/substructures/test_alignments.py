@@ -7,15 +7,15 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import admits
 from stages.shape.kit import Assembly, Kit, Multiset
 from stages.variations.kernels.tables import kit_tables
-from stages.variations.substructures.alignments import find_moves
+from stages.variations.substructures.alignments import find_region_swaps
 from stages.variations.substructures.consistency import make_consistent
 from stages.variations.substructures.docking_sites import contact_graph, docking_graph
 from stages.variations.substructures.ordered_graph import OrderedGraph
-from stages.variations.substructures.region_swaps import Move, Moves
+from stages.variations.substructures.region_swaps import RegionSwap, RegionSwaps
 from stages.variations.substructures.result_key import moved_key
 from tests.stages.variations.substructures.overlays import Replaced, replacements
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, box, chain, kit_of, pose, ring, with_arrow
@@ -24,14 +24,14 @@ TILES = {"plain": box(1.0, 0.2, 1.0), "arrow": with_arrow(box(1.0, 0.2, 1.0)), "
 
 
 def placed(kit: Kit) -> list[tuple[Assembly, OrderedGraph]]:
-    dockings = ContactAnswers(kit).dockings
+    dockings = ContactOracle(kit).dockings
     wholes = [each.assembly for each in kit.exemplars]
     return [
         (each, docking_graph(kit, each, dockings.label_edges(each.types, each.poses, each.edges))) for each in wholes
     ]
 
 
-def sizes(moves: Moves) -> list[int]:
+def sizes(moves: RegionSwaps) -> list[int]:
     """How many parts each result has."""
     return sorted({int(move.piece.sum() + (~move.taken).sum()) for move in (moves[at] for at in range(len(moves)))})
 
@@ -39,7 +39,7 @@ def sizes(moves: Moves) -> list[int]:
 def test_a_chain_laid_upon_itself_grows_and_shrinks_by_any_number_of_links() -> None:
     kit = kit_of(CHAIN, [chain(4)])
     (own,) = placed(kit)
-    moves = find_moves(kit, 1, own, own)
+    moves = find_region_swaps(kit, 1, own, own)
     assert moves.is_whole
     assert {3, 4, 5, 7, 8, 9} <= set(sizes(moves))
 
@@ -48,7 +48,7 @@ def test_what_stays_and_what_comes_do_not_overlap_and_every_move_keeps_a_part_th
     kit = kit_of(ROAD, [ring(1, 1), ring(2, 3)])
     for base in placed(kit):
         for giver in placed(kit):
-            moves = find_moves(kit, 1, base, giver)
+            moves = find_region_swaps(kit, 1, base, giver)
             for number in range(len(moves)):
                 taken, piece, held, motion = moves[number]
                 assert piece.any()
@@ -64,7 +64,7 @@ def test_the_key_of_a_move_that_brings_nothing_new_is_that_of_the_base() -> None
     """A chain of which one end is replaced by its like has the key that it had, a longer one another."""
     kit = kit_of(CHAIN, [chain(4)])
     (own,) = placed(kit)
-    moves = find_moves(kit, 1, own, own)
+    moves = find_region_swaps(kit, 1, own, own)
     none = np.zeros(len(own[0]), dtype=bool)
     whole = int(moved_key(own[1], own[1], none, none, np.full(len(own[0]), -1, dtype=np.int16)))
     for number in range(len(moves)):
@@ -92,7 +92,7 @@ def tiling(rng: np.random.Generator, tiles: int) -> list[Placed]:
 def test_a_list_that_is_cut_short_has_the_motions_by_which_most_coincides() -> None:
     kit = kit_of(CHAIN, [chain(12)])
     (own,) = placed(kit)
-    whole, short = find_moves(kit, 1, own, own), find_moves(kit, 1, own, own, 12 * len(own[0]))
+    whole, short = find_region_swaps(kit, 1, own, own), find_region_swaps(kit, 1, own, own, 12 * len(own[0]))
     assert whole.is_whole
     assert not short.is_whole
     assert {row.tobytes() for row in short.images} <= {row.tobytes() for row in whole.images}
@@ -106,7 +106,7 @@ def test_several_regions_along_one_motion_change_places_at_once() -> None:
     kit = kit_of(TILES, [tiling(rng, tiles) for tiles in (9, 12)])
     for base in placed(kit):
         for giver in placed(kit):
-            moves = find_moves(kit, 1, base, giver)
+            moves = find_region_swaps(kit, 1, base, giver)
             numbers = [each for each in moves.order(rng) if each >= len(moves)]
             for number in numbers:
                 motion, chosen = moves.draw(rng, number)
@@ -125,7 +125,7 @@ def test_several_regions_along_one_motion_change_places_at_once() -> None:
 def test_where_nothing_comes_the_parts_are_told_upon_which_the_other_shape_ends() -> None:
     kit = kit_of(CHAIN, [chain(3), chain(4)[1:]])
     base, giver = placed(kit)
-    moves = find_moves(kit, 1, base, giver)
+    moves = find_region_swaps(kit, 1, base, giver)
     motion = int((moves.images >= 0).sum(axis=1).argmax())
     assert (moves.images[motion] >= 0).sum() == 3, "all links of the base"
     came = set()
@@ -149,7 +149,7 @@ def test_a_choice_of_regions_is_changed_until_the_grammar_admits_what_stands_aro
     tables = kit_tables(kit, True)
     for base in placed(kit):
         for giver in placed(kit):
-            moves = find_moves(kit, 1, base, giver)
+            moves = find_region_swaps(kit, 1, base, giver)
             types = base[0].types, giver[0].types
             for motion, (regions, image) in enumerate(zip(moves.regions, moves.images, strict=True)):
                 chosen = rng.random(len(regions)) < 0.5
@@ -164,7 +164,7 @@ def test_a_choice_of_regions_is_changed_until_the_grammar_admits_what_stands_aro
 
 
 def around(
-    kit: Kit, base: tuple[Assembly, OrderedGraph], giver: tuple[Assembly, OrderedGraph], move: Move, part: int
+    kit: Kit, base: tuple[Assembly, OrderedGraph], giver: tuple[Assembly, OrderedGraph], move: RegionSwap, part: int
 ) -> Multiset:
     """The labels beside a part of the base that coincides with one of the giver, once the move is made."""
     own = int(np.flatnonzero(move.image == part)[0])
@@ -175,7 +175,7 @@ def around(
 
 def test_a_graph_without_an_order_of_sites_is_that_with_one_but_for_the_order() -> None:
     kit = kit_of(ROAD, [ring(2, 3)])
-    dockings, whole = ContactAnswers(kit).dockings, kit.exemplars[0].assembly
+    dockings, whole = ContactOracle(kit).dockings, kit.exemplars[0].assembly
     labels = dockings.label_edges(whole.types, whole.poses, whole.edges)
     plain, ordered = (graph_of(kit, whole, labels) for graph_of in (contact_graph, docking_graph))
     assert (plain.types == ordered.types).all()
@@ -184,7 +184,7 @@ def test_a_graph_without_an_order_of_sites_is_that_with_one_but_for_the_order() 
     assert (plain.twins[plain.twins] == np.arange(len(plain.twins))).all()
 
 
-def listed(moves: Moves) -> list[Replaced]:
+def listed(moves: RegionSwaps) -> list[Replaced]:
     """The moves in the oracle's words; pairs at the border alone."""
     found = []
     for number in range(len(moves)):
@@ -203,7 +203,7 @@ def check_against_all_motions(kit: Kit) -> int:
         for giver, giver_graph in shapes:
             near, beyond = base.neighbours(), giver.neighbours()
             for up in (1, -1):
-                moves = find_moves(kit, up, (base, base_graph), (giver, giver_graph))
+                moves = find_region_swaps(kit, up, (base, base_graph), (giver, giver_graph))
                 found = [
                     (taken, piece, frozenset((x, y) for x, y in held if taken & set(near[x]) or piece & set(beyond[y])))
                     for taken, piece, held in listed(moves)

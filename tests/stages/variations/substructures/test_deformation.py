@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import Assembly, Kit
 from stages.variations.search.search import Search, Variant
@@ -38,7 +38,7 @@ def kit() -> Kit:
 
 
 def side(kit: Kit, assembly: Assembly) -> Side:
-    labels = ContactAnswers(kit).dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
+    labels = ContactOracle(kit).dockings.label_edges(assembly.types, assembly.poses, assembly.edges)
     return Side(assembly, docking_graph(kit, assembly, labels))
 
 
@@ -104,8 +104,8 @@ def test_a_cut_whose_edges_stand_at_other_angles_is_refused(kit: Kit) -> None:
 
 
 def found_in(kit: Kit, *, bends: bool) -> tuple[Search, list[Variant]]:
-    config = {"method": "substructures", "matching": "centroid", "blend": bends}
-    line = Search(ContactAnswers(kit), SearchConfig.model_validate(config))
+    config = {"method": "substructures", "matching": "centroid", "deform": bends}
+    line = Search(ContactOracle(kit), SearchConfig.model_validate(config))
     return line, line.run(np.random.default_rng(0), 400, 10**9, "test", lambda count: None)[0]
 
 
@@ -116,7 +116,7 @@ def test_knobs_come_to_stand_on_posts_at_another_distance_only_where_pieces_may_
     assert line.rejects["replaced: no embedding"]
     near = [each for each in bent if named(kit, each.assembly, "knob").sum() == 2]
     assert near
-    assert all(each.lineage["bent"] for each in near)
+    assert all(each.lineage["deformed"] for each in near)
     contact = ContactTest(kit.types, kit.contact_tolerance)
     for each in near:
         posts = each.assembly.poses[named(kit, each.assembly, "post"), 0, 3]

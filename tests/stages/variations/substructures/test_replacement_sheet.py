@@ -24,9 +24,9 @@ from tests.toy_kits.chains_and_rings import CHAIN, ROAD, chain, kit_of, ring
 
 def samples_of(kit: Kit, turned: float = 0.0) -> list[Sample]:
     """What a short search finds, as a dataset has it."""
-    _, found = replaced(kit, 600, repeats=1, largest=3.0)
+    _, found = replaced(kit, 600, max_repeats=1, max_size=3.0)
     turn = vertical_turn(1, turned)
-    told = {"turned": turned, "backdrop": 0}
+    told = {"turned_degrees": turned, "restored_hubs": 0}
     return [
         Sample(
             f"toy-{place}",

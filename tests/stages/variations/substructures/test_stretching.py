@@ -11,11 +11,11 @@ from stages.package.glb import glb_bytes
 from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_oracle import ContactAnswers
+from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Kit
 from stages.shape.shape import kit_shape
 from stages.shape.stretch import moved_by
-from stages.variations.requirements.stretched_contacts import contact_fault
+from stages.variations.requirements.stretched_contacts import broken_contact
 from stages.variations.search.search import Search, Variant
 from stages.variations.settings import SearchConfig
 from tests.toy_kits.chains_and_rings import Placed, box, kit_of, pose, with_arrow
@@ -43,7 +43,7 @@ def kit() -> Kit:
 
 def found_in(kit: Kit, **stretch: Any) -> tuple[Search, list[Variant]]:
     config = {"method": "substructures", "stretch": stretch}
-    line = Search(ContactAnswers(kit), SearchConfig.model_validate(config))
+    line = Search(ContactOracle(kit), SearchConfig.model_validate(config))
     return line, line.run(np.random.default_rng(0), 1500, 10**9, "test", lambda count: None)[0]
 
 
@@ -62,7 +62,7 @@ def test_a_piece_takes_the_place_of_a_longer_one_only_where_it_may_be_stretched(
     ]
     contact = []
     for each in bent:
-        assert each.lineage["bent"]
+        assert each.lineage["deformed"]
         shape = kit_shape(kit, each.assembly)
         contact.append(ContactTest(shape.meshes, kit.contact_tolerance))
         touching = contact[-1].contacts(shape.assembly.types, shape.assembly.poses)
@@ -86,7 +86,7 @@ def verified(kit: Kit, variant: Variant, motion: np.ndarray) -> list[str]:
     motions = np.tile(np.eye(4), (len(variant.assembly), 1, 1))
     motions[at] = motion
     assembly = moved_by(variant.assembly, motions)
-    assert (contact_fault(kit, assembly) is None) == np.array_equal(motion, np.eye(4))
+    assert (broken_contact(kit, assembly) is None) == np.array_equal(motion, np.eye(4))
     shape = kit_shape(kit, assembly)
     parts = [
         b'{"name": "%s", "pose": %s}' % (name.encode(), str(pose).encode())
