@@ -15,14 +15,14 @@ import open3d as o3d
 from eval.engine.table import Cell, Table
 from eval.grammars.decomposition import merged, points_of_parts, scene_of_parts
 from eval.grammars.exchanges import LARGEST, Exchange, known_exchanges
-from stages.grammars.extraction.docked_pieces import Docker
-from stages.grammars.extraction.extract import extract
+from stages.grammars.extraction.docked_pieces import DockedPiece
+from stages.grammars.extraction.extract import extract_grammar
 from stages.grammars.read_surface import read_surface
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert, transform_points
 from stages.shape.kit import Kit
 from stages.shape.shape import Shape, kit_shape
-from stages.symmetry.matching.cell_lookup import among
+from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.grid import SurfaceGrid
 
 RADIUS = 0.016
@@ -50,7 +50,7 @@ class GrammarReturned:
     parts: int
     known: int
     found: int
-    dockers: int
+    docked_pieces: int
     classes: int
     pairs: int
     whole: int
@@ -89,12 +89,12 @@ def grammar_returned(name: str, kit: Kit) -> GrammarReturned:
         path = Path(folder) / "merged.glb"
         merged(shape, path)
         surface, _ = read_surface(path)
-    made = extract(surface, name, RADIUS, kit.up, np.random.default_rng(0))
+    made = extract_grammar(surface, name, RADIUS, kit.up, np.random.default_rng(0))
     seconds = time.process_time() - begun
     sample = _Sample(shape, made.grid)
     known = [change for each in known_exchanges(kit) if (change := sample.of_parts(each)).is_any]
     ours, whole = [], 0
-    for one, other in combinations(made.dockers, 2):
+    for one, other in combinations(made.docked_pieces, 2):
         if one.site == other.site and max(sample.held(one).mean(), sample.held(other).mean()) <= LARGEST:
             change, leaves_whole = sample.of_dockers(one, other)
             if change.is_any:
@@ -105,8 +105,8 @@ def grammar_returned(name: str, kit: Kit) -> GrammarReturned:
         len(shape.assembly),
         len(known),
         sum(any(each.is_like(one) for one in ours) for each in known),
-        len(made.dockers),
-        len({each.site for each in made.dockers}),
+        len(made.docked_pieces),
+        len({each.site for each in made.docked_pieces}),
         len(ours),
         whole,
         seconds,
@@ -126,9 +126,9 @@ class _Sample:
         self._grid, self._cells = grid, KDTree(grid.cells)
         self._home = self._cells_at(np.eye(4))
 
-    def held(self, docker: Docker) -> BoolArray:
+    def held(self, docker: DockedPiece) -> BoolArray:
         """Which points a docker holds, bool (p,)."""
-        return among(docker.cells, self._home)
+        return is_among(docker.cells, self._home)
 
     def of_parts(self, exchange: Exchange) -> _Change:
         """What an exchange of parts changes."""
@@ -139,7 +139,7 @@ class _Sample:
             exchange.piece[self._part] & ~(on & exchange.taken[part]),
         )
 
-    def of_dockers(self, one: Docker, other: Docker) -> tuple[_Change, bool]:
+    def of_dockers(self, one: DockedPiece, other: DockedPiece) -> tuple[_Change, bool]:
         """What it changes to put one docker where another of its class is, and whether that leaves every part whole.
 
         Each part either stays, for hardly any of it changes, or can go as a whole, for what of it is not held is
@@ -150,7 +150,7 @@ class _Sample:
         for own, docked, there in ((one, other, invert(way)), (other, one, way)):
             on, _ = self._met(there)
             held = self.held(own)
-            changed.append(held & ~(on & among(docked.cells, self._cells_at(there))))
+            changed.append(held & ~(on & is_among(docked.cells, self._cells_at(there))))
             goes = self._share(changed[-1]) > 1 - WHOLE
             whole &= bool((self._share(held | on)[goes] >= WHOLE).all())
             whole &= bool((held | goes[self._part]).mean() <= LARGEST)
@@ -165,7 +165,7 @@ class _Sample:
 
     def _cells_at(self, motion: FloatArray) -> np.ndarray:
         """The occupied cell that is nearest to where a motion (4, 4) takes each point, int64 (p,)."""
-        at = (transform_points(motion, self._points) - self._grid.origin) / self._grid.size
+        at = (transform_points(motion, self._points) - self._grid.origin) / self._grid.cell_size
         found: np.ndarray = self._cells.query(at - 0.5)[1]
         return found
 
@@ -177,7 +177,7 @@ class _Sample:
         away = np.linalg.norm(closest["points"].numpy() - at, axis=1)
         turned = (closest["primitive_normals"].numpy() * (self._normals @ motion[:3, :3].T)).sum(axis=1)
         parts = np.array([self._part_of[each] for each in closest["geometry_ids"].numpy().tolist()], dtype=np.int64)
-        return (away < NEAR * self._grid.size) & (turned > TURNED), parts
+        return (away < NEAR * self._grid.cell_size) & (turned > TURNED), parts
 
 
 def _same(one: BoolArray, other: BoolArray) -> bool:
@@ -192,7 +192,7 @@ def grammar_table(kits: Iterable[tuple[str, Kit]]) -> Table:
         each = grammar_returned(name, kit)
         found: Cell = 100 * each.found / each.known if each.known else ""
         whole: Cell = 100 * each.whole / each.pairs if each.pairs else ""
-        counts = (f"{each.dockers} / {each.classes}", each.pairs)
+        counts = (f"{each.docked_pieces} / {each.classes}", each.pairs)
         rows.append((name, each.parts, each.known, found, *counts, whole, each.seconds))
     columns = ("model", "parts", "exchanges", "found %", "dockers / classes", "pairs", "whole parts %", "CPU s")
     notes = (

@@ -9,9 +9,9 @@ from typing import Literal
 from eval.engine.evaluation import Figure
 from eval.engine.table import Cell, Table
 from pipeline.randomness import decision_rng
-from stages.grammars.distinct_shapes import some_shapes
-from stages.grammars.extraction.extract import Extraction, extract
-from stages.grammars.picture import dockers_row, shapes_row
+from stages.grammars.distinct_shapes import preview_shapes
+from stages.grammars.extraction.extract import ExtractedGrammar, extract_grammar
+from stages.grammars.picture import docked_pieces_row, shapes_row
 from stages.grammars.read_surface import read_surface
 from stages.grammars.settings import GrammarConfig
 from stages.shape.views.sheet import Section, contact_sheet, picture_png
@@ -23,21 +23,21 @@ SHAPES = 2
 CELL = 200
 
 
-def extractions(path: Path, radii: Sequence[float], up: Literal["y", "z"]) -> dict[float, Extraction]:
+def extractions(path: Path, radii: Sequence[float], up: Literal["y", "z"]) -> dict[float, ExtractedGrammar]:
     """The grammar of the mesh or cloud in a file, whose axis `up` points up, for each radius, as a share of the longest
     side."""
     name = path.parent.name if path.stem == "model" else path.stem
     surface, _ = read_surface(path)
-    return {each: extract(surface, name, each, up, decision_rng(0, "radii", name)) for each in radii}
+    return {each: extract_grammar(surface, name, each, up, decision_rng(0, "radii", name)) for each in radii}
 
 
-def radii_table(found: dict[float, Extraction]) -> Table:
+def radii_table(found: dict[float, ExtractedGrammar]) -> Table:
     """A row for each radius."""
     rows: list[tuple[Cell, ...]] = []
     for radius, each in found.items():
         grids = ", ".join(" x ".join(map(str, one.counts)) for one in each.grammar.grids)
-        sites = len({docker.site for docker in each.dockers})
-        counts = (len(each.grid), each.motions, len(each.dockers), sites, len(each.grammar.rules))
+        sites = len({docker.site for docker in each.docked_pieces})
+        counts = (len(each.grid), each.transforms, len(each.docked_pieces), sites, len(each.grammar.productions))
         rows.append((f"{radius:.1%}", *counts, grids or "none", sum(each.seconds.values())))
     columns = ("radius", "cells", "motions", "docking sites", "classes", "rules", "grids", "s")
     notes = (
@@ -47,15 +47,15 @@ def radii_table(found: dict[float, Extraction]) -> Table:
     return Table("What the radius of similarity does", columns, tuple(rows), notes)
 
 
-def radii_sheet(path: Path, found: dict[float, Extraction]) -> Figure:
+def radii_sheet(path: Path, found: dict[float, ExtractedGrammar]) -> Figure:
     """For each radius the model with its docking sites, some dockers, and some shapes by rules and by grids."""
     sections = []
     for radius, each in found.items():
         grammar = each.grammar
         config = GrammarConfig(name="radii", model=path.resolve(), radius=radius)
-        shapes = [text for texts in some_shapes(grammar, config, SHAPES).values() for text in texts]
-        row = [*dockers_row(each, DOCKERS), *shapes_row(grammar, shapes)]
-        note = f"{each.motions} motions, {len(grammar.rules)} rules, {len(grammar.grids)} grids"
+        shapes = [text for texts in preview_shapes(grammar, config, SHAPES).values() for text in texts]
+        row = [*docked_pieces_row(each, DOCKERS), *shapes_row(grammar, shapes)]
+        note = f"{each.transforms} motions, {len(grammar.productions)} rules, {len(grammar.grids)} grids"
         sections.append(Section(f"Radius {radius:.1%}", [row], note))
     name = next(iter(found.values())).grammar.name
     title = f"{name}: docking sites, dockers (yellow), shapes"

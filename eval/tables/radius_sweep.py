@@ -24,14 +24,16 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
 
 def _of_files(paths: Sequence[Path], asked: Namespace) -> TableResult:
     from eval.grammars.radius_sweep import extractions, radii_sheet, radii_table
-    from stages.grammars.settings import LARGEST_RADIUS, LEAST_RADIUS
+    from stages.grammars.settings import MAX_RADIUS_SHARE, MIN_RADIUS_SHARE
 
     for path in paths:
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")
     for radius in asked.radii:
-        if not LEAST_RADIUS <= radius <= LARGEST_RADIUS:
-            raise ConfigError(f"--radii: {radius:g} is not from {LEAST_RADIUS:g} to {LARGEST_RADIUS:g} longest sides")
+        if not MIN_RADIUS_SHARE <= radius <= MAX_RADIUS_SHARE:
+            raise ConfigError(
+                f"--radii: {radius:g} is not from {MIN_RADIUS_SHARE:g} to {MAX_RADIUS_SHARE:g} longest sides"
+            )
     found = {path: extractions(path, sorted(asked.radii), asked.up) for path in paths}
     return TableResult(
         [radii_table(each) for each in found.values()], sheets=[radii_sheet(path, each) for path, each in found.items()]

@@ -37,14 +37,14 @@ def _exemplars(subject: DatasetRun) -> dict[str, list[FloatArray]]:
     """The triangles of the exemplars of each kit, and of the mesh of each grammar."""
     from eval.grammars.similarity import triangles_of
     from stages.exemplars.language import dataset_kits
-    from stages.grammars.files import made_grammars
+    from stages.grammars.files import load_grammars
     from stages.shape.shape import kit_shape
 
     found = {
         name: [triangles_of(kit_shape(kit, each.assembly)) for each in kit.exemplars]
         for name, kit in dataset_kits(subject.places).items()
     }
-    for name, grammar in made_grammars(subject.places).items():
+    for name, grammar in load_grammars(subject.places).items():
         found[name] = [grammar.exemplar.vertices[grammar.exemplar.faces]]
     return found
 

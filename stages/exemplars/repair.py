@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from stages.exemplars.components import connected_corners, connected_faces
 from stages.exemplars.orientation import face_outward, flipped_faces
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
+from stages.shape.geometry.connected_faces import connected_corners, connected_faces
 
 FLAT = 1e-7
 """Height of a face, as a share of the mesh's diagonal, that 32-bit coordinates cannot carry: it has no area."""

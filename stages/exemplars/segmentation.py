@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from stages.exemplars.components import connected_faces
+from stages.exemplars.cut_surface import cut_by_sections, cut_by_symmetry, search_size
 from stages.exemplars.formats.scene import ModelScene, Placement, Surface, UniqueNames
-from stages.symmetry.parts import by_sections, by_symmetry, search_size
+from stages.shape.geometry.connected_faces import connected_faces
 
 Segmentation = Literal["auto", "nodes", "objects", "materials", "colors", "components", "symmetry", "sections"]
 SOURCES: tuple[Segmentation, ...] = ("nodes", "objects", "materials", "colors", "components")
@@ -72,7 +72,7 @@ def pick_segmentation(scene: ModelScene) -> tuple[Segmentation, str, ModelScene]
     if size > LARGEST:
         why = f"{told}: too much surface to look unasked for what repeats, about {size:,} cells and triangles"
         return scene.kind, f"{why} where {LARGEST:,} are the most; `parts: symmetry` looks all the same", scene
-    parted = by_symmetry(scene)
+    parted = cut_by_symmetry(scene)
     if len(parted.placements) >= ENOUGH:
         return "symmetry", f"{told}; {len(parted.placements)} pieces between copies of what repeats", parted
     return scene.kind, f"{told}: nothing tells parts apart", scene
@@ -88,9 +88,9 @@ def segment_scene(scene: ModelScene, source: Segmentation) -> ModelScene:
     if source == scene.kind:
         return scene
     if source == "symmetry":
-        return by_symmetry(scene)
+        return cut_by_symmetry(scene)
     if source == "sections":
-        return by_sections(scene)
+        return cut_by_sections(scene)
     alone = len(scene.placements) == 1
     surfaces: list[Surface] = []
     cut: list[list[tuple[str, str | None, int]]] = []

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.places import Places
-from stages.grammars.derivation_text import derivation_text, pieces_of, read_derivation, surface_digest
-from stages.grammars.files import made_grammars
+from stages.grammars.derivation_text import format_derivation, parse_derivation, placed_terminals, surface_digest
+from stages.grammars.files import load_grammars
 from stages.grammars.language import LANGUAGE
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
@@ -18,11 +18,11 @@ def _anew(sample: Packaged, places: Places) -> Iterator[str]:
     record = sample.record
     if record["language"] != LANGUAGE.name:
         return
-    grammar = made_grammars(places)[record["kit"]]
-    made = read_derivation(grammar, record["text"])
-    if derivation_text(grammar, made) != record["text"]:
+    grammar = load_grammars(places)[record["kit"]]
+    made = parse_derivation(grammar, record["text"])
+    if format_derivation(grammar, made) != record["text"]:
         yield "its derivation is written in another way than the grammar writes it"
-    if surface_digest(grammar, pieces_of(grammar, made)) != record["graph"]:
+    if surface_digest(grammar, placed_terminals(grammar, made)) != record["graph"]:
         yield "its derivation makes another surface than its json names"
 
 

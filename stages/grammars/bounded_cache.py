@@ -10,7 +10,7 @@ Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
 
 
-class Recent(Generic[Key, Value]):
+class BoundedCache(Generic[Key, Value]):
     """Values by their keys, each made when it is asked for. As soon as all take more than so many bytes, those are
     forgotten that were not asked for the longest, and made anew if they are needed again."""
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from stages.grammars.bounded_cache import Recent
+from stages.grammars.bounded_cache import BoundedCache
 from stages.grammars.derivation import Derivation, row_seams
-from stages.grammars.derivation_text import Piece, Resized, pieces_of
+from stages.grammars.derivation_text import PlacedTerminal, ResizedGrid, placed_terminals
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.terminal_samples import TerminalSamples
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
@@ -38,12 +38,14 @@ class Collisions:
         self._grammar = grammar
         self.samples = TerminalSamples(grammar)
         self._cell = self.samples.cell
-        self._answers: Recent[tuple[int, int, bytes], IntArray] = Recent(
+        self._answers: BoundedCache[tuple[int, int, bytes], IntArray] = BoundedCache(
             lambda key: self._points_near(*key), lambda near: BYTES_A_KEY + near.nbytes, HELD
         )
         self._seam_trees: dict[int, Any] = {}
 
-    def collides(self, piece: Piece, others: Sequence[Piece], seams: Sequence[tuple[int, FloatArray]]) -> bool:
+    def collides(
+        self, piece: PlacedTerminal, others: Sequence[PlacedTerminal], seams: Sequence[tuple[int, FloatArray]]
+    ) -> bool:
         """Whether a piece is near one of others where no seam is, a class of sites and its frame (4, 4) each, and
         nothing in the exemplar is so near."""
         for other in others:
@@ -55,25 +57,25 @@ class Collisions:
                 return True
         return False
 
-    def whole(self, made: Resized) -> bool:
+    def whole(self, made: ResizedGrid) -> bool:
         """Whether pieces of a resized grid run into each other."""
         grid = self._grammar.grids[made.grid]
-        seams = row_seams(grid.motions, grid.frames, grid.sites, made.counts)
-        pieces = pieces_of(self._grammar, made)
+        seams = row_seams(grid.transforms, grid.frames, grid.sites, made.counts)
+        pieces = placed_terminals(self._grammar, made)
         return any(self.collides(each, pieces[:place], seams) for place, each in enumerate(pieces))
 
     @cached_property
     def _known(self) -> dict[tuple[int, int], list[FloatArray]]:
         """For each two meshes how the second stands to the first in the exemplar, near to it or not."""
         grammar = self._grammar
-        shown: list[Derivation | Resized] = [
-            Derivation(number, tuple(place.original for place in rule.places))
-            for number, rule in enumerate(grammar.rules)
+        shown: list[Derivation | ResizedGrid] = [
+            Derivation(number, tuple(place.original for place in rule.non_terminals))
+            for number, rule in enumerate(grammar.productions)
         ]
-        shown += [Resized(number, grid.counts) for number, grid in enumerate(grammar.grids)]
+        shown += [ResizedGrid(number, grid.counts) for number, grid in enumerate(grammar.grids)]
         found: dict[tuple[int, int], list[FloatArray]] = {}
         for made in shown:
-            pieces = pieces_of(grammar, made)
+            pieces = placed_terminals(grammar, made)
             for place, one in enumerate(pieces):
                 for other in pieces[:place]:
                     pose = invert(one.pose) @ other.pose
@@ -83,7 +85,7 @@ class Collisions:
                         found.setdefault((other.mesh, one.mesh), []).append(invert(pose))
         return found
 
-    def _as_in_exemplar(self, one: Piece, other: Piece) -> bool:
+    def _as_in_exemplar(self, one: PlacedTerminal, other: PlacedTerminal) -> bool:
         listed = self._known.get((one.mesh, other.mesh), [])
         return self._listed(listed, other.mesh, invert(one.pose) @ other.pose)
 
@@ -93,7 +95,7 @@ class Collisions:
         here = transform_points(pose, corners)
         return any(np.abs(transform_points(each, corners) - here).max() < SAME * self._cell for each in listed)
 
-    def _near(self, one: Piece, other: Piece) -> IntArray:
+    def _near(self, one: PlacedTerminal, other: PlacedTerminal) -> IntArray:
         """Which points of a piece are near another piece, int32 (k,). Relative poses recur, so that answers are held,
         each for the rounded value of its pose."""
         pose = invert(other.pose) @ one.pose

@@ -26,7 +26,7 @@ class Derivation:
 
 
 @dataclass(frozen=True)
-class Place:
+class NonTerminal:
     """A non-terminal in a production: a site of class `site`, where it is in the exemplar, `frame` (4, 4), and what the
     exemplar has there."""
 

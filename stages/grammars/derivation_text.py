@@ -29,7 +29,7 @@ class DerivationError(ValueError):
 
 
 @dataclass(frozen=True)
-class Resized:
+class ResizedGrid:
     """A grid with so many cells along each of its rows."""
 
     grid: int
@@ -37,22 +37,22 @@ class Resized:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class PlacedTerminal:
     """A mesh of a grammar at a pose (4, 4)."""
 
     mesh: int
     pose: FloatArray
 
 
-def derivation_text(grammar: ShapeGrammar, made: Derivation | Resized) -> str:
+def format_derivation(grammar: ShapeGrammar, made: Derivation | ResizedGrid) -> str:
     """The text of a derivation."""
-    if isinstance(made, Resized):
+    if isinstance(made, ResizedGrid):
         return f"{grammar.grids[made.grid].name}[{','.join(map(str, made.counts))}]"
-    inner = ",".join(derivation_text(grammar, each) for each in made.parts)
-    return grammar.rules[made.production].name + (f"({inner})" if inner else "")
+    inner = ",".join(format_derivation(grammar, each) for each in made.parts)
+    return grammar.productions[made.production].name + (f"({inner})" if inner else "")
 
 
-def read_derivation(grammar: ShapeGrammar, text: str) -> Derivation | Resized:
+def parse_derivation(grammar: ShapeGrammar, text: str) -> Derivation | ResizedGrid:
     """The derivation of a text. Raises DerivationError for one that the grammar cannot have written."""
     grid = re.fullmatch(r"([A-Za-z0-9_]+)\[(\d+(?:,\d+)*)\]", text, re.ASCII)
     if grid is None:
@@ -67,7 +67,7 @@ def read_derivation(grammar: ShapeGrammar, text: str) -> Derivation | Resized:
         raise DerivationError(
             f"{text!r}: {grid[1]} takes {rows} numbers of cells, and at most {MOST:,} pieces come of it"
         )
-    return Resized(place, counts)
+    return ResizedGrid(place, counts)
 
 
 class _Reader:
@@ -75,7 +75,7 @@ class _Reader:
 
     def __init__(self, grammar: ShapeGrammar, text: str) -> None:
         self._grammar, self._text, self._at = grammar, text, 0
-        self._named = {each.name: number for number, each in enumerate(grammar.rules)}
+        self._named = {each.name: number for number, each in enumerate(grammar.productions)}
 
     def whole(self) -> Derivation:
         found = self._production(START, 0)
@@ -87,12 +87,14 @@ class _Reader:
         name = re.compile(r"[A-Za-z0-9_]*", re.ASCII).match(self._text, self._at)
         begin, word = self._at, name[0] if name else ""
         number = self._named.get(word)
-        if number is None or self._grammar.rules[number].site != site or depth > DEEPEST:
-            known = ", ".join(self._grammar.rules[each].name for each in self._grammar.of_site.get(site, ()))
+        if number is None or self._grammar.productions[number].site != site or depth > DEEPEST:
+            known = ", ".join(
+                self._grammar.productions[each].name for each in self._grammar.productions_of_site.get(site, ())
+            )
             raise self._error(f"one of {known} must stand here")
         self._at = begin + len(word)
         parts: list[Derivation] = []
-        for place in self._grammar.rules[number].places:
+        for place in self._grammar.productions[number].non_terminals:
             self._expect("," if parts else "(")
             parts.append(self._production(place.site, depth + 1))
         if parts:
@@ -112,23 +114,24 @@ class _Reader:
         )
 
 
-def pieces_of(grammar: ShapeGrammar, made: Derivation | Resized) -> list[Piece]:
+def placed_terminals(grammar: ShapeGrammar, made: Derivation | ResizedGrid) -> list[PlacedTerminal]:
     """The pieces of a derivation, each where it stands."""
-    if isinstance(made, Resized):
+    if isinstance(made, ResizedGrid):
         grid = grammar.grids[made.grid]
         along = [where for _, where in grid.pieces]
-        placed = grid_poses(grid.motions, grid.counts, along, made.counts)
+        placed = grid_poses(grid.transforms, grid.counts, along, made.counts)
         return [
-            Piece(grid.pieces[number][0], grammar.standing(grid.pieces[number][0], pose)) for number, pose in placed
+            PlacedTerminal(grid.pieces[number][0], grammar.standing(grid.pieces[number][0], pose))
+            for number, pose in placed
         ]
-    found: list[Piece] = []
+    found: list[PlacedTerminal] = []
     waiting = [(made, np.eye(4))]
     while waiting:
         here, motion = waiting.pop()
-        rule = grammar.rules[here.production]
-        found.append(Piece(rule.terminal, grammar.standing(rule.terminal, motion)))
-        for place, part in zip(reversed(rule.places), reversed(here.parts), strict=True):
-            child = grammar.rules[part.production]
+        rule = grammar.productions[here.production]
+        found.append(PlacedTerminal(rule.terminal, grammar.standing(rule.terminal, motion)))
+        for place, part in zip(reversed(rule.non_terminals), reversed(here.parts), strict=True):
+            child = grammar.productions[part.production]
             waiting.append((part, motion @ place.frame @ invert(child.frame)))
     return found
 
@@ -136,18 +139,18 @@ def pieces_of(grammar: ShapeGrammar, made: Derivation | Resized) -> list[Piece]:
 def shape_of_text(grammar: ShapeGrammar, text: str) -> Shape:
     """The shape of a text, with all meshes of the grammar, so that what is known of them serves all of its shapes.
     Raises DerivationError for a text that is no derivation of the grammar."""
-    pieces = pieces_of(grammar, read_derivation(grammar, text))
+    pieces = placed_terminals(grammar, parse_derivation(grammar, text))
     return _shape(grammar, pieces, np.arange(len(grammar.meshes)))
 
 
-def lone_shape(grammar: ShapeGrammar, text: str) -> Shape:
+def compact_shape_of_text(grammar: ShapeGrammar, text: str) -> Shape:
     """The shape of a text, with no more meshes than stand in it: all that a grammar makes as they are asked for are
     gigabytes. Raises DerivationError for a text that is no derivation of the grammar."""
-    pieces = pieces_of(grammar, read_derivation(grammar, text))
+    pieces = placed_terminals(grammar, parse_derivation(grammar, text))
     return _shape(grammar, pieces, np.unique([each.mesh for each in pieces]))
 
 
-def _shape(grammar: ShapeGrammar, pieces: Sequence[Piece], meshes: np.ndarray) -> Shape:
+def _shape(grammar: ShapeGrammar, pieces: Sequence[PlacedTerminal], meshes: np.ndarray) -> Shape:
     """The shape of some pieces, with the meshes at these places, int64 (k,) ascending."""
     types = np.searchsorted(meshes, [each.mesh for each in pieces]).astype(np.int16)
     poses = np.array([each.pose for each in pieces])
@@ -162,7 +165,7 @@ def exemplar_shape(grammar: ShapeGrammar) -> Shape:
     return Shape((grammar.exemplar,), alone, grammar.up, (grammar.exemplar.name,), one_surface=True)
 
 
-def surface_digest(grammar: ShapeGrammar, pieces: list[Piece]) -> str:
+def surface_digest(grammar: ShapeGrammar, pieces: list[PlacedTerminal]) -> str:
     """A hex digest of the surface that pieces make, equal for shapes that a rigid motion, or a mirror, takes to each
     other however they are cut: of its area and of moments up to the fourth, which are sums over triangles."""
     corners = np.concatenate(

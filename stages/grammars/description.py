@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 
 from stages.grammars.derivation import ENDS, Derivation
-from stages.grammars.derivation_text import derivation_text
-from stages.grammars.editing import options_of
-from stages.grammars.extraction.extract import Extraction
-from stages.grammars.grammar import GridRule, site_name
+from stages.grammars.derivation_text import format_derivation
+from stages.grammars.editing import editing_options
+from stages.grammars.extraction.extract import ExtractedGrammar
+from stages.grammars.grammar import Grid, site_name
 
 
-def describe_grammar(found: Extraction) -> dict[str, Any]:
+def describe_grammar(found: ExtractedGrammar) -> dict[str, Any]:
     """All that there is to say of a grammar, with the editing options at each docking site. `tree` and `frame` are what
     programs read: an original as places among the rules, and poses (4, 4)."""
     grammar = found.grammar
     whole = float(found.grid.area.sum())
-    options = options_of(found)
+    options = editing_options(found)
     terminals = [
         {
             "name": each.name,
@@ -35,16 +35,16 @@ def describe_grammar(found: Extraction) -> dict[str, Any]:
         "made_of": grammar.made_of,
         grammar.made_of: len(grammar.exemplar.faces),
         "area": whole,
-        "motions": found.motions,
-        "dockers": len(found.dockers),
+        "motions": found.transforms,
+        "dockers": len(found.docked_pieces),
         "non_terminals": [
             {
                 "name": site_name(site),
                 "site": site,
-                "dockers": sum(each.site == site for each in found.dockers),
-                "rules": [grammar.rules[each].name for each in rules],
+                "dockers": sum(each.site == site for each in found.docked_pieces),
+                "rules": [grammar.productions[each].name for each in rules],
             }
-            for site, rules in grammar.of_site.items()
+            for site, rules in grammar.productions_of_site.items()
         ],
         "rules": [
             {
@@ -56,13 +56,13 @@ def describe_grammar(found: Extraction) -> dict[str, Any]:
                         "site": place.site,
                         "non_terminal": site_name(place.site),
                         "frame": place.frame.tolist(),
-                        "original": derivation_text(grammar, place.original),
+                        "original": format_derivation(grammar, place.original),
                         "tree": _tree(place.original),
                     }
-                    for place in each.places
+                    for place in each.non_terminals
                 ],
             }
-            for each in grammar.rules
+            for each in grammar.productions
         ],
         "grids": [_described_grid(each) for each in grammar.grids],
         "terminals": terminals,
@@ -76,24 +76,24 @@ def describe_grammar(found: Extraction) -> dict[str, Any]:
                     {
                         "docker": each.other,
                         "kind": each.kind,
-                        "share": round(found.dockers[each.other].area, 6),
-                        "motion": each.motion.tolist(),
+                        "share": round(found.docked_pieces[each.other].area, 6),
+                        "motion": each.transform.tolist(),
                     }
                     for each in options.get(place, [])
                 ],
             }
-            for place, docker in enumerate(found.dockers)
+            for place, docker in enumerate(found.docked_pieces)
         ],
     }
 
 
-def _middle(found: Extraction, docker: int) -> np.ndarray:
-    cells = found.dockers[docker].border
-    middle: np.ndarray = found.grid.origin + (found.grid.cells[cells].mean(axis=0) + 0.5) * found.grid.size
+def _middle(found: ExtractedGrammar, docker: int) -> np.ndarray:
+    cells = found.docked_pieces[docker].border
+    middle: np.ndarray = found.grid.origin + (found.grid.cells[cells].mean(axis=0) + 0.5) * found.grid.cell_size
     return middle
 
 
-def _described_grid(grid: GridRule) -> dict[str, Any]:
+def _described_grid(grid: Grid) -> dict[str, Any]:
     return {
         "name": grid.name,
         "rows": [
@@ -104,7 +104,7 @@ def _described_grid(grid: GridRule) -> dict[str, Any]:
                 "motion": motion.tolist(),
                 "frame": frame.tolist(),
             }
-            for site, count, motion, frame in zip(grid.sites, grid.counts, grid.motions, grid.frames, strict=True)
+            for site, count, motion, frame in zip(grid.sites, grid.counts, grid.transforms, grid.frames, strict=True)
         ],
         "pieces": [{"terminal": mesh, "along": [ENDS[each] for each in where]} for mesh, where in grid.pieces],
     }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.grammars.extraction.extract import Extraction
+from stages.grammars.extraction.extract import ExtractedGrammar
 from stages.grammars.extraction.seams import cut_out
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert, transform_points
@@ -25,22 +25,22 @@ SAME_AREA = 2e-3
 
 
 @dataclass(frozen=True)
-class Option:
+class EditingOption:
     """At the site of a docker, by its place, another one: its place; kind: insert where it holds what it replaces,
     delete where it is held in it, else replace; motion: float64 (4, 4), from where it docks to this site."""
 
     docker: int
     other: int
     kind: OperationKind
-    motion: FloatArray
+    transform: FloatArray
 
 
-def options_of(found: Extraction) -> dict[int, list[Option]]:
+def editing_options(found: ExtractedGrammar) -> dict[int, list[EditingOption]]:
     """For each docker of the exemplar that is one of its kind at its site what else may dock there, each kind of docker
     once, those of the smallest first."""
     kinds = _kinds(found)
-    dockers = found.dockers
-    options: dict[int, list[Option]] = {}
+    dockers = found.docked_pieces
+    options: dict[int, list[EditingOption]] = {}
     for place, docker in enumerate(dockers):
         seen = {kinds[place]}
         for other, each in enumerate(dockers):
@@ -48,32 +48,32 @@ def options_of(found: Extraction) -> dict[int, list[Option]]:
                 seen.add(kinds[other])
                 kind = operation_kind(each.cells, docker.cells, found.grid.slack)
                 motion = docker.frame @ invert(each.frame)
-                options.setdefault(place, []).append(Option(place, other, kind, motion))
+                options.setdefault(place, []).append(EditingOption(place, other, kind, motion))
     return options
 
 
-def edited(found: Extraction, option: Option) -> tuple[Soup, Soup]:
+def apply_option(found: ExtractedGrammar, option: EditingOption) -> tuple[Soup, Soup]:
     """The exemplar after an option: what stays, and what has come."""
-    grid, dockers, seams = found.grid, found.dockers, found.seams
+    grid, dockers, seams = found.grid, found.docked_pieces, found.seams
     whole = Soup(grid.corners, np.arange(len(grid.corners), dtype=np.int32))
     old, new = dockers[option.docker], dockers[option.other]
     _, stays = cut_out(whole, grid, old.cells, old.frame, seams[old.site])
     comes, _ = cut_out(whole, grid, new.cells, new.frame, seams[new.site])
-    moved = transform_points(option.motion, comes.corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    moved = transform_points(option.transform, comes.corners.reshape(-1, 3)).reshape(-1, 3, 3)
     return stays, Soup(moved, comes.faces)
 
 
-def _kinds(found: Extraction) -> list[int]:
+def _kinds(found: ExtractedGrammar) -> list[int]:
     """For each docker the place of the first that is like it: a motion from site to site takes one onto the other."""
     kinds: list[int] = []
-    for place, docker in enumerate(found.dockers):
-        known = [each for each in dict.fromkeys(kinds) if found.dockers[each].site == docker.site]
+    for place, docker in enumerate(found.docked_pieces):
+        known = [each for each in dict.fromkeys(kinds) if found.docked_pieces[each].site == docker.site]
         kinds.append(next((each for each in known if _alike(found, each, place)), place))
     return kinds
 
 
-def _alike(found: Extraction, one: int, other: int) -> bool:
-    first, second = found.dockers[one], found.dockers[other]
+def _alike(found: ExtractedGrammar, one: int, other: int) -> bool:
+    first, second = found.docked_pieces[one], found.docked_pieces[other]
     if abs(first.area - second.area) > SAME_AREA * first.area:
         return False
     items = items_in(found.grid, first.cells)

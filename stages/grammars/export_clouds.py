@@ -17,10 +17,10 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
-from stages.grammars.derivation_text import DerivationError, pieces_of, read_derivation
+from stages.grammars.derivation_text import DerivationError, parse_derivation, placed_terminals
 from stages.grammars.files import load_grammar
 from stages.grammars.grammar import ShapeGrammar
-from stages.grammars.scans.scanned_grid import Cloud
+from stages.grammars.scans.scanned_grid import ScannedCloud
 from stages.shape.geometry.pose import transform_points
 
 ROW = np.dtype([("place", "<f8", 3), ("normal", "<f4", 3), ("color", "u1", 3)])
@@ -41,28 +41,28 @@ end_header
 """
 
 
-def cloud_of_text(grammar: ShapeGrammar, text: str) -> Cloud:
+def cloud_of_text(grammar: ShapeGrammar, text: str) -> ScannedCloud:
     """The shape of a derivation: points of the exemplar, on the planes of their patches, moved as the pieces are that
     they are in. Raises DerivationError for a text that is no derivation of the grammar."""
     points, normals, colors = [], [], []
-    for piece in pieces_of(grammar, read_derivation(grammar, text)):
+    for piece in placed_terminals(grammar, parse_derivation(grammar, text)):
         mesh = grammar.meshes[piece.mesh]
         corners = transform_points(piece.pose, mesh.vertices)[mesh.faces]
         ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         points.append(corners.mean(axis=1))
         normals.append(ways / np.linalg.norm(ways, axis=1)[:, None])
         colors.append(mesh.face_colors)
-    return Cloud(np.concatenate(points), np.concatenate(colors), np.concatenate(normals))
+    return ScannedCloud(np.concatenate(points), np.concatenate(colors), np.concatenate(normals))
 
 
-def ply_bytes(cloud: Cloud) -> bytes:
+def ply_bytes(cloud: ScannedCloud) -> bytes:
     """A binary PLY file of a cloud with normals."""
     rows = np.empty(len(cloud.points), dtype=ROW)
     rows["place"], rows["normal"], rows["color"] = cloud.points, cloud.normals, cloud.colors
     return HEADER.format(count=len(rows)).encode() + rows.tobytes()
 
 
-def written_clouds(folder: Path, name: str, grammar: ShapeGrammar, texts: Sequence[str]) -> Iterator[tuple[str, Path]]:
+def write_clouds(folder: Path, name: str, grammar: ShapeGrammar, texts: Sequence[str]) -> Iterator[tuple[str, Path]]:
     """Write the shapes of some derivations as `<name>-<number>.ply`; each with where it is."""
     for number, text in enumerate(texts):
         yield text, write_file(folder / f"{name}-{number}.ply", ply_bytes(cloud_of_text(grammar, text)))
@@ -84,7 +84,7 @@ def main(arguments: list[str]) -> int:
         grammar = load_grammar(asked.grammar, asked.grammar.with_suffix(".tar"))
         if not grammar.splats:
             raise ConfigError(f"{asked.grammar}: is of a mesh, of which shapes are meshes and no clouds")
-        for text, path in written_clouds(asked.out, grammar.name, grammar, asked.texts):
+        for text, path in write_clouds(asked.out, grammar.name, grammar, asked.texts):
             print(f"{text:<18} {path}")
     except (ConfigError, DerivationError) as error:
         print(error, file=sys.stderr)

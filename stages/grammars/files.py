@@ -13,8 +13,8 @@ import numpy as np
 
 from pipeline.places import Places
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
-from stages.grammars.derivation import ENDS, Derivation, Place
-from stages.grammars.grammar import GridRule, Rule, ShapeGrammar
+from stages.grammars.derivation import ENDS, Derivation, NonTerminal
+from stages.grammars.grammar import Grid, Production, ShapeGrammar
 from stages.shape.kit import PartMesh
 
 
@@ -53,7 +53,7 @@ def load_grammar(text: Path, arrays: Path) -> ShapeGrammar:
         radius=said["radius"],
         meshes=tuple(meshes[:-1]),
         middles=np.array([each["middle"] for each in said["terminals"]]).reshape(-1, 3),
-        rules=tuple(_rule(number, each) for number, each in enumerate(said["rules"])),
+        productions=tuple(_rule(number, each) for number, each in enumerate(said["rules"])),
         grids=tuple(map(_grid, said["grids"])),
         seams=seams,
         exemplar=meshes[-1],
@@ -61,20 +61,20 @@ def load_grammar(text: Path, arrays: Path) -> ShapeGrammar:
     )
 
 
-def _rule(number: int, said: Mapping[str, Any]) -> Rule:
-    places = [Place(each["site"], np.array(each["frame"]), _derivation(each["tree"])) for each in said["places"]]
-    return Rule(said["name"], said["site"], np.array(said["frame"]), number, tuple(places))
+def _rule(number: int, said: Mapping[str, Any]) -> Production:
+    places = [NonTerminal(each["site"], np.array(each["frame"]), _derivation(each["tree"])) for each in said["places"]]
+    return Production(said["name"], said["site"], np.array(said["frame"]), number, tuple(places))
 
 
 def _derivation(tree: Sequence[Any]) -> Derivation:
     return Derivation(tree[0], tuple(map(_derivation, tree[1:])))
 
 
-def _grid(said: Mapping[str, Any]) -> GridRule:
+def _grid(said: Mapping[str, Any]) -> Grid:
     rows = said["rows"]
-    return GridRule(
+    return Grid(
         name=said["name"],
-        motions=np.array([each["motion"] for each in rows]),
+        transforms=np.array([each["motion"] for each in rows]),
         counts=tuple(each["cells"] for each in rows),
         sites=tuple(each["site"] for each in rows),
         frames=np.array([each["frame"] for each in rows]),
@@ -82,7 +82,7 @@ def _grid(said: Mapping[str, Any]) -> GridRule:
     )
 
 
-def made_grammars(places: Places) -> dict[str, ShapeGrammar]:
+def load_grammars(places: Places) -> dict[str, ShapeGrammar]:
     """The grammars of a dataset out of the mill's folder."""
     made = places.stage("grammars").root
     return {

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from stages.grammars.derivation import START, Place
+from stages.grammars.derivation import START, NonTerminal
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 
@@ -17,7 +17,7 @@ LETTERS = "ABCDEFHIJKLMNOPQRTUVWXYZ"
 
 
 @dataclass(frozen=True, eq=False)
-class Rule:
+class Production:
     """A production: at a site of class `site` may stand the mesh `terminal`, with `places` for others.
 
     frame: float64 (4, 4), of the site where the exemplar has it; places: where the exemplar has them.
@@ -27,11 +27,11 @@ class Rule:
     site: int
     frame: FloatArray
     terminal: int
-    places: tuple[Place, ...]
+    non_terminals: tuple[NonTerminal, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class GridRule:
+class Grid:
     """A grid of k rows that cross.
 
     motions: float64 (k, 4, 4), from cell to cell; counts: of the exemplar; sites, frames float64 (k, 4, 4): where the
@@ -39,7 +39,7 @@ class GridRule:
     """
 
     name: str
-    motions: FloatArray
+    transforms: FloatArray
     counts: tuple[int, ...]
     sites: tuple[int, ...]
     frames: FloatArray
@@ -61,8 +61,8 @@ class ShapeGrammar:
     radius: float
     meshes: Sequence[PartMesh]
     middles: FloatArray
-    rules: tuple[Rule, ...]
-    grids: tuple[GridRule, ...]
+    productions: tuple[Production, ...]
+    grids: tuple[Grid, ...]
     seams: Mapping[int, FloatArray]
     exemplar: PartMesh
     splats: bool = False
@@ -83,10 +83,10 @@ class ShapeGrammar:
         return np.array([each.bounds for each in self.meshes]).reshape(-1, 2, 3)
 
     @cached_property
-    def of_site(self) -> Mapping[int, tuple[int, ...]]:
+    def productions_of_site(self) -> Mapping[int, tuple[int, ...]]:
         """The rules of each class of sites, by their places."""
         found: dict[int, list[int]] = {}
-        for number, rule in enumerate(self.rules):
+        for number, rule in enumerate(self.productions):
             found.setdefault(rule.site, []).append(number)
         return {site: tuple(each) for site, each in found.items()}
 

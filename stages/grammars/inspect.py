@@ -10,17 +10,17 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
+from stages.exemplars.cut_surface import estimate_grid_size
 from stages.exemplars.model import Model
 from stages.exemplars.settings import ReadLimits
 from stages.grammars.description import describe_grammar
-from stages.grammars.distinct_shapes import METHODS, some_shapes
-from stages.grammars.export_clouds import written_clouds
-from stages.grammars.extraction.extract import Extraction, extract, mesh_of
+from stages.grammars.distinct_shapes import METHODS, preview_shapes
+from stages.grammars.export_clouds import write_clouds
+from stages.grammars.extraction.extract import ExtractedGrammar, extract_grammar, model_surface
 from stages.grammars.picture import grammar_sheet, shapes_sheet
 from stages.grammars.read_surface import read_surface
-from stages.grammars.scans.scanned_grid import Cloud, points_for, radius_for
-from stages.grammars.settings import LARGEST_RADIUS, GrammarConfig
-from stages.symmetry.parts import about_size
+from stages.grammars.scans.scanned_grid import ScannedCloud, required_points, suitable_radius
+from stages.grammars.settings import MAX_RADIUS_SHARE, GrammarConfig
 
 SHOWN = 12
 """So many shapes by each method are drawn to see what will come."""
@@ -52,16 +52,20 @@ grammars:
 """
 
 
-def has_grammar(model: Model, asked: str) -> bool:
+def may_have_grammar(model: Model, asked: str) -> bool:
     """Whether a grammar is worth a look: of a model whose parts are what symmetry makes of it, and of one part alone
     that is not too large, where nobody has said what parts are."""
     if model.segmentation == "symmetry":
         return True
     radius = float(GrammarConfig.model_fields["radius"].default)
-    return asked == "auto" and len(model.parts) == 1 and about_size(mesh_of(model).corners, radius) <= LARGEST
+    return (
+        asked == "auto"
+        and len(model.parts) == 1
+        and estimate_grid_size(model_surface(model).corners, radius) <= LARGEST
+    )
 
 
-def written_grammar(
+def write_grammar_report(
     folder: Path, name: str, path: Path, up: str, limits: ReadLimits
 ) -> Iterator[tuple[str, Path | str]]:
     """Write the grammar of a mesh or cloud as JSON and as a picture, some shapes of it, and a config; what each is, and
@@ -69,25 +73,25 @@ def written_grammar(
     eye."""
     surface, _ = read_surface(path, limits)
     config = GrammarConfig(name=name, model=path.resolve(), up="z" if up == "z" else "y")
-    if isinstance(surface, Cloud):
-        radius = radius_for(surface, config.radius)
-        if radius > LARGEST_RADIUS:
+    if isinstance(surface, ScannedCloud):
+        radius = suitable_radius(surface, config.radius)
+        if radius > MAX_RADIUS_SHARE:
             raise ConfigError(
                 f"{path}: too thin or too noisy: it takes a radius of {radius:.0%} of its longest side, at most "
-                f"{LARGEST_RADIUS:.0%} make sense; scan more densely, or take the noise out"
+                f"{MAX_RADIUS_SHARE:.0%} make sense; scan more densely, or take the noise out"
             )
         if radius > config.radius:
             yield "radius", _coarse(surface, radius, config.radius)
         config = config.model_copy(update={"radius": radius})
-    found = extract(surface, name, config.radius, "z" if up == "z" else "y", np.random.default_rng(0))
+    found = extract_grammar(surface, name, config.radius, "z" if up == "z" else "y", np.random.default_rng(0))
     said = _sentence(found)
     yield "grammar", said
-    if len(found.grammar.rules) < 2 and not found.grammar.grids:
+    if len(found.grammar.productions) < 2 and not found.grammar.grids:
         return
     text = json.dumps(describe_grammar(found), indent=1, ensure_ascii=False, allow_nan=False)
     yield "grammar as JSON", write_file(folder / f"{name}-grammar.json", f"{text}\n".encode())
     yield "docking sites", write_file(folder / f"{name}-grammar.png", grammar_sheet(found))
-    drawn = some_shapes(found.grammar, config, SHOWN)
+    drawn = preview_shapes(found.grammar, config, SHOWN)
     counts = {method: len(each) for method, each in drawn.items()}
     yield "shapes", _prospect(counts)
     if not any(counts.values()):
@@ -95,7 +99,7 @@ def written_grammar(
     shapes = [each for listed in drawn.values() for each in listed]
     yield "some shapes", write_file(folder / f"{name}-grammar-shapes.png", shapes_sheet(found.grammar, shapes))
     if found.grammar.splats:
-        yield from written_clouds(folder, f"{name}-grammar", found.grammar, shapes[:: max(1, len(shapes) // CLOUDS)])
+        yield from write_clouds(folder, f"{name}-grammar", found.grammar, shapes[:: max(1, len(shapes) // CLOUDS)])
     if len(shapes) < FEWEST:
         return
     asked = {method: 100 if count == SHOWN else count for method, count in counts.items()}
@@ -124,21 +128,21 @@ def _prospect(counts: dict[str, int]) -> str:
     )
 
 
-def _coarse(cloud: Cloud, radius: float, usual: float) -> str:
+def _coarse(cloud: ScannedCloud, radius: float, usual: float) -> str:
     """What a scan is too thin or too noisy for."""
-    points = points_for(cloud, usual)
+    points = required_points(cloud, usual)
     more = "less noise" if points is None else f"about {points:,} points, {len(cloud.points):,} are there,"
     return f"{radius:.1%} of the longest side: what is finer is not seen; with {more} it could be {usual:.1%}"
 
 
-def _sentence(found: Extraction) -> str:
+def _sentence(found: ExtractedGrammar) -> str:
     """What there is in a grammar."""
     grammar = found.grammar
-    if not found.dockers:
-        return f"none: {found.motions} motions leave no docking site"
+    if not found.docked_pieces:
+        return f"none: {found.transforms} motions leave no docking site"
     grids = ", ".join(" x ".join(map(str, each.counts)) for each in grammar.grids) or "none"
-    classes = len({each.site for each in found.dockers})
+    classes = len({each.site for each in found.docked_pieces})
     return (
-        f"{found.motions} motions, {len(found.dockers)} dockers at {classes} classes of docking sites, "
-        f"{len(grammar.rules)} rules; cells of grids: {grids}"
+        f"{found.transforms} motions, {len(found.docked_pieces)} dockers at {classes} classes of docking sites, "
+        f"{len(grammar.productions)} rules; cells of grids: {grids}"
     )

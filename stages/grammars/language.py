@@ -11,7 +11,7 @@ from pipeline.config import Config
 from pipeline.places import Places
 from pipeline.stage import Plan, Task
 from stages.grammars.derivation_text import exemplar_shape, shape_of_text
-from stages.grammars.files import load_grammar, made_grammars
+from stages.grammars.files import load_grammar, load_grammars
 from stages.grammars.grammar import ShapeGrammar
 from stages.grammars.settings import GrammarsConfig
 from stages.shape.arrays import IntArray
@@ -41,7 +41,7 @@ def _source(grammar: ShapeGrammar) -> Source:
     return Source(
         grammar.labels,
         tuple((red, green, blue) for red, green, blue in colors),
-        f"one mesh, {len(grammar.rules)} rules, {len(grammar.grids)} grids",
+        f"one mesh, {len(grammar.productions)} rules, {len(grammar.grids)} grids",
     )
 
 
@@ -68,7 +68,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
 
 
 def _anew(places: Places) -> Anew:
-    grammars = made_grammars(places)
+    grammars = load_grammars(places)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:
         if record["kit"] not in grammars:

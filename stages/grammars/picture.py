@@ -9,10 +9,16 @@ from typing import Literal
 
 import numpy as np
 
-from stages.grammars.derivation_text import Piece, Resized, exemplar_shape, lone_shape, pieces_of
-from stages.grammars.editing import Option, edited, options_of
-from stages.grammars.extraction.extract import Extraction
-from stages.grammars.grammar import GridRule, ShapeGrammar, site_name
+from stages.grammars.derivation_text import (
+    PlacedTerminal,
+    ResizedGrid,
+    compact_shape_of_text,
+    exemplar_shape,
+    placed_terminals,
+)
+from stages.grammars.editing import EditingOption, apply_option, editing_options
+from stages.grammars.extraction.extract import ExtractedGrammar
+from stages.grammars.grammar import Grid, ShapeGrammar, site_name
 from stages.shape.arrays import ByteArray, FloatArray
 from stages.shape.geometry.pose import transform_points
 from stages.shape.kit import Assembly, PartMesh
@@ -23,7 +29,7 @@ from stages.shape.views.portrait import points_portrait, portrait
 from stages.shape.views.scene import scene_of
 from stages.shape.views.sheet import Cell, Section, contact_sheet, picture_png
 from stages.symmetry.surface.soup import Soup, carve
-from stages.symmetry.surface.welding import welded
+from stages.symmetry.surface.welding import weld
 
 CELL = 200
 COLUMNS = 4
@@ -39,17 +45,17 @@ OPTIONS = 3
 """So many editing options of one site, those that change most."""
 
 
-def grammar_sheet(found: Extraction) -> bytes:
+def grammar_sheet(found: ExtractedGrammar) -> bytes:
     """A PNG: the exemplar, its sites in a colour for each class, and dockers; at a site of each class what may take the
     place of what is there, yellow, in red; and each grid with other numbers of cells."""
     grammar, whole = found.grammar, _whole(found)
-    dockers = len(found.dockers)
-    classes = len({each.site for each in found.dockers})
+    dockers = len(found.docked_pieces)
+    classes = len({each.site for each in found.docked_pieces})
     exemplar = [
         _cell(found, [(whole, STAYS)], f"{len(grammar.exemplar.faces):,} {grammar.made_of}"),
         _cell(found, _sites(found), f"{dockers} docking sites of {classes} classes"),
     ]
-    sections = [Section("Exemplar", [exemplar], f"{len(grammar.rules)} rules, {len(grammar.grids)} grids", 2)]
+    sections = [Section("Exemplar", [exemplar], f"{len(grammar.productions)} rules, {len(grammar.grids)} grids", 2)]
     rows = list(_editing(found))
     if rows:
         sections.append(Section("Editing options", rows, "yellow: what a site holds; red: what may take its place"))
@@ -68,54 +74,56 @@ def shapes_sheet(grammar: ShapeGrammar, texts: Sequence[str]) -> bytes:
 
 def shapes_row(grammar: ShapeGrammar, texts: Sequence[str]) -> list[Cell]:
     """The shapes of some derivations, each with its text."""
-    return [Cell(_pictured(lone_shape(grammar, each), grammar.splats), each) for each in texts]
+    return [Cell(_pictured(compact_shape_of_text(grammar, each), grammar.splats), each) for each in texts]
 
 
-def dockers_row(found: Extraction, most: int) -> list[Cell]:
+def docked_pieces_row(found: ExtractedGrammar, most: int) -> list[Cell]:
     """The exemplar with its sites, and, of at most so many classes of sites, those at which most dock, the smallest
     docker."""
-    classes = Counter(each.site for each in found.dockers)
-    cells = [_cell(found, _sites(found), f"{len(found.dockers)} docking sites of {len(classes)} classes")]
+    classes = Counter(each.site for each in found.docked_pieces)
+    cells = [_cell(found, _sites(found), f"{len(found.docked_pieces)} docking sites of {len(classes)} classes")]
     for site, count in sorted(classes.items(), key=lambda each: (-each[1], each[0]))[:most]:
-        docker = next(each for each in found.dockers if each.site == site)
+        docker = next(each for each in found.docked_pieces if each.site == site)
         inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
         caption = f"{site_name(site)}, one of {count}: {docker.area:.1%}"
         cells.append(_cell(found, [(outside, STAYS), (inside, GOES)], caption))
     return cells
 
 
-def _whole(found: Extraction) -> Soup:
+def _whole(found: ExtractedGrammar) -> Soup:
     return Soup(found.grid.corners, np.arange(len(found.grid.corners), dtype=np.int32))
 
 
-def _sites(found: Extraction) -> list[tuple[Soup, tuple[int, int, int]]]:
+def _sites(found: ExtractedGrammar) -> list[tuple[Soup, tuple[int, int, int]]]:
     """The exemplar with what lies in the cells of docking sites in the colour of their class."""
     rest, parts = _whole(found), []
-    colors = label_colors(1 + max((each.site for each in found.dockers), default=0)).tolist()
-    for docker in found.dockers:
+    colors = label_colors(1 + max((each.site for each in found.docked_pieces), default=0)).tolist()
+    for docker in found.docked_pieces:
         red, green, blue = colors[docker.site]
         inside, rest = carve(rest, found.grid, docker.border, np.eye(4))
         parts.append((inside, (red, green, blue)))
     return [*parts, (rest, STAYS)]
 
 
-def _editing(found: Extraction) -> Iterator[list[Cell]]:
+def _editing(found: ExtractedGrammar) -> Iterator[list[Cell]]:
     """For the site of each class at which sizes differ most what is there, and what may be."""
-    options = options_of(found)
+    options = editing_options(found)
 
     def most(place: int) -> float:
-        return max(abs(found.dockers[each.other].area - found.dockers[place].area) for each in options[place])
+        return max(
+            abs(found.docked_pieces[each.other].area - found.docked_pieces[place].area) for each in options[place]
+        )
 
     best: dict[int, int] = {}
     for place in sorted(options, key=lambda each: (-most(each), each)):
-        best.setdefault(found.dockers[place].site, place)
+        best.setdefault(found.docked_pieces[place].site, place)
     for site, place in list(best.items())[:SITES]:
-        docker = found.dockers[place]
+        docker = found.docked_pieces[place]
         inside, outside = carve(_whole(found), found.grid, docker.cells, np.eye(4))
         camera = _facing(inside, found.grammar.up)
         caption = f"{site_name(site)}: {docker.area:.0%} of it"
         cells = [_cell(found, [(outside, STAYS), (inside, GOES)], caption, camera)]
-        chosen = sorted(options[place], key=lambda each: -abs(found.dockers[each.other].area - docker.area))
+        chosen = sorted(options[place], key=lambda each: -abs(found.docked_pieces[each.other].area - docker.area))
         cells += [_option(found, each, camera) for each in chosen[:OPTIONS]]
         yield cells
 
@@ -128,12 +136,12 @@ def _facing(soup: Soup, up: Literal["y", "z"]) -> Camera:
     return sides[int(np.argmax(np.round(seen, 9)))]
 
 
-def _option(found: Extraction, option: Option, camera: Camera) -> Cell:
-    stays, comes = edited(found, option)
+def _option(found: ExtractedGrammar, option: EditingOption, camera: Camera) -> Cell:
+    stays, comes = apply_option(found, option)
     return _cell(found, [(stays, STAYS), (comes, COMES)], f"{option.kind}: docker {option.other}", camera)
 
 
-def _grid_row(found: Extraction, number: int, grid: GridRule) -> list[Cell]:
+def _grid_row(found: ExtractedGrammar, number: int, grid: Grid) -> list[Cell]:
     """A grid with no cells, as in the exemplar, and with more along each row."""
     wanted: Sequence[tuple[int, ...]] = [
         tuple(0 for _ in grid.counts),
@@ -144,21 +152,21 @@ def _grid_row(found: Extraction, number: int, grid: GridRule) -> list[Cell]:
     return [_resized(found, number, counts) for counts in dict.fromkeys(wanted)][:COLUMNS]
 
 
-def _resized(found: Extraction, number: int, counts: tuple[int, ...]) -> Cell:
+def _resized(found: ExtractedGrammar, number: int, counts: tuple[int, ...]) -> Cell:
     grammar = found.grammar
-    pieces = pieces_of(grammar, Resized(number, counts))
+    pieces = placed_terminals(grammar, ResizedGrid(number, counts))
     paint = dict(zip((mesh for mesh, _ in grammar.grids[number].pieces), label_colors(27).tolist(), strict=False))
     parts = [(_soup(grammar.meshes[each.mesh], each), tuple(paint[each.mesh])) for each in pieces]
     return _cell(found, parts, f"{grammar.grids[number].name}[{','.join(map(str, counts))}]")
 
 
-def _soup(mesh: PartMesh, piece: Piece) -> Soup:
+def _soup(mesh: PartMesh, piece: PlacedTerminal) -> Soup:
     corners = transform_points(piece.pose, mesh.vertices)[mesh.faces]
     return Soup(corners, np.zeros(len(corners), dtype=np.int32))
 
 
 def _cell(
-    found: Extraction, parts: Sequence[tuple[Soup, tuple[int, int, int]]], caption: str, camera: Camera = CAMERA
+    found: ExtractedGrammar, parts: Sequence[tuple[Soup, tuple[int, int, int]]], caption: str, camera: Camera = CAMERA
 ) -> Cell:
     filled = [(each, color) for each, color in parts if len(each)]
     meshes = tuple(_mesh(each.corners, color) for each, color in filled)
@@ -182,5 +190,5 @@ def _pictured(shape: Shape, splats: bool, camera: Camera = CAMERA) -> ByteArray:
 
 def _mesh(corners: FloatArray, color: tuple[int, int, int]) -> PartMesh:
     colors: ByteArray = np.tile(np.array(color, np.uint8), (len(corners), 1))
-    places, vertices = welded(corners, 0.0)
+    places, vertices = weld(corners, 0.0)
     return PartMesh("part", vertices, places, colors)

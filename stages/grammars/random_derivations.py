@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.grammars.collisions import Collisions
 from stages.grammars.derivation import START, Derivation
-from stages.grammars.derivation_text import Piece, Resized
+from stages.grammars.derivation_text import PlacedTerminal, ResizedGrid
 from stages.grammars.grammar import ShapeGrammar
 from stages.shape.arrays import FloatArray
 from stages.shape.geometry.pose import invert
@@ -15,7 +15,7 @@ TRIES = 10
 """So many random rules are tried at a site before it gets what the exemplar has (symmetry §4.2)."""
 
 
-class Collided(Exception):
+class DerivationCollides(Exception):
     """What the exemplar has at a site runs into what stands there already."""
 
 
@@ -25,10 +25,10 @@ def random_derivation(grammar: ShapeGrammar, collisions: Collisions, most: int, 
     return _Drawing(grammar, collisions, most, rng).whole()
 
 
-def random_counts(grammar: ShapeGrammar, most: int, rng: np.random.Generator) -> Resized:
+def random_resized_grid(grammar: ShapeGrammar, most: int, rng: np.random.Generator) -> ResizedGrid:
     """A grid with 0 to `most` cells along each row."""
     grid = int(rng.integers(len(grammar.grids)))
-    return Resized(grid, tuple(int(each) for each in rng.integers(0, most + 1, len(grammar.grids[grid].counts))))
+    return ResizedGrid(grid, tuple(int(each) for each in rng.integers(0, most + 1, len(grammar.grids[grid].counts))))
 
 
 class _Drawing:
@@ -36,11 +36,11 @@ class _Drawing:
 
     def __init__(self, grammar: ShapeGrammar, collisions: Collisions, most: int, rng: np.random.Generator) -> None:
         self._grammar, self._collisions, self._most, self._rng = grammar, collisions, most, rng
-        self._pieces: list[Piece] = []
+        self._pieces: list[PlacedTerminal] = []
         self._seams: list[tuple[int, FloatArray]] = []
 
     def whole(self) -> Derivation:
-        starts = self._grammar.of_site[START]
+        starts = self._grammar.productions_of_site[START]
         number = starts[int(self._rng.integers(len(starts)))]
         self._put(number, np.eye(4))
         return self._filled(number, np.eye(4))
@@ -49,15 +49,15 @@ class _Drawing:
         """The production with something at all its places."""
         parts = [
             self._at_site(place.site, motion @ place.frame, place.original)
-            for place in self._grammar.rules[number].places
+            for place in self._grammar.productions[number].non_terminals
         ]
         return Derivation(number, tuple(parts))
 
     def _at_site(self, site: int, frame: FloatArray, original: Derivation) -> Derivation:
-        known = self._grammar.of_site[site]
+        known = self._grammar.productions_of_site[site]
         for _ in range(TRIES if len(self._pieces) < self._most else 0):
             number = known[int(self._rng.integers(len(known)))]
-            motion = frame @ invert(self._grammar.rules[number].frame)
+            motion = frame @ invert(self._grammar.productions[number].frame)
             if self._put(number, motion):
                 return self._filled(number, motion)
         self._original(original, frame)
@@ -65,17 +65,17 @@ class _Drawing:
 
     def _original(self, made: Derivation, frame: FloatArray) -> None:
         """Put what the exemplar has at a site."""
-        motion = frame @ invert(self._grammar.rules[made.production].frame)
+        motion = frame @ invert(self._grammar.productions[made.production].frame)
         if not self._put(made.production, motion):
-            raise Collided
-        for place, part in zip(self._grammar.rules[made.production].places, made.parts, strict=True):
+            raise DerivationCollides
+        for place, part in zip(self._grammar.productions[made.production].non_terminals, made.parts, strict=True):
             self._original(part, motion @ place.frame)
 
     def _put(self, number: int, motion: FloatArray) -> bool:
         """Whether the terminal of a rule runs into nothing; then it stands there."""
-        rule = self._grammar.rules[number]
-        piece = Piece(rule.terminal, self._grammar.standing(rule.terminal, motion))
-        seams = [(place.site, motion @ place.frame) for place in rule.places]
+        rule = self._grammar.productions[number]
+        piece = PlacedTerminal(rule.terminal, self._grammar.standing(rule.terminal, motion))
+        seams = [(place.site, motion @ place.frame) for place in rule.non_terminals]
         if self._collisions.collides(piece, self._pieces, [*self._seams, *seams]):
             return False
         self._pieces.append(piece)

@@ -15,8 +15,8 @@ from stages.exemplars.formats.ply import read_ply_points
 from stages.exemplars.formats.scene import GREY
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import ReadLimits
-from stages.grammars.extraction.extract import Mesh, mesh_of
-from stages.grammars.scans.scanned_grid import Cloud
+from stages.grammars.extraction.extract import SurfaceMesh, model_surface
+from stages.grammars.scans.scanned_grid import ScannedCloud
 
 TABLES = {".xyz": None, ".xyzn": "normals", ".xyzrgb": "colours"}
 """Clouds as text, a point a line: x, y, z, and what else, colours from 0 to 1 (as Open3D writes them)."""
@@ -24,7 +24,9 @@ MESH = b""
 """What the child says of a PLY file with faces."""
 
 
-def read_surface(path: Path, limits: ReadLimits | None = None) -> tuple[Mesh | Cloud, Literal["y", "z"] | None]:
+def read_surface(
+    path: Path, limits: ReadLimits | None = None
+) -> tuple[SurfaceMesh | ScannedCloud, Literal["y", "z"] | None]:
     """The surface in a model file, all of it one mesh, or in a cloud; and the axis that the file says points up.
 
     Raises ConfigError as `read_model` and `read_cloud` do.
@@ -33,15 +35,15 @@ def read_surface(path: Path, limits: ReadLimits | None = None) -> tuple[Mesh | C
     if cloud is not None:
         return cloud, None
     model = read_model(path, "components", limits)
-    return mesh_of(model), model.up
+    return model_surface(model), model.up
 
 
-def is_cloud(path: Path, limits: ReadLimits | None = None) -> bool:
+def is_point_cloud(path: Path, limits: ReadLimits | None = None) -> bool:
     """Whether a file is a point cloud. Raises ConfigError as `read_cloud` does."""
     return path.suffix.lower() in TABLES or read_cloud(path, limits) is not None
 
 
-def read_cloud(path: Path, limits: ReadLimits | None = None) -> Cloud | None:
+def read_cloud(path: Path, limits: ReadLimits | None = None) -> ScannedCloud | None:
     """The cloud in a PLY file without faces, or a table of numbers; None for any other file.
 
     Raises ConfigError for a file that cannot be read as such. Which clouds are scans of a surface, `cloud_grid` says.
@@ -62,7 +64,7 @@ def read_cloud(path: Path, limits: ReadLimits | None = None) -> Cloud | None:
         return None
     with np.load(io.BytesIO(content), allow_pickle=False) as stored:
         normals = stored["normals"]
-        return Cloud(stored["points"], stored["colors"], normals if len(normals) else None)
+        return ScannedCloud(stored["points"], stored["colors"], normals if len(normals) else None)
 
 
 def _packed(path: Path) -> bytes:

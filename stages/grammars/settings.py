@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from pipeline.config import ExistingFile, StrictModel
 from stages.shape.collection.origin import Credit
 
-LEAST_RADIUS, LARGEST_RADIUS = 0.004, 0.1
+MIN_RADIUS_SHARE, MAX_RADIUS_SHARE = 0.004, 0.1
 """Of similarity, as shares of the longest side."""
 
 
@@ -29,8 +29,8 @@ class GrammarConfig(StrictModel):
     credit: Credit = Field(default_factory=Credit, exclude=True, description="Whose the model is.")
     radius: float = Field(
         0.016,
-        ge=LEAST_RADIUS,
-        le=LARGEST_RADIUS,
+        ge=MIN_RADIUS_SHARE,
+        le=MAX_RADIUS_SHARE,
         description="Radius of similarity, as a share of the longest side of the model's box: every neighbourhood of "
         "this size in a shape is one of the model's. Smaller finds more sites, and takes longer.",
     )
@@ -50,15 +50,15 @@ class GrammarConfig(StrictModel):
         le=1_000_000,
         description="Shapes by grids with other numbers of cells; those that look alike count once.",
     )
-    apart: float = Field(
+    min_difference: float = Field(
         0.05,
         ge=0,
         lt=1,
         description="Share of what one sees of a shape, its surface by voxels as wide as the radius, that must differ "
         "from the exemplar and from each shape drawn before. A grammar may give fewer shapes than are asked for.",
     )
-    most_cells: int = Field(12, ge=1, le=1000, description="Most cells along a row of a resized grid.")
-    most_pieces: int = Field(
+    max_cells: int = Field(12, ge=1, le=1000, description="Most cells along a row of a resized grid.")
+    max_pieces: int = Field(
         40, ge=1, le=400, description="After so many productions a random shape takes what the model has."
     )
 

@@ -60,7 +60,7 @@ def run_extraction(task: Task) -> Outcome:
     """Read a mesh or a cloud, find its grammar, write it. Raises ShardFailed for one in which nothing can be
     exchanged."""
     from stages.grammars.description import describe_grammar
-    from stages.grammars.extraction.extract import extract
+    from stages.grammars.extraction.extract import extract_grammar
     from stages.grammars.files import write_grammar
     from stages.grammars.picture import grammar_sheet
     from stages.grammars.read_surface import read_surface
@@ -69,10 +69,10 @@ def run_extraction(task: Task) -> Outcome:
     config = task.config.section(GrammarsConfig).models[names.index(task.shard.name)]
     surface, said = read_surface(config.model)
     up = config.up if config.up != "auto" else said or "y"
-    found = extract(surface, config.name, config.radius, up, task.rng("sets"), config.upright)
-    if len(found.grammar.rules) < 2 and not found.grammar.grids:
+    found = extract_grammar(surface, config.name, config.radius, up, task.rng("sets"), config.upright)
+    if len(found.grammar.productions) < 2 and not found.grammar.grids:
         raise ShardFailed(
-            f"{config.model}: nothing in it can be exchanged, for {found.motions} motions leave no docking site; set "
+            f"{config.model}: nothing in it can be exchanged, {found.transforms} leave no docking site; set "
             f"grammars.models[{config.name}].radius smaller, or take it by its parts: exemplars.kits"
         )
     described = describe_grammar(found)
@@ -84,10 +84,10 @@ def run_extraction(task: Task) -> Outcome:
         samples=0,
         summary={
             "made_of": f"{len(found.grammar.exemplar.faces):,} {found.grammar.made_of}",
-            "motions": found.motions,
-            "sites": len({each.site for each in found.dockers}),
-            "dockers": len(found.dockers),
-            "rules": len(found.grammar.rules),
+            "motions": found.transforms,
+            "sites": len({each.site for each in found.docked_pieces}),
+            "dockers": len(found.docked_pieces),
+            "rules": len(found.grammar.productions),
             "grids": [list(each.counts) for each in found.grammar.grids],
         },
     )
@@ -99,14 +99,14 @@ def run_drawing(task: Task) -> Outcome:
     Writes a file for each shard of the collection, `.<split>-<number>.jsonl`, one sample a line. Raises ShardFailed
     where there are no shapes.
     """
-    from stages.grammars.distinct_shapes import few
+    from stages.grammars.distinct_shapes import shortfall_message
 
     config = task.config.section(GrammarsConfig)
     rows: list[dict[str, Any]] = []
     for each in config.models:
         rows += _drawn(task, each, len(rows))
     if not rows:
-        raise ShardFailed("; ".join(few(each, 0) for each in config.models))
+        raise ShardFailed("; ".join(shortfall_message(each, 0) for each in config.models))
     groups: dict[str, list[int]] = {}
     for index, row in enumerate(rows):
         groups.setdefault(row["graph"], []).append(index)
@@ -128,16 +128,16 @@ def run_drawing(task: Task) -> Outcome:
 
 def _drawn(task: Task, config: GrammarConfig, first: int) -> list[dict[str, Any]]:
     """The shapes of one grammar as rows, `first` rows being there already."""
-    from stages.grammars.distinct_shapes import Variety, wanted
+    from stages.grammars.distinct_shapes import DistinctShapes, requested_counts
 
-    variety = Variety(
+    variety = DistinctShapes(
         input_grammars(task)[config.name],
         config,
         lambda *decision: task.rng(config.name, *decision),
         lambda reason: task.reject(config.name, reason),
     )
     rows: list[dict[str, Any]] = []
-    for method, most in wanted(config).items():
+    for method, most in requested_counts(config).items():
         for drawn in variety.shapes(method, most):
             rows.append(
                 {
@@ -169,7 +169,7 @@ def run_collection(task: Task) -> Outcome:
 
 def report(plan: Plan) -> Sequence[str]:
     """What each grammar has, how many shapes were drawn of it, why others were refused, and where there are no more."""
-    from stages.grammars.distinct_shapes import few
+    from stages.grammars.distinct_shapes import shortfall_message
 
     lines = []
     for name in grammar_shards(plan.config):
@@ -190,7 +190,7 @@ def report(plan: Plan) -> Sequence[str]:
         lines.append(f"shapes: {shapes}; refused: {why or 'none'}")
         for each in plan.config.section(GrammarsConfig).models:
             count = sum(made["shapes"][each.name].values())
-            lines += [f"warning: {few(each, count)}"] if count < each.instances + each.resized else []
+            lines += [f"warning: {shortfall_message(each, count)}"] if count < each.instances + each.resized else []
     lines += [f"warning: {sentence}" for sentence in unstated(mesh_origins(plan))]
     return lines
 

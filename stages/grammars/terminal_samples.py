@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from stages.grammars.bounded_cache import Recent
+from stages.grammars.bounded_cache import BoundedCache
 from stages.grammars.grammar import ShapeGrammar
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 from stages.symmetry.surface.clip import fragments
-from stages.symmetry.surface.grid import CELLS_A_RADIUS
+from stages.symmetry.surface.grid import CELLS_PER_RADIUS
 from stages.symmetry.surface.lattice import pack
 
 TILT = np.array([1.0, 1.0137, 1.0271])
@@ -27,7 +27,7 @@ BYTES_A_POINT = 72
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class SurfaceSamples:
     """Points of a mesh, float64 (n, 3), and its outward normals there, float64 (n, 3)."""
 
     points: FloatArray
@@ -46,30 +46,32 @@ class TerminalSamples:
 
     def __init__(self, grammar: ShapeGrammar) -> None:
         self._grammar = grammar
-        self._taken: Recent[int, Samples] = Recent(
-            lambda mesh: sampled(grammar.meshes[mesh], self.cell), lambda taken: BYTES_A_POINT * len(taken.points), HELD
+        self._taken: BoundedCache[int, SurfaceSamples] = BoundedCache(
+            lambda mesh: sample_surface(grammar.meshes[mesh], self.cell),
+            lambda taken: BYTES_A_POINT * len(taken.points),
+            HELD,
         )
 
     @property
     def cell(self) -> float:
         """The width of a cell of the lattice."""
-        return self._grammar.radius / CELLS_A_RADIUS
+        return self._grammar.radius / CELLS_PER_RADIUS
 
-    def __getitem__(self, mesh: int) -> Samples:
+    def __getitem__(self, mesh: int) -> SurfaceSamples:
         return self._taken[mesh]
 
 
-def sampled(part: PartMesh, size: float) -> Samples:
+def sample_surface(part: PartMesh, size: float) -> SurfaceSamples:
     """The samples of a mesh on a lattice of cells of this size."""
     corners = part.vertices[part.faces]
     ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = ways / np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
     where, owner, middles = fragments(corners, corners.min(axis=(0, 1)) - size / 3, size)
-    _, first = np.unique((pack(where) << FACING) + facing(normals)[owner], return_index=True)
-    return Samples(np.ascontiguousarray(middles[first, :3]), normals[owner[first]])
+    _, first = np.unique((pack(where) << FACING) + facing_axis(normals)[owner], return_index=True)
+    return SurfaceSamples(np.ascontiguousarray(middles[first, :3]), normals[owner[first]])
 
 
-def facing(normals: FloatArray) -> np.ndarray:
+def facing_axis(normals: FloatArray) -> np.ndarray:
     """Along which axis normals (n, 3) point most, int64 (n,): 0 to 2 along x, y, z, 3 to 5 against them."""
     axis = np.abs(normals * TILT).argmax(axis=1)
     found: np.ndarray = axis + 3 * (normals[np.arange(len(normals)), axis] < 0)

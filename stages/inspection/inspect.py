@@ -21,8 +21,8 @@ from stages.exemplars.read import read_model
 from stages.exemplars.scene_file import READERS
 from stages.exemplars.segmentation import Segmentation
 from stages.exemplars.settings import ContactConfig, KitConfig, ReadLimits, ShapeFile
-from stages.grammars.inspect import has_grammar, written_grammar
-from stages.grammars.read_surface import is_cloud
+from stages.grammars.inspect import may_have_grammar, write_grammar_report
+from stages.grammars.read_surface import is_point_cloud
 from stages.inspection.config_text import config_text, dataset_name, proportions_section, variations_section
 from stages.inspection.observation import describe_observation, observation_lines
 from stages.inspection.report import InspectionReport, inspect_models
@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> int:
     try:
         paths = [path for text in asked.models for path in _paths(text)]
         limits = _limits(asked)
-        if len(paths) == 1 and is_cloud(paths[0], limits):
+        if len(paths) == 1 and is_point_cloud(paths[0], limits):
             _show_cloud(asked, paths[0], limits)
             return 0
         models = [read_model(path, asked.parts, limits) for path in paths]
@@ -61,10 +61,10 @@ def main(arguments: list[str]) -> int:
         sys.stdout.flush()
         for title, path in _written(asked.out or FOLDER, paths, found):
             print(f"{title:<18} {path}")
-        if len(models) == 1 and has_grammar(models[0], asked.parts):
+        if len(models) == 1 and may_have_grammar(models[0], asked.parts):
             sys.stdout.flush()
             up, name = found.config.resolved().up, dataset_name(paths)
-            for title, said in written_grammar(asked.out or FOLDER, name, paths[0], up, limits):
+            for title, said in write_grammar_report(asked.out or FOLDER, name, paths[0], up, limits):
                 print(f"{title:<18} {said}")
     except ConfigError as error:
         print(error, file=sys.stderr)
@@ -74,7 +74,7 @@ def main(arguments: list[str]) -> int:
 
 def _show_cloud(asked: argparse.Namespace, path: Path, limits: ReadLimits) -> None:
     """Print what there is in a point cloud: no parts, but perhaps a grammar."""
-    found = written_grammar(asked.out or FOLDER, dataset_name([path]), path, asked.up or "y", limits)
+    found = write_grammar_report(asked.out or FOLDER, dataset_name([path]), path, asked.up or "y", limits)
     if asked.json:
         print(json.dumps({title: str(said) for title, said in found}, ensure_ascii=False))
         return

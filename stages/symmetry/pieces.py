@@ -8,12 +8,12 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
-from stages.symmetry.matching.equality import equal_soups
-from stages.symmetry.matching.repetitions import PART, Repetition, repetitions
-from stages.symmetry.rows import chunks_along, row_of
+from stages.symmetry.matching.equality import soups_match
+from stages.symmetry.matching.repetitions import PART, Repetition, find_repetitions
+from stages.symmetry.rows import chunks_along, find_row
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.grid import SurfaceGrid, surface_grid
-from stages.symmetry.surface.soup import Soup, carve, connected_soups, joined
+from stages.symmetry.surface.soup import Soup, carve, connected_soups, join_soups
 
 RADIUS = 0.016
 """Radius of similarity, as a share of the longest side of the model's box (symmetry §5)."""
@@ -34,7 +34,7 @@ CRUMB = 1e-7
 
 
 @dataclass(frozen=True)
-class Piece:
+class SurfacePiece:
     """A piece of the surface and everywhere it stands.
 
     triangles: in the world, where it stands at the identity; poses: rigid (4, 4), the identity first; strained: by what
@@ -46,7 +46,7 @@ class Piece:
     strained: float = 0.0
 
 
-def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[Piece]:
+def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[SurfacePiece]:
     """The pieces of a mesh, vertices (v, 3) and faces (f, 3): cut between copies of what repeats, those that are equal
     once with all their poses. One piece alone where nothing repeats.
 
@@ -57,7 +57,7 @@ def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[Piece]:
     corners = vertices[faces]
     grid = surface_grid(corners, RADIUS)
     whole = Soup(grid.corners, grid.faces)
-    pieces, cost = [Piece(whole, (np.eye(4),))], 1.0 + PART
+    pieces, cost = [SurfacePiece(whole, (np.eye(4),))], 1.0 + PART
     for turn in range(ROUNDS):
         left = max(
             (each for each in pieces if len(each.poses) == 1), key=lambda each: each.triangles.area, default=None
@@ -76,18 +76,18 @@ def repeated_pieces(vertices: FloatArray, faces: IntArray) -> list[Piece]:
     return [part for part in _parts(pieces, grid) if part.triangles.area > CRUMB * whole.area]
 
 
-def _grid_like(grid: SurfaceGrid, piece: Piece) -> SurfaceGrid:
+def _grid_like(grid: SurfaceGrid, piece: SurfacePiece) -> SurfaceGrid:
     """A grid of a piece alone, with cells as large as those of `grid`."""
     corners = piece.triangles.corners
     return surface_grid(corners, grid.radius / float(np.ptp(corners.reshape(-1, 3), axis=0).max()))
 
 
 def _searched(
-    left: Piece, others: list[Piece], grid: SurfaceGrid, whole: float, cost: float
-) -> tuple[list[Piece], float]:
+    left: SurfacePiece, others: list[SurfacePiece], grid: SurfaceGrid, whole: float, cost: float
+) -> tuple[list[SurfacePiece], float]:
     """`left` cut by what it repeats, with the other pieces, and what they all cost."""
     pieces = [left]
-    for each in repetitions(grid)[:TRIED]:
+    for each in find_repetitions(grid)[:TRIED]:
         cut = [part for piece in pieces for part in _cut(piece, grid, each)]
         every = [*others, *cut]
         price = sum(piece.triangles.area for piece in every) / whole + PART * sum(len(piece.poses) for piece in every)
@@ -96,36 +96,36 @@ def _searched(
     return [*others, *pieces], cost
 
 
-def _cut(piece: Piece, grid: SurfaceGrid, repetition: Repetition) -> list[Piece]:
+def _cut(piece: SurfacePiece, grid: SurfaceGrid, repetition: Repetition) -> list[SurfacePiece]:
     """A piece cut along the copies of a repetition; copies with one shape are one piece."""
     rest = piece.triangles
-    cut: list[tuple[Piece, FloatArray]] = []
+    cut: list[tuple[SurfacePiece, FloatArray]] = []
     for pose in repetition.poses:
         inside, rest = carve(rest, grid, repetition.band, pose)
         if repetition.ahead is not None:
             beyond, inside = carve(inside, grid, repetition.band, pose @ repetition.ahead)
-            rest = joined(rest, beyond)
+            rest = join_soups(rest, beyond)
         if inside.area <= CRUMB * grid.area.sum():
             continue
         for place, (known, first) in enumerate(cut):
             way = pose @ invert(first)
-            if equal_soups(known.triangles, inside, way, grid.tolerance):
-                cut[place] = Piece(known.triangles, (*known.poses, *(pose @ way for pose in piece.poses))), first
+            if soups_match(known.triangles, inside, way, grid.tolerance):
+                cut[place] = SurfacePiece(known.triangles, (*known.poses, *(pose @ way for pose in piece.poses))), first
                 break
         else:
-            cut.append((Piece(inside, piece.poses), pose))
+            cut.append((SurfacePiece(inside, piece.poses), pose))
     found = [each for each, _ in cut]
-    return [*found, Piece(rest, piece.poses)] if len(rest) else found
+    return [*found, SurfacePiece(rest, piece.poses)] if len(rest) else found
 
 
-def _with_what_runs_along(pieces: list[Piece], place: int, grid: SurfaceGrid) -> list[Piece]:
+def _with_what_runs_along(pieces: list[SurfacePiece], place: int, grid: SurfaceGrid) -> list[SurfacePiece]:
     """The pieces, where those at `place` make a row with what runs along it; all as they are where it has none, or not
     about the same at all copies.
 
     A cable beside a mast hangs as it likes: the chunk of the first copy stands for those that lie within a cell of it.
     """
     piece = pieces[place]
-    row = row_of(piece.poses, grid.tolerance)
+    row = find_row(piece.poses, grid.tolerance)
     if row is None:
         return pieces
     found = list(pieces)
@@ -136,17 +136,17 @@ def _with_what_runs_along(pieces: list[Piece], place: int, grid: SurfaceGrid) ->
         chunks, rest = chunks_along(piece.triangles, row, single.triangles, grid)
         first = chunks[0]
         if not len(first) or not all(
-            len(chunk) and equal_soups(first, chunk, pose, grid.size / 2, LOOSE)
+            len(chunk) and soups_match(first, chunk, pose, grid.cell_size / 2, LOOSE)
             for chunk, pose in zip(chunks, piece.poses, strict=True)
         ):
             continue
         strained = max(strained, *(abs(chunk.area / first.area - 1) for chunk in chunks))
-        gained, found[other] = joined(gained, first), Piece(rest, single.poses)
-    found[place] = Piece(gained, piece.poses, strained)
+        gained, found[other] = join_soups(gained, first), SurfacePiece(rest, single.poses)
+    found[place] = SurfacePiece(gained, piece.poses, strained)
     return found
 
 
-def _parts(pieces: list[Piece], grid: SurfaceGrid) -> list[Piece]:
+def _parts(pieces: list[SurfacePiece], grid: SurfaceGrid) -> list[SurfacePiece]:
     """Each piece as the pieces that do not touch each other, if they are large enough to be parts.
 
     What is smaller stays with the largest of them, but what lies between copies and is of no copy is left out: it would
@@ -159,11 +159,11 @@ def _parts(pieces: list[Piece], grid: SurfaceGrid) -> list[Piece]:
         for pose in each.poses
     ]
     beside = _cells(np.concatenate(copies).reshape(-1, 3, 3), grid) if copies else np.empty((0, 3))
-    found: list[Piece] = []
+    found: list[SurfacePiece] = []
     for piece in pieces:
         if not len(piece.triangles):
             continue
-        soups = sorted(connected_soups(piece.triangles, grid.origin, grid.size), key=lambda each: -each.area)
+        soups = sorted(connected_soups(piece.triangles, grid.origin, grid.cell_size), key=lambda each: -each.area)
         parts = [each for each in soups if each.area > SPLINTER * grid.area.sum()]
         if not parts and len(piece.poses) > 1:
             parts = soups[:1]
@@ -173,14 +173,14 @@ def _parts(pieces: list[Piece], grid: SurfaceGrid) -> list[Piece]:
         if not parts:
             parts, crumbs = crumbs[:1], crumbs[1:]
         for crumb in crumbs:
-            parts[0] = joined(parts[0], crumb)
-        found += [Piece(each, piece.poses, piece.strained) for each in parts]
+            parts[0] = join_soups(parts[0], crumb)
+        found += [SurfacePiece(each, piece.poses, piece.strained) for each in parts]
     return found
 
 
 def _cells(corners: FloatArray, grid: SurfaceGrid) -> np.ndarray:
     """The cells of triangles (t, 3, 3), int64 (n, 3)."""
-    return np.unique(fragments(corners, grid.origin, grid.size)[0], axis=0)
+    return np.unique(fragments(corners, grid.origin, grid.cell_size)[0], axis=0)
 
 
 def _near(cells: np.ndarray, others: np.ndarray) -> bool:

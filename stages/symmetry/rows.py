@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.exemplars.components import connected_faces
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
+from stages.shape.geometry.connected_faces import connected_faces
 from stages.shape.geometry.pose import rotation_angle
 from stages.symmetry.surface.grid import SurfaceGrid
-from stages.symmetry.surface.soup import Soup, joined
-from stages.symmetry.surface.welding import welded
+from stages.symmetry.surface.soup import Soup, join_soups
+from stages.symmetry.surface.welding import weld
 
 FEWEST = 3
 """So many copies make a row."""
@@ -22,7 +22,7 @@ SPANS = 2.0
 
 
 @dataclass(frozen=True)
-class Row:
+class CopyRow:
     """Copies that stand at multiples of a shift. way: float64 (3,), of length 1; step: how far apart neighbours stand;
     places: int64 (n,), of each copy the multiple."""
 
@@ -31,7 +31,7 @@ class Row:
     places: np.ndarray
 
 
-def row_of(poses: Sequence[FloatArray], tolerance: float) -> Row | None:
+def find_row(poses: Sequence[FloatArray], tolerance: float) -> CopyRow | None:
     """The row that poses (4, 4) make, which begin with the identity; None where they turn, stand on no line, or not at
     multiples of one step."""
     if len(poses) < FEWEST or (rotation_angle(np.array(poses)) > tolerance).any():
@@ -46,10 +46,10 @@ def row_of(poses: Sequence[FloatArray], tolerance: float) -> Row | None:
     places = np.round(along / step)
     if np.abs(along - places * step).max() > tolerance:
         return None
-    return Row(way, step, places.astype(np.int64))
+    return CopyRow(way, step, places.astype(np.int64))
 
 
-def chunks_along(copy: Soup, row: Row, rest: Soup, grid: SurfaceGrid) -> tuple[list[Soup], Soup]:
+def chunks_along(copy: Soup, row: CopyRow, rest: Soup, grid: SurfaceGrid) -> tuple[list[Soup], Soup]:
     """What of `rest` runs along a row, cut across it: a soup for each copy, where that copy stands, and what is left.
 
     `copy` is the one at place 0. Connected triangles count that are longer than some steps of the row and, seen along
@@ -77,14 +77,14 @@ def chunks_along(copy: Soup, row: Row, rest: Soup, grid: SurfaceGrid) -> tuple[l
     chunks = []
     for place in row.places.tolist():
         at = begin + place * row.step
-        before, after = cut_across(runner, row.way, at)
-        chunk, after = cut_across(after, row.way, at + row.step)
-        runner = joined(before, after)
+        before, after = cut_by_plane(runner, row.way, at)
+        chunk, after = cut_by_plane(after, row.way, at + row.step)
+        runner = join_soups(before, after)
         chunks.append(chunk)
-    return chunks, joined(left, runner)
+    return chunks, join_soups(left, runner)
 
 
-def cut_across(soup: Soup, normal: FloatArray, offset: float) -> tuple[Soup, Soup]:
+def cut_by_plane(soup: Soup, normal: FloatArray, offset: float) -> tuple[Soup, Soup]:
     """The triangles cut by the plane of points x with `normal` (3,) times x = `offset`: what lies below, and beyond."""
     height = soup.corners @ normal - offset
     above = height > 0
@@ -106,8 +106,8 @@ def cut_across(soup: Soup, normal: FloatArray, offset: float) -> tuple[Soup, Sou
     real = pieces.areas > 0
     whole: BoolArray = np.asarray((soup.corners @ normal > offset).all(axis=1))
     return (
-        joined(soup.select(~whole & ~crossing), pieces.select(real & ~beyond)),
-        joined(soup.select(whole), pieces.select(real & beyond)),
+        join_soups(soup.select(~whole & ~crossing), pieces.select(real & ~beyond)),
+        join_soups(soup.select(whole), pieces.select(real & beyond)),
     )
 
 
@@ -115,5 +115,5 @@ def _components(soup: Soup, tolerance: float) -> IntArray:
     """The connected component of each triangle, int32 (t,); corners closer than about `tolerance` are one."""
     if not len(soup):
         return np.empty(0, dtype=np.int32)
-    places, vertices = welded(soup.corners, tolerance)
+    places, vertices = weld(soup.corners, tolerance)
     return connected_faces(vertices, places, np.zeros(len(soup), dtype=np.int64))

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stages.grammars.extraction.extract import Extraction, Mesh, extract
-from stages.grammars.scans.scanned_grid import Cloud
+from stages.grammars.extraction.extract import ExtractedGrammar, SurfaceMesh, extract_grammar
+from stages.grammars.scans.scanned_grid import ScannedCloud
 from tests.bench.measure import Measure
 from tests.stages.grammars.scanned import scanned
 from tests.stages.symmetry.planted import mesh, wall
@@ -52,25 +52,25 @@ def _scan() -> tuple[int, float, str]:
     )
 
 
-def _told(found: Extraction) -> str:
-    sites = ", ".join(map(str, sorted(Counter(each.site for each in found.dockers).values(), reverse=True)))
+def _told(found: ExtractedGrammar) -> str:
+    sites = ", ".join(map(str, sorted(Counter(each.site for each in found.docked_pieces).values(), reverse=True)))
     grids = ", ".join(" x ".join(map(str, each.counts)) for each in found.grammar.grids)
     return (
-        f"{len(found.grid):,} cells, {found.motions} motions, {len(found.dockers)} dockers ({sites} a class), "
-        f"{len(found.grammar.rules)} rules, grids {grids}"
+        f"{len(found.grid):,} cells, {found.transforms} motions, {len(found.docked_pieces)} dockers ({sites} a class), "
+        f"{len(found.grammar.productions)} rules, grids {grids}"
     )
 
 
-def _extracted(surface: Mesh | Cloud, radius: float) -> Extraction:
-    return extract(surface, "bench", radius, "z", np.random.default_rng(0))
+def _extracted(surface: SurfaceMesh | ScannedCloud, radius: float) -> ExtractedGrammar:
+    return extract_grammar(surface, "bench", radius, "z", np.random.default_rng(0))
 
 
-def _surface(triangles: np.ndarray) -> Mesh:
+def _surface(triangles: np.ndarray) -> SurfaceMesh:
     vertices, faces = mesh(triangles)
-    return Mesh(vertices, faces, np.full((len(faces), 3), 160, np.uint8))
+    return SurfaceMesh(vertices, faces, np.full((len(faces), 3), 160, np.uint8))
 
 
-def _cloud(triangles: np.ndarray, count: int, radius: float) -> Cloud:
+def _cloud(triangles: np.ndarray, count: int, radius: float) -> ScannedCloud:
     cell = radius / 4 * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     points, _ = scanned(triangles, count, NOISE * cell, HOLES, HOLE * cell, np.random.default_rng(0))
-    return Cloud(points, np.full((len(points), 3), 160, np.uint8))
+    return ScannedCloud(points, np.full((len(points), 3), 160, np.uint8))

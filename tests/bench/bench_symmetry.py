@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from stages.exemplars.read import read_model
-from stages.grammars.extraction.extract import Mesh, extract, mesh_of
+from stages.grammars.extraction.extract import SurfaceMesh, extract_grammar, model_surface
 from stages.shape.arrays import FloatArray
-from stages.symmetry.surface.welding import welded
+from stages.symmetry.surface.welding import weld
 from tests.bench.measure import Measure
 from tests.stages.symmetry.planted import wall
 
@@ -46,48 +46,48 @@ def split(corners: FloatArray) -> FloatArray:
     return np.concatenate([*tips, middles])
 
 
-def _facade(steps: int) -> tuple[Mesh, str]:
+def _facade(steps: int) -> tuple[SurfaceMesh, str]:
     triangles = wall(5, 4)
     for _ in range(steps):
         triangles = split(triangles)
     return _grey(triangles), "z"
 
 
-def _subdivided(path: Path) -> tuple[Mesh, str]:
+def _subdivided(path: Path) -> tuple[SurfaceMesh, str]:
     model = read_model(path, "components")
-    triangles = mesh_of(model).corners
+    triangles = model_surface(model).corners
     while len(triangles) < LEAST:
         triangles = split(triangles)
     return _grey(triangles), model.up or "y"
 
 
-def _grey(triangles: FloatArray) -> Mesh:
-    faces, vertices = welded(triangles, 0.0)
-    return Mesh(vertices, faces, np.full((len(faces), 3), 160, np.uint8))
+def _grey(triangles: FloatArray) -> SurfaceMesh:
+    faces, vertices = weld(triangles, 0.0)
+    return SurfaceMesh(vertices, faces, np.full((len(faces), 3), 160, np.uint8))
 
 
 Found = tuple[int, float, str]
 
 
-def _alone(made: Callable[[], tuple[Mesh, str]]) -> Found:
+def _alone(made: Callable[[], tuple[SurfaceMesh, str]]) -> Found:
     """Triangles, CPU seconds and a note of the grammar of a mesh, made and searched in a process of its own."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(_grammar, (made,))
 
 
-def _grammar(made: Callable[[], tuple[Mesh, str]]) -> Found:
+def _grammar(made: Callable[[], tuple[SurfaceMesh, str]]) -> Found:
     small = _grey(wall(2))
-    extract(small, "warm", 0.05, "z", np.random.default_rng(0))
+    extract_grammar(small, "warm", 0.05, "z", np.random.default_rng(0))
     source, up = made()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()
-    found = extract(source, "bench", RADIUS, "z" if up == "z" else "y", np.random.default_rng(0))
+    found = extract_grammar(source, "bench", RADIUS, "z" if up == "z" else "y", np.random.default_rng(0))
     spent = time.process_time() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     parts = ", ".join(f"{name} {each:.1f}" for name, each in found.seconds.items())
     note = (
-        f"{len(source.faces):,} triangles in {spent:.1f} s ({parts}); {len(found.grid):,} cells, {found.motions} "
-        f"motions, {len(found.dockers)} dockers, {len(found.grammar.rules)} rules, {len(found.grammar.grids)} grids; "
+        f"{len(source.faces):,} triangles in {spent:.1f} s ({parts}); {len(found.grid):,} cells, {found.transforms} "
+        f"motions, {len(found.docked_pieces)} dockers,, {len(found.grammar.grids)} grids; "
         f"peak {peak / 1024:.0f} MiB, {before / 1024:.0f} before"
     )
     return len(source.faces), spent, note

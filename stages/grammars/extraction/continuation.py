@@ -6,8 +6,8 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
-from stages.symmetry.matching.cell_lookup import among, items_in
-from stages.symmetry.matching.docking_sites import regions_of
+from stages.symmetry.matching.cell_lookup import is_among, items_in
+from stages.symmetry.matching.docking_sites import connected_regions
 from stages.symmetry.matching.r_symmetry import cells_within, matched_items
 from stages.symmetry.surface.grid import SurfaceGrid
 
@@ -32,14 +32,14 @@ def corner_cells(grid: SurfaceGrid) -> IntArray:
     return np.flatnonzero(values[:, 0] > HELD * values[:, 2]).astype(np.int32)
 
 
-def carries_corners(grid: SurfaceGrid, corners: IntArray, motion: FloatArray) -> bool:
+def maps_enough_corners(grid: SurfaceGrid, corners: IntArray, motion: FloatArray) -> bool:
     """Whether a rigid motion (4, 4) carries as many of the `corner_cells` onto the surface as a candidate must."""
     items = items_in(grid, corners)
     lost = np.unique(grid.item_cell[items[~matched_items(grid, motion, items)]])
     return len(corners) - len(lost) >= CORNERS
 
 
-def parted_at(grid: SurfaceGrid, cells: IntArray, border: IntArray, motion: FloatArray) -> IntArray | None:
+def separated_cells(grid: SurfaceGrid, cells: IntArray, border: IntArray, motion: FloatArray) -> IntArray | None:
     """The cells that a docking site parts from the rest where a rigid motion (4, 4) takes it, int32 ascending; None
     where it parts nothing there.
 
@@ -49,13 +49,13 @@ def parted_at(grid: SurfaceGrid, cells: IntArray, border: IntArray, motion: Floa
     from scipy.spatial import KDTree
 
     band = cells_within(grid, border, BAND)
-    inside = among(cells, band)
-    middles = grid.origin + (grid.cells + 0.5) * grid.size
-    back = (transform_points(invert(motion), middles) - grid.origin) / grid.size - 0.5
+    inside = is_among(cells, band)
+    middles = grid.origin + (grid.cells + 0.5) * grid.cell_size
+    back = (transform_points(invert(motion), middles) - grid.origin) / grid.cell_size - 0.5
     _, nearest = KDTree(grid.cells[band]).query(back, distance_upper_bound=REACH)
     within, beyond = np.r_[inside, False][nearest], np.r_[~inside, False][nearest]
     docker = within.copy()
-    for region in regions_of(grid, ~(within | beyond)):
+    for region in connected_regions(grid, ~(within | beyond)):
         around = grid.neighbours[region]
         around = around[around >= 0]
         if within[around].any():

@@ -10,19 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from stages.grammars.extraction.continuation import carries_corners, corner_cells, parted_at
-from stages.grammars.extraction.seams import stands, widened
+from stages.grammars.extraction.continuation import corner_cells, maps_enough_corners, separated_cells
+from stages.grammars.extraction.seams import cells_within_steps, surface_recurs
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, rotation_angle, transform_points
 from stages.symmetry.matching.docking_sites import (
     DockingSite,
     OperationKind,
-    docking_sites,
+    count_slippable_motions,
+    find_docking_sites,
     operation_kind,
-    slippable_motions,
 )
-from stages.symmetry.matching.r_symmetry import cells_within, eroded_twice, mutual, symmetric_cells
-from stages.symmetry.surface.grid import CELLS_A_RADIUS, SurfaceGrid
+from stages.symmetry.matching.r_symmetry import (
+    cells_within,
+    erode_cells_twice,
+    mutually_symmetric_cells,
+    symmetric_cells,
+)
+from stages.symmetry.surface.grid import CELLS_PER_RADIUS, SurfaceGrid
 
 SLIPPERY = 3
 """A site that slips in so many ways lies on a plane or a sphere, where a docker could stand anywhere."""
@@ -44,7 +49,7 @@ UNDOES: dict[OperationKind, OperationKind] = {"insert": "delete", "delete": "ins
 
 
 @dataclass(frozen=True)
-class Docker:
+class DockedPiece:
     """A piece of the surface that a docking site parts from the rest.
 
     cells: int32, ascending; border: int32, the cells around it, all r-symmetric under the motion that it was found by.
@@ -61,7 +66,7 @@ class Docker:
     ways: tuple[tuple[int, FloatArray], ...] = ()
 
 
-def dockers_of(grid: SurfaceGrid, motions: FloatArray) -> list[Docker]:
+def find_docked_pieces(grid: SurfaceGrid, motions: FloatArray) -> list[DockedPiece]:
     """The dockers of the elementary docking sites of rigid motions (m, 4, 4) and their inverses, each once, those of a
     class of sites together and the smallest first.
 
@@ -76,9 +81,11 @@ def dockers_of(grid: SurfaceGrid, motions: FloatArray) -> list[Docker]:
     ends: list[tuple[int, int, OperationKind]] = []
     both = np.stack([each for one in motions for each in (one, invert(one))])
     for number, motion in enumerate(motions):
-        forth, back = (eroded_twice(grid, each, BEYOND) for each in symmetric_cells(grid, motion))
+        forth, back = (erode_cells_twice(grid, each, BEYOND) for each in symmetric_cells(grid, motion))
         kept += [forth[0], back[0]]
-        for site, primary, secondary in _of_motion(grid, motion, *mutual(grid, motion, forth[1], back[1])):
+        for site, primary, secondary in _of_motion(
+            grid, motion, *mutually_symmetric_cells(grid, motion, forth[1], back[1])
+        ):
             first, last = found.place_of(primary), found.place_of(secondary)
             if first is None or last is None or site.kind == "replace":
                 continue
@@ -87,47 +94,47 @@ def dockers_of(grid: SurfaceGrid, motions: FloatArray) -> list[Docker]:
     for end, way, kind in ends:
         at: int | None = end
         whole = both[way]  # from the other docker of the site, and on to the next
-        while at is not None and carries_corners(grid, corners, whole := both[way] @ whole):
+        while at is not None and maps_enough_corners(grid, corners, whole := both[way] @ whole):
             docker = _next_in_row(grid, found.sites[at], both[way], kept[way], kind)
             at = None if docker is None else found.place_of(docker)
     return _identified(grid, found.sites, both, kept)
 
 
-def beside(grid: SurfaceGrid, cells: np.ndarray) -> IntArray:
+def surrounding_cells(grid: SurfaceGrid, cells: np.ndarray) -> IntArray:
     """The cells around `cells`, int32, ascending."""
-    around = widened(grid, cells, 1)
+    around = cells_within_steps(grid, cells, 1)
     around[cells] = False
     return np.flatnonzero(around).astype(np.int32)
 
 
 def _of_motion(
     grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray
-) -> Iterator[tuple[DockingSite, Docker, Docker]]:
+) -> Iterator[tuple[DockingSite, DockedPiece, DockedPiece]]:
     """The elementary docking sites of a motion, each with its primary and its secondary docker."""
-    for site in docking_sites(grid, motion, kept, kept_back):
+    for site in find_docking_sites(grid, motion, kept, kept_back):
         if site.slips >= SLIPPERY:
             continue
         pair = _docker(grid, site.primary), _docker(grid, site.secondary)
         # a site whose dockers are the same piece on both sides changes nothing; one without a border parts nothing
         if min(each.area for each in pair) < LEAST or not all(len(each.border) for each in pair):
             continue
-        if all(slippable_motions(grid, each.border) < SLIPPERY for each in pair):
+        if all(count_slippable_motions(grid, each.border) < SLIPPERY for each in pair):
             yield site, *pair
 
 
-def _docker(grid: SurfaceGrid, cells: IntArray) -> Docker:
-    return Docker(cells, beside(grid, cells), float(grid.area[cells].sum() / grid.area.sum()))
+def _docker(grid: SurfaceGrid, cells: IntArray) -> DockedPiece:
+    return DockedPiece(cells, surrounding_cells(grid, cells), float(grid.area[cells].sum() / grid.area.sum()))
 
 
 def _next_in_row(
     grid: SurfaceGrid, site: _Site, motion: FloatArray, symmetric: BoolArray, kind: OperationKind
-) -> Docker | None:
+) -> DockedPiece | None:
     """What a site parts where a motion (4, 4) takes it, if all around it is r-symmetric under that and it takes the
     place of the docker as `kind` says: in a row always with a cell more, or always with one less."""
     docker = site.docker
     if symmetric[docker.border].mean() < grid.agreement:
         return None
-    cells = parted_at(grid, docker.cells, docker.border, motion)
+    cells = separated_cells(grid, docker.cells, docker.border, motion)
     if cells is None or operation_kind(docker.cells, cells, grid.slack) != kind:
         return None
     after = _docker(grid, cells)
@@ -143,7 +150,7 @@ class _Sites:
         self.sites: list[_Site] = []
         self._grid = grid
 
-    def place_of(self, docker: Docker) -> int | None:
+    def place_of(self, docker: DockedPiece) -> int | None:
         """Where the site of a docker is among them, put there if it is new; None where there is no room."""
         site = _Site(self._grid, docker)
         for place, each in enumerate(self.sites):
@@ -158,7 +165,7 @@ class _Sites:
 class _Site:
     """The cells of a site, and those of its docker along it, as points to compare."""
 
-    def __init__(self, grid: SurfaceGrid, docker: Docker) -> None:
+    def __init__(self, grid: SurfaceGrid, docker: DockedPiece) -> None:
         self.docker = docker
         self._grid = grid
         self.around = _centres(grid, docker.border)
@@ -175,7 +182,7 @@ class _Site:
     def rim(self) -> FloatArray:
         """Middles of the docker's cells within the radius of the site, float64 (m, 3): those right beside it would lie
         near those on its other side."""
-        near = widened(self._grid, self.docker.border, CELLS_A_RADIUS)[self.docker.cells]
+        near = cells_within_steps(self._grid, self.docker.border, CELLS_PER_RADIUS)[self.docker.cells]
         return _centres(self._grid, self.docker.cells[near])
 
     @cached_property
@@ -189,7 +196,7 @@ class _Site:
         """Whether a motion takes this site to another one, with the docker on the same side."""
         from scipy.spatial import KDTree
 
-        most = APART * self._grid.size
+        most = APART * self._grid.cell_size
         here = transform_points(motion, self.around)
         for end, there in ((here.min(axis=0), other.around.min(axis=0)), (here.max(axis=0), other.around.max(axis=0))):
             if (np.abs(end - there) > most).any():
@@ -204,11 +211,11 @@ class _Site:
 
 
 def _centres(grid: SurfaceGrid, cells: IntArray) -> FloatArray:
-    found: FloatArray = grid.origin + (grid.cells[cells] + 0.5) * grid.size
+    found: FloatArray = grid.origin + (grid.cells[cells] + 0.5) * grid.cell_size
     return found
 
 
-def _identified(grid: SurfaceGrid, sites: list[_Site], motions: FloatArray, kept: list[BoolArray]) -> list[Docker]:
+def _identified(grid: SurfaceGrid, sites: list[_Site], motions: FloatArray, kept: list[BoolArray]) -> list[DockedPiece]:
     """The dockers with their classes of sites, each class from its first docker on by motions that take one to the
     next."""
     found = [each.docker for each in sites]
@@ -219,7 +226,7 @@ def _identified(grid: SurfaceGrid, sites: list[_Site], motions: FloatArray, kept
             if symmetric[docker.border].mean() < grid.agreement:
                 continue
             away = np.linalg.norm(middles - transform_points(motion, middles[one]), axis=1)
-            for other in np.flatnonzero(away <= 2 * APART * grid.size).tolist():
+            for other in np.flatnonzero(away <= 2 * APART * grid.cell_size).tolist():
                 if other != one and sites[one].lies_on(sites[other], motion):
                     ways[one].append((other, motion))
                     ways[other].append((one, invert(motion)))
@@ -229,11 +236,11 @@ def _identified(grid: SurfaceGrid, sites: list[_Site], motions: FloatArray, kept
         if first in frames:
             continue
         # a site that is symmetric in itself is reached in several ways: by those that turn least
-        around = cells_within(grid, found[first].border, grid.radius / grid.size)
+        around = cells_within(grid, found[first].border, grid.radius / grid.cell_size)
         waiting: list[tuple[float, int, int, FloatArray]] = [(0.0, 0, first, np.eye(4))]
         while waiting:
             turned, _, place, frame = heapq.heappop(waiting)
-            if place in frames or (place != first and not stands(grid, around, frame)):
+            if place in frames or (place != first and not surface_recurs(grid, around, frame)):
                 continue
             frames[place] = (site, frame)
             for other, motion in ways[place]:

@@ -11,21 +11,21 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model
-from stages.grammars.extraction.docked_pieces import Docker, dockers_of
-from stages.grammars.extraction.grids import Row, crossing, cut_grid, rows_of
-from stages.grammars.extraction.productions import productions, seams_of
+from stages.grammars.extraction.docked_pieces import DockedPiece, find_docked_pieces
+from stages.grammars.extraction.grids import GridRow, crossing_rows, cut_grid, find_rows
+from stages.grammars.extraction.productions import extract_productions, seams_by_site
 from stages.grammars.extraction.seams import Seam
-from stages.grammars.extraction.terminals import Terminal, alone
-from stages.grammars.grammar import GridRule, Rule, ShapeGrammar, site_name
+from stages.grammars.extraction.terminals import Terminal, unshared_terminal
+from stages.grammars.grammar import Grid, Production, ShapeGrammar, site_name
 from stages.grammars.scans.ridge_frames import ridge_frames
-from stages.grammars.scans.scanned_grid import Cloud, cloud_grid
-from stages.grammars.terminal_meshes import TerminalMeshes, part_around
+from stages.grammars.scans.scanned_grid import ScannedCloud, scanned_grid
+from stages.grammars.terminal_meshes import TerminalMeshes, centred_part
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
-from stages.symmetry.matching.candidate_transforms import candidate_motions
+from stages.symmetry.matching.candidate_transforms import candidate_transforms
 from stages.symmetry.surface.corner_frames import CornerFrames, corner_frames
-from stages.symmetry.surface.grid import SurfaceGrid, surface_grid, with_area
-from stages.symmetry.surface.welding import welded
+from stages.symmetry.surface.grid import SurfaceGrid, has_area, surface_grid
+from stages.symmetry.surface.welding import weld
 
 MOTIONS = 24
 """So many motions are looked at, of a grid of many cells fewer."""
@@ -36,7 +36,7 @@ WELDED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class SurfaceMesh:
     """A mesh: vertices float64 (v, 3), faces int32 (f, 3), face colours uint8 (f, 3) sRGB."""
 
     vertices: FloatArray
@@ -51,39 +51,39 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False)
-class Extraction:
+class ExtractedGrammar:
     """A grammar, and what it was made of, in the cells of a grid. motions: how many; seconds: CPU seconds of surface,
     motions, dockers, grids and productions, by name."""
 
     grammar: ShapeGrammar
     grid: SurfaceGrid
-    motions: int
-    dockers: Sequence[Docker]
+    transforms: int
+    docked_pieces: Sequence[DockedPiece]
     seams: dict[int, Seam]
-    rows: Sequence[Row]
+    rows: Sequence[GridRow]
     seconds: dict[str, float]
 
 
-def mesh_of(model: Model) -> Mesh:
+def model_surface(model: Model) -> SurfaceMesh:
     """All parts of a model where they stand, as one mesh."""
     vertices = [transform_points(each.pose, each.vertices) for each in model.parts]
     shifts = np.cumsum([0, *(len(each) for each in vertices[:-1])])
     faces = [each.faces + shift for each, shift in zip(model.parts, shifts, strict=True)]
-    return Mesh(
+    return SurfaceMesh(
         np.concatenate(vertices),
         np.concatenate(faces).astype(np.int32),
         np.concatenate([each.face_colors for each in model.parts]),
     )
 
 
-def extract(
-    surface: Mesh | Cloud,
+def extract_grammar(
+    surface: SurfaceMesh | ScannedCloud,
     name: str,
     radius: float,
     up: Literal["y", "z"],
     rng: np.random.Generator,
     upright: bool = True,
-) -> Extraction:
+) -> ExtractedGrammar:
     """The grammar of a surface for a radius of similarity, as a share of the longest side of its box. That of a cloud
     is made of splats, a triangle for each point, which are never cut.
 
@@ -101,18 +101,18 @@ def extract(
     grid, frames = _gridded(surface, name, radius)
     passed("surface")
     axis = np.eye(3)[{"y": 1, "z": 2}[up]] if upright else None
-    motions = candidate_motions(grid, min(MOTIONS, max(1, WORK // len(grid))), axis, frames)
+    motions = candidate_transforms(grid, min(MOTIONS, max(1, WORK // len(grid))), axis, frames)
     passed("motions")
-    dockers = dockers_of(grid, motions)
-    seams = seams_of(grid, dockers)
+    dockers = find_docked_pieces(grid, motions)
+    seams = seams_by_site(grid, dockers)
     passed("dockers")
-    rows = rows_of(grid, dockers, seams)
+    rows = find_rows(grid, dockers, seams)
     grids = [
-        cut_grid(grid, dockers, [rows[each] for each in chosen], seams) for chosen in crossing(grid, dockers, rows)
+        cut_grid(grid, dockers, [rows[each] for each in chosen], seams) for chosen in crossing_rows(grid, dockers, rows)
     ]
     passed("grids")
-    found, pieces = productions(grid, dockers, seams, rng)
-    passed("productions")
+    found, pieces = extract_productions(grid, dockers, seams, rng)
+    passed("extract_productions")
     terminals: list[tuple[str, Terminal]] = []
 
     def kept(name: str, terminal: Terminal) -> int:
@@ -123,39 +123,42 @@ def extract(
     for each in found:
         called = f"{site_name(each.site)}{counted[each.site]}"
         counted[each.site] += 1
-        rules.append(Rule(called, each.site, each.frame, kept(called, each.terminal), each.places))
+        rules.append(Production(called, each.site, each.frame, kept(called, each.terminal), each.non_terminals))
     grid_rules = []
     for number, one in enumerate(grids):
-        cut = [(kept(f"G{number}-{'-'.join(map(str, where))}", alone(soup)), where) for where, soup in one.pieces]
-        grid_rules.append(GridRule(f"G{number}", one.motions, one.counts, one.sites, one.frames, tuple(cut)))
+        cut = [
+            (kept(f"G{number}-{'-'.join(map(str, where))}", unshared_terminal(soup)), where)
+            for where, soup in one.pieces
+        ]
+        grid_rules.append(Grid(f"G{number}", one.transforms, one.counts, one.sites, one.frames, tuple(cut)))
     colors = surface.colors[grid.faces]
-    meshes = TerminalMeshes(grid.corners, pieces, colors, terminals, WELDED * grid.size)
-    faces, vertices = welded(grid.corners, 0.0)
+    meshes = TerminalMeshes(grid.corners, pieces, colors, terminals, WELDED * grid.cell_size)
+    faces, vertices = weld(grid.corners, 0.0)
     grammar = ShapeGrammar(
         name=name,
         up=up,
         radius=grid.radius,
         meshes=meshes,
         middles=meshes.middles,
-        rules=tuple(rules),
+        productions=tuple(rules),
         grids=tuple(grid_rules),
-        seams={site: grid.origin + (grid.cells[each.band] + 0.5) * grid.size for site, each in seams.items()},
-        exemplar=part_around(np.zeros(3), "exemplar", faces, vertices, colors),
+        seams={site: grid.origin + (grid.cells[each.band] + 0.5) * grid.cell_size for site, each in seams.items()},
+        exemplar=centred_part(np.zeros(3), "exemplar", faces, vertices, colors),
         splats=grid.splats,
     )
-    return Extraction(grammar, grid, len(motions), dockers, seams, rows, seconds)
+    return ExtractedGrammar(grammar, grid, len(motions), dockers, seams, rows, seconds)
 
 
-def _gridded(surface: Mesh | Cloud, name: str, radius: float) -> tuple[SurfaceGrid, CornerFrames]:
+def _gridded(surface: SurfaceMesh | ScannedCloud, name: str, radius: float) -> tuple[SurfaceGrid, CornerFrames]:
     """The grid of a surface, and the frames in its corners."""
-    if isinstance(surface, Cloud):
+    if isinstance(surface, ScannedCloud):
         try:
-            scan = cloud_grid(surface, radius)
+            scan = scanned_grid(surface, radius)
         except ConfigError as error:
             raise ConfigError(f"{name}: {error}") from None
         return scan.grid, ridge_frames(scan)
     corners = surface.corners
-    if not with_area(corners).any():
+    if not has_area(corners).any():
         raise ConfigError(f"{name}: no triangle has any area; export the model again, with its surfaces")
     grid = surface_grid(corners, radius)
     return grid, corner_frames(grid.corners, grid.tolerance)

@@ -8,11 +8,11 @@ from itertools import combinations
 
 import numpy as np
 
-from stages.grammars.extraction.docked_pieces import Docker
-from stages.grammars.extraction.seams import Seam, cut_out, stands, widened
+from stages.grammars.extraction.docked_pieces import DockedPiece
+from stages.grammars.extraction.seams import Seam, cells_within_steps, cut_out, surface_recurs
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.pose import rotation_angle, transform_points
-from stages.symmetry.matching.cell_lookup import among
+from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.soup import Soup
 
@@ -27,23 +27,23 @@ TILED = 0.99
 
 
 @dataclass(frozen=True)
-class Row:
+class GridRow:
     """A 1-grid: dockers of one class, each in the one before it, that one motion takes each to the next.
 
     dockers: places among the dockers of the exemplar, the largest first; motion: rigid (4, 4).
     """
 
-    dockers: tuple[int, ...]
-    motion: FloatArray
+    docked_pieces: tuple[int, ...]
+    transform: FloatArray
 
     @property
     def count(self) -> int:
         """How often the exemplar has the cell."""
-        return len(self.dockers) - 1
+        return len(self.docked_pieces) - 1
 
 
 @dataclass(frozen=True)
-class Grid:
+class ExtractedGrid:
     """Rows that cross, and the pieces that they cut the exemplar into, up to 3^k of them.
 
     motions: float64 (k, 4, 4), which commute; counts: of the exemplar; sites: of each row the class of its sites, and
@@ -51,55 +51,60 @@ class Grid:
     the surface's triangles, as the exemplar has them first along all rows.
     """
 
-    motions: FloatArray
+    transforms: FloatArray
     counts: tuple[int, ...]
     sites: tuple[int, ...]
     frames: FloatArray
     pieces: tuple[tuple[tuple[int, ...], Soup], ...]
 
 
-def rows_of(grid: SurfaceGrid, dockers: Sequence[Docker], seams: dict[int, Seam]) -> list[Row]:
+def find_rows(grid: SurfaceGrid, dockers: Sequence[DockedPiece], seams: dict[int, Seam]) -> list[GridRow]:
     """The 1-grids among dockers, those of most cells first: chains of insertions that undo deletions.
 
     A docker holds another of its class, and the motion from site to site goes on. What is the same row from its other
     end, or the row at a multiple of its motion, is left out.
     """
-    middles = [grid.origin + (grid.cells[each.border].mean(axis=0) + 0.5) * grid.size for each in dockers]
+    middles = [grid.origin + (grid.cells[each.border].mean(axis=0) + 0.5) * grid.cell_size for each in dockers]
     steps: dict[int, list[tuple[int, FloatArray]]] = {}
     for one, docker in enumerate(dockers):
         within = np.zeros(len(grid), dtype=bool)
         within[docker.cells] = True
         for other, motion in docker.ways:
             held = dockers[other]
-            if held.area < docker.area - LEAST and not (widened(grid, held.cells, ROOM) & ~within).any():
+            if held.area < docker.area - LEAST and not (cells_within_steps(grid, held.cells, ROOM) & ~within).any():
                 steps.setdefault(one, []).append((other, motion))
-    found: list[Row] = []
+    found: list[GridRow] = []
     for one, ways in steps.items():
         for other, motion in ways:
             chain, place = [one, other], other
-            while (after := _next(steps.get(place, []), motion, middles[place], grid.size)) is not None:
+            while (after := _next(steps.get(place, []), motion, middles[place], grid.cell_size)) is not None:
                 chain.append(after)
                 place = after
             first = _frames(dockers[one].frame, motion, len(chain))
-            if all(stands(grid, seams[dockers[one].site].band, frame) for frame in first[1:]):
-                found.append(Row(tuple(chain), motion))
+            if all(surface_recurs(grid, seams[dockers[one].site].band, frame) for frame in first[1:]):
+                found.append(GridRow(tuple(chain), motion))
     cells = [_cells(dockers, each) for each in found]
     areas = [float(grid.area[each].sum()) for each in cells]
     order = sorted(
         range(len(found)),
-        key=lambda n: (-found[n].count, round(float(rotation_angle(found[n].motion)), 3), -areas[n], found[n].dockers),
+        key=lambda n: (
+            -found[n].count,
+            round(float(rotation_angle(found[n].transform)), 3),
+            -areas[n],
+            found[n].docked_pieces,
+        ),
     )
     kept: list[int] = []
     for new in order:
         if all(
-            grid.area[cells[new][among(cells[old], cells[new])]].sum() < SAME * min(areas[new], areas[old])
+            grid.area[cells[new][is_among(cells[old], cells[new])]].sum() < SAME * min(areas[new], areas[old])
             for old in kept
         ):
             kept.append(new)
     return [found[each] for each in kept]
 
 
-def crossing(grid: SurfaceGrid, dockers: Sequence[Docker], rows: Sequence[Row]) -> list[tuple[int, ...]]:
+def crossing_rows(grid: SurfaceGrid, dockers: Sequence[DockedPiece], rows: Sequence[GridRow]) -> list[tuple[int, ...]]:
     """The sets of rows that make grids of as many degrees of freedom as there can be, each as places among `rows`: rows
     that cross nothing alone."""
     fits = np.zeros((len(rows), len(rows)), dtype=bool)
@@ -116,15 +121,17 @@ def crossing(grid: SurfaceGrid, dockers: Sequence[Docker], rows: Sequence[Row]) 
     return found
 
 
-def cut_grid(grid: SurfaceGrid, dockers: Sequence[Docker], rows: Sequence[Row], seams: dict[int, Seam]) -> Grid:
+def cut_grid(
+    grid: SurfaceGrid, dockers: Sequence[DockedPiece], rows: Sequence[GridRow], seams: dict[int, Seam]
+) -> ExtractedGrid:
     """The pieces of a grid of rows that cross: what all of them cut the exemplar into, a cell of each row once."""
     pieces: list[tuple[tuple[int, ...], Soup]] = [
         ((), Soup(grid.corners, np.arange(len(grid.corners), dtype=np.int32)))
     ]
     for row in rows:
-        held = [dockers[row.dockers[place]].cells for place in (0, 1, -1)]
-        frames = _frames(dockers[row.dockers[0]].frame, row.motion, len(row.dockers))
-        seam = seams[dockers[row.dockers[0]].site]
+        held = [dockers[row.docked_pieces[place]].cells for place in (0, 1, -1)]
+        frames = _frames(dockers[row.docked_pieces[0]].frame, row.transform, len(row.docked_pieces))
+        seam = seams[dockers[row.docked_pieces[0]].site]
         cut = []
         for where, soup in pieces:
             inside, rest = cut_out(soup, grid, held[0], frames[0], seam)
@@ -132,9 +139,9 @@ def cut_grid(grid: SurfaceGrid, dockers: Sequence[Docker], rows: Sequence[Row], 
             end, _ = cut_out(inside, grid, held[2], frames[-1], seam)
             cut += [((*where, place), each) for place, each in enumerate((rest, cell, end)) if len(each)]
         pieces = cut
-    first = [dockers[each.dockers[0]] for each in rows]
-    return Grid(
-        motions=np.array([each.motion for each in rows]),
+    first = [dockers[each.docked_pieces[0]] for each in rows]
+    return ExtractedGrid(
+        transforms=np.array([each.transform for each in rows]),
         counts=tuple(each.count for each in rows),
         sites=tuple(each.site for each in first),
         frames=np.array([each.frame for each in first]),
@@ -159,50 +166,55 @@ def _next(ways: Sequence[tuple[int, FloatArray]], motion: FloatArray, middle: Fl
     return None
 
 
-def _cells(dockers: Sequence[Docker], row: Row) -> IntArray:
+def _cells(dockers: Sequence[DockedPiece], row: GridRow) -> IntArray:
     """The cells between the first docker of a row and its last."""
-    held = dockers[row.dockers[0]].cells
-    found: IntArray = held[~among(dockers[row.dockers[-1]].cells, held)]
+    held = dockers[row.docked_pieces[0]].cells
+    found: IntArray = held[~is_among(dockers[row.docked_pieces[-1]].cells, held)]
     return found
 
 
-def _labels(grid: SurfaceGrid, dockers: Sequence[Docker], row: Row) -> IntArray:
+def _labels(grid: SurfaceGrid, dockers: Sequence[DockedPiece], row: GridRow) -> IntArray:
     """How many dockers of a row each cell is in, int32 (n,)."""
     labels = np.zeros(len(grid), dtype=np.int32)
-    for each in row.dockers:
+    for each in row.docked_pieces:
         labels[dockers[each].cells] += 1
     return labels
 
 
 def _tile(
-    grid: SurfaceGrid, dockers: Sequence[Docker], rows: Sequence[Row], labels: Sequence[IntArray], one: int, other: int
+    grid: SurfaceGrid,
+    dockers: Sequence[DockedPiece],
+    rows: Sequence[GridRow],
+    labels: Sequence[IntArray],
+    one: int,
+    other: int,
 ) -> bool:
     """Whether two rows make a 2-grid: their cells overlap, their motions commute, and each motion takes what the other
     row parts to what it parts in the same way, borders of cells too."""
     shared = _cells(dockers, rows[one])
-    shared = shared[among(_cells(dockers, rows[other]), shared)]
+    shared = shared[is_among(_cells(dockers, rows[other]), shared)]
     if not len(shared):
         return False
-    points = grid.origin + (grid.cells[shared] + 0.5) * grid.size
-    forth = transform_points(rows[one].motion @ rows[other].motion, points)
-    if np.abs(forth - transform_points(rows[other].motion @ rows[one].motion, points)).max() > grid.size:
+    points = grid.origin + (grid.cells[shared] + 0.5) * grid.cell_size
+    forth = transform_points(rows[one].transform @ rows[other].transform, points)
+    if np.abs(forth - transform_points(rows[other].transform @ rows[one].transform, points)).max() > grid.cell_size:
         return False
     return _keeps(grid, dockers, rows[one], labels[one], labels[other]) and _keeps(
         grid, dockers, rows[other], labels[other], labels[one]
     )
 
 
-def _keeps(grid: SurfaceGrid, dockers: Sequence[Docker], row: Row, own: IntArray, other: IntArray) -> bool:
+def _keeps(grid: SurfaceGrid, dockers: Sequence[DockedPiece], row: GridRow, own: IntArray, other: IntArray) -> bool:
     """Whether the motion of a row takes each cell of it, and the borders of these, to the next, in the same places of
     another row."""
     inner = (other[grid.neighbours] == other[:, None]) | (grid.neighbours < 0)
     clear = inner.all(axis=1)
     asked = np.zeros(len(grid), dtype=bool)
     asked[(own >= 1) & (own < row.count)] = True
-    for docker in row.dockers[:-1]:
+    for docker in row.docked_pieces[:-1]:
         asked[dockers[docker].border] = True
-    points = grid.origin + (grid.cells[asked & clear] + 0.5) * grid.size
-    there = _nearest_labels(grid, transform_points(row.motion, points), other)
+    points = grid.origin + (grid.cells[asked & clear] + 0.5) * grid.cell_size
+    there = _nearest_labels(grid, transform_points(row.transform, points), other)
     return bool((there == other[asked & clear]).mean() >= TILED - grid.slack)
 
 
@@ -210,5 +222,5 @@ def _nearest_labels(grid: SurfaceGrid, points: FloatArray, labels: IntArray) -> 
     """The labels of the occupied cells that are nearest to points (n, 3)."""
     from scipy.spatial import KDTree
 
-    found: IntArray = labels[KDTree(grid.cells).query((points - grid.origin) / grid.size - 0.5)[1]]
+    found: IntArray = labels[KDTree(grid.cells).query((points - grid.origin) / grid.cell_size - 0.5)[1]]
     return found

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.grammars.derivation import START, Derivation, Place
-from stages.grammars.extraction.docked_pieces import Docker, beside
-from stages.grammars.extraction.seams import Seam, seam_of, widened
-from stages.grammars.extraction.terminals import Cuts, Terminal
+from stages.grammars.derivation import START, Derivation, NonTerminal
+from stages.grammars.extraction.docked_pieces import DockedPiece, surrounding_cells
+from stages.grammars.extraction.seams import Seam, cells_within_steps, make_seam
+from stages.grammars.extraction.terminals import Terminal, TerminalCutter
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shape.geometry.pose import invert, transform_points
-from stages.symmetry.matching.cell_lookup import Chosen, items_in
+from stages.symmetry.matching.cell_lookup import ChosenSet, items_in
 from stages.symmetry.matching.r_symmetry import matched_items
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.soup import Soup
@@ -33,7 +33,7 @@ BORDERS = 1.5
 
 
 @dataclass(frozen=True)
-class Production:
+class ExtractedProduction:
     """What may stand at a site: a terminal, and places for others.
 
     site: its class, or START; frame: float64 (4, 4), of the site where the exemplar has this docker; terminal: its
@@ -43,29 +43,29 @@ class Production:
     site: int
     frame: FloatArray
     terminal: Terminal
-    places: tuple[Place, ...]
+    non_terminals: tuple[NonTerminal, ...]
 
 
-def seams_of(grid: SurfaceGrid, dockers: Sequence[Docker]) -> dict[int, Seam]:
+def seams_by_site(grid: SurfaceGrid, dockers: Sequence[DockedPiece]) -> dict[int, Seam]:
     """The seam of each class of sites."""
     firsts = [each for each in dockers if np.array_equal(each.frame, np.eye(4))]
-    return {each.site: seam_of(grid, each.border, each.cells) for each in reversed(firsts)}
+    return {each.site: make_seam(grid, each.border, each.cells) for each in reversed(firsts)}
 
 
-def productions(
-    grid: SurfaceGrid, dockers: Sequence[Docker], seams: dict[int, Seam], rng: np.random.Generator
-) -> tuple[list[Production], Soup]:
+def extract_productions(
+    grid: SurfaceGrid, dockers: Sequence[DockedPiece], seams: dict[int, Seam], rng: np.random.Generator
+) -> tuple[list[ExtractedProduction], Soup]:
     """The productions of an exemplar, those of START first, and all pieces that their terminals may have.
 
     Dockers that lie in a docker are its children; of those that overlap some are chosen, in at most SETS ways, each a
     production of its own. Of a child that overlaps what is chosen its own children are tried, one level. Productions
     that are equal, terminal and places, are one.
     """
-    whole = Docker(np.arange(len(grid), dtype=np.int32), np.empty(0, np.int32), 1.0, START, np.eye(4))
+    whole = DockedPiece(np.arange(len(grid), dtype=np.int32), np.empty(0, np.int32), 1.0, START, np.eye(4))
     every = [*dockers, whole]
     inside, apart = _relations(grid, every)
-    cuts = Cuts(grid, every, seams)
-    found: list[tuple[Production, Chosen]] = []
+    cuts = TerminalCutter(grid, every, seams)
+    found: list[tuple[ExtractedProduction, ChosenSet]] = []
     original: dict[int, Derivation] = {}
     # smallest first: what gives a docker back is made of what gives those in it back
     for node in np.argsort([each.area for each in every], kind="stable").tolist():
@@ -76,8 +76,8 @@ def productions(
             terminal = cuts.between(node, chosen)
             if not len(terminal) or not _faithful(grid, terminal, np.flatnonzero(left)):
                 continue
-            places = tuple(Place(every[each].site, every[each].frame, original[each]) for each in chosen)
-            made = Production(every[node].site, every[node].frame, terminal, places), Chosen.of(left)
+            places = tuple(NonTerminal(every[each].site, every[each].frame, original[each]) for each in chosen)
+            made = ExtractedProduction(every[node].site, every[node].frame, terminal, places), ChosenSet.of(left)
             known, order = len(found), tuple(range(len(places)))
             for number, each in enumerate(found):
                 same = _equal(grid, each, made, seams)
@@ -91,10 +91,10 @@ def productions(
     return _by_site([each for each, _ in found]), cuts.pieces()
 
 
-def _relations(grid: SurfaceGrid, every: Sequence[Docker]) -> tuple[BoolArray, BoolArray]:
+def _relations(grid: SurfaceGrid, every: Sequence[DockedPiece]) -> tuple[BoolArray, BoolArray]:
     """Of each two dockers whether the second lies in the first, and whether they lie apart, bool (n, n) each."""
     count = len(every)
-    wide = [widened(grid, each.cells, ROOM) for each in every]
+    wide = [cells_within_steps(grid, each.cells, ROOM) for each in every]
     inside, apart = np.zeros((count, count), dtype=bool), np.zeros((count, count), dtype=bool)
     for one, docker in enumerate(every):
         within = np.zeros(len(grid), dtype=bool)
@@ -131,7 +131,7 @@ def _direct(node: int, inside: BoolArray) -> np.ndarray:
     return found
 
 
-def _rest(grid: SurfaceGrid, every: Sequence[Docker], node: int, chosen: tuple[int, ...]) -> BoolArray:
+def _rest(grid: SurfaceGrid, every: Sequence[DockedPiece], node: int, chosen: tuple[int, ...]) -> BoolArray:
     """Which cells are of a docker and in none of those chosen in it, bool (n,)."""
     left = np.zeros(len(grid), dtype=bool)
     left[every[node].cells] = True
@@ -144,43 +144,46 @@ def _faithful(grid: SurfaceGrid, terminal: Terminal, cells: np.ndarray) -> bool:
     """Whether triangles that were cut out are those of some cells, but for the border: a seam that moved here may part
     something else where sheets lie in one cell."""
     wanted = float(grid.area[cells].sum())
-    border = float(grid.area[beside(grid, cells)].sum())
+    border = float(grid.area[surrounding_cells(grid, cells)].sum())
     return abs(terminal.area - wanted) <= BORDERS * border + (SAME_AREA + grid.slack) * wanted
 
 
 def _equal(
-    grid: SurfaceGrid, one: tuple[Production, Chosen], other: tuple[Production, Chosen], seams: dict[int, Seam]
+    grid: SurfaceGrid,
+    one: tuple[ExtractedProduction, ChosenSet],
+    other: tuple[ExtractedProduction, ChosenSet],
+    seams: dict[int, Seam],
 ) -> tuple[int, ...] | None:
     """Whether two productions, each with its cells, are equal in their sites, their places, and what is left: for each
     place of the first which of the second it is, None where they are not."""
     (first, cells), (second, others) = one, other
-    if first.site != second.site or len(first.places) != len(second.places):
+    if first.site != second.site or len(first.non_terminals) != len(second.non_terminals):
         return None
     if abs(first.terminal.area - second.terminal.area) > (SAME_AREA + grid.slack) * first.terminal.area:
         return None
     motion = second.frame @ invert(first.frame)
     order: list[int] = []
-    for place in first.places:
+    for place in first.non_terminals:
         probe = grid.points[items_in(grid, seams[place.site].inner)]
         want = transform_points(motion @ place.frame, probe)
         same = [
             number
-            for number, each in enumerate(second.places)
+            for number, each in enumerate(second.non_terminals)
             if number not in order
             and each.site == place.site
-            and np.abs(transform_points(each.frame, probe) - want).max() < grid.size
+            and np.abs(transform_points(each.frame, probe) - want).max() < grid.cell_size
         ]
         if not same:
             return None
         order.append(same[0])
     alike = all(
         bool(matched_items(grid, way, items_in(grid, held)).mean() > ALIKE * grid.agreement)
-        for way, held in ((motion, cells.places), (invert(motion), others.places))
+        for way, held in ((motion, cells.indices), (invert(motion), others.indices))
     )
     return tuple(order) if alike else None
 
 
-def _by_site(found: Sequence[Production]) -> list[Production]:
+def _by_site(found: Sequence[ExtractedProduction]) -> list[ExtractedProduction]:
     """The productions in the order of their sites."""
     order = sorted(range(len(found)), key=lambda place: (found[place].site, place))
     number = {old: new for new, old in enumerate(order)}
@@ -191,7 +194,7 @@ def _by_site(found: Sequence[Production]) -> list[Production]:
     return [
         replace(
             found[old],
-            places=tuple(replace(each, original=renumbered(each.original)) for each in found[old].places),
+            non_terminals=tuple(replace(each, original=renumbered(each.original)) for each in found[old].non_terminals),
         )
         for old in order
     ]

@@ -9,10 +9,10 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert
-from stages.symmetry.matching.cell_lookup import among, items_in, items_moved_into
+from stages.symmetry.matching.cell_lookup import is_among, items_in, items_moved_into
 from stages.symmetry.matching.r_symmetry import cells_within, matched_items
 from stages.symmetry.surface.grid import SurfaceGrid
-from stages.symmetry.surface.soup import Soup, carve, joined, middles_in
+from stages.symmetry.surface.soup import Soup, carve, join_soups, middles_in
 
 BAND = 3.0
 """Cells around a site that are cut as the first of its class is: the others lie up to 2.5 cells from it once moved."""
@@ -29,13 +29,13 @@ class Seam:
     inner: IntArray
 
 
-def seam_of(grid: SurfaceGrid, border: IntArray, cells: IntArray) -> Seam:
+def make_seam(grid: SurfaceGrid, border: IntArray, cells: IntArray) -> Seam:
     """The seam between a docker's cells and the cells around it."""
     band = cells_within(grid, border, BAND)
-    return Seam(band, band[among(cells, band)])
+    return Seam(band, band[is_among(cells, band)])
 
 
-def widened(grid: SurfaceGrid, cells: np.ndarray, steps: int) -> BoolArray:
+def cells_within_steps(grid: SurfaceGrid, cells: np.ndarray, steps: int) -> BoolArray:
     """Which cells of the grid are at most so many steps from `cells`, bool (n,)."""
     chosen = np.zeros(len(grid), dtype=bool)
     chosen[cells] = True
@@ -61,7 +61,7 @@ def _widen(chosen, cells, neighbours, steps):
         begin, end = end, tail
 
 
-def stands(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> bool:
+def surface_recurs(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> bool:
     """Whether the surface has at a pose (4, 4) what lies in ascending cells, and nothing beside."""
     least = STANDS * grid.agreement
     if matched_items(grid, pose, items_in(grid, cells)).mean() < least:
@@ -80,4 +80,4 @@ def cut_out(soup: Soup, grid: SurfaceGrid, cells: IntArray, frame: FloatArray, s
     along, away = carve(soup, grid, seam.band, frame)
     inside, outside = carve(along, grid, seam.inner, frame)
     within = middles_in(away, grid, cells, np.eye(4))
-    return joined(inside, away.select(within)), joined(outside, away.select(~within))
+    return join_soups(inside, away.select(within)), join_soups(outside, away.select(~within))

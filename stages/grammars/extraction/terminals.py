@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.grammars.derivation import START
-from stages.grammars.extraction.docked_pieces import Docker
+from stages.grammars.extraction.docked_pieces import DockedPiece
 from stages.grammars.extraction.seams import Seam, cut_out
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from stages.symmetry.matching.cell_lookup import Chosen
+from stages.symmetry.matching.cell_lookup import ChosenSet
 from stages.symmetry.surface.grid import SurfaceGrid
-from stages.symmetry.surface.soup import Soup, joined
+from stages.symmetry.surface.soup import Soup, join_soups
 
 OUTSIDE, INSIDE, CUT = 0, 1, 2
 """Where a triangle lies: outside a docker, in it, or on both sides of its seam."""
@@ -28,7 +28,7 @@ class Terminal:
     all that one seam cuts, int32; area: of all together.
     """
 
-    whole: Chosen
+    whole: ChosenSet
     cut: Soup
     pieces: IntArray
     area: float
@@ -37,10 +37,10 @@ class Terminal:
         return len(self.whole) + len(self.cut) + len(self.pieces)
 
 
-def alone(soup: Soup) -> Terminal:
+def unshared_terminal(soup: Soup) -> Terminal:
     """Triangles that have nothing in common with others."""
     nothing = np.empty(0, dtype=np.int32)
-    return Terminal(Chosen.of(nothing.astype(bool)), soup, nothing, soup.area)
+    return Terminal(ChosenSet.of(nothing.astype(bool)), soup, nothing, soup.area)
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,11 @@ class _Side:
         return (first + places).astype(np.int32), soup.areas[places]
 
 
-class Cuts:
+class TerminalCutter:
     """Dockers cut out of the triangles of a surface. Each is cut once; only triangles on two seams, of a docker and of
     what is chosen in it, are cut anew for the two."""
 
-    def __init__(self, grid: SurfaceGrid, every: Sequence[Docker], seams: dict[int, Seam]) -> None:
+    def __init__(self, grid: SurfaceGrid, every: Sequence[DockedPiece], seams: dict[int, Seam]) -> None:
         self._grid, self._every, self._seams = grid, every, seams
         self._whole = Soup(grid.corners, grid.faces)
         self._known: dict[int, _Side] = {}
@@ -73,7 +73,7 @@ class Cuts:
     def pieces(self) -> Soup:
         """The pieces of all triangles that seams have cut, one at a time."""
         every = [soup for each in self._known.values() for soup in (each.within, each.beyond)]
-        return joined(*every, Soup(np.empty((0, 3, 3)), np.empty(0, dtype=np.int32)))
+        return join_soups(*every, Soup(np.empty((0, 3, 3)), np.empty(0, dtype=np.int32)))
 
     def between(self, node: int, chosen: Sequence[int]) -> Terminal:
         """The triangles of docker `node` that are in none of those chosen."""
@@ -92,7 +92,7 @@ class Cuts:
         whole = left & (seams == 0)
         area = float(self._whole.areas[whole].sum())
         area += float(np.concatenate([cut.areas, *(areas for _, areas in pieces)]).sum())
-        return Terminal(Chosen.of(whole), cut, np.concatenate([found for found, _ in pieces]), area)
+        return Terminal(ChosenSet.of(whole), cut, np.concatenate([found for found, _ in pieces]), area)
 
     def _side(self, place: int) -> _Side:
         if place not in self._known:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.grammars.scans.point_neighbourhoods import contacts
+from stages.grammars.scans.point_neighbourhoods import patch_contacts
 from stages.shape.arrays import FloatArray, IntArray
 
 ALIKE = 0.7
 """Cosine of the angle of two patches from which on what meets at them is no crease."""
 
 
-def outward(
+def outward_signs(
     points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, given: FloatArray | None
 ) -> FloatArray:
     """1 or -1 for each patch, by which its normal is outward, float64 (m,)."""
@@ -34,7 +34,7 @@ def _agreeing(
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
-    one, other = contacts(near, of)
+    one, other = patch_contacts(near, of)
     flip = of[one] > of[other]
     one, other = np.where(flip, other, one), np.where(flip, one, other)
     pairs, place, count = np.unique(

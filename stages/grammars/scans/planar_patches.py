@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from stages.grammars.scans.outward_normals import outward
-from stages.grammars.scans.point_neighbourhoods import Neighbourhoods, contacts
+from stages.grammars.scans.outward_normals import outward_signs
+from stages.grammars.scans.point_neighbourhoods import PointNeighbourhoods, patch_contacts
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 
 TILT = 0.4
@@ -28,7 +28,7 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class Patches:
+class PlanarPatches:
     """Planar patches of n points: `of`, int32 (n,), the patch of each, -1 for none; middles and outward normals of
     their planes, float64 (m, 3) each."""
 
@@ -46,7 +46,9 @@ class Patches:
         return found
 
 
-def planar_patches(points: FloatArray, around: Neighbourhoods, least: float, given: FloatArray | None) -> Patches:
+def planar_patches(
+    points: FloatArray, around: PointNeighbourhoods, least: float, given: FloatArray | None
+) -> PlanarPatches:
     """The planar patches of points (n, 3), grown from where they are flattest (Rabbani and others 2006).
 
     least: how far from a plane points may be at least, however little noise there is. given: outward normals of the
@@ -66,7 +68,9 @@ def planar_patches(points: FloatArray, around: Neighbourhoods, least: float, giv
         of[noise[of]] = -1
         of = _numbered(_settled(points, around.near, of, middles, normals, most, around.lonely))
     middles, normals, _ = _fitted(points, of)
-    return Patches(of, middles, normals * outward(points, around.near, of, middles, normals, given)[:, None])
+    return PlanarPatches(
+        of, middles, normals * outward_signs(points, around.near, of, middles, normals, given)[:, None]
+    )
 
 
 @numba.njit(cache=True)
@@ -151,7 +155,7 @@ def _merged(
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    one, other = contacts(near, of)
+    one, other = patch_contacts(near, of)
     pairs, place = np.unique(np.column_stack([of[one], of[other]]), axis=0, return_inverse=True)
     first, second = pairs.T
     off = np.abs(((points[one] - middles[of[other]]) * normals[of[other]]).sum(axis=1))
@@ -169,7 +173,7 @@ def _explained(
     points: FloatArray, near: IntArray, of: IntArray, middles: FloatArray, normals: FloatArray, most: float
 ) -> BoolArray:
     """Which patches lie in the planes of larger ones that they meet, bool (m,): such as noise makes along creases."""
-    one, other = contacts(near, of)
+    one, other = patch_contacts(near, of)
     pairs = np.unique(np.column_stack([of[one], of[other]]), axis=0)
     order = np.argsort(of, kind="stable")
     members = np.split(order, np.searchsorted(of[order], np.arange(len(middles) + 1)))[1:-1]

@@ -22,7 +22,7 @@ BLOCK = 100_000
 
 
 @dataclass(frozen=True)
-class Neighbourhoods:
+class PointNeighbourhoods:
     """What is around each of n points: `near`, the k nearest, itself first, int32 (n, k); `reach`, how far they
     are, float64 (n,); `normals` of the planes through them, float64 (n, 3), of either sign; `rough`, how far from it
     they are, a standard deviation, float64 (n,); `lonely`, bool (n,), outliers. noise: of the whole cloud, the median
@@ -40,7 +40,7 @@ class Neighbourhoods:
         return float(np.median(self.rough[~self.lonely]))
 
 
-def neighbourhoods(points: FloatArray) -> Neighbourhoods:
+def point_neighbourhoods(points: FloatArray) -> PointNeighbourhoods:
     """The neighbourhoods of at least MOST_NEIGHBOURS points (n, 3), of as many points as their noise asks for."""
     from scipy.spatial import KDTree
 
@@ -50,7 +50,7 @@ def neighbourhoods(points: FloatArray) -> Neighbourhoods:
     return _around(tree, points, points, int(np.clip(wanted, LEAST_NEIGHBOURS, MOST_NEIGHBOURS)))
 
 
-def glance(points: FloatArray) -> tuple[float, float, int]:
+def estimate_noise(points: FloatArray) -> tuple[float, float, int]:
     """The noise of points (n, 3), and how far neighbourhoods of so many points reach, medians of some of them."""
     from scipy.spatial import KDTree
 
@@ -62,7 +62,7 @@ def _glance(tree: Any, points: FloatArray) -> tuple[float, float, int]:
     return found.noise, float(np.median(found.reach)), LEAST_NEIGHBOURS
 
 
-def _around(tree: Any, points: FloatArray, asked: FloatArray, count: int) -> Neighbourhoods:
+def _around(tree: Any, points: FloatArray, asked: FloatArray, count: int) -> PointNeighbourhoods:
     """The neighbourhoods, of `count` out of points (n, 3), around those `asked`, (m, 3)."""
     near = np.empty((len(asked), count), dtype=np.int32)
     reach, rough, normals = np.empty(len(asked)), np.empty(len(asked)), np.empty((len(asked), 3))
@@ -75,10 +75,10 @@ def _around(tree: Any, points: FloatArray, asked: FloatArray, count: int) -> Nei
         values, ways = np.linalg.eigh(around.transpose(0, 2, 1) @ around)
         # a plane takes three degrees of freedom
         rough[block], normals[block] = np.sqrt(np.maximum(values[:, 0], 0) / (count - 3)), ways[:, :, 0]
-    return Neighbourhoods(near, reach, normals, rough, reach > ALONE * np.median(reach))
+    return PointNeighbourhoods(near, reach, normals, rough, reach > ALONE * np.median(reach))
 
 
-def contacts(near: IntArray, of: IntArray) -> tuple[IntArray, IntArray]:
+def patch_contacts(near: IntArray, of: IntArray) -> tuple[IntArray, IntArray]:
     """Pairs of neighbouring points of different patches, int32 (c,) each."""
     nearest = near[:, 1:LEAST_NEIGHBOURS]
     one, other = np.repeat(np.arange(len(near), dtype=np.int32), nearest.shape[1]), nearest.reshape(-1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.grammars.scans.scanned_grid import ScannedGrid
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.symmetry.matching.cell_lookup import among
+from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.corner_frames import CREASE, CornerFrames, frames_of_lines
 from stages.symmetry.surface.lattice import cell_keys
 
@@ -43,8 +43,8 @@ def ridge_frames(scan: ScannedGrid) -> CornerFrames:
         way = np.cross(normals[first], normals[second])
         way /= np.linalg.norm(way, axis=1)[:, None]
         sides = [
-            _beside(scan, occupied, corners + turn * ALONG * grid.size * way, first)
-            & _beside(scan, occupied, corners + turn * ALONG * grid.size * way, second)
+            _beside(scan, occupied, corners + turn * ALONG * grid.cell_size * way, first)
+            & _beside(scan, occupied, corners + turn * ALONG * grid.cell_size * way, second)
             for turn in (1, -1)
         ]
         turn = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
@@ -135,8 +135,8 @@ def _meetings(scan: ScannedGrid) -> tuple[np.ndarray, FloatArray]:
     triple, home, normals = triple[volume > FLATTEST], home[volume > FLATTEST], normals[volume > FLATTEST]
     offsets = (normals * scan.middles[triple]).sum(axis=2)
     corners = np.linalg.solve(normals, offsets[:, :, None])[:, :, 0]
-    middle = grid.origin + (grid.cells[home] + 0.5) * grid.size
-    close = (np.abs(corners - middle) < NEAR * grid.size).all(axis=1)
+    middle = grid.origin + (grid.cells[home] + 0.5) * grid.cell_size
+    close = (np.abs(corners - middle) < NEAR * grid.cell_size).all(axis=1)
     found = np.unique(triple[close], axis=0, return_index=True)[1]
     return triple[close][found], corners[close][found]
 
@@ -155,10 +155,10 @@ def _by_patch(scan: ScannedGrid) -> np.ndarray:
 def _beside(scan: ScannedGrid, occupied: np.ndarray, points: FloatArray, patches: np.ndarray) -> BoolArray:
     """Whether each point (c, 3) is in a cell with a patch, int (c,), or beside one, bool (c,)."""
     grid = scan.grid
-    cells = np.floor((points - grid.origin) / grid.size).astype(np.int64)
+    cells = np.floor((points - grid.origin) / grid.cell_size).astype(np.int64)
     found = np.zeros(len(points), dtype=bool)
     for shift in np.ndindex(3, 3, 3):
         keys = cell_keys(cells + np.array(shift) - 1)
         place = np.minimum(np.searchsorted(grid.keys, keys), len(grid) - 1)
-        found |= (grid.keys[place] == keys) & among(occupied, place * len(scan.normals) + patches)
+        found |= (grid.keys[place] == keys) & is_among(occupied, place * len(scan.normals) + patches)
     return found

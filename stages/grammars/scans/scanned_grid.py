@@ -8,9 +8,9 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from stages.grammars.scans.planar_patches import planar_patches
-from stages.grammars.scans.point_neighbourhoods import glance, neighbourhoods
+from stages.grammars.scans.point_neighbourhoods import estimate_noise, point_neighbourhoods
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
-from stages.symmetry.surface.grid import CELLS_A_RADIUS, SHIFT, SurfaceGrid
+from stages.symmetry.surface.grid import CELLS_PER_RADIUS, SHIFT, SurfaceGrid
 from stages.symmetry.surface.lattice import neighbours_of, pack, unpack
 
 FEWEST_POINTS = 500
@@ -37,7 +37,7 @@ COVER = 4.0
 
 
 @dataclass(frozen=True, eq=False)
-class Cloud:
+class ScannedCloud:
     """A point cloud: points float64 (n, 3), their colours uint8 (n, 3) sRGB, and outward normals float64 (n, 3); None
     where nobody knows these."""
 
@@ -61,7 +61,7 @@ class ScannedGrid:
     noise: float
 
 
-def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
+def scanned_grid(cloud: ScannedCloud, share: float) -> ScannedGrid:
     """The grid of a point cloud for a radius of `share` of the longest side of the box around all but outliers.
 
     Points are moved onto the planes of their patches: what noise has put into the next cell goes back. Outliers, and
@@ -71,11 +71,11 @@ def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
     """
     points = cloud.points
     _check(points)
-    around = neighbourhoods(points)
+    around = point_neighbourhoods(points)
     if not np.median(around.reach) > 0:
         raise ConfigError("most points are at the place of another; take those out that are there more than once")
     held = points[~around.lonely]
-    size = share * float(np.ptp(held, axis=0).max()) / CELLS_A_RADIUS
+    size = share * float(np.ptp(held, axis=0).max()) / CELLS_PER_RADIUS
     if around.noise > MOST_NOISE * size:
         raise ConfigError(
             f"points lie {around.noise:.3g} off the surface in the mean, cells are {size:.3g} wide; set radius to at "
@@ -88,7 +88,7 @@ def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
     patch, places = patches.of[faces], patches.projected(points)[faces]
     low = places.min(axis=0)
     radius = share * float((places.max(axis=0) - low).max())
-    size = radius / CELLS_A_RADIUS
+    size = radius / CELLS_PER_RADIUS
     origin = low - size * (np.array(SHIFT) + 2)
     packed = pack(np.floor((places - origin) / size).astype(np.int64))
     order = np.lexsort((patch, packed))
@@ -109,7 +109,7 @@ def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
         corners=_splats(places, patches.normals[patch], COVER * areas),
         faces=faces.astype(np.int32),
         origin=origin,
-        size=size,
+        cell_size=size,
         radius=radius,
         keys=keys,
         cells=cells,
@@ -129,27 +129,27 @@ def cloud_grid(cloud: Cloud, share: float) -> ScannedGrid:
     return ScannedGrid(grid, patch[begin], patches.middles, patches.normals, around.noise)
 
 
-def radius_for(cloud: Cloud, least: float) -> float:
+def suitable_radius(cloud: ScannedCloud, least: float) -> float:
     """The radius of similarity that suits a cloud, at least `least`, as a share of the longest side: with it cells hold
-    twice the points that they must, and noise is half as much as it may be. Raises ConfigError as `cloud_grid` does for
+    twice the points that they must, and noise is half as much as it may be. ConfigError:
     points that are no surface."""
     return max(least, float(np.ceil(1000 * max(_shares_that_suit(cloud))) / 1000))
 
 
-def points_for(cloud: Cloud, share: float) -> int | None:
+def required_points(cloud: ScannedCloud, share: float) -> int | None:
     """About how many points a scan like `cloud` must have for a radius of `share` of the longest side; None where it
-    would drown in noise. Raises ConfigError as `radius_for`."""
+    would drown in noise. Raises ConfigError as `suitable_radius`."""
     by_points, by_noise = _shares_that_suit(cloud)
     points = len(cloud.points) * (by_points / share) ** 2
     return None if by_noise > share else int(round(points, 1 - int(np.log10(points))))
 
 
-def _shares_that_suit(cloud: Cloud) -> tuple[float, float]:
+def _shares_that_suit(cloud: ScannedCloud) -> tuple[float, float]:
     """The radius that suits how dense the points are, and that which suits their noise, shares of the longest side."""
     _check(cloud.points)
-    noise, reach, count = glance(cloud.points)
+    noise, reach, count = estimate_noise(cloud.points)
     low, high = np.quantile(cloud.points, [0.001, 0.999], axis=0)
-    a_cell = CELLS_A_RADIUS / float((high - low).max())
+    a_cell = CELLS_PER_RADIUS / float((high - low).max())
     return (2 * A_CELL * np.pi / count) ** 0.5 * reach * a_cell, 2 * noise / MOST_NOISE * a_cell
 
 

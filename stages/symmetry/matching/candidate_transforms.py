@@ -26,7 +26,7 @@ PLAIN = 1e-4
 """Radians below which a motion does not turn."""
 
 
-def candidate_motions(
+def candidate_transforms(
     grid: SurfaceGrid, most: int, axis: FloatArray | None = None, frames: CornerFrames | None = None
 ) -> FloatArray:
     """At most `most` rigid motions (m, 4, 4) that carry parts of the surface onto it, that of the largest part first.
@@ -44,11 +44,11 @@ def candidate_motions(
     source, target = _mates(found, grid.radius)
     aligned = centred[target] @ invert(centred[source])
     reach = float(np.linalg.norm(np.ptp(grid.corners.reshape(-1, 3), axis=0))) / 2
-    aligned = _one_of_each(aligned, grid.size / reach)
+    aligned = _one_of_each(aligned, grid.cell_size / reach)
     if axis is not None:
-        aligned = aligned[np.linalg.norm(aligned[:, :3, :3] @ axis - axis, axis=1) * reach <= 2 * grid.size]
+        aligned = aligned[np.linalg.norm(aligned[:, :3, :3] @ axis - axis, axis=1) * reach <= 2 * grid.cell_size]
     moves = rotation_angle(aligned) * reach + np.linalg.norm(aligned[:, :3, 3], axis=1) > grid.radius
-    clusters = _clusters(aligned[moves], grid.size, reach)
+    clusters = _clusters(aligned[moves], grid.cell_size, reach)
     motions = np.array([_agreed(each) for each in clusters]).reshape(-1, 4, 4)
     motions[:, :3, 3] += middle - motions[:, :3, :3] @ middle
     items = _sample(grid)
@@ -138,6 +138,6 @@ def _apart(motions: FloatArray, grid: SurfaceGrid, middle: FloatArray, reach: fl
     vectors = _vectors(about, reach)
     kept: list[int] = []
     for place in range(len(motions)):
-        if not kept or np.linalg.norm(vectors[kept] - vectors[place], axis=1).min() > 2 * grid.size:
+        if not kept or np.linalg.norm(vectors[kept] - vectors[place], axis=1).min() > 2 * grid.cell_size:
             kept.append(place)
     return motions[kept]

@@ -13,7 +13,7 @@ from stages.symmetry.surface.lattice import cell_keys
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class ChosenSet:
     """Which of many things are chosen, a bit each, uint8 (bytes,); how many there are, and how many of them are."""
 
     bits: ByteArray
@@ -21,7 +21,7 @@ class Chosen:
     chosen: int
 
     @classmethod
-    def of(cls, chosen: BoolArray) -> Chosen:
+    def of(cls, chosen: BoolArray) -> ChosenSet:
         """Those that are `chosen`, bool (n,)."""
         return cls(np.packbits(chosen), len(chosen), int(chosen.sum()))
 
@@ -29,7 +29,7 @@ class Chosen:
         return self.chosen
 
     @property
-    def places(self) -> IntArray:
+    def indices(self) -> IntArray:
         """Where they are, int32 ascending."""
         return np.flatnonzero(np.unpackbits(self.bits, count=self.count)).astype(np.int32)
 
@@ -43,10 +43,10 @@ def items_in(grid: SurfaceGrid, cells: np.ndarray) -> np.ndarray:
 
 def keys_at(grid: SurfaceGrid, pose: FloatArray, points: FloatArray) -> np.ndarray:
     """Keys of the cells, empty ones too, to which a pose (4, 4) takes points (n, 3)."""
-    return cell_keys(np.floor((transform_points(pose, points) - grid.origin) / grid.size).astype(np.int64))
+    return cell_keys(np.floor((transform_points(pose, points) - grid.origin) / grid.cell_size).astype(np.int64))
 
 
-def among(keys: np.ndarray, asked: np.ndarray) -> BoolArray:
+def is_among(keys: np.ndarray, asked: np.ndarray) -> BoolArray:
     """Which of the keys `asked`, (n,), are among ascending `keys`, bool (n,)."""
     if not len(keys):
         return np.zeros(len(asked), dtype=bool)
@@ -60,9 +60,9 @@ def items_moved_into(grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> np
     No point of a cell is farther from its middle than a cell is wide: those of the box around the moved middles are
     asked.
     """
-    middles = transform_points(pose, grid.origin + (grid.cells[cells] + 0.5) * grid.size)
-    home = (middles - grid.origin) / grid.size
+    middles = transform_points(pose, grid.origin + (grid.cells[cells] + 0.5) * grid.cell_size)
+    home = (middles - grid.origin) / grid.cell_size
     low, high = np.floor(home.min(axis=0)) - 1, np.floor(home.max(axis=0)) + 1
     items = items_in(grid, np.flatnonzero(((grid.cells >= low) & (grid.cells <= high)).all(axis=1)))
-    found: np.ndarray = items[among(grid.keys[cells], keys_at(grid, invert(pose), grid.points[items]))]
+    found: np.ndarray = items[is_among(grid.keys[cells], keys_at(grid, invert(pose), grid.points[items]))]
     return found

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
-from stages.symmetry.matching.cell_lookup import among, items_in
+from stages.symmetry.matching.cell_lookup import is_among, items_in
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.lattice import cell_index, cell_of
 
@@ -35,7 +35,7 @@ class DockingSite:
     slips: how many of six infinitesimal motions move the site along itself.
     """
 
-    motion: FloatArray
+    transform: FloatArray
     primary: IntArray
     secondary: IntArray
     border: IntArray
@@ -43,7 +43,9 @@ class DockingSite:
     slips: int
 
 
-def docking_sites(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray) -> list[DockingSite]:
+def find_docking_sites(
+    grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray
+) -> list[DockingSite]:
     """The elementary docking sites of `motion` (4, 4), in the order of their first cells; `kept` and `kept_back` are
     its `r_symmetric_cells`.
 
@@ -64,7 +66,7 @@ def docking_sites(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_b
         grid.starts,
         motion,
         grid.origin,
-        grid.size,
+        grid.cell_size,
         grid.keys,
     )
     of_region, of_image = _members(regions, count), _members(regions_back, count_back)
@@ -83,19 +85,19 @@ def docking_sites(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_b
                 secondary,
                 cells,
                 operation_kind(primary, secondary, grid.slack),
-                slippable_motions(grid, cells),
+                count_slippable_motions(grid, cells),
             )
         )
     return sites
 
 
-def regions_of(grid: SurfaceGrid, chosen: BoolArray) -> list[IntArray]:
+def connected_regions(grid: SurfaceGrid, chosen: BoolArray) -> list[IntArray]:
     """The connected regions of `chosen` cells, bool (n,), int32 each and ascending, in the order of their first."""
     regions = _regions(chosen, grid.neighbours)
     return [each.astype(np.int32) for each in _members(regions, int(regions.max(initial=-1)) + 1)]
 
 
-def slippable_motions(grid: SurfaceGrid, cells: IntArray) -> int:
+def count_slippable_motions(grid: SurfaceGrid, cells: IntArray) -> int:
     """How many independent infinitesimal motions take the surface in `cells` along itself (Gelfand and Guibas 2004).
 
     1 for a straight prism, 2 for a cylinder, 3 for a plane or a sphere: there a docker could stand anywhere.
@@ -120,7 +122,7 @@ def _members(region: np.ndarray, count: int) -> list[np.ndarray]:
 def operation_kind(primary: IntArray, secondary: IntArray, slack: float) -> OperationKind:
     """What it is to put the docker of cells `primary` where that of cells `secondary` is, int32 (n,) each. slack: share
     that may lie elsewhere for noise."""
-    shared = int(among(primary, secondary).sum())
+    shared = int(is_among(primary, secondary).sum())
     if len(secondary) < len(primary) and shared >= (1 - SAME_SET - slack) * len(secondary):
         return "insert"
     if len(primary) < len(secondary) and shared >= (1 - SAME_SET - slack) * len(primary):

@@ -14,7 +14,7 @@ INSIDE = 0.8
 """Points that are compared lie so far from the middle of a triangle to its corners."""
 
 
-def equal_soups(one: Soup, other: Soup, pose: FloatArray, tolerance: float, share: float = DUST) -> bool:
+def soups_match(one: Soup, other: Soup, pose: FloatArray, tolerance: float, share: float = DUST) -> bool:
     """Whether `pose` (4, 4) moves one surface onto another: by their areas, which may differ by `share`, and by points
     of all triangles but the smallest, dust of about this share of the surface, within twice the tolerance."""
     from stages.shape.geometry.triangles import build_tree, points_on_surface

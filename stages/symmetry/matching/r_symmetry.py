@@ -43,13 +43,13 @@ def _without(grid: SurfaceGrid, lost: np.ndarray, lost_back: np.ndarray, back: F
     are lost under it, bool (n,)."""
     found = np.ones(len(grid), dtype=bool)
     found[grid.item_cell[lost]] = False
-    _mark(found, grid.points[lost_back], back, grid.origin, grid.size, grid.keys, grid.tolerance)
+    _mark(found, grid.points[lost_back], back, grid.origin, grid.cell_size, grid.keys, grid.tolerance)
     return found
 
 
 def _anything_at(grid: SurfaceGrid, motion: FloatArray, items: np.ndarray) -> BoolArray:
     """Whether a motion takes each of some items to an occupied cell or beside one, bool (i,)."""
-    found: BoolArray = _near_cells(grid.points[items], motion, grid.origin, grid.size, grid.keys)
+    found: BoolArray = _near_cells(grid.points[items], motion, grid.origin, grid.cell_size, grid.keys)
     return found
 
 
@@ -63,32 +63,34 @@ def _without_specks(grid: SurfaceGrid, symmetric: BoolArray, differs: BoolArray)
 def r_symmetric_cells(grid: SurfaceGrid, motion: FloatArray) -> tuple[BoolArray, BoolArray]:
     """The cells that are r-symmetric under a rigid motion (4, 4), and those that are under its inverse, bool (n,)."""
     forth, back = symmetric_cells(grid, motion)
-    return eroded(grid, forth), eroded(grid, back)
+    return erode_cells(grid, forth), erode_cells(grid, back)
 
 
 def matched_items(grid: SurfaceGrid, motion: FloatArray, items: np.ndarray | None = None) -> BoolArray:
     """For each item of the grid (or of those with indices `items`) whether it is weak or, moved, lies on its equal."""
     asked = np.arange(len(grid.points)) if items is None else items
     found: BoolArray = _matched(
-        asked, motion, grid.origin, grid.size, grid.keys, grid.starts, grid.points, grid.directions, grid.is_line,
+        asked, motion, grid.origin, grid.cell_size, grid.keys, grid.starts, grid.points, grid.directions, grid.is_line,
         grid.tolerance, grid.same_angle,
     )  # fmt: skip
     return found if grid.weak is None else found | grid.weak[asked]
 
 
-def eroded(grid: SurfaceGrid, symmetric: BoolArray) -> BoolArray:
+def erode_cells(grid: SurfaceGrid, symmetric: BoolArray) -> BoolArray:
     """The r-symmetric cells: farther than the radius, along the surface, from every cell that is not symmetric."""
-    return eroded_twice(grid, symmetric, 0.0)[0]
+    return erode_cells_twice(grid, symmetric, 0.0)[0]
 
 
-def eroded_twice(grid: SurfaceGrid, symmetric: BoolArray, beyond: float) -> tuple[BoolArray, BoolArray]:
+def erode_cells_twice(grid: SurfaceGrid, symmetric: BoolArray, beyond: float) -> tuple[BoolArray, BoolArray]:
     """The r-symmetric cells, and those that would be for a radius larger by so many cells `beyond`, bool (n,) each."""
-    most = grid.radius / grid.size
+    most = grid.radius / grid.cell_size
     away = _distances(symmetric, grid.cells, grid.neighbours, most + beyond)
     return away > most + TINY, away > most + beyond + TINY
 
 
-def mutual(grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray) -> tuple[BoolArray, BoolArray]:
+def mutually_symmetric_cells(
+    grid: SurfaceGrid, motion: FloatArray, kept: BoolArray, kept_back: BoolArray
+) -> tuple[BoolArray, BoolArray]:
     """The cells of `kept` that a rigid motion (4, 4) takes to cells of `kept_back`, and those of `kept_back` that its
     inverse takes to cells of `kept`, bool (n,) each.
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, rotation_angle, transform_points
-from stages.symmetry.matching.candidate_transforms import candidate_motions
-from stages.symmetry.matching.cell_lookup import among, items_in, items_moved_into, keys_at
-from stages.symmetry.matching.docking_sites import docking_sites, regions_of
+from stages.symmetry.matching.candidate_transforms import candidate_transforms
+from stages.symmetry.matching.cell_lookup import is_among, items_in, items_moved_into, keys_at
+from stages.symmetry.matching.docking_sites import connected_regions, find_docking_sites
 from stages.symmetry.matching.r_symmetry import matched_items, r_symmetric_cells
 from stages.symmetry.surface.grid import SurfaceGrid
 
@@ -70,14 +70,14 @@ class Repetition:
         return (len(self.poses) - 1) * self.area
 
 
-def repetitions(grid: SurfaceGrid) -> list[Repetition]:
+def find_repetitions(grid: SurfaceGrid) -> list[Repetition]:
     """What the surface has at least twice, that which saves most surface first.
 
     A motion takes r-symmetric cells onto the surface; those that it does not take others onto begin a row. What is not
     r-symmetric under one motion, a docker, may have copies under others. For each such region all motions and their
     products are tried.
     """
-    motions = candidate_motions(grid, min(MOTIONS, max(1, WORK // len(grid))))
+    motions = candidate_transforms(grid, min(MOTIONS, max(1, WORK // len(grid))))
     both = np.concatenate([motions, invert(motions)])
     seeds = [each for motion in motions for each in _seeds(grid, motion)]
     promise = [_promise(grid, cells, ahead, both) for cells, ahead in seeds]
@@ -94,10 +94,10 @@ def _seeds(grid: SurfaceGrid, motion: FloatArray) -> Iterator[tuple[IntArray, Fl
     """Regions that a motion tells apart, each with the motion ahead if it begins a row."""
     kept, kept_back = r_symmetric_cells(grid, motion)
     for chosen, ahead in ((kept & ~kept_back, motion), (kept_back & ~kept, invert(motion))):
-        for cells in regions_of(grid, chosen):
+        for cells in connected_regions(grid, chosen):
             if _fits(grid, cells):
                 yield cells, ahead
-    for site in docking_sites(grid, motion, kept, kept_back):
+    for site in find_docking_sites(grid, motion, kept, kept_back):
         if site.kind == "replace" and site.slips < SLIPPERY and _fits(grid, site.primary):
             yield site.primary, None
 
@@ -107,11 +107,11 @@ def _known(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None, known: 
     corners = grid.points[_sample(grid, items_in(grid, known.cells))[[0, -1]]]
     if ahead is not None:
         moved = transform_points(ahead, corners)
-        if min(float(np.abs(transform_points(pose, corners) - moved).max()) for pose in known.poses) > grid.size:
+        if min(float(np.abs(transform_points(pose, corners) - moved).max()) for pose in known.poses) > grid.cell_size:
             return False
     points = grid.points[items_in(grid, known.cells)]
     there = np.unique(np.concatenate([keys_at(grid, pose, points) for pose in known.poses]))
-    return bool(among(there, grid.keys[cells]).mean() > KNOWN)
+    return bool(is_among(there, grid.keys[cells]).mean() > KNOWN)
 
 
 def _fits(grid: SurfaceGrid, cells: IntArray) -> bool:
@@ -149,7 +149,7 @@ def _goes_on(grid: SurfaceGrid, repetition: Repetition) -> bool:
     there = others[:, :3, :3] @ middle + others[:, :3, 3]
 
     def stands(pose: FloatArray) -> bool:
-        return bool((np.linalg.norm(there - transform_points(pose, middle), axis=1) < grid.size).any())
+        return bool((np.linalg.norm(there - transform_points(pose, middle), axis=1) < grid.cell_size).any())
 
     steps = [stands(each) for each in (back @ back, back, ahead, ahead @ ahead)]
     return any(one and two for one, two in pairwise(steps))
@@ -205,7 +205,7 @@ def _copies(
         pose = waiting[place]
         place += 1
         at = transform_points(pose, corners).reshape(1, -1)
-        if len(tried) and np.abs(tried - at).max(axis=1).min() < grid.size:
+        if len(tried) and np.abs(tried - at).max(axis=1).min() < grid.cell_size:
             continue
         tried = np.concatenate([tried, at])
         if matched_items(grid, pose, sample).mean() <= ALIKE:
@@ -222,7 +222,7 @@ def _copies(
 
 def _row(grid: SurfaceGrid, points: FloatArray, ahead: FloatArray | None) -> Iterator[FloatArray]:
     """The multiples (4, 4) of a motion, and of its inverse, that keep points (n, 3) in the model's box."""
-    low, high = grid.points.min(axis=0) - grid.size, grid.points.max(axis=0) + grid.size
+    low, high = grid.points.min(axis=0) - grid.cell_size, grid.points.max(axis=0) + grid.cell_size
     for step in () if ahead is None else (ahead, invert(ahead)):
         pose = step
         for _ in range(COPIES // 2):
@@ -237,7 +237,7 @@ def _overlaps(
     grid: SurfaceGrid, keys: np.ndarray, points: FloatArray, pose: FloatArray, poses: list[FloatArray]
 ) -> bool:
     """Whether points (n, 3) of a region at a pose lie in cells of it, with these keys, at one of `poses`."""
-    return any(among(keys, keys_at(grid, invert(other) @ pose, points)).mean() > OVERLAP for other in poses)
+    return any(is_among(keys, keys_at(grid, invert(other) @ pose, points)).mean() > OVERLAP for other in poses)
 
 
 def _same_cells(grid: SurfaceGrid, cells: IntArray, items: np.ndarray, pose: FloatArray) -> BoolArray:
@@ -264,7 +264,7 @@ def _pieces(grid: SurfaceGrid, cells: IntArray) -> list[np.ndarray]:
     """The connected regions of ascending `cells`, as places among them."""
     chosen = np.zeros(len(grid), dtype=bool)
     chosen[cells] = True
-    return [np.searchsorted(cells, each) for each in regions_of(grid, chosen)]
+    return [np.searchsorted(cells, each) for each in connected_regions(grid, chosen)]
 
 
 def _band(grid: SurfaceGrid, cells: IntArray, ahead: FloatArray | None) -> IntArray:

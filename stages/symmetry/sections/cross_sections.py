@@ -17,7 +17,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Section:
+class CrossSection:
     """The lines in which a plane cuts a surface, as points along them.
 
     points: float64 (n, 3); normals: float64 (n, 3), of the surface there; lengths: float64 (n,), the line that each
@@ -34,7 +34,7 @@ class Section:
         return float(self.lengths.sum())
 
 
-def section(corners: FloatArray, normals: FloatArray, heights: FloatArray, step: float) -> Section:
+def cross_section(corners: FloatArray, normals: FloatArray, heights: FloatArray, step: float) -> CrossSection:
     """The section of triangles (f, 3, 3) with unit `normals` (f, 3) by a plane that each of them crosses, over which
     their corners lie at `heights` (f, 3), with a point for each `step` of a line."""
     above = heights > 0
@@ -49,10 +49,10 @@ def section(corners: FloatArray, normals: FloatArray, heights: FloatArray, step:
     of = np.repeat(np.arange(len(line)), count)
     place = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
     points = ends[of, 0] + place[:, None] * (ends[of, 1] - ends[of, 0])
-    return Section(points, normals[of], (line / count)[of])
+    return CrossSection(points, normals[of], (line / count)[of])
 
 
-def alike(one: Section, other: Section, shift: FloatArray, tolerance: float, least: float) -> float:
+def shared_share(one: CrossSection, other: CrossSection, shift: FloatArray, tolerance: float, least: float) -> float:
     """The share of two sections that they have in common once `one` is moved by `shift` (3,): of the one that has less
     in common; 0 if that is less than `least`. Points count that have one of the other within `tolerance`, on a side
     that looks the same way."""

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.symmetry.sections.cross_sections import Section, alike, section
+from stages.symmetry.sections.cross_sections import CrossSection, cross_section, shared_share
 from stages.symmetry.surface.boundary_lines import SAME_ANGLE
 from stages.symmetry.surface.corner_frames import creases
-from stages.symmetry.surface.grid import with_area
-from stages.symmetry.surface.welding import welded
+from stages.symmetry.surface.grid import has_area
+from stages.symmetry.surface.welding import weld
 
 # Lengths are shares of the longest side of the model's box.
 NEAR = 1.5e-3
@@ -56,7 +56,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True)
-class Cuts:
+class ParallelCuts:
     """A family of parallel planes at which a model is cut.
 
     way: float64 (3,), their unit normal; offsets: float64 (n,), ascending: a plane is where `way` times x is one.
@@ -68,7 +68,7 @@ class Cuts:
     planes: int
 
 
-def parallel_cuts(corners: FloatArray) -> list[Cuts]:
+def find_parallel_cuts(corners: FloatArray) -> list[ParallelCuts]:
     """Families of planes at which triangles (f, 3, 3) can be cut into slabs that may be there once more or gone, of any
     two families square to each other, that of most planes first; empty where nothing is alike.
 
@@ -76,11 +76,11 @@ def parallel_cuts(corners: FloatArray) -> list[Cuts]:
     after a shift. Two planes with like sections are docking sites of each other. From stretches thin joints are cut,
     which are then equal, whatever stands between them: parts that stand between joints can change places.
     """
-    corners = corners[with_area(corners)]
+    corners = corners[has_area(corners)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    places, vertices = welded(corners, FINE * extent)
+    places, vertices = weld(corners, FINE * extent)
     edges, _, _ = creases(places, normals)
     families = []
     for way in _ways(vertices[edges[:, 1]] - vertices[edges[:, 0]]):
@@ -90,7 +90,7 @@ def parallel_cuts(corners: FloatArray) -> list[Cuts]:
         if len(found.offsets) >= FEWEST:
             families.append(found)
     families.sort(key=lambda each: -each.planes)
-    chosen: list[Cuts] = []
+    chosen: list[ParallelCuts] = []
     for family in families:
         if all(abs(float(family.way @ other.way)) < SQUARE for other in chosen):
             chosen.append(family)
@@ -117,16 +117,16 @@ class _Model:
         """The lowest and the highest corner of each triangle along the direction, float64 (f,) each."""
         return self.heights.min(axis=1), self.heights.max(axis=1)
 
-    def section(self, offset: float) -> Section:
+    def section(self, offset: float) -> CrossSection:
         low, high = self.spans
         crossed = np.flatnonzero((low <= offset) & (high > offset))
         heights = self.heights[crossed] - offset
-        return section(self.corners[crossed], self.normals[crossed], heights, STEP * self.extent)
+        return cross_section(self.corners[crossed], self.normals[crossed], heights, STEP * self.extent)
 
-    def alike(self, one: Section, other: Section, shift: float) -> float:
+    def alike(self, one: CrossSection, other: CrossSection, shift: float) -> float:
         """The share of the one section, moved by so much along the direction, and the other that they have in common,
         from 0, where they are not alike, to 1."""
-        return max(0.0, alike(one, other, shift * self.way, NEAR * self.extent, SAME) - SAME) / (1 - SAME)
+        return max(0.0, shared_share(one, other, shift * self.way, NEAR * self.extent, SAME) - SAME) / (1 - SAME)
 
     def kinds(self, offsets: FloatArray) -> np.ndarray:
         """For each of ascending offsets the first before it with a section like its own, int64 (n,); itself where there
@@ -142,7 +142,7 @@ class _Model:
                     break
         return kinds
 
-    def signatures(self, sections: Sequence[Section]) -> FloatArray:
+    def signatures(self, sections: Sequence[CrossSection]) -> FloatArray:
         """Numbers in which sections that are alike hardly differ, float64 (n, 10): of length, middle and spread."""
         found = np.zeros((len(sections), 10))
         for place, each in enumerate(sections):
@@ -198,7 +198,7 @@ def _plain(model: _Model) -> FloatArray:
     return found
 
 
-def _joints(model: _Model, plain: FloatArray) -> Cuts:
+def _joints(model: _Model, plain: FloatArray) -> ParallelCuts:
     """Joints in plain stretches (n, 2) of kinds that occur more than once, and cuts through those that are long."""
     kinds = model.kinds(plain.mean(axis=1))
     joined: list[tuple[float, float, int]] = []
@@ -223,7 +223,7 @@ def _joints(model: _Model, plain: FloatArray) -> Cuts:
         for begin, end, _ in near:
             borders += [(begin + end - width) / 2, (begin + end + width) / 2]
         total += len(near)
-    return Cuts(model.way, np.sort(np.array(borders)), total)
+    return ParallelCuts(model.way, np.sort(np.array(borders)), total)
 
 
 def _of_one_kind(stretches: list[tuple[float, float, int]]) -> list[list[tuple[float, float, int]]]:
@@ -243,7 +243,7 @@ def _near(members: list[tuple[float, float, int]], extent: float) -> list[tuple[
     ]
 
 
-def _rows(model: _Model, plain: FloatArray, vertices: FloatArray) -> Cuts:
+def _rows(model: _Model, plain: FloatArray, vertices: FloatArray) -> ParallelCuts:
     """The planes at which the section comes back after one shift along the direction, for the shift after which it does
     so most and best; none of them in a plain stretch (n, 2) that is longer than the shift: there any would do.
 
@@ -259,7 +259,7 @@ def _rows(model: _Model, plain: FloatArray, vertices: FloatArray) -> Cuts:
             offsets = offsets[~inside.any(axis=1)]
             about = model.signatures([model.section(offset) for offset in offsets])
             hopes.append((int(_in_rows(_close(about[1:], about[:-1])).sum()), offsets))
-    best, worth = Cuts(model.way, np.empty(0), 0), 0.0
+    best, worth = ParallelCuts(model.way, np.empty(0), 0), 0.0
     for hope, offsets in sorted(hopes, key=lambda each: -each[0])[:HOPES]:
         if hope <= worth:
             break
@@ -267,11 +267,11 @@ def _rows(model: _Model, plain: FloatArray, vertices: FloatArray) -> Cuts:
         same = _like_the_first(model, sections, offsets)
         if sum(same) > worth:
             chosen = offsets[_in_rows(np.array(same) > 0)]
-            best, worth = Cuts(model.way, chosen, len(chosen)), sum(same)
+            best, worth = ParallelCuts(model.way, chosen, len(chosen)), sum(same)
     return best
 
 
-def _like_the_first(model: _Model, sections: Sequence[Section], offsets: FloatArray) -> list[float]:
+def _like_the_first(model: _Model, sections: Sequence[CrossSection], offsets: FloatArray) -> list[float]:
     """How alike each section but the first is to the first of its row, 0 where a new row begins.
 
     Not to the one before it: a shift that is nearly the right one hardly shows from plane to plane, and adds up.

@@ -6,8 +6,8 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.symmetry.surface.lattice import cell_index, cell_of, grown
-from stages.symmetry.surface.welding import sides_by_edge, welded
+from stages.symmetry.surface.lattice import cell_index, cell_of, doubled
+from stages.symmetry.surface.welding import sides_by_edge, weld
 
 SAME_ANGLE = 5e-3
 """Radians up to which directions are one."""
@@ -76,8 +76,8 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
                     if n < 0:
                         continue
                     if total == len(cell):
-                        cell, points = grown(cell), grown(points)
-                        directions, lengths = grown(directions), grown(lengths)
+                        cell, points = doubled(cell), doubled(points)
+                        directions, lengths = doubled(directions), doubled(lengths)
                     cell[total], points[total], directions[total] = n, middle, way / length
                     lengths[total] = (far - near) * length
                     total += 1
@@ -88,7 +88,7 @@ def boundary_lines(corners, normals, origin, size, keys, starts, owner, toleranc
 def sides_that_go_on(corners: FloatArray, normals: FloatArray, size: float) -> BoolArray:
     """Which sides of triangles (f, 3, 3) with these normals they share with one other triangle, which lies in their
     plane and is no sliver, bool (f, 3): the inner sides of a flat face that is subdivided."""
-    places, _ = welded(corners, 0.0)
+    places, _ = weld(corners, 0.0)
     sides = sides_by_edge(places)
     pair = sides.first[sides.count == 2]
     one, other = sides.side[pair], sides.side[pair + 1]
@@ -188,7 +188,7 @@ def _bare(near, far, spans, count, bare, filled):
                 bare[filled - 1, 1] = until
             else:
                 if filled == len(bare):
-                    bare = grown(bare)
+                    bare = doubled(bare)
                 bare[filled, 0], bare[filled, 1] = at, until
                 filled += 1
         if place < count:

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
-from stages.symmetry.surface.lattice import grown
+from stages.symmetry.surface.lattice import doubled
 
 MOST_CORNERS = 12
 """A triangle cut by six planes has at most nine corners."""
@@ -97,7 +97,7 @@ def _all_fragments(corners, origin, size, low_cell, high_cell):
                     if area <= SPECK * size * size:
                         continue
                     if total == len(faces):
-                        cells, faces, middles = grown(cells), grown(faces), grown(middles)
+                        cells, faces, middles = doubled(cells), doubled(faces), doubled(middles)
                     cells[total, 0], cells[total, 1], cells[total, 2] = i, j, k
                     faces[total] = face
                     for axis in range(3):
@@ -129,7 +129,7 @@ def _emit(polygon, count, size, side, face, triangles, sides, faces, total):
         return triangles, sides, faces, total
     for k in range(1, count - 1):
         if total == len(faces):
-            triangles, sides, faces = grown(triangles), grown(sides), grown(faces)
+            triangles, sides, faces = doubled(triangles), doubled(sides), doubled(faces)
         triangles[total, 0], triangles[total, 1], triangles[total, 2] = polygon[0], polygon[k], polygon[k + 1]
         sides[total], faces[total] = side, face
         total += 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
-from stages.symmetry.surface.welding import sides_by_edge, welded
+from stages.symmetry.surface.welding import sides_by_edge, weld
 
 CREASE = 0.4
 """Radians between the normals at an edge from which on it is a feature line."""
@@ -36,7 +36,7 @@ def corner_frames(corners: FloatArray, tolerance: float) -> CornerFrames:
 
     Of each corner those frames are taken whose kind is the first in order, all of them where several are equal.
     """
-    places, vertices = welded(corners, tolerance)
+    places, vertices = weld(corners, tolerance)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     edges, turns, outwards = creases(places, normals)

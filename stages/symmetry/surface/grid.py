@@ -12,7 +12,7 @@ from stages.symmetry.surface.boundary_lines import SAME_ANGLE, boundary_lines, s
 from stages.symmetry.surface.clip import fragments
 from stages.symmetry.surface.lattice import neighbours_of, pack, unpack
 
-CELLS_A_RADIUS = 4
+CELLS_PER_RADIUS = 4
 """Cells have a quarter of the radius of similarity (symmetry §4)."""
 SAME_PLACE = 1e-2
 """Planes and lines closer than this share of a cell are one."""
@@ -40,7 +40,7 @@ class SurfaceGrid:
     corners: FloatArray
     faces: IntArray
     origin: FloatArray
-    size: float
+    cell_size: float
     radius: float
     keys: np.ndarray
     cells: np.ndarray
@@ -73,11 +73,11 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     boundary where the triangle's plane does not go on beyond it, whatever the mesh's connectivity: so T-junctions and
     doublets make none.
     """
-    faces = np.flatnonzero(with_area(corners))
+    faces = np.flatnonzero(has_area(corners))
     corners = np.ascontiguousarray(corners[faces])
     low = corners.min(axis=(0, 1))
     radius = share * float((corners.max(axis=(0, 1)) - low).max())
-    size = radius / CELLS_A_RADIUS
+    size = radius / CELLS_PER_RADIUS
     origin = low - size * (np.array(SHIFT) + 2)
     where, owner, middles = fragments(corners, origin, size)
     packed = pack(where)
@@ -97,7 +97,7 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
         corners=corners,
         faces=faces.astype(np.int32),
         origin=origin,
-        size=size,
+        cell_size=size,
         radius=radius,
         keys=keys,
         cells=cells,
@@ -112,7 +112,7 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     )
 
 
-def with_area(corners: FloatArray) -> BoolArray:
+def has_area(corners: FloatArray) -> BoolArray:
     """Which of triangles (f, 3, 3) have area, bool (f,)."""
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

@@ -70,7 +70,7 @@ def neighbours_of(cells, keys):
 
 
 @numba.njit(cache=True)
-def grown(array):
+def doubled(array):
     """An array twice as long that begins with this one."""
     larger = np.empty((2 * len(array), *array.shape[1:]), dtype=array.dtype)
     larger[: len(array)] = array

@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray, IntArray
 from stages.shape.geometry.pose import invert, transform_points
-from stages.symmetry.matching.cell_lookup import among
+from stages.symmetry.matching.cell_lookup import is_among
 from stages.symmetry.surface.clip import cut_triangles, fragments
 from stages.symmetry.surface.grid import SurfaceGrid
 from stages.symmetry.surface.lattice import cell_index, cell_keys, cell_of
@@ -59,16 +59,16 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
         return soup.select(inside), soup.select(~inside)
     chosen = grid.cells[cells]
     box = np.array([chosen.min(axis=0), chosen.max(axis=0)])
-    bounds = grid.origin + grid.size * np.array([box[0], box[1] + 1])
+    bounds = grid.origin + grid.cell_size * np.array([box[0], box[1] + 1])
     blocks = np.zeros((box[1] - box[0]) // BLOCK + 1, dtype=bool)
     blocks[tuple(((chosen - box[0]) // BLOCK).T)] = True
     back = invert(pose)
-    asked = _reaching(soup.corners, back, bounds[0], BLOCK * grid.size, blocks)
+    asked = _reaching(soup.corners, back, bounds[0], BLOCK * grid.cell_size, blocks)
     if not len(asked):
         return soup.select(asked), soup
     local = transform_points(back, soup.corners[asked].reshape(-1, 3)).reshape(-1, 3, 3)
-    where, owner, _ = fragments(local, grid.origin, grid.size, box)
-    inside = among(grid.keys[cells], cell_keys(where))
+    where, owner, _ = fragments(local, grid.origin, grid.cell_size, box)
+    inside = is_among(grid.keys[cells], cell_keys(where))
     held, total = np.bincount(owner[inside], minlength=len(asked)), np.bincount(owner, minlength=len(asked))
     whole = (held == total) & ((local >= bounds[0]) & (local <= bounds[1])).all(axis=(1, 2)) & (held > 0)
     crossing = (held > 0) & ~whole
@@ -79,7 +79,7 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
     corners, side, of = cut_triangles(
         local[crossing],
         grid.origin,
-        grid.size,
+        grid.cell_size,
         where[mine],
         np.searchsorted(np.flatnonzero(crossing), owner[mine]),
         inside[mine],
@@ -89,7 +89,9 @@ def carve(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray) -> t
     untouched = ~within
     untouched[cut] = False
     pieces = Soup(corners, soup.faces[cut][of])
-    return joined(soup.select(within), pieces.select(side)), joined(soup.select(untouched), pieces.select(~side))
+    return join_soups(soup.select(within), pieces.select(side)), join_soups(
+        soup.select(untouched), pieces.select(~side)
+    )
 
 
 @numba.njit(cache=True)
@@ -131,7 +133,7 @@ def middles_in(soup: Soup, grid: SurfaceGrid, cells: IntArray, pose: FloatArray)
     (t,)."""
     chosen = grid.cells[cells]
     low, high = (chosen.min(axis=0), chosen.max(axis=0)) if len(chosen) else (np.zeros(3, int), np.full(3, -1))
-    found: BoolArray = _middles_in(soup.corners, invert(pose), grid.origin, grid.size, grid.keys[cells], low, high)
+    found: BoolArray = _middles_in(soup.corners, invert(pose), grid.origin, grid.cell_size, grid.keys[cells], low, high)
     return found
 
 
@@ -175,6 +177,6 @@ def connected_soups(soup: Soup, origin: FloatArray, size: float) -> list[Soup]:
     return [soup.select(piece == each) for each in order]
 
 
-def joined(*soups: Soup) -> Soup:
+def join_soups(*soups: Soup) -> Soup:
     """The triangles of some soups, one after another."""
     return Soup(np.concatenate([each.corners for each in soups]), np.concatenate([each.faces for each in soups]))

@@ -13,7 +13,7 @@ MIX = -7046029254386353131
 """An odd number whose bits are about half ones: what is multiplied by it differs in its high bits (golden ratio)."""
 
 
-def welded(corners: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
+def weld(corners: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
     """The vertex of each corner of triangles (f, 3, 3), int32 (f, 3), and the vertices, float64 (v, 3), in
     lexicographic order. Points closer than about `tolerance` are one; those at equal coordinates alone where it is 0.
 
@@ -40,12 +40,12 @@ class WeldedSurface:
     def __init__(self, corners: FloatArray, tolerance: float) -> None:
         self._points = corners.reshape(-1, 3)
         self._tolerance = tolerance
-        self._places, vertices = welded(corners, tolerance)
+        self._places, vertices = weld(corners, tolerance)
         self._rows = _rounded(vertices, tolerance)
 
     def around(self, first: IntArray, others: FloatArray, last: IntArray) -> tuple[IntArray, FloatArray]:
-        """What `welded` makes of triangles at places `first` (n,), then `others` (m, 3, 3), then those at `last`."""
-        places, vertices = welded(others, self._tolerance)
+        """What `weld` makes of triangles at places `first` (n,), then `others` (m, 3, 3), then those at `last`."""
+        places, vertices = weld(others, self._tolerance)
         rows = _rounded(vertices, self._tolerance)
         faces, source = _merged(self._places, self._rows, first, places, rows, last)
         own = source >= 0

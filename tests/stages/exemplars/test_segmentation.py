@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
-from stages.exemplars.components import connected_faces
 from stages.exemplars.formats.scene import ModelScene, Placement, Surface
 from stages.exemplars.read import read_model
 from stages.exemplars.segmentation import count_parts, pick_segmentation, segment_scene
+from stages.shape.geometry.connected_faces import connected_faces
 from tests.stages.exemplars.model_files import BOX_FACES, Glb, box, signed_volume, write_obj
 
 RED, BLUE = (255, 0, 0), (0, 0, 255)

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from stages.grammars.collisions import Collisions
-from stages.grammars.extraction.extract import Extraction, Mesh, extract
+from stages.grammars.extraction.extract import ExtractedGrammar, SurfaceMesh, extract_grammar
 from stages.grammars.grammar import ShapeGrammar
 from tests.stages.symmetry.planted import mesh, wall
 
 
 @pytest.fixture(scope="session")
-def found() -> Extraction:
+def found() -> ExtractedGrammar:
     """A wall of four windows."""
     vertices, faces = mesh(wall(4))
     colors = np.full((len(faces), 3), 160, np.uint8)
-    return extract(Mesh(vertices, faces, colors), "wall", 0.03, "z", np.random.default_rng(0))
+    return extract_grammar(SurfaceMesh(vertices, faces, colors), "wall", 0.03, "z", np.random.default_rng(0))
 
 
 @pytest.fixture(scope="session")
-def grammar(found: Extraction) -> ShapeGrammar:
+def grammar(found: ExtractedGrammar) -> ShapeGrammar:
     return found.grammar
 
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from stages.grammars.bounded_cache import Recent
+from stages.grammars.bounded_cache import BoundedCache
 
 
 def test_of_what_takes_more_than_is_allowed_that_goes_which_was_not_asked_for_the_longest() -> None:
@@ -10,7 +10,7 @@ def test_of_what_takes_more_than_is_allowed_that_goes_which_was_not_asked_for_th
         made.append(key)
         return key * 4
 
-    recent: Recent[str, str] = Recent(make, len, 8)
+    recent: BoundedCache[str, str] = BoundedCache(make, len, 8)
     assert [recent[each] for each in ("a", "b", "a", "c")] == ["aaaa", "bbbb", "aaaa", "cccc"]
     assert (made, len(recent)) == (["a", "b", "c"], 2)
     assert recent["a"] == "aaaa"
@@ -20,6 +20,6 @@ def test_of_what_takes_more_than_is_allowed_that_goes_which_was_not_asked_for_th
 
 
 def test_what_is_larger_than_all_may_be_is_held_alone() -> None:
-    recent: Recent[str, str] = Recent(lambda key: key * 9, len, 8)
+    recent: BoundedCache[str, str] = BoundedCache(lambda key: key * 9, len, 8)
     assert recent["a"] == recent["a"] == "a" * 9
     assert (recent["b"], len(recent)) == ("b" * 9, 1)

@@ -5,13 +5,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from stages.grammars.extraction.continuation import carries_corners, corner_cells, parted_at
-from stages.grammars.extraction.docked_pieces import beside, dockers_of
-from stages.grammars.extraction.grids import crossing, rows_of
-from stages.grammars.extraction.productions import seams_of
-from stages.grammars.scans.scanned_grid import Cloud, cloud_grid
-from stages.symmetry.matching.candidate_transforms import candidate_motions
-from stages.symmetry.surface.grid import CELLS_A_RADIUS, SurfaceGrid, surface_grid
+from stages.grammars.extraction.continuation import corner_cells, maps_enough_corners, separated_cells
+from stages.grammars.extraction.docked_pieces import find_docked_pieces, surrounding_cells
+from stages.grammars.extraction.grids import crossing_rows, find_rows
+from stages.grammars.extraction.productions import seams_by_site
+from stages.grammars.scans.scanned_grid import ScannedCloud, scanned_grid
+from stages.symmetry.matching.candidate_transforms import candidate_transforms
+from stages.symmetry.surface.grid import CELLS_PER_RADIUS, SurfaceGrid, surface_grid
 from tests.stages.grammars.scanned import scanned
 from tests.stages.symmetry.planted import area, box, shift, wall
 
@@ -21,14 +21,14 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def cut_at(grid: SurfaceGrid, across: float) -> np.ndarray:
     """The cells whose x is larger."""
-    return np.flatnonzero(grid.origin[0] + grid.size * (grid.cells[:, 0] + 0.5) > across).astype(np.int32)
+    return np.flatnonzero(grid.origin[0] + grid.cell_size * (grid.cells[:, 0] + 0.5) > across).astype(np.int32)
 
 
 def scan_grid(triangles: np.ndarray, share: float, points: int) -> SurfaceGrid:
     """The grid of a scan with noise of a fifth of a cell and eight holes."""
-    cell = share / CELLS_A_RADIUS * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    cell = share / CELLS_PER_RADIUS * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     at, _ = scanned(triangles, points, 0.2 * cell, 8, 1.5 * cell, np.random.default_rng(0))
-    return cloud_grid(Cloud(at, np.full((points, 3), 160, np.uint8)), share).grid
+    return scanned_grid(ScannedCloud(at, np.full((points, 3), 160, np.uint8)), share).grid
 
 
 def has_ends(areas: list[float], period: float, count: int, ends: int) -> bool:
@@ -46,7 +46,7 @@ class TestRows:
         none to all but one storey one each. Grids are cut from the left or the right, and from above or below."""
         whole = area(wall(windows, storeys))
         grid = surface_grid(wall(windows, storeys), SHARE)
-        dockers = dockers_of(grid, candidate_motions(grid, 24, UP))
+        dockers = find_docked_pieces(grid, candidate_transforms(grid, 24, UP))
         bay = (whole - area(wall(windows - 1, storeys))) / whole
         wanted = [(bay, windows, 2)]
         if storeys > 1:
@@ -57,13 +57,13 @@ class TestRows:
             exact = [has_ends(each, period, count, ends) for each in classes]
             assert any(exact)
             classes.pop(exact.index(True))
-        seams = seams_of(grid, dockers)
-        rows = rows_of(grid, dockers, seams)
-        grids = [tuple(sorted(rows[each].count for each in chosen)) for chosen in crossing(grid, dockers, rows)]
+        seams = seams_by_site(grid, dockers)
+        rows = find_rows(grid, dockers, seams)
+        grids = [tuple(sorted(rows[each].count for each in chosen)) for chosen in crossing_rows(grid, dockers, rows)]
         counts = (windows - 1,) if storeys == 1 else tuple(sorted((windows - 1, storeys - 1)))
         assert grids == [counts] * 2 * len(counts)
         for row in rows:
-            step = np.abs(row.motion - np.eye(4))
+            step = np.abs(row.transform - np.eye(4))
             assert np.allclose(step, np.abs(shift(1, 0, 0) - np.eye(4)), atol=1e-9) or np.allclose(
                 step, np.abs(shift(0, 0, 2) - np.eye(4)), atol=1e-9
             )
@@ -73,17 +73,17 @@ class TestSites:
     def test_a_site_moved_a_bay_on_parts_a_bay_more(self) -> None:
         grid = surface_grid(wall(4), SHARE)
         cells = cut_at(grid, 2.6)
-        after = parted_at(grid, cells, beside(grid, cells), shift(-1, 0, 0))
+        after = separated_cells(grid, cells, surrounding_cells(grid, cells), shift(-1, 0, 0))
         assert after is not None
         most = len(np.setxor1d(after, cut_at(grid, 1.6)))
-        assert most <= len(beside(grid, cells)), "but for the cells along the cut"
+        assert most <= len(surrounding_cells(grid, cells)), "but for the cells along the cut"
 
     def test_holes_of_a_scan_beside_the_site_do_not_let_its_sides_run_together(self) -> None:
         grid = scan_grid(wall(3), 0.05, 40_000)
         cells = cut_at(grid, 2.6)
-        after = parted_at(grid, cells, beside(grid, cells), shift(-1, 0, 0))
+        after = separated_cells(grid, cells, surrounding_cells(grid, cells), shift(-1, 0, 0))
         assert after is not None
-        assert len(np.setxor1d(after, cut_at(grid, 1.6))) <= len(beside(grid, cells))
+        assert len(np.setxor1d(after, cut_at(grid, 1.6))) <= len(surrounding_cells(grid, cells))
 
     def test_a_site_that_parts_nothing_where_it_is_taken_has_no_docker_there(self) -> None:
         """A bar cut across, taken to where the bar is a ring: its other way round goes around the cut."""
@@ -91,17 +91,17 @@ class TestSites:
         ring = [box((0, 0, 0), (3, 0.2, 0.2)), box((0, 0, 2), (3, 0.2, 2.2))]
         sides = [box((0, 0, 0.2), (0.2, 0.2, 2)), box((2.8, 0, 0.2), (3, 0.2, 2))]
         grid = surface_grid(np.concatenate([bar, *ring, *sides]), SHARE)
-        x = grid.origin[0] + grid.size * (grid.cells[:, 0] + 0.5)
+        x = grid.origin[0] + grid.cell_size * (grid.cells[:, 0] + 0.5)
         cells = np.flatnonzero((x > -2.5) & (x < -0.5)).astype(np.int32)
-        border = beside(grid, cells)
-        assert parted_at(grid, cells, border, shift(-0.5, 0, 0)) is not None
-        assert parted_at(grid, cells, border, shift(4, 0, 0)) is None
+        border = surrounding_cells(grid, cells)
+        assert separated_cells(grid, cells, border, shift(-0.5, 0, 0)) is not None
+        assert separated_cells(grid, cells, border, shift(4, 0, 0)) is None
 
     def test_corners_are_where_no_shift_takes_the_surface_along_itself(self) -> None:
         grid = surface_grid(box((0, 0, 0), (1, 1, 1)), 0.2)
-        middles = grid.origin + grid.size * (grid.cells[corner_cells(grid)] + 0.5)
+        middles = grid.origin + grid.cell_size * (grid.cells[corner_cells(grid)] + 0.5)
         assert len(middles) == 8
-        assert (np.abs(middles - np.round(middles)) <= grid.size / 2).all()
+        assert (np.abs(middles - np.round(middles)) <= grid.cell_size / 2).all()
 
     def test_a_sheet_of_no_thickness_has_corners_too(self) -> None:
         sheet = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)[[[0, 1, 2], [0, 2, 3]]]
@@ -110,11 +110,11 @@ class TestSites:
     def test_a_shift_that_lays_margins_upon_margins_carries_no_corners(self) -> None:
         grid = surface_grid(wall(3), SHARE)
         corners = corner_cells(grid)
-        assert carries_corners(grid, corners, shift(2, 0, 0))
-        assert not carries_corners(grid, corners, shift(3, 0, 0))
+        assert maps_enough_corners(grid, corners, shift(2, 0, 0))
+        assert not maps_enough_corners(grid, corners, shift(3, 0, 0))
 
     def test_what_may_be_missing_of_a_scan_makes_no_corners(self) -> None:
         grid = scan_grid(wall(4, 3), SHARE, 250_000)
         corners = corner_cells(grid)
-        assert carries_corners(grid, corners, shift(3, 0, 0))
-        assert not carries_corners(grid, corners, shift(4, 0, 0))
+        assert maps_enough_corners(grid, corners, shift(3, 0, 0))
+        assert not maps_enough_corners(grid, corners, shift(4, 0, 0))

@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 
 from eval.grammars.similarity import r_similarity
-from stages.grammars.extraction.docked_pieces import dockers_of
-from stages.grammars.extraction.productions import seams_of
+from stages.grammars.extraction.docked_pieces import find_docked_pieces
+from stages.grammars.extraction.productions import seams_by_site
 from stages.grammars.extraction.seams import cut_out
-from stages.symmetry.matching.candidate_transforms import candidate_motions
-from stages.symmetry.matching.docking_sites import DockingSite, docking_sites, slippable_motions
-from stages.symmetry.matching.r_symmetry import eroded, matched_items, mutual, r_symmetric_cells, symmetric_cells
+from stages.symmetry.matching.candidate_transforms import candidate_transforms
+from stages.symmetry.matching.docking_sites import DockingSite, count_slippable_motions, find_docking_sites
+from stages.symmetry.matching.r_symmetry import (
+    erode_cells,
+    matched_items,
+    mutually_symmetric_cells,
+    r_symmetric_cells,
+    symmetric_cells,
+)
 from stages.symmetry.surface.grid import SurfaceGrid, surface_grid
 from stages.symmetry.surface.soup import Soup
 from tests.stages.symmetry.planted import (
@@ -30,7 +36,7 @@ SHARE = 0.03
 
 
 def sites_of(grid: SurfaceGrid, motion: np.ndarray) -> list[DockingSite]:
-    return docking_sites(grid, motion, *r_symmetric_cells(grid, motion))
+    return find_docking_sites(grid, motion, *r_symmetric_cells(grid, motion))
 
 
 def has_motion(motions: np.ndarray, wanted: np.ndarray) -> bool:
@@ -81,7 +87,7 @@ class TestSymmetricCells:
     def test_erosion_leaves_what_is_a_radius_away(self, four_windows: SurfaceGrid) -> None:
         symmetric = np.ones(len(four_windows), dtype=bool)
         symmetric[100] = False
-        kept = eroded(four_windows, symmetric)
+        kept = erode_cells(four_windows, symmetric)
         away = np.linalg.norm(four_windows.cells - four_windows.cells[100], axis=1)
         assert not kept[away <= 3].any()
         assert kept[away > 4].all()
@@ -93,11 +99,11 @@ class TestSymmetricCells:
         middles = four_windows.origin + four_windows.size * (four_windows.cells + 0.5)
         there = middles[np.flatnonzero(kept_back & (np.abs(middles[:, 0] - 3) < 0.05))[0]]
         leak = np.linalg.norm(middles - there, axis=1) < 3.5 * four_windows.size
-        forth, back = mutual(four_windows, motion, kept, kept_back & ~leak)
+        forth, back = mutually_symmetric_cells(four_windows, motion, kept, kept_back & ~leak)
         away = np.linalg.norm(middles + np.array([1, 0, 0]) - there, axis=1) / four_windows.size
         assert leak.sum() > 10
         assert not forth[away < 2.5].any()
-        assert (forth == mutual(four_windows, motion, kept, kept_back)[0])[away > 4.5].all()
+        assert (forth == mutually_symmetric_cells(four_windows, motion, kept, kept_back)[0])[away > 4.5].all()
         assert (back <= kept_back & ~leak).all()
 
     def test_a_turn_that_maps_a_box_onto_itself_leaves_nothing(self) -> None:
@@ -109,22 +115,22 @@ class TestSymmetricCells:
 class TestMotions:
     def test_those_that_keep_a_direction_turn_nothing_over(self, four_windows: SurfaceGrid) -> None:
         up = np.array([0.0, 0.0, 1.0])
-        anywhere, upright = (candidate_motions(four_windows, 64, axis) for axis in (None, up))
+        anywhere, upright = (candidate_transforms(four_windows, 64, axis) for axis in (None, up))
         assert (anywhere[:, 2, 2] < 0).any(), "the wall is like itself upside down"
         assert len(upright)
         np.testing.assert_allclose(upright[:, :3, :3] @ up, np.tile(up, (len(upright), 1)), atol=1e-6)
 
     def test_the_period_of_a_wall_is_found(self, four_windows: SurfaceGrid) -> None:
-        motions = candidate_motions(four_windows, 64)
+        motions = candidate_transforms(four_windows, 64)
         for count in (1, 2, 3):
             assert has_motion(motions, shift(count, 0, 0))
 
     def test_the_screw_of_a_spiral_stair_is_found(self) -> None:
-        assert has_motion(candidate_motions(surface_grid(spiral_stair(6), SHARE), 32), screw(0.5, 0.35))
+        assert has_motion(candidate_transforms(surface_grid(spiral_stair(6), SHARE), 32), screw(0.5, 0.35))
 
     def test_a_turned_wall_has_turned_motions(self) -> None:
         turn = screw(0.7, 0.0)
-        motions = candidate_motions(surface_grid(moved(wall(3), turn), SHARE), 64)
+        motions = candidate_transforms(surface_grid(moved(wall(3), turn), SHARE), 64)
         assert has_motion(motions, turn @ shift(1, 0, 0) @ np.linalg.inv(turn))
 
 
@@ -151,7 +157,7 @@ class TestDockingSites:
         grid = surface_grid(prongs_and_bridge(), 0.02)
         sites = [each for each in sites_of(grid, shift(9, 0, 0)) if each.kind == "replace"]
         assert len(sites) == 1
-        x = grid.origin[0] + grid.size * grid.cells[sites[0].primary, 0]
+        x = grid.origin[0] + grid.cell_size * grid.cells[sites[0].primary, 0]
         assert ((x < 2.5).any(), ((x > 2.5) & (x < 4.5)).any(), (x > 4.5).any()) == (True, False, True)
 
     def test_interlocked_dockers_take_the_place_of_each_other_as_one(self) -> None:
@@ -159,10 +165,10 @@ class TestDockingSites:
         3 by 1 and covers two of 1 by 1."""
         triangles = prongs_and_bridge()
         grid = surface_grid(triangles, 0.02)
-        dockers = dockers_of(grid, shift(9, 0, 0)[None])
-        seams = seams_of(grid, dockers)
+        dockers = find_docked_pieces(grid, shift(9, 0, 0)[None])
+        seams = seams_by_site(grid, dockers)
         whole = Soup(grid.corners, grid.faces)
-        z = grid.origin[2] + grid.size * grid.cells[:, 2]
+        z = grid.origin[2] + grid.cell_size * grid.cells[:, 2]
         prongs, bridge = (each for each in dockers if z[each.cells].min() > 1)
         assert prongs.site == bridge.site
         for old, new, more in ((prongs, bridge, 10.0), (bridge, prongs, -10.0)):
@@ -175,10 +181,10 @@ class TestDockingSites:
     def test_dockers_on_two_sides_of_a_bar_have_sites_of_two_classes(self) -> None:
         """Where the bar is the same on both sides of a site, the left end of it lies near the right end of another."""
         grid = surface_grid(prongs_and_bridge(), 0.02)
-        across = grid.origin[0] + grid.size * (grid.cells[:, 0] + 0.5)
+        across = grid.origin[0] + grid.cell_size * (grid.cells[:, 0] + 0.5)
         sides: dict[int, set[bool]] = {}
-        for each in dockers_of(grid, np.array([shift(9, 0, 0), shift(15, 0, 0), shift(4, 0, 0)])):
-            if np.ptp(across[each.border]) < 2 * grid.size:
+        for each in find_docked_pieces(grid, np.array([shift(9, 0, 0), shift(15, 0, 0), shift(4, 0, 0)])):
+            if np.ptp(across[each.border]) < 2 * grid.cell_size:
                 rightward = bool(across[each.cells].mean() > across[each.border].mean())
                 sides.setdefault(each.site, set()).add(rightward)
         assert {True} in sides.values()
@@ -187,11 +193,11 @@ class TestDockingSites:
 
     def test_a_straight_prism_slips_one_way_and_a_plane_three(self) -> None:
         grid = surface_grid(box((0, 0, 0), (6, 1, 1)), 0.03)
-        x, z = (grid.origin[d] + grid.size * (grid.cells[:, d] + 0.5) for d in (0, 2))
+        x, z = (grid.origin[d] + grid.cell_size * (grid.cells[:, d] + 0.5) for d in (0, 2))
         around = np.flatnonzero(np.abs(x - 3) < 0.3).astype(np.int32)
-        top = around[z[around] > 1 - grid.size]
+        top = around[z[around] > 1 - grid.cell_size]
         inner = top[np.abs(grid.cells[top, 1] - np.median(grid.cells[top, 1])) < 5]
-        assert (slippable_motions(grid, around), slippable_motions(grid, inner)) == (1, 3)
+        assert (count_slippable_motions(grid, around), count_slippable_motions(grid, inner)) == (1, 3)
 
 
 def period_area() -> float:

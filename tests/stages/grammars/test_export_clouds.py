@@ -11,10 +11,10 @@ from pipeline.errors import ConfigError
 from stages.exemplars.read import read_model
 from stages.grammars.description import describe_grammar
 from stages.grammars.export_clouds import cloud_of_text, main, ply_bytes
-from stages.grammars.extraction.extract import Extraction, extract
+from stages.grammars.extraction.extract import ExtractedGrammar, extract_grammar
 from stages.grammars.files import write_grammar
-from stages.grammars.read_surface import is_cloud, read_cloud, read_surface
-from stages.grammars.scans.scanned_grid import Cloud
+from stages.grammars.read_surface import is_point_cloud, read_cloud, read_surface
+from stages.grammars.scans.scanned_grid import ScannedCloud
 from stages.shape.arrays import FloatArray
 from tests.cloud_similarity import MATCHED_SHARE, cloud_similarity
 from tests.stages.grammars.test_planted import extraction
@@ -23,30 +23,30 @@ from tests.stages.symmetry.planted import wall
 
 
 @pytest.fixture(scope="module")
-def cloud() -> Cloud:
+def cloud() -> ScannedCloud:
     return cloud_of(wall(4), count=50_000)
 
 
 @pytest.fixture(scope="module")
-def found(cloud: Cloud) -> Extraction:
-    return extract(cloud, "scan", SHARE, "z", np.random.default_rng(0))
+def found(cloud: ScannedCloud) -> ExtractedGrammar:
+    return extract_grammar(cloud, "scan", SHARE, "z", np.random.default_rng(0))
 
 
 class TestGrammar:
-    def test_sites_dockers_rules_and_grids_are_those_of_the_mesh(self, found: Extraction) -> None:
+    def test_sites_dockers_rules_and_grids_are_those_of_the_mesh(self, found: ExtractedGrammar) -> None:
         exact = extraction(wall(4), SHARE)
         for each in (found, exact):
-            assert [docker.site for docker in each.dockers] == [0] * 8
+            assert [docker.site for docker in each.docked_pieces] == [0] * 8
             assert [grid.counts for grid in each.grammar.grids] == [(3,), (3,)]
-        assert len(found.grammar.rules) == len(exact.grammar.rules)
+        assert len(found.grammar.productions) == len(exact.grammar.productions)
 
-    def test_every_terminal_is_made_of_whole_splats(self, found: Extraction) -> None:
+    def test_every_terminal_is_made_of_whole_splats(self, found: ExtractedGrammar) -> None:
         for mesh in found.grammar.meshes:
             corners = mesh.vertices[mesh.faces]
             sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
             assert np.allclose(sides, sides[:, :1], rtol=1e-3)
 
-    def test_a_grid_as_the_exemplar_has_it_gives_all_of_its_points_back(self, found: Extraction) -> None:
+    def test_a_grid_as_the_exemplar_has_it_gives_all_of_its_points_back(self, found: ExtractedGrammar) -> None:
         back = cloud_of_text(found.grammar, "G0[3]").points
         assert len(back) == pytest.approx(len(found.grid.corners), rel=0.02)
         assert np.allclose(np.ptp(back, axis=0), np.ptp(found.grid.corners.mean(axis=1), axis=0), atol=CELL)
@@ -55,13 +55,13 @@ class TestGrammar:
 class TestSimilar:
     @pytest.mark.parametrize("text", ["G0[1]", "G0[6]", "G1[4]"])
     def test_every_neighbourhood_of_a_shape_is_one_of_the_scan(
-        self, cloud: Cloud, found: Extraction, text: str
+        self, cloud: ScannedCloud, found: ExtractedGrammar, text: str
     ) -> None:
         shape = cloud_of_text(found.grammar, text).points
         assert np.ptp(shape[:, 0]) == pytest.approx(5.2 + int(text[3]) - 3, abs=CELL)
         assert (similarity(cloud.points, shape) >= MATCHED_SHARE).all()
 
-    def test_a_step_that_no_scan_has_is_found(self, cloud: Cloud) -> None:
+    def test_a_step_that_no_scan_has_is_found(self, cloud: ScannedCloud) -> None:
         stepped = cloud.points.copy()
         stepped[stepped[:, 0] > 2.6, 1] += 3 * CELL
         here = np.abs(stepped[:, 0] - 2.6) < CELL
@@ -75,10 +75,12 @@ def similarity(exemplar: FloatArray, shape: FloatArray, only: np.ndarray | None 
 
 
 class TestFiles:
-    def test_a_ply_without_faces_is_a_cloud_with_its_normals_and_colours(self, tmp_path: Path, cloud: Cloud) -> None:
+    def test_a_ply_without_faces_is_a_cloud_with_its_normals_and_colours(
+        self, tmp_path: Path, cloud: ScannedCloud
+    ) -> None:
         normals = np.tile([0.0, 1.0, 0.0], (len(cloud.points), 1))
         path = tmp_path / "scan.ply"
-        path.write_bytes(ply_bytes(Cloud(cloud.points, cloud.colors, normals)))
+        path.write_bytes(ply_bytes(ScannedCloud(cloud.points, cloud.colors, normals)))
         read = read_cloud(path)
         assert read is not None
         assert read.normals is not None
@@ -95,10 +97,10 @@ class TestFiles:
         assert read is not None
         assert (read.points == rows[:, :3]).all()
         assert (read.normals is not None) == (suffix == "xyzn")
-        assert is_cloud(path)
+        assert is_point_cloud(path)
 
     def test_a_mesh_is_none(self) -> None:
-        assert not is_cloud(Path("datasets/exemplars/facade/townhouse.glb"))
+        assert not is_point_cloud(Path("datasets/exemplars/facade/townhouse.glb"))
 
     @pytest.mark.parametrize(
         ("name", "content", "why"),
@@ -116,15 +118,15 @@ class TestFiles:
         with pytest.raises(ConfigError, match=why):
             read_surface(path)
 
-    def test_a_cloud_has_no_parts(self, tmp_path: Path, cloud: Cloud) -> None:
+    def test_a_cloud_has_no_parts(self, tmp_path: Path, cloud: ScannedCloud) -> None:
         path = tmp_path / "scan.ply"
-        path.write_bytes(ply_bytes(Cloud(cloud.points, cloud.colors, cloud.points)))
+        path.write_bytes(ply_bytes(ScannedCloud(cloud.points, cloud.colors, cloud.points)))
         with pytest.raises(ConfigError, match="if it is a point cloud, which has no parts, make a grammar of it"):
             read_model(path)
 
 
 def test_the_command_writes_shapes_as_clouds(
-    tmp_path: Path, found: Extraction, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, found: ExtractedGrammar, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text, arrays = tmp_path / "scan.json", tmp_path / "scan.tar"
     with text.open("wb") as json, arrays.open("wb") as tar:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.grammars.extraction.extract import Mesh, extract
+from stages.grammars.extraction.extract import SurfaceMesh, extract_grammar
 from stages.shape.arrays import IntArray
 from tests.stages.symmetry.planted import mesh, wall
 
@@ -18,11 +18,11 @@ def test_terminals_have_the_colours_of_their_faces_where_others_without_area_are
     vertices, faces = mesh(wall(3))
     colors = np.eye(3, dtype=np.uint8)[facing(vertices[faces])] * 200
     flat = np.zeros((5, 3), dtype=np.int32)
-    found = extract(
-        Mesh(vertices, np.concatenate([flat, faces]), np.concatenate([np.full((5, 3), 9, np.uint8), colors])),
+    found = extract_grammar(
+        SurfaceMesh(vertices, np.concatenate([flat, faces]), np.concatenate([np.full((5, 3), 9, np.uint8), colors])),
         "wall", 0.05, "z", np.random.default_rng(0),
     )  # fmt: skip
-    assert found.grammar.rules
+    assert found.grammar.productions
     assert found.grammar.grids
     for each in (*found.grammar.meshes, found.grammar.exemplar):
         assert (each.face_colors.argmax(axis=1) == facing(each.vertices[each.faces])).all()

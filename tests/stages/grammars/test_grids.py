@@ -7,11 +7,11 @@ import pytest
 
 from eval.grammars.similarity import r_similarity
 from stages.grammars.derivation import START, Derivation, grid_poses
-from stages.grammars.extraction.docked_pieces import Docker, beside, dockers_of
-from stages.grammars.extraction.grids import Grid, crossing, cut_grid, rows_of
-from stages.grammars.extraction.productions import Production, productions, seams_of
+from stages.grammars.extraction.docked_pieces import DockedPiece, find_docked_pieces, surrounding_cells
+from stages.grammars.extraction.grids import ExtractedGrid, crossing_rows, cut_grid, find_rows
+from stages.grammars.extraction.productions import ExtractedProduction, extract_productions, seams_by_site
 from stages.shape.geometry.pose import transform_points
-from stages.symmetry.matching.candidate_transforms import candidate_motions
+from stages.symmetry.matching.candidate_transforms import candidate_transforms
 from stages.symmetry.surface.grid import SurfaceGrid, surface_grid
 from tests.stages.symmetry.planted import area, screw, spiral_stair, wall
 
@@ -24,11 +24,13 @@ class Planted:
     def __init__(self, triangles: np.ndarray) -> None:
         self.triangles = triangles
         self.grid: SurfaceGrid = surface_grid(triangles, SHARE)
-        self.dockers: list[Docker] = dockers_of(self.grid, candidate_motions(self.grid, 40))
-        self.seams = seams_of(self.grid, self.dockers)
-        self.rows = rows_of(self.grid, self.dockers, self.seams)
-        self.sets = crossing(self.grid, self.dockers, self.rows)
-        self.first: Grid = cut_grid(self.grid, self.dockers, [self.rows[each] for each in self.sets[0]], self.seams)
+        self.docked_pieces: list[DockedPiece] = find_docked_pieces(self.grid, candidate_transforms(self.grid, 40))
+        self.seams = seams_by_site(self.grid, self.docked_pieces)
+        self.rows = find_rows(self.grid, self.docked_pieces, self.seams)
+        self.sets = crossing_rows(self.grid, self.docked_pieces, self.rows)
+        self.first: ExtractedGrid = cut_grid(
+            self.grid, self.docked_pieces, [self.rows[each] for each in self.sets[0]], self.seams
+        )
 
     def resized(self, *counts: int) -> np.ndarray:
         """The triangles of the first grid with so many cells along its rows."""
@@ -36,7 +38,7 @@ class Planted:
             [
                 transform_points(pose, self.first.pieces[piece][1].corners.reshape(-1, 3)).reshape(-1, 3, 3)
                 for piece, pose in grid_poses(
-                    self.first.motions, self.first.counts, [where for where, _ in self.first.pieces], counts
+                    self.first.transforms, self.first.counts, [where for where, _ in self.first.pieces], counts
                 )
             ]
         )
@@ -57,15 +59,15 @@ def facade() -> Planted:
 
 
 @pytest.fixture(scope="module")
-def found(row: Planted) -> list[Production]:
-    return productions(row.grid, row.dockers, row.seams, np.random.default_rng(0))[0]
+def found(row: Planted) -> list[ExtractedProduction]:
+    return extract_productions(row.grid, row.docked_pieces, row.seams, np.random.default_rng(0))[0]
 
 
 class TestSites:
     def test_the_ends_of_a_wall_with_none_to_three_bays_dock_at_one_class_of_sites(self, row: Planted) -> None:
         """Symmetry §3.4.2: sites of one shape are identified across the model."""
         bay = 2 * (1 * 2.4 - 0.5) + 0.3 * 3 + 0.6
-        classes = [[each.area for each in row.dockers if each.site == site] for site in range(9)]
+        classes = [[each.area for each in row.docked_pieces if each.site == site] for site in range(9)]
         found = max(classes, key=lambda each: max(each, default=0.0))
         end = min(found)
         windows = (np.array(sorted(found)) - end) * area(row.triangles) / bay
@@ -76,7 +78,7 @@ class TestSites:
 class TestGrids:
     def test_a_wall_of_four_windows_is_a_row_of_three_cells_and_what_holds_the_fourth(self, row: Planted) -> None:
         assert [each.count for each in row.rows] == [3, 3]  # cut from the left and from the right
-        assert np.allclose(np.abs(row.first.motions[0, :3, 3]), (1, 0, 0), atol=1e-9)
+        assert np.allclose(np.abs(row.first.transforms[0, :3, 3]), (1, 0, 0), atol=1e-9)
         assert [where for where, _ in row.first.pieces] == [(0,), (1,), (2,)]
 
     @pytest.mark.parametrize("count", [0, 3, 7])
@@ -89,29 +91,29 @@ class TestGrids:
         """Symmetry figure 7a."""
         assert sorted(facade.first.counts) == [2, 3]
         assert len(facade.first.pieces) == 9
-        one, other = facade.first.motions
+        one, other = facade.first.transforms
         assert np.allclose(one @ other, other @ one)
 
     def test_rows_whose_sites_cross_unlike_from_cell_to_cell_make_no_grid(self, facade: Planted) -> None:
         """Symmetry figure 7b: the sites of each row are symmetric under its motion, but those of one lie higher in one
         cell of the other."""
         grid, one, other = facade.grid, *(facade.rows[each] for each in facade.sets[0])
-        upward, along = (one, other) if abs(one.motion[2, 3]) > 1 else (other, one)
-        middles = grid.origin + grid.size * (grid.cells + 0.5)
-        above = middles[:, 2] if upward.motion[2, 3] > 0 else 6.4 - 0.4 - middles[:, 2]
+        upward, along = (one, other) if abs(one.transform[2, 3]) > 1 else (other, one)
+        middles = grid.origin + grid.cell_size * (grid.cells + 0.5)
+        above = middles[:, 2] if upward.transform[2, 3] > 0 else 6.4 - 0.4 - middles[:, 2]
 
-        def cut_at(heights: np.ndarray) -> list[Docker]:
+        def cut_at(heights: np.ndarray) -> list[DockedPiece]:
             """The dockers, those of the row upward beginning at a height, float64 (n,) for each cell, and a storey of 2
             further each."""
-            dockers = list(facade.dockers)
-            for number, place in enumerate(upward.dockers):
+            dockers = list(facade.docked_pieces)
+            for number, place in enumerate(upward.docked_pieces):
                 cells = np.flatnonzero(above > heights + 2 * number).astype(np.int32)
-                dockers[place] = replace(dockers[place], cells=cells, border=beside(grid, cells))
+                dockers[place] = replace(dockers[place], cells=cells, border=surrounding_cells(grid, cells))
             return dockers
 
         in_one_bay = (middles[:, 0] > 1.6) & (middles[:, 0] < 2.6)
-        assert crossing(grid, cut_at(np.full(len(grid), 0.4)), [along, upward]) == [(0, 1)]
-        assert crossing(grid, cut_at(np.where(in_one_bay, 0.1, 0.4)), [along, upward]) == [(0,), (1,)]
+        assert crossing_rows(grid, cut_at(np.full(len(grid), 0.4)), [along, upward]) == [(0, 1)]
+        assert crossing_rows(grid, cut_at(np.where(in_one_bay, 0.1, 0.4)), [along, upward]) == [(0,), (1,)]
 
     def test_a_grid_of_any_counts_is_the_wall_of_so_many_windows(self, facade: Planted) -> None:
         across = facade.first.counts.index(3)
@@ -124,8 +126,8 @@ class TestGrids:
         stair = Planted(spiral_stair(5))
         own = stair.rows[0].count
         assert own >= 2
-        step = screw(0.5, 0.35) if stair.rows[0].motion[2, 3] > 0 else np.linalg.inv(screw(0.5, 0.35))
-        assert np.allclose(stair.rows[0].motion, step, atol=1e-6)
+        step = screw(0.5, 0.35) if stair.rows[0].transform[2, 3] > 0 else np.linalg.inv(screw(0.5, 0.35))
+        assert np.allclose(stair.rows[0].transform, step, atol=1e-6)
         longer = stair.resized(own + 2)
         assert area(longer) == pytest.approx(area(stair.triangles) * 7 / 5, rel=1e-9)
         assert stair.similar(longer) == 1.0
@@ -133,7 +135,7 @@ class TestGrids:
 
 class TestProductions:
     def test_what_the_exemplar_has_at_every_place_gives_the_exemplar_back(
-        self, row: Planted, found: list[Production]
+        self, row: Planted, found: list[ExtractedProduction]
     ) -> None:
         def whole(one: Derivation) -> float:
             return found[one.production].terminal.area + sum(map(whole, one.parts))
@@ -141,13 +143,13 @@ class TestProductions:
         starts = [each for each in found if each.site == START]
         assert starts
         for each in starts:
-            parts = sum(whole(place.original) for place in each.places)
+            parts = sum(whole(place.original) for place in each.non_terminals)
             assert each.terminal.area + parts == pytest.approx(area(row.triangles), rel=1e-9)
 
-    def test_a_bay_is_followed_by_what_it_stands_beside(self, found: list[Production]) -> None:
+    def test_a_bay_is_followed_by_what_it_stands_beside(self, found: list[ExtractedProduction]) -> None:
         """The rule of a 1-grid: a site of the class of its own site is left in what docks there."""
-        recursive = [each for each in found if [place.site for place in each.places] == [each.site]]
+        recursive = [each for each in found if [place.site for place in each.non_terminals] == [each.site]]
         assert min(each.terminal.area for each in recursive) == pytest.approx(
             2 * (1 * 2.4 - 0.5) + 0.3 * 3 + 0.6, rel=1e-9
         )
-        assert any(each.site == recursive[0].site and not each.places for each in found)
+        assert any(each.site == recursive[0].site and not each.non_terminals for each in found)

@@ -7,10 +7,10 @@ import pytest
 
 from eval.grammars.similarity import r_similarity, triangles_of
 from stages.grammars.collisions import Collisions
-from stages.grammars.derivation_text import derivation_text, pieces_of, shape_of_text, surface_digest
-from stages.grammars.extraction.extract import Extraction, Mesh, extract
+from stages.grammars.derivation_text import format_derivation, placed_terminals, shape_of_text, surface_digest
+from stages.grammars.extraction.extract import ExtractedGrammar, SurfaceMesh, extract_grammar
 from stages.grammars.grammar import ShapeGrammar
-from stages.grammars.random_derivations import Collided, random_counts, random_derivation
+from stages.grammars.random_derivations import DerivationCollides, random_derivation, random_resized_grid
 from stages.shape.arrays import FloatArray
 from tests.stages.symmetry.planted import (
     blind_corners,
@@ -25,11 +25,11 @@ MOST = 8
 """So many shapes of a grammar are looked at."""
 
 
-def extraction(triangles: FloatArray, radius: float) -> Extraction:
+def extraction(triangles: FloatArray, radius: float) -> ExtractedGrammar:
     """The grammar of triangles (f, 3, 3) in grey."""
     vertices, faces = mesh(triangles)
     grey = np.full((len(faces), 3), 160, np.uint8)
-    return extract(Mesh(vertices, faces, grey), "planted", radius, "z", np.random.default_rng(0))
+    return extract_grammar(SurfaceMesh(vertices, faces, grey), "planted", radius, "z", np.random.default_rng(0))
 
 
 def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
@@ -39,12 +39,16 @@ def shapes_of(grammar: ShapeGrammar) -> list[FloatArray]:
     for seed in range(2 * MOST):
         try:
             drawn = random_derivation(grammar, collisions, 5, np.random.default_rng(seed))
-            texts.setdefault(surface_digest(grammar, pieces_of(grammar, drawn)), derivation_text(grammar, drawn))
-        except Collided:
+            texts.setdefault(
+                surface_digest(grammar, placed_terminals(grammar, drawn)), format_derivation(grammar, drawn)
+            )
+        except DerivationCollides:
             pass
-        counts = random_counts(grammar, 7, np.random.default_rng(seed))
+        counts = random_resized_grid(grammar, 7, np.random.default_rng(seed))
         if not collisions.whole(counts):
-            texts.setdefault(surface_digest(grammar, pieces_of(grammar, counts)), derivation_text(grammar, counts))
+            texts.setdefault(
+                surface_digest(grammar, placed_terminals(grammar, counts)), format_derivation(grammar, counts)
+            )
     return [triangles_of(shape_of_text(grammar, each)) for each in list(texts.values())[:MOST]]
 
 
@@ -64,7 +68,7 @@ def test_sites_and_grids_are_those_expected_and_every_shape_is_r_similar(
     triangles: FloatArray, radius: float, classes: int, grids: list[tuple[int, ...]]
 ) -> None:
     found = extraction(triangles, radius)
-    assert len({each.site for each in found.dockers}) == classes
+    assert len({each.site for each in found.docked_pieces}) == classes
     assert [each.counts for each in found.grammar.grids] == grids
     shapes = shapes_of(found.grammar)
     assert len(shapes) >= MOST - 1
@@ -77,8 +81,8 @@ def test_rows_that_cross_otherwise_from_cell_to_cell_make_no_2_grid() -> None:
     found = extraction(blind_corners(), 0.045)
     cells: dict[tuple[float, ...], list[set[int]]] = {}
     for row in found.rows:
-        first, last = (found.dockers[row.dockers[end]].cells for end in (0, -1))
-        along = tuple(np.abs(row.motion[:3, 3]).round(6).tolist())
+        first, last = (found.docked_pieces[row.docked_pieces[end]].cells for end in (0, -1))
+        along = tuple(np.abs(row.transform[:3, 3]).round(6).tolist())
         cells.setdefault(along, []).append(set(first.tolist()) - set(last.tolist()))
     assert set(cells) == {(1, 0, 0), (0, 0, 1)}
     assert all(bays & storeys for bays in cells[1, 0, 0] for storeys in cells[0, 0, 1])

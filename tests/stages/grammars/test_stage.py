@@ -15,7 +15,7 @@ license: MIT
 grammars:
   models:
     - {{name: wall, model: {model}, credit: {{license: MIT}}, radius: 0.03, up: z, instances: 2, resized: {resized},
-       most_cells: 2, most_pieces: 1}}
+       max_cells: 2, max_pieces: 1}}
 """
 
 

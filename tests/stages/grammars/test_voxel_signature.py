@@ -3,19 +3,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.grammars.terminal_samples import facing, sampled
-from stages.grammars.voxel_signature import Sight, difference, sight_of
+from stages.grammars.terminal_samples import facing_axis, sample_surface
+from stages.grammars.voxel_signature import VoxelSignature, difference, voxel_signature
 from stages.shape.kit import PartMesh
 from tests.stages.symmetry.planted import blocks, box, mesh, moved, screw, wall
 
 RADIUS = 0.15
 
 
-def seen(triangles: np.ndarray) -> Sight:
+def seen(triangles: np.ndarray) -> VoxelSignature:
     vertices, faces = mesh(triangles)
     part = PartMesh("wall", vertices, faces, np.full((len(faces), 3), 160, np.uint8))
     low, high = part.bounds
-    return sight_of([(sampled(part, RADIUS / 4), np.eye(4))], low, high, RADIUS)
+    return voxel_signature([(sample_surface(part, RADIUS / 4), np.eye(4))], low, high, RADIUS)
 
 
 def window(at: float, ticks: tuple[float, ...] = ()) -> np.ndarray:
@@ -55,4 +55,4 @@ def test_a_shape_that_grows_at_one_end_differs_by_what_has_come() -> None:
 def test_what_faces_between_two_axes_faces_alike_whatever_rounding_does() -> None:
     level = np.sqrt(0.5)
     normals = np.array([[level, level, 0], [level + 1e-15, level - 1e-15, 0], [-level, 0, -level - 1e-15]])
-    assert facing(normals).tolist() == [1, 1, 5]
+    assert facing_axis(normals).tolist() == [1, 1, 5]

@@ -27,7 +27,7 @@ class TestItems:
         grid = three_windows
         cells = np.flatnonzero(grid.cells[:, 0] < np.median(grid.cells[:, 0])).astype(np.int32)
         back = (grid.points - pose[:3, 3]) @ pose[:3, :3]
-        there = np.floor((back - grid.origin) / grid.size).astype(np.int64)
+        there = np.floor((back - grid.origin) / grid.cell_size).astype(np.int64)
         wanted = {tuple(each) for each in grid.cells[cells].tolist()}
         expected = [item for item, cell in enumerate(there.tolist()) if tuple(cell) in wanted]
         assert items_moved_into(grid, cells, pose).tolist() == expected

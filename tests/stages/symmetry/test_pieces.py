@@ -23,7 +23,7 @@ class TestCarve:
         inside, outside = carve(Soup(grid.corners, grid.faces), grid, left, pose)
         assert inside.area + outside.area == pytest.approx(2 * (4.2 * 2.4 - 1.5) + 0.3 * (2 * 6.6 + 9), rel=1e-9)
         local = (inside.corners.mean(axis=1) - pose[:3, 3]) @ pose[:3, :3]
-        cells = np.floor((local - grid.origin) / grid.size)
+        cells = np.floor((local - grid.origin) / grid.cell_size)
         assert (cells[:, 0] < np.median(grid.cells[:, 0])).all()
 
     def test_triangles_that_stay_on_one_side_are_not_cut(self) -> None:

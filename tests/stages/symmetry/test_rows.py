@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.symmetry.rows import chunks_along, cut_across, row_of
+from stages.symmetry.rows import chunks_along, cut_by_plane, find_row
 from stages.symmetry.surface.grid import surface_grid
 from stages.symmetry.surface.soup import Soup
 from tests.stages.symmetry.planted import box, screw
@@ -23,7 +23,7 @@ def shifts(*along: float) -> list[np.ndarray]:
 class TestCutAcross:
     def test_both_sides_of_a_box_keep_its_surface_and_their_faces(self) -> None:
         whole = soup(box((0, 0, 0), (4, 1, 1)))
-        below, beyond = cut_across(whole, np.array([1.0, 0, 0]), 1.5)
+        below, beyond = cut_by_plane(whole, np.array([1.0, 0, 0]), 1.5)
         assert below.area == pytest.approx(1 + 1.5 * 4)
         assert beyond.area == pytest.approx(1 + 2.5 * 4)
         assert below.corners[..., 0].max() == pytest.approx(1.5)
@@ -36,15 +36,15 @@ class TestCutAcross:
 
 class TestRow:
     def test_copies_at_multiples_of_a_step_are_a_row_with_gaps(self) -> None:
-        row = row_of(shifts(0, 4, 2, -6), 1e-3)
+        row = find_row(shifts(0, 4, 2, -6), 1e-3)
         assert row is not None
         assert row.step == pytest.approx(2)
         assert sorted((row.places * round(float(row.way[0]))).tolist()) == [-3, 0, 1, 2]
 
     def test_two_copies_turned_copies_and_uneven_ones_are_none(self) -> None:
-        assert row_of(shifts(0, 1), 1e-3) is None
-        assert row_of([np.eye(4), screw(0.3, 1.0), screw(0.6, 2.0)], 1e-3) is None
-        assert row_of(shifts(0, 2, 3.1), 1e-3) is None
+        assert find_row(shifts(0, 1), 1e-3) is None
+        assert find_row([np.eye(4), screw(0.3, 1.0), screw(0.6, 2.0)], 1e-3) is None
+        assert find_row(shifts(0, 2, 3.1), 1e-3) is None
 
 
 class TestChunks:
@@ -53,7 +53,7 @@ class TestChunks:
         cable = box((-1, 2.05, 0.5), (9, 2.08, 0.6))
         rest = soup(np.concatenate([cable, beam]))
         grid = surface_grid(np.concatenate([bay, rest.corners]), 0.016)
-        row = row_of(shifts(0, 2, 4), grid.tolerance)
+        row = find_row(shifts(0, 2, 4), grid.tolerance)
         assert row is not None
         chunks, left = chunks_along(soup(bay), row, rest, grid)
         around = 2 * (0.03 + 0.1)

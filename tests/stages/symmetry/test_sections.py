@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.symmetry.sections.cross_sections import TURNED, Section, alike, section
+from stages.symmetry.sections.cross_sections import TURNED, CrossSection, cross_section, shared_share
 from tests.stages.symmetry.planted import box
 
 ALONG = np.array([1.0, 0, 0])
 
 
-def _cut(corners: np.ndarray, offset: float) -> Section:
+def _cut(corners: np.ndarray, offset: float) -> CrossSection:
     """The section across the first axis."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     heights = corners[..., 0] - offset
     crossed = (heights.min(axis=1) <= 0) & (heights.max(axis=1) > 0)
-    return section(corners[crossed], normals[crossed], heights[crossed], 0.01)
+    return cross_section(corners[crossed], normals[crossed], heights[crossed], 0.01)
 
 
 def test_a_section_of_a_box_is_as_long_as_the_way_around_it() -> None:
@@ -29,25 +29,25 @@ def test_a_section_of_a_box_is_as_long_as_the_way_around_it() -> None:
 def test_sections_are_alike_by_the_share_of_both_that_they_have_in_common() -> None:
     corners = np.concatenate([box((0, 0, 0), (4, 2, 3)), box((2, 5, 0), (4, 6, 1.5))])
     alone, both = _cut(corners, 1.0), _cut(corners, 3.0)
-    assert alike(alone, alone, np.zeros(3), 0.01, 0.0) == 1.0
-    assert alike(alone, both, 2 * ALONG, 0.01, 0.0) == pytest.approx(10 / 15, abs=0.01)
-    assert alike(alone, both, 2 * ALONG, 0.01, 0.7) == 0.0
-    assert alike(alone, both, np.zeros(3), 0.01, 0.0) == 0.0
+    assert shared_share(alone, alone, np.zeros(3), 0.01, 0.0) == 1.0
+    assert shared_share(alone, both, 2 * ALONG, 0.01, 0.0) == pytest.approx(10 / 15, abs=0.01)
+    assert shared_share(alone, both, 2 * ALONG, 0.01, 0.7) == 0.0
+    assert shared_share(alone, both, np.zeros(3), 0.01, 0.0) == 0.0
 
 
 def test_the_two_sides_of_a_plate_are_not_one() -> None:
     corners = box((0, 0, 0), (4, 1, 1))
-    assert alike(_cut(corners, 1.0), _cut(corners[:, ::-1], 1.0), np.zeros(3), 0.01, 0.0) == 0.0
+    assert shared_share(_cut(corners, 1.0), _cut(corners[:, ::-1], 1.0), np.zeros(3), 0.01, 0.0) == 0.0
 
 
-def _line(count: int, seed: int) -> Section:
+def _line(count: int, seed: int) -> CrossSection:
     rng = np.random.default_rng(seed)
     normals = rng.normal(size=(count, 3))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return Section(rng.uniform(-1, 1, (count, 3)), normals, rng.uniform(0.5, 1.5, count))
+    return CrossSection(rng.uniform(-1, 1, (count, 3)), normals, rng.uniform(0.5, 1.5, count))
 
 
-def _share(one: Section, other: Section, shift: np.ndarray, tolerance: float) -> float:
+def _share(one: CrossSection, other: CrossSection, shift: np.ndarray, tolerance: float) -> float:
     """What sections have in common, by looking at every two points."""
     here = np.column_stack([one.points + shift, tolerance / TURNED * one.normals])
     there = np.column_stack([other.points, tolerance / TURNED * other.normals])
@@ -64,18 +64,18 @@ def test_what_sections_have_in_common_is_what_a_look_at_every_two_points_finds(t
     shift = np.array([0.1, -0.2, 5.0])
     for seed in range(6):
         one, other = _line(60, seed), _line(80, seed + 100)
-        mixed = Section(
+        mixed = CrossSection(
             np.concatenate([one.points + shift, other.points]),
             np.concatenate([one.normals, other.normals]),
             np.concatenate([one.lengths, other.lengths]),
         )
         for first, second, moved in ((one, other, np.zeros(3)), (one, mixed, shift)):
             expected = _share(first, second, moved, tolerance)
-            assert alike(first, second, moved, tolerance, 0.0) == pytest.approx(expected)
-            assert alike(first, second, moved, tolerance, expected - 1e-6) == pytest.approx(expected)
-            assert alike(first, second, moved, tolerance, expected + 1e-6) == 0.0
+            assert shared_share(first, second, moved, tolerance, 0.0) == pytest.approx(expected)
+            assert shared_share(first, second, moved, tolerance, expected - 1e-6) == pytest.approx(expected)
+            assert shared_share(first, second, moved, tolerance, expected + 1e-6) == 0.0
 
 
 def test_an_empty_section_is_like_none() -> None:
-    nothing = Section(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
-    assert alike(_line(40, 7), nothing, np.zeros(3), 1e-3, 0.9) == 0.0
+    nothing = CrossSection(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+    assert shared_share(_line(40, 7), nothing, np.zeros(3), 1e-3, 0.9) == 0.0

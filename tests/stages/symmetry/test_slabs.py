@@ -11,7 +11,7 @@ import pytest
 from stages.exemplars.scene_file import parse_model
 from stages.exemplars.segmentation import segment_scene
 from stages.exemplars.settings import ReadLimits
-from stages.symmetry.sections.parallel_cuts import parallel_cuts
+from stages.symmetry.sections.parallel_cuts import find_parallel_cuts
 from stages.symmetry.sections.slabs import slab_pieces
 from tests.stages.symmetry.planted import blocks, box, mesh, one_object, wall
 
@@ -37,19 +37,19 @@ def tetrahedron() -> np.ndarray:
 class TestCuts:
     def test_stretches_of_one_kind_get_a_joint_each(self) -> None:
         """Between its windows a wall is plain, six times, and it is at each of its five windows."""
-        family = next(each for each in parallel_cuts(wall(5)) if each.way[0] == 1)
+        family = next(each for each in find_parallel_cuts(wall(5)) if each.way[0] == 1)
         assert family.planes == 11
         begin, end = family.offsets[::2], family.offsets[1::2]
         assert np.allclose(end - begin, 0.25, atol=1e-4)
         assert np.allclose((begin + end)[1:10] / 2, np.arange(1.1, 5.6, 0.5), atol=1e-4)
 
     def test_a_row_without_a_plane_between_its_bays_is_found_by_its_shift(self) -> None:
-        family = next(each for each in parallel_cuts(truss(8)) if each.way[0] == 1)
+        family = next(each for each in find_parallel_cuts(truss(8)) if each.way[0] == 1)
         assert np.allclose(np.diff(family.offsets), 1.0)
         assert family.planes >= 6
 
     def test_a_lone_block_has_no_kind_of_section_twice(self) -> None:
-        assert parallel_cuts(tetrahedron()) == []
+        assert find_parallel_cuts(tetrahedron()) == []
 
 
 class TestSlabs:
@@ -74,7 +74,7 @@ class TestSlabs:
             x, [0.0, 0.3], [0.0, 0.5, 1.5, 2.0],
             lambda a, _, c: not (0.5 < c < 1.5 and any(low < a < high for low, high in holes)),
         )  # fmt: skip
-        across = [each for each in parallel_cuts(corners) if each.way[0] == 1]
+        across = [each for each in find_parallel_cuts(corners) if each.way[0] == 1]
         joints = across[0].offsets
         assert across[0].planes == 7
         assert np.allclose(joints[1::2] - joints[::2], [0.5, 0.15, 0.5, 0.15, 0.5, 0.15, 0.5], atol=1e-4)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.symmetry.surface.welding import WeldedSurface, welded
+from stages.symmetry.surface.welding import WeldedSurface, weld
 from tests.stages.symmetry.planted import wall
 
 
@@ -17,6 +17,6 @@ def test_what_is_put_together_of_a_welded_surface_and_of_others_is_as_if_welded_
     pieces[:, 1] = (pieces[:, 0] + pieces[:, 1]) / 2
     pieces[: others // 4, 2] -= 9
     had = WeldedSurface(near, 1e-6).around(first, pieces, last)
-    wanted = welded(np.concatenate([near[first], pieces, near[last]]), 1e-6)
+    wanted = weld(np.concatenate([near[first], pieces, near[last]]), 1e-6)
     assert np.array_equal(had[0], wanted[0])
     assert np.array_equal(had[1], wanted[1])

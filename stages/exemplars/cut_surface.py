@@ -10,11 +10,11 @@ import numpy as np
 from stages.exemplars.formats.scene import ModelScene, Placement, Surface
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
-from stages.symmetry.pieces import RADIUS, Piece, repeated_pieces
+from stages.symmetry.pieces import RADIUS, SurfacePiece, repeated_pieces
 from stages.symmetry.sections.slabs import slab_pieces
-from stages.symmetry.surface.grid import CELLS_A_RADIUS, with_area
+from stages.symmetry.surface.grid import CELLS_PER_RADIUS, has_area
 from stages.symmetry.surface.soup import Soup
-from stages.symmetry.surface.welding import welded
+from stages.symmetry.surface.welding import weld
 
 LEFT_OUT = 1e-5
 """Share of the surface from which on it is told that it is left out."""
@@ -22,21 +22,21 @@ STRAINED = 0.02
 """Share of the surface of what runs along a row from which on it is told that one copy stands for others."""
 
 
-def by_symmetry(scene: ModelScene) -> ModelScene:
+def cut_by_symmetry(scene: ModelScene) -> ModelScene:
     """The scene as one mesh in the world, cut into `repeated_pieces`: a surface for each of them, `piece-00` and so on,
     with a placement for each of its poses. Triangles without area are left out, with a warning that counts them; where
     there are no others, the scene stays as it is."""
     return _parted(scene, repeated_pieces)
 
 
-def by_sections(scene: ModelScene) -> ModelScene:
-    """The scene as one mesh in the world, cut into `slab_pieces`; as `by_symmetry`."""
+def cut_by_sections(scene: ModelScene) -> ModelScene:
+    """The scene as one mesh in the world, cut into `slab_pieces`; as `cut_by_symmetry`."""
     return _parted(scene, slab_pieces)
 
 
-def _parted(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[Piece]]) -> ModelScene:
+def _parted(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[SurfacePiece]]) -> ModelScene:
     vertices, joined = _in_the_world(scene)
-    real = with_area(vertices[joined])
+    real = has_area(vertices[joined])
     if not real.any():
         return scene
     colors = np.concatenate([scene.surfaces[placement.surface].face_colors for placement in scene.placements])
@@ -61,18 +61,18 @@ def _parted(scene: ModelScene, pieces_of: Callable[[FloatArray, IntArray], list[
 
 
 def search_size(scene: ModelScene) -> int:
-    """How large a search for symmetries of the scene would be: `about_size`."""
+    """How large a search for symmetries of the scene would be: `estimate_grid_size`."""
     vertices, faces = _in_the_world(scene)
-    return about_size(vertices[faces], RADIUS)
+    return estimate_grid_size(vertices[faces], RADIUS)
 
 
-def about_size(corners: FloatArray, radius: float) -> int:
+def estimate_grid_size(corners: FloatArray, radius: float) -> int:
     """How many triangles (f, 3, 3) have area, and about how many cells they lie in, for a radius as a share of the
     longest side. A plane at a random slant crosses 3/2 cells of a lattice for each square as wide as a cell."""
-    corners = corners[with_area(corners)]
+    corners = corners[has_area(corners)]
     if not len(corners):
         return 0
-    size = radius / CELLS_A_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    size = radius / CELLS_PER_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
     return len(corners) + round(1.5 * area / 2 / size**2)
 
@@ -92,7 +92,7 @@ def _in_the_world(scene: ModelScene) -> tuple[FloatArray, IntArray]:
     return np.concatenate(moved), np.concatenate(faces).astype(np.int32)
 
 
-def _surface(name: str, piece: Piece, colors: ByteArray) -> Surface:
+def _surface(name: str, piece: SurfacePiece, colors: ByteArray) -> Surface:
     """The surface of a piece, corners at one position one vertex."""
-    places, vertices = welded(piece.triangles.corners, 0.0)
+    places, vertices = weld(piece.triangles.corners, 0.0)
     return Surface(name, vertices, places, colors[piece.triangles.faces])
