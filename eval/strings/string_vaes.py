@@ -165,7 +165,7 @@ def sampling_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], str, Sa
     ]
     notes = (
         "Ways of strings §5.2, each as published; prior, gaussian: points drawn from the prior, or from the Gaussian "
-        f"of the training strings, decoded once, tokens drawn at a temperature of {TEMPERATURE}. Valid: of all strings "
+        f"of the training strings, decoded once at token temperature {TEMPERATURE}. Valid: of all strings "
         "that were decoded. Found: searches that end with a valid string other than where they began. Unique: distinct "
         "shape graphs of what was found; novel: of these not in train. "
         "The paper has no figures; its order is path, linear, perturbation.",

@@ -60,9 +60,7 @@ def bounded(root: Part, source: str) -> Part:
     while level:
         depth, count = depth + 1, count + len(level)
         if depth > MAX_DEPTH or count > MAX_PARTS:
-            raise Rejected(
-                UNREADABLE, f"{source}: more than {MAX_PARTS} parts or {MAX_DEPTH} levels; split or simplify it"
-            )
+            raise Rejected(UNREADABLE, f"{source}: over {MAX_PARTS} parts or {MAX_DEPTH} levels; split or simplify it")
         level = [child for part in level for child in part.children]
     return root
 

@@ -38,7 +38,7 @@ class TrainedPartGraphVae:
 
     @torch.no_grad()
     def encode(self, shapes: Sequence[Execution]) -> Points:
-        """The mean of each executed program in the latent space, float32 (n, latent). Raises Rejected as `nodes_of`."""
+        """Encode executed programs: posterior means, float32 (n, latent). Raises Rejected as `nodes_of`."""
         graphs = Graphs.of([nodes_of(each) for each in shapes])
         found: Points = self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
         return found

@@ -22,8 +22,10 @@ Corpus = tuple[dict[str, Any], FloatArray, dict[str, Texts]]
 
 
 def prepare_corpus(task: Task) -> Outcome:
-    """Files of the shard: `.<split>.safetensors`, the `Texts` of train and val; `.values.safetensors`, what steps of
-    numbers stand for; `.json`, how many there are, the unit of length and the longest.
+    """Prepare the programs of a category as words.
+
+    Files of the shard: `.<split>.safetensors` holds the `Texts` of train and val, `.values.safetensors` the values of
+    number steps, `.json` the counts, the unit of length and the longest program.
 
     Programs of more than `longest` words, and those that break a rule, are refused. Raises Rejected where train or val
     keeps no program.

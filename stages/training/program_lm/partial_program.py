@@ -1,7 +1,7 @@
-"""A program while it is written word by word: what comes next, and which words may (shapeassembly App. D).
+"""A program that is generated word by word: its state, and the words that may follow (shapeassembly App. D).
 
-Beyond what `Draft` holds assemblies to, every cuboid is attached before any is copied and before the assembly ends, so
-that nothing must be left out.
+`Draft` holds the rules of an assembly. In addition, every cuboid is attached before any is copied and before
+the assembly ends, so that no cuboid has to be left out.
 """
 
 from __future__ import annotations

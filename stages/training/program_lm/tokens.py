@@ -47,7 +47,8 @@ FIELDS: dict[int, tuple[Field, ...]] = {
     CUBOID: (Field.SIZE_X, Field.SIZE_Y, Field.SIZE_Z, Field.BUILD),
     ATTACH: (
         Field.MOVED, Field.TARGET,
-        Field.SOURCE_X, Field.SOURCE_Y, Field.SOURCE_Z, Field.GOAL_X, Field.GOAL_Y, Field.GOAL_Z,
+        Field.SOURCE_X, Field.SOURCE_Y, Field.SOURCE_Z,
+        Field.GOAL_X, Field.GOAL_Y, Field.GOAL_Z,
     ),
     SQUEEZE: (Field.MOVED, Field.FIRST, Field.SECOND, Field.FACE, Field.U, Field.V),
     TRANSLATE: (Field.MOVED, Field.AXIS, Field.COPIES, Field.DISTANCE),
@@ -64,8 +65,8 @@ WORDS: int = _STARTS[-1]
 """Words of the vocabulary."""
 
 _KIND = {
-    Field.COMMAND: 0, Field.MOVED: 1, Field.TARGET: 1, Field.FIRST: 1, Field.SECOND: 1, Field.BUILD: 2, Field.FACE: 3,
-    Field.AXIS: 4, Field.COPIES: 5,
+    Field.COMMAND: 0, Field.MOVED: 1, Field.TARGET: 1, Field.FIRST: 1, Field.SECOND: 1,
+    Field.BUILD: 2, Field.FACE: 3, Field.AXIS: 4, Field.COPIES: 5,
 }  # fmt: skip
 _NUMBER = 6
 

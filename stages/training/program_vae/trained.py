@@ -36,7 +36,7 @@ class TrainedProgramVae:
 
     @torch.no_grad()
     def encode(self, programs: Sequence[Program]) -> Points:
-        """The mean of each program in the latent space, float32 (n, latent). Raises ProgramError as `node_lines`."""
+        """Encode programs: posterior means, float32 (n, latent). Raises ProgramError as `node_lines`."""
         means: list[Points] = [np.empty((0, self.latent), np.float32)]
         for start in range(0, len(programs), AT_ONCE):
             read = Programs.of([node_lines(each) for each in programs[start : start + AT_ONCE]])
