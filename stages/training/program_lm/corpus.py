@@ -24,8 +24,10 @@ Corpus = tuple[dict[str, Any], FloatArray, dict[str, Texts]]
 def prepare_corpus(task: Task) -> Outcome:
     """Prepare the programs of a category as words.
 
-    Files of the shard: `.<split>.safetensors` holds the `Texts` of train and val, `.values.safetensors` the values of
-    number steps, `.json` the counts, the unit of length and the longest program.
+    Files of the shard:
+        `.<split>.safetensors`: the `Texts` of train and val
+        `.values.safetensors`: the values of number steps
+        `.json`: counts, unit of length, words of the longest program
 
     Programs of more than `longest` words, and those that break a rule, are refused. Raises Rejected where train or val
     keeps no program.
