@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from eval.engine.table import Cell
 from pipeline.errors import ConfigError
-from stages.training.checkpoint import CheckpointError, weights_header, weights_of_kind
+from stages.training.checkpoint import CheckpointError, read_header, weights_of_kind
 
 Model = TypeVar("Model")
 Figures = TypeVar("Figures")
@@ -50,7 +50,7 @@ def trained_models(
     found = []
     for path in weights_of_kind(folder, kind):
         try:
-            header = weights_header(path)
+            header = read_header(path)
             if kits is not None and header.get("kit") not in kits:
                 continue
             model = load(path, header)

@@ -24,7 +24,7 @@ from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import STANDARD_METHOD, SolverMethod
 from stages.strings.alphabet import Alphabet
 from stages.strings.decoder import Decoded, decode
-from stages.training.checkpoint import weights_header, weights_of_kind
+from stages.training.checkpoint import read_header, weights_of_kind
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
 from stages.variations.settings import VariationsConfig
 
@@ -100,7 +100,7 @@ def instantiator_of(subject: DatasetRun, kit: Kit) -> Instantiator:
 
 def edge_categories(folder: Path, kit: Kit) -> list[TrainedModel[TrainedEdgeCategories]]:
     """The models of edge categories of a kit among published models, the first seed of each."""
-    own = {path for path in weights_of_kind(folder, "edge_categories") if weights_header(path).get("kit") == kit.name}
+    own = {path for path in weights_of_kind(folder, "edge_categories") if read_header(path).get("kit") == kit.name}
 
     def load(path: Path, _: Mapping[str, Any]) -> TrainedEdgeCategories | None:
         return load_edge_categories(path, kit) if path in own else None

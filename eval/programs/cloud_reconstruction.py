@@ -20,13 +20,13 @@ from stages.abstraction.hierarchy import Boxes, hierarchy_of
 from stages.abstraction.settings import AbstractionConfig
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.fitting import fit, fit_cuboids
-from stages.shapeassembly.extraction.category_rules import RULES
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.settings import Cleaning, Gates
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.program import Program
-from stages.training.latent import Points
+from stages.shapeassembly.syntax.program import AssemblyProgram
+from stages.training.latent import LatentPoints
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 
@@ -39,7 +39,7 @@ HIDDEN = 512
 FITS = ("", " + cuboids", " + program")
 """What is done with what the model writes: nothing; its cuboids, or its program, are fitted to the points."""
 
-Encoder = Callable[[FloatArray], Points]
+Encoder = Callable[[FloatArray], LatentPoints]
 """Descriptions of clouds to points of a latent space, float32 (n, latent)."""
 
 
@@ -52,7 +52,7 @@ def described(clouds: FloatArray) -> FloatArray:
     return np.concatenate([features, clouds.min(axis=1), clouds.max(axis=1)], axis=1)
 
 
-def trained_encoder(seen: FloatArray, points: Points, seed: int) -> Encoder:
+def trained_encoder(seen: FloatArray, points: LatentPoints, seed: int) -> Encoder:
     """From descriptions of clouds (n, d) to the points float32 (n, latent) at which a model has their shapes."""
     centre, spread = seen.mean(axis=0), seen.std(axis=0) + 1e-6
     unit = float(points.std()) + 1e-6
@@ -74,9 +74,9 @@ def trained_encoder(seen: FloatArray, points: Points, seed: int) -> Encoder:
                 falling.step()
     module.eval()
 
-    def encode(clouds: FloatArray) -> Points:
+    def encode(clouds: FloatArray) -> LatentPoints:
         with torch.no_grad():
-            found: Points = module(torch.from_numpy((clouds - centre) / spread).float()).numpy() * unit
+            found: LatentPoints = module(torch.from_numpy((clouds - centre) / spread).float()).numpy() * unit
         return found.astype(np.float32)
 
     return encode
@@ -84,7 +84,7 @@ def trained_encoder(seen: FloatArray, points: Points, seed: int) -> Encoder:
 
 def reconstructions(
     model: TrainedProgramVae | TrainedPartGraphVae,
-    place: Points,
+    place: LatentPoints,
     cloud: FloatArray,
     rng: np.random.Generator,
     steps: int,
@@ -110,12 +110,12 @@ def reconstructions(
         yield FITS[2], [replace(box, center=centre + scale * box.center, size=scale * box.size) for box in found]
 
 
-def _program_of(boxes: Sequence[Box]) -> tuple[Program | None, FloatArray, float]:
+def _program_of(boxes: Sequence[Box]) -> tuple[AssemblyProgram | None, FloatArray, float]:
     """The program that is extracted of cuboids, with the centre and the scale of its coordinates; None where none is
     found."""
     try:
         hierarchy = hierarchy_of(shape_of_boxes(boxes), AbstractionConfig().children, Boxes())
-        found = extract(hierarchy, RULES["any"], Gates(), Cleaning())
+        found = extract(hierarchy, CATEGORY_RULES["any"], Gates(), Cleaning())
     except Rejected:
         return None, np.zeros(3), 1.0
     return found.program, found.center, found.scale

@@ -22,7 +22,7 @@ from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.editing.edits import edited
 from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 
@@ -43,7 +43,7 @@ def sheet_of(name: str, title: str, rows: Mapping[str, Sequence[tuple[str, ByteA
 
 
 def neighbours(
-    name: str, category: str, programs: Sequence[Program], train: Sequence[Program], clouds: FloatArray
+    name: str, category: str, programs: Sequence[AssemblyProgram], train: Sequence[AssemblyProgram], clouds: FloatArray
 ) -> tuple[Figure, tuple[TableCell, ...]]:
     """Figure 7: programs that a model wrote, above each the shape of train that is nearest by Chamfer distance, below
     the one whose program is. clouds: of train. And what the table says of them."""
@@ -80,7 +80,7 @@ def neighbours_table(rows: Sequence[tuple[TableCell, ...]]) -> Table:
                  tuple(rows), notes)  # fmt: skip
 
 
-def edits_sheet(name: str, category: str, programs: Sequence[Program], rng: np.random.Generator) -> Figure:
+def edits_sheet(name: str, category: str, programs: Sequence[AssemblyProgram], rng: np.random.Generator) -> Figure:
     """Figure 8: programs that a model wrote, below each a variant with other numbers and the same structure."""
     variants = [edited(each, SPREAD, rng) for each in programs]
     rows = {
@@ -97,7 +97,7 @@ def beside_sheet(category: str, samples: Mapping[str, Sequence[Sequence[Box]]]) 
 
 
 def journey_sheet(
-    category: str, models: Sequence[TrainedModel[Any]], pairs: Sequence[tuple[Program, Program]]
+    category: str, models: Sequence[TrainedModel[Any]], pairs: Sequence[tuple[AssemblyProgram, AssemblyProgram]]
 ) -> Figure:
     """Figure 12: on a straight way through the latent space of each model from one shape to another, each of val."""
     rows = {}
@@ -111,7 +111,7 @@ def journey_sheet(
 
 
 def _between(
-    model: TrainedProgramVae | TrainedPartGraphVae, first: Program, last: Program
+    model: TrainedProgramVae | TrainedPartGraphVae, first: AssemblyProgram, last: AssemblyProgram
 ) -> Iterator[Sequence[Box] | None]:
     """The cuboids at STOPS points between two programs; None where there is no shape."""
     shares = np.linspace(0, 1, STOPS + 2, dtype=np.float32)[1:-1, None]

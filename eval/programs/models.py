@@ -17,23 +17,23 @@ from stages.shape.sample import read_samples
 from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.syntax.errors import ProgramError
 from stages.shapeassembly.syntax.parser import parse
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from stages.training.cuboid_rnn.trained import load_cuboid_rnn
-from stages.training.part_graph_vae.corpus import nodes_of
+from stages.training.part_graph_vae.corpus import graph_nodes
 from stages.training.part_graph_vae.trained import load_part_graph_vae
 from stages.training.program_lm.trained import load_program_lm
-from stages.training.program_vae.lines import node_lines
+from stages.training.program_vae.lines import assembly_lines
 from stages.training.program_vae.trained import load_program_vae
 
 PROGRAM_KINDS = ("program_vae", "program_lm")
 """The kinds that write whole programs; the others write cuboids."""
 
 
-def program_models(subject: DatasetRun, nucleus: float) -> list[TrainedModel[Any]]:
-    """All of them, category by category. nucleus: as in `shapeassembly.written`."""
+def program_models(subject: DatasetRun, top_p: float) -> list[TrainedModel[Any]]:
+    """All of them, category by category. top_p: as in `shapeassembly.sampled`."""
     loaders: dict[str, Callable[[Path, Mapping[str, Any]], Any]] = {
         "program_vae": load_program_vae,
-        "program_lm": partial(load_program_lm, nucleus=nucleus),
+        "program_lm": partial(load_program_lm, top_p=top_p),
         "cuboid_rnn": load_cuboid_rnn,
         "part_graph_vae": load_part_graph_vae,
     }
@@ -46,7 +46,7 @@ def told_without(trained: TrainedModel[Any]) -> str:
     return str(trained.model.header["settings"].get("without", "nothing"))
 
 
-def category_programs(subject: DatasetRun, category: str, split: str) -> list[Program]:
+def category_programs(subject: DatasetRun, category: str, split: str) -> list[AssemblyProgram]:
     """The programs of a category in a split of the dataset."""
     shards = program_shards(subject, split)
     return [parse(each.text) for shard in shards for each in read_samples(shard) if each.kit == category]
@@ -57,15 +57,17 @@ def program_shards(subject: DatasetRun, split: str) -> list[Path]:
     return sorted(subject.places.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
 
 
-def read_by_all(subject: DatasetRun, category: str, split: str, most: int, rng: np.random.Generator) -> list[Program]:
+def read_by_all(
+    subject: DatasetRun, category: str, split: str, most: int, rng: np.random.Generator
+) -> list[AssemblyProgram]:
     """At most so many random programs of a category in a split, of those that every kind of model with a latent space
     can read."""
     programs = category_programs(subject, category, split)
-    kept: list[Program] = []
+    kept: list[AssemblyProgram] = []
     for place in rng.permutation(len(programs)).tolist():
         try:
-            node_lines(programs[place])
-            nodes_of(execute(programs[place]))
+            assembly_lines(programs[place])
+            graph_nodes(execute(programs[place]))
         except (Rejected, ProgramError):
             continue
         kept.append(programs[place])

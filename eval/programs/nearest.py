@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stages.shapeassembly.analysis.structure import token_distance, tokens
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
 CELLS = 24
 """Cells along each axis of the grid that bounds of distances are looked up in."""
@@ -164,7 +164,7 @@ def paired(clouds, others):
     return found
 
 
-def nearest_programs(programs: Sequence[Program], others: Sequence[Program]) -> list[tuple[int, int]]:
+def nearest_programs(programs: Sequence[AssemblyProgram], others: Sequence[AssemblyProgram]) -> list[tuple[int, int]]:
     """For each program the distance (`program_distance`) to the nearest of the others, the first of several, and which
     that is."""
     known = [tokens(each) for each in others]

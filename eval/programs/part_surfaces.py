@@ -21,7 +21,7 @@ from stages.shapeassembly.extraction.boxes import box_corners, nearest_axes
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 from stages.shapeassembly.extraction.validity import surface_points
-from stages.training.latent import drawn as drawn_points
+from stages.training.latent import reparameterize as drawn_points
 from stages.training.recovery.shapes import TRAIN_INTERVAL, random_shapes
 from stages.training.recovery.surface import even_points
 

@@ -21,9 +21,9 @@ from stages.shapeassembly.analysis.structure import program_distance, signature
 from stages.shapeassembly.execution.interpreter import execute_all
 from stages.shapeassembly.extraction.boxes import box_corners
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.validity import boxes_of, surface_points
-from stages.shapeassembly.syntax.program import Program
-from stages.training.latent import Points
+from stages.shapeassembly.extraction.validity import execution_boxes, surface_points
+from stages.shapeassembly.syntax.program import AssemblyProgram
+from stages.training.latent import LatentPoints
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.program_vae.trained import TrainedProgramVae
 
@@ -42,9 +42,9 @@ class Physics:
     stable: float
 
 
-def boxes_of_programs(programs: Sequence[Program]) -> list[list[Box]]:
+def boxes_of_programs(programs: Sequence[AssemblyProgram]) -> list[list[Box]]:
     """The cuboids of each executed program."""
-    return [boxes_of(execution) for execution in execute_all(programs)]
+    return [execution_boxes(execution) for execution in execute_all(programs)]
 
 
 def shape_of_boxes(boxes: Sequence[Box]) -> Shape:
@@ -93,17 +93,19 @@ def variability(samples: Sequence[Sequence[Box]], train: FloatArray, val: FloatA
     )
 
 
-def novelty(samples: Sequence[Program], train: Sequence[Program]) -> float:
+def novelty(samples: Sequence[AssemblyProgram], train: Sequence[AssemblyProgram]) -> float:
     """Percent of samples whose structure train has not (§7.1.3)."""
     known = {signature(each) for each in train}
     return 100 * fmean(signature(each) not in known for each in samples)
 
 
-def unrejected(model: TrainedProgramVae, count: int, rng: np.random.Generator, temperature: float) -> list[Program]:
+def unrejected(
+    model: TrainedProgramVae, count: int, rng: np.random.Generator, temperature: float
+) -> list[AssemblyProgram]:
     """So many programs of random points, none of which is rejected for a line that breaks a rule: its assembly ends
     before that line (§7.1.1, "no reject"). Points that give no cuboid at all are passed over. Raises ValueError where
     nearly all do."""
-    kept: list[Program] = []
+    kept: list[AssemblyProgram] = []
     most = 50 * (1 + count // AT_ONCE)
     for _ in range(most):
         found = model.decode(model.points(AT_ONCE, rng, temperature), reject=False)
@@ -136,8 +138,8 @@ def smoothness(
 
 
 def _decoded(
-    model: TrainedProgramVae | TrainedPartGraphVae, points: Points
-) -> tuple[list[Program], Sequence[Sequence[Box]]]:
+    model: TrainedProgramVae | TrainedPartGraphVae, points: LatentPoints
+) -> tuple[list[AssemblyProgram], Sequence[Sequence[Box]]]:
     """The programs at points that give any, nothing rejected, and the cuboids at those that give any."""
     if isinstance(model, TrainedPartGraphVae):
         return [], [each for each in model.decode(points) if each]

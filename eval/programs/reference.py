@@ -13,7 +13,7 @@ from eval.programs.models import category_programs
 from eval.programs.quality import boxes_of_programs, clouds_of
 from eval.programs.two_sample_test import POINTS, features_of
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Reference:
     """train, val: the programs; learnt, unseen: clouds (n, k, 3) of their shapes; shown: clouds (m, realism.POINTS, 3)
     of the first shapes of train, which networks look at."""
 
-    train: list[Program]
-    val: list[Program]
+    train: list[AssemblyProgram]
+    val: list[AssemblyProgram]
     learnt: FloatArray
     unseen: FloatArray
     shown: FloatArray

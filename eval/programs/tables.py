@@ -8,7 +8,7 @@ from eval.engine.table import Cell, ReferenceRow, Table
 from eval.programs.quality import POINTS, Physics, Variability
 from eval.programs.two_sample_test import Realism
 from stages.shapeassembly.analysis.statistics import program_statistics
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
 _CATEGORIES = ("chair", "table", "storage")
 _METHODS = ("3D-PRNN", "StructureNet", "ShapeAssembly", "validation")
@@ -54,7 +54,7 @@ def _realism(seen: Realism | None) -> tuple[Cell, Cell]:
     return ("", "") if seen is None else (seen.fool, seen.fd)
 
 
-def editability_table(rows: Mapping[str, Sequence[Program]]) -> Table:
+def editability_table(rows: Mapping[str, Sequence[AssemblyProgram]]) -> Table:
     """Tables 3 of the paper: lines, and macros a line."""
     figures = {
         "chair": ((15.7, 0.11, 0.002, 0.024), (27.1, 0.06, 0.0004, 0.07), (20.4, 0.088, 0.0054, 0.092),

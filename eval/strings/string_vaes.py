@@ -17,7 +17,7 @@ from pipeline.randomness import decision_rng
 from stages.shape.graphs.canonical import graph_digest
 from stages.strings.decoder import decode
 from stages.training.string_vae.latent_graph import PathFigures, naive_graph, path_figures, search_graph
-from stages.training.string_vae.latent_sampling import TEMPERATURE, sample
+from stages.training.string_vae.latent_sampling import SAMPLING_TEMPERATURE, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 
 NODES = 1000
@@ -165,7 +165,7 @@ def sampling_table(found: Iterable[tuple[TrainedModel[TrainedStringVae], str, Sa
     ]
     notes = (
         "Ways of strings §5.2, each as published; prior, gaussian: points drawn from the prior, or from the Gaussian "
-        f"of the training strings, decoded once at token temperature {TEMPERATURE}. Valid: of all strings "
+        f"of the training strings, decoded once at token temperature {SAMPLING_TEMPERATURE}. Valid: of all strings "
         "that were decoded. Found: searches that end with a valid string other than where they began. Unique: distinct "
         "shape graphs of what was found; novel: of these not in train. "
         "The paper has no figures; its order is path, linear, perturbation.",

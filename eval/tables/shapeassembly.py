@@ -14,7 +14,7 @@ from eval.engine.evaluation import Chart, Evaluation, ImageRow, TableResult
 from eval.engine.models import TrainedModel, training_curve
 from eval.engine.requirements import PROGRAM_WRITERS, PROGRAMS
 from eval.engine.results_cache import TableSection, cached_sections
-from stages.shapeassembly.settings import NUCLEUS
+from stages.shapeassembly.settings import DEFAULT_TOP_P
 from stages.training.checkpoint import weights_of_kind
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from eval.engine.table import Table
     from eval.programs.reference import Reference
     from stages.shapeassembly.extraction.hierarchy import Box
-    from stages.shapeassembly.syntax.program import Program
+    from stages.shapeassembly.syntax.program import AssemblyProgram
 
 SHOWN = 16
 SECONDS = {"program_vae": 900.0, "program_lm": 300.0, "cuboid_rnn": 120.0, "part_graph_vae": 120.0}
@@ -38,7 +38,7 @@ def _parts(subject: DatasetRun, asked: Namespace) -> Iterator[TableSection]:
     reads = [*program_shards(subject, "train"), *program_shards(subject, "val")]
     reads += weights_of_kind(PRETRAINED_FOLDER, "recovery")  # one of them is the network whose features are compared
     reference = lru_cache(1)(partial(read_reference, subject, judged=asked.judged))
-    for category, models in groupby(program_models(subject, asked.nucleus), key=lambda each: each.kit):
+    for category, models in groupby(program_models(subject, asked.top_p), key=lambda each: each.kit):
         for each in models:
             folder = subject.models / each.folder
             of_model = partial(_of_model, subject, asked, each, reference)
@@ -114,7 +114,7 @@ class Written:
 
     name: str
     samples: Sequence[Sequence[Box]]
-    programs: Sequence[Program] = ()
+    programs: Sequence[AssemblyProgram] = ()
     begun: int = 0
     of_val: bool = False
 
@@ -167,8 +167,8 @@ def _options(parser: ArgumentParser) -> None:
         default=1000,
         help="of these, how many networks look at, for fool and FD, which takes longest",
     )
-    parser.add_argument("--temperature", type=float, default=1.0, help="as in shapeassembly.written")
-    parser.add_argument("--nucleus", type=float, default=NUCLEUS, help="as in shapeassembly.written")
+    parser.add_argument("--temperature", type=float, default=1.0, help="as in shapeassembly.sampled")
+    parser.add_argument("--top_p", type=float, default=DEFAULT_TOP_P, help="as in shapeassembly.sampled")
     parser.add_argument("--sequences", type=int, default=100, help="straight ways in the latent space of each model")
     parser.add_argument("--steps", type=int, default=100, help="points of each way")
 

@@ -32,7 +32,7 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from stages.shapeassembly.execution.interpreter import execute_all
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 
-    models = [each for each in program_models(subject, asked.nucleus) if told_without(each) == "nothing"]
+    models = [each for each in program_models(subject, asked.top_p) if told_without(each) == "nothing"]
     models = [each for each in models if each.model.header["kind"] in KINDS]
     rows: dict[str, Rebuilt] = {}
     sheets = []

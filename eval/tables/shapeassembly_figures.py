@@ -25,7 +25,7 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from stages.training.part_graph_vae.trained import TrainedPartGraphVae
     from stages.training.program_vae.trained import TrainedProgramVae
 
-    models = [each for each in program_models(subject, asked.nucleus) if told_without(each) == "nothing"]
+    models = [each for each in program_models(subject, asked.top_p) if told_without(each) == "nothing"]
     sheets: list[Figure] = []
     rows = []
     for category in sorted({each.kit for each in models}):

@@ -60,7 +60,7 @@ def _look_at(subject: DatasetRun, searches: int, trained: TrainedModel[TrainedSt
     from stages.exemplars.language import dataset_kits
     from stages.string_sampling.instantiation.state import STANDARD_METHOD
     from stages.strings.settings import StringsConfig
-    from stages.training.string_vae.latent_sampling import WAYS
+    from stages.training.string_vae.latent_sampling import SAMPLING_METHODS
 
     model, seed, kits = trained.model, subject.config.seed, dataset_kits(subject.places)
     train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))
@@ -73,7 +73,7 @@ def _look_at(subject: DatasetRun, searches: int, trained: TrainedModel[TrainedSt
     known = shape_graphs(model, train)
     return _Seen(
         reconstruction(model, test) if test else None,
-        {way: sampling(model, way, train, known, searches, model_rng(seed, trained, way)) for way in WAYS},
+        {way: sampling(model, way, train, known, searches, model_rng(seed, trained, way)) for way in SAMPLING_METHODS},
         *structure(model, train, model_rng(seed, trained, "structure")),
         strips,
     )

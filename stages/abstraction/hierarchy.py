@@ -9,8 +9,8 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shape.kit import PartMesh
 from stages.shape.shape import Shape
-from stages.shapeassembly.extraction.boxes import around, box_corners, gap
-from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy, bounded
+from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box_gap
+from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode, check_limits
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
 NEAR = 0.01
@@ -43,17 +43,17 @@ def hierarchy_of(shape: Shape, children: int, boxes: Boxes) -> PartHierarchy:
     """
     assembly = shape.assembly
     leaves = [
-        Part(shape.meshes[kind].label, boxes.of(shape.meshes[kind], pose))
+        PartNode(shape.meshes[kind].label, boxes.of(shape.meshes[kind], pose))
         for kind, pose in zip(assembly.types.tolist(), assembly.poses, strict=True)
     ]
     corners = np.stack([box_corners(leaf.box) for leaf in leaves])
     reach = NEAR * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     label = max(leaves, key=lambda leaf: float(np.prod(leaf.box.size))).label
-    bounded(Part(label, leaves[0].box, tuple(leaves)), "a sample")
+    check_limits(PartNode(label, leaves[0].box, tuple(leaves)), "a sample")
     return PartHierarchy("sample", _node(label, leaves, corners, children, reach))
 
 
-def _node(label: str, leaves: Sequence[Part], corners: FloatArray, children: int, reach: float) -> Part:
+def _node(label: str, leaves: Sequence[PartNode], corners: FloatArray, children: int, reach: float) -> PartNode:
     """The node of some leaves, whose corners are (n, 8, 3)."""
     below = []
     for group in _gathered(leaves, corners, children, reach):
@@ -63,10 +63,10 @@ def _node(label: str, leaves: Sequence[Part], corners: FloatArray, children: int
         else:
             largest = max(within, key=lambda leaf: float(np.prod(leaf.box.size)))
             below.append(_node(f"{largest.label}_group", within, corners[group], children, reach))
-    return Part(label, around(corners.reshape(-1, 3), np.eye(3)), tuple(below))
+    return PartNode(label, bounding_box(corners.reshape(-1, 3), np.eye(3)), tuple(below))
 
 
-def _gathered(leaves: Sequence[Part], corners: FloatArray, most: int, reach: float) -> list[list[int]]:
+def _gathered(leaves: Sequence[PartNode], corners: FloatArray, most: int, reach: float) -> list[list[int]]:
     """Leaves with corners (n, 8, 3) in at most `most` groups, or as many as they fall apart into: of two groups
     that touch, those are joined whose common upright box is least, again and again."""
     groups = [[index] for index in range(len(corners))]
@@ -74,7 +74,7 @@ def _gathered(leaves: Sequence[Part], corners: FloatArray, most: int, reach: flo
     # Over all pairs of groups: the volume of their common box, and infinite where they do not touch.
     touching = (np.maximum(low[:, None], low) <= np.minimum(high[:, None], high) + reach).all(axis=-1)
     for first, second in np.argwhere(np.triu(touching, 1)).tolist():
-        near = gap(leaves[first].box, leaves[second].box)[0] <= reach
+        near = box_gap(leaves[first].box, leaves[second].box)[0] <= reach
         touching[first, second] = touching[second, first] = near
     cost = np.where(touching, _common(low, high, low, high), np.inf)
     np.fill_diagonal(cost, np.inf)

@@ -19,7 +19,7 @@ class AbstractionConfig(StrictModel):
         description="Cuboids of an assembly at most; more parts are gathered into groups; unit: cuboids.",
     )
     gates: Gates = Field(
-        default_factory=lambda: Gates(fewest_leaves=1, most_leaves=200),
+        default_factory=lambda: Gates(min_leaves=1, max_leaves=200),
         description="What a program must pass; a sample without one says why.",
     )
     cleaning: Cleaning = Field(default_factory=Cleaning, description="How hierarchies are made tidier before.")

@@ -14,8 +14,8 @@ from stages.abstraction.settings import AbstractionConfig
 from stages.shape.collection.collection import Collection, add_members
 from stages.shape.collection.shards import PRODUCERS, collection_shards, sample_count
 from stages.shape.sample import Sample
-from stages.shapeassembly.extraction.category_rules import RULES
-from stages.shapeassembly.extraction.extract import Extraction, extract
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
+from stages.shapeassembly.extraction.extract import ExtractedProgram, extract
 from stages.shapeassembly.syntax.printer import print_program
 
 BYTES_A_SAMPLE = 4096
@@ -36,7 +36,7 @@ def run_shard(task: Task) -> Outcome:
         shape = collection.shape(sample)
         try:
             hierarchy = hierarchy_of(shape, config.children, boxes)
-            found = extract(hierarchy, RULES["any"], config.gates, config.cleaning)
+            found = extract(hierarchy, CATEGORY_RULES["any"], config.gates, config.cleaning)
         except Rejected as error:
             nothing = {"refused": error.reason, "f_score": 0, "lines": 0, "leaves": 0, "centre": [0, 0, 0], "scale": 0}
             return {PROGRAM: b"", "json": json_bytes({"program": nothing})}
@@ -50,7 +50,7 @@ def run_shard(task: Task) -> Outcome:
     return Outcome(samples, {"split": task.shard.params["split"], "samples": samples, **sums})
 
 
-def _fields(found: Extraction) -> dict[str, Any]:
+def _fields(found: ExtractedProgram) -> dict[str, Any]:
     return {
         "refused": FOUND,
         "f_score": round(found.f_score, 3),

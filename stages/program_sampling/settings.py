@@ -8,6 +8,6 @@ from pipeline.config import StrictModel
 
 
 class ProgramSamplingConfig(StrictModel):
-    """How the models of `shapeassembly.written` write their programs."""
+    """How the models of `shapeassembly.sampled` write their programs."""
 
     programs_per_shard: int = Field(500, ge=1, le=100_000, description="Most programs of a shard; unit: programs.")

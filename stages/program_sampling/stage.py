@@ -14,7 +14,7 @@ from pipeline.places import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.program_sampling.settings import ProgramSamplingConfig
-from stages.shapeassembly.settings import ShapeAssemblyConfig, WrittenPrograms
+from stages.shapeassembly.settings import SampledPrograms, ShapeAssemblyConfig
 from stages.shapeassembly.syntax.printer import print_program
 
 BYTES_A_PROGRAM = 3_000
@@ -24,7 +24,7 @@ def plan(plan: Plan) -> list[Shard]:
     """The shards of every model, in the order of the config. Raises ConfigError where one is not there."""
     most = plan.config.section(ProgramSamplingConfig).programs_per_shard
     shards: list[Shard] = []
-    for source in plan.config.section(ShapeAssemblyConfig).written:
+    for source in plan.config.section(ShapeAssemblyConfig).sampled:
         digest = file_digest(_weights(plan, source))
         for first in range(0, source.samples, most):
             params = {
@@ -33,7 +33,7 @@ def plan(plan: Plan) -> list[Shard]:
                 "digest": digest,
                 "kit": source.kit,
                 "temperature": source.temperature,
-                "nucleus": source.nucleus,
+                "top_p": source.top_p,
                 "first": first,
                 "samples": min(most, source.samples - first),
             }
@@ -41,11 +41,11 @@ def plan(plan: Plan) -> list[Shard]:
     return shards
 
 
-def _weights(plan: Plan, source: WrittenPrograms) -> Path:
+def _weights(plan: Plan, source: SampledPrograms) -> Path:
     path = plan.published(f"{source.folder}/weights.safetensors")
     if not path.is_file():
         raise ConfigError(
-            f"{plan.config.path}: shapeassembly.written[{source.name}]: there is no {path}; make train with the config "
+            f"{plan.config.path}: shapeassembly.sampled[{source.name}]: there is no {path}; make train with the config "
             f"of {source.dataset} and MODEL={source.model} first"
         )
     return path
@@ -58,14 +58,14 @@ def run_shard(task: Task) -> Outcome:
     all; ShardFailed for weights that are others than when the run began.
     """
     from stages.training.checkpoint import CheckpointError
-    from stages.training.load import load_program_writer
+    from stages.training.load import load_program_sampler
 
     params = task.shard.params
     path = task.published(f"{params['folder']}/weights.safetensors")
     if file_digest(path) != params["digest"]:
         raise ShardFailed(f"{path} has changed since the run began")
     try:
-        model = load_program_writer(path, {"kit": params["kit"]}, params["nucleus"])
+        model = load_program_sampler(path, {"kit": params["kit"]}, params["top_p"])
         programs, drawn = model.sample(params["samples"], task.rng("points"), params["temperature"])
     except (CheckpointError, ValueError) as error:
         raise Rejected(f"{path}: {error}") from error
@@ -81,7 +81,7 @@ def run_shard(task: Task) -> Outcome:
 def report(plan: Plan) -> Sequence[str]:
     """How many programs each model has begun for those that it wrote."""
     lines = []
-    for source in plan.config.section(ShapeAssemblyConfig).written:
+    for source in plan.config.section(ShapeAssemblyConfig).sampled:
         found = [
             plan.summary("program_sampling", shard.name)
             for shard in STAGE.plan(plan)
@@ -96,7 +96,7 @@ def report(plan: Plan) -> Sequence[str]:
 
 def estimate_bytes(plan: Plan) -> int:
     """Of all programs."""
-    return BYTES_A_PROGRAM * sum(each.samples for each in plan.config.section(ShapeAssemblyConfig).written)
+    return BYTES_A_PROGRAM * sum(each.samples for each in plan.config.section(ShapeAssemblyConfig).sampled)
 
 
 def trial(config: Config) -> ProgramSamplingConfig:

@@ -12,16 +12,16 @@ from stages.shape.physics.judge import unmet
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.editing.edits import edited
 from stages.shapeassembly.execution.interpreter import execute
-from stages.shapeassembly.extraction.shards import read_made
+from stages.shapeassembly.extraction.shards import read_program_texts
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.shapeassembly.shape import shape_of_execution
 from stages.shapeassembly.sources import program_texts
-from stages.shapeassembly.syntax.checks import overflow, reaching_out, violations
+from stages.shapeassembly.syntax.checks import overflow, protruding_parts, violations
 from stages.shapeassembly.syntax.errors import ProgramError
 from stages.shapeassembly.syntax.parser import parse
 from stages.shapeassembly.syntax.printer import print_program
 
-TRIES = 8
+MAX_EDIT_TRIES = 8
 """Edits of a program that are tried for one that passes."""
 
 
@@ -57,14 +57,14 @@ def accepted_rows(task: Task, config: ShapeAssemblyConfig, refused: Counter[str]
         count, spread = edits.get(kind, (0, 0.0))
         for number in range(count):
             rng = task.rng("edit", kind, name, number)
-            for _ in range(TRIES):
+            for _ in range(MAX_EDIT_TRIES):
                 try:
                     yield accepted(kind, name, print_program(edited(parse(row["text"]), spread, rng)), "edited")
                     break
                 except (ProgramError, Rejected):
                     continue
             else:
-                task.reject(f"{kind}/{name}", "no edit passed", f"in {TRIES} tries; a smaller spread may help")
+                task.reject(f"{kind}/{name}", "no edit passed", f"in {MAX_EDIT_TRIES} tries; a smaller spread may help")
 
 
 def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, str]]:
@@ -74,7 +74,7 @@ def _texts(task: Task, config: ShapeAssemblyConfig) -> Iterator[tuple[str, str, 
         for name, text in program_texts(source.path, source.folder):
             if name not in source.lists.values():
                 yield source.name, name, text
-    for each in read_made(task):
+    for each in read_program_texts(task):
         yield each.kind, each.name, each.text
 
 
@@ -82,7 +82,7 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
     """What there is to say of one program. Raises ProgramError or Rejected where it does not pass."""
     program = parse(text)
     execution = execute(program)
-    if not config.least_parts <= len(execution) <= config.most_parts:
+    if not config.min_parts <= len(execution) <= config.max_parts:
         raise Rejected("number of parts", f"{len(execution)} leaf cuboids")
     beyond = overflow(program, execution)
     if beyond > config.overflow:
@@ -92,7 +92,7 @@ def _row(text: str, config: ShapeAssemblyConfig) -> dict[str, Any]:
         if broken:
             raise Rejected(broken[0].rule, str(broken[0]))
         for block in program.blocks:
-            for name in reaching_out(block):
+            for name in protruding_parts(block):
                 raise Rejected("reaches out of its assembly", f"{name} of {block.name}")
     weak = unmet(config.require, shape_of_execution(execution))
     if weak is not None:

@@ -13,7 +13,7 @@ from stages.shape.shape import Shape, upright
 from stages.shapeassembly.shape import label_colors, shape_of_text
 
 
-class Programs:
+class ProgramDecoder:
     """The categories of programs that the assignment has listed with the labels of their parts."""
 
     def __init__(self, listed: Mapping[str, Sequence[str]]) -> None:
@@ -42,9 +42,9 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return (f"shapeassembly/{assignment_name(plan.config.name)}",)
 
 
-def _speaker(task: Task) -> Programs:
+def _speaker(task: Task) -> ProgramDecoder:
     listed = task.input("shapeassembly", f"{assignment_name(task.config.name)}.labels.json")
-    return Programs(json.loads(listed.read_bytes()))
+    return ProgramDecoder(json.loads(listed.read_bytes()))
 
 
 def _anew(places: Places) -> Anew:

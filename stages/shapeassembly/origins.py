@@ -20,8 +20,8 @@ def program_origins(plan: Plan) -> list[Origin]:
     hierarchies = [
         _origin("hierarchies", each, each.path, each.source.digest(0, len(each.source))) for each in section.hierarchies
     ]
-    weights = [(each, plan.published(f"{each.folder}/weights.safetensors")) for each in section.written]
-    written = [_origin("written", each, path, file_digest(path)) for each, path in weights]
+    weights = [(each, plan.published(f"{each.folder}/weights.safetensors")) for each in section.sampled]
+    written = [_origin("sampled", each, path, file_digest(path)) for each, path in weights]
     return [*programs, *hierarchies, *written]
 
 

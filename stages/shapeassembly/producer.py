@@ -8,7 +8,7 @@ from stages.shapeassembly.settings import ShapeAssemblyConfig
 
 PRODUCER = Producer(
     language="shapeassembly",
-    keys="shapeassembly.programs, hierarchies or written",
+    keys="shapeassembly.programs, hierarchies or sampled",
     asked=lambda config: config.section(ShapeAssemblyConfig).has_sources,
     sentence="ShapeAssembly programs are executed; a shape's program is its `txt`.",
     origins=program_origins,

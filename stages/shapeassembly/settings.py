@@ -12,7 +12,7 @@ from stages.shape.physics.settings import Requirements
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles, NamedFiles
 from stages.shapeassembly.sources import existing_programs
 
-NUCLEUS = 0.8
+DEFAULT_TOP_P = 0.8
 """Of 360 chairs that a language model wrote 83 % stay up, of the real ones 92 %, and about 29 % have the commonest
 structure, of the real ones 8 %; with 0.7 it is 88 % of 160, and half of them have one structure."""
 
@@ -44,7 +44,7 @@ class ProgramFiles(NamedFiles):
     )
 
 
-class WrittenPrograms(NamedFiles):
+class SampledPrograms(NamedFiles):
     """Programs that a trained model writes."""
 
     dataset: str = Field(
@@ -69,8 +69,8 @@ class WrittenPrograms(NamedFiles):
         description="Of a VAE the spread of the points of its latent space, 1 being that of the programs it has learnt "
         "of; of a language model how evenly it draws words, 1 being as it says.",
     )
-    nucleus: float = Field(
-        NUCLEUS,
+    top_p: float = Field(
+        DEFAULT_TOP_P,
         gt=0,
         le=1,
         description="A language model draws each number among the likeliest that have this share together.",
@@ -100,7 +100,7 @@ class ShapeAssemblyConfig(StrictModel):
     hierarchies: tuple[HierarchyFiles, ...] = Field(
         (), description="Where the part hierarchies are from which programs are extracted."
     )
-    written: tuple[WrittenPrograms, ...] = Field((), description="The trained models that write programs.")
+    sampled: tuple[SampledPrograms, ...] = Field((), description="The trained models that write programs.")
     extraction: Gates = Field(default_factory=Gates, description="What an extracted program must pass.")
     cleaning: Cleaning = Field(default_factory=Cleaning, description="How hierarchies are made tidier before.")
     accept: Literal["executable", "valid"] = Field(
@@ -110,8 +110,8 @@ class ShapeAssemblyConfig(StrictModel):
     overflow: float = Field(
         0.05, ge=0, description="How far cuboids may reach out of the bounding box, as a share of its size."
     )
-    least_parts: int = Field(1, ge=1, description="Fewest leaf cuboids of an executed program.")
-    most_parts: int = Field(10_000, ge=1, description="Most leaf cuboids of an executed program.")
+    min_parts: int = Field(1, ge=1, description="Fewest leaf cuboids of an executed program.")
+    max_parts: int = Field(10_000, ge=1, description="Most leaf cuboids of an executed program.")
     require: Requirements = Field(
         default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
     )
@@ -123,7 +123,7 @@ class ShapeAssemblyConfig(StrictModel):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [each.name for each in (*self.programs, *self.hierarchies, *self.written)]
+        names = [each.name for each in (*self.programs, *self.hierarchies, *self.sampled)]
         if len(set(names)) < len(names):
             raise ValueError(f"two entries of programs, hierarchies and written have one name: {', '.join(names)}")
         return self
@@ -131,4 +131,4 @@ class ShapeAssemblyConfig(StrictModel):
     @property
     def has_sources(self) -> bool:
         """Whether the dataset is made of programs."""
-        return bool(self.programs or self.hierarchies or self.written)
+        return bool(self.programs or self.hierarchies or self.sampled)

@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.places import file_digest
-from stages.shapeassembly.syntax.limits import MAX_TEXT
+from stages.shapeassembly.syntax.limits import MAX_TEXT_CHARACTERS
 
 
 def existing_programs(path: Path) -> Path:
@@ -32,7 +32,7 @@ def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
         for name, file in sorted((each.relative_to(path).as_posix(), each) for each in files):
             if _below(name, folder):
                 with open(file, "rb") as stream:
-                    yield name, stream.read(MAX_TEXT + 1).decode(errors="replace")
+                    yield name, stream.read(MAX_TEXT_CHARACTERS + 1).decode(errors="replace")
         return
     with tarfile.open(path) as archive:
         members = {
@@ -45,7 +45,7 @@ def program_texts(path: Path, folder: str = "") -> Iterator[tuple[str, str]]:
         for name, member in members.items():
             stored = archive.extractfile(member)
             assert stored is not None
-            texts[name] = stored.read(MAX_TEXT + 1).decode(errors="replace")
+            texts[name] = stored.read(MAX_TEXT_CHARACTERS + 1).decode(errors="replace")
     yield from sorted(texts.items())
 
 

@@ -26,13 +26,13 @@ from stages.shape.collection.shards import planned_collection
 from stages.shape.sample import Sample, write_sample
 from stages.shapeassembly.acceptance import accepted_rows
 from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
-from stages.shapeassembly.language import Programs, assignment_name
+from stages.shapeassembly.language import ProgramDecoder, assignment_name
 from stages.shapeassembly.origins import program_origins
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.shapeassembly.sources import program_texts, source_digest
 from stages.shapeassembly.splits import splits_of
 
-BYTES_A_PROGRAM = 12_000
+BYTES_PER_PROGRAM = 12_000
 """A sample in its shard, and its line in the assignment."""
 
 
@@ -83,7 +83,7 @@ def run_assignment(task: Task) -> Outcome:
         found.setdefault(row["kit"], set()).update(row.pop("labels"))
     labels = {kit: sorted(found[kit]) for kit in sorted(found)}
     try:
-        Classes.of(Programs(labels).sources)
+        Classes.of(ProgramDecoder(labels).sources)
     except ValueError as error:
         raise ShardFailed(f"{error}; the names in the programs make them") from error
     split_of = splits_of(rows, config, task.rng("splits"))
@@ -147,14 +147,14 @@ def report(plan: Plan) -> Sequence[str]:
 def estimate_bytes(plan: Plan) -> int:
     """Bytes of all samples, as far as they are known."""
     summary = plan.summary("shapeassembly", assignment_name(plan.config.name))
-    return BYTES_A_PROGRAM * sum(summary["programs"].values()) if summary else 0
+    return BYTES_PER_PROGRAM * sum(summary["programs"].values()) if summary else 0
 
 
 def asked(config: Config) -> Sequence[int]:
     """The programs of each shard of the collection, if all are accepted."""
     section = config.section(ShapeAssemblyConfig)
     total = sum((1 + each.edits) * sum(1 for _ in program_texts(each.path, each.folder)) for each in section.programs)
-    total += sum(len(each.source) for each in section.hierarchies) + sum(each.samples for each in section.written)
+    total += sum(len(each.source) for each in section.hierarchies) + sum(each.samples for each in section.sampled)
     val, test = round(section.splits.val * total), round(section.splits.test * total)
     return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
 
@@ -162,10 +162,10 @@ def asked(config: Config) -> Sequence[int]:
 def trial(config: Config) -> ShapeAssemblyConfig:
     """The same programs in shards of few, of edits and of models' programs a few."""
     section = config.section(ShapeAssemblyConfig)
-    written = tuple(each.model_copy(update={"samples": min(each.samples, 16)}) for each in section.written)
+    written = tuple(each.model_copy(update={"samples": min(each.samples, 16)}) for each in section.sampled)
     programs = tuple(each.model_copy(update={"edits": min(each.edits, 1)}) for each in section.programs)
     splits = section.splits.model_copy(update={"samples_per_shard": 8})
-    return section.model_copy(update={"splits": splits, "programs": programs, "written": written})
+    return section.model_copy(update={"splits": splits, "programs": programs, "sampled": written})
 
 
 STAGE = Stage(

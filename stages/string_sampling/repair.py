@@ -14,8 +14,8 @@ import numpy as np
 from stages.string_sampling.instantiation.instantiate import Instantiator
 from stages.string_sampling.instantiation.state import SolverMethod
 from stages.strings.decoder import Decoded, decode
-from stages.training.string_vae.decoding import Draft
-from stages.training.string_vae.latent_sampling import Found
+from stages.training.string_vae.decoding import PartialString
+from stages.training.string_vae.latent_sampling import LatentSearchResult
 from stages.training.string_vae.trained import TrainedStringVae
 
 MAX_PROBE_PLACEMENTS = 2000
@@ -23,7 +23,12 @@ MAX_PROBE_PLACEMENTS = 2000
 
 
 def repair_strings(
-    model: TrainedStringVae, found: Sequence[Found], maker: Instantiator, method: SolverMethod, times: int, seed: int
+    model: TrainedStringVae,
+    found: Sequence[LatentSearchResult],
+    maker: Instantiator,
+    method: SolverMethod,
+    times: int,
+    seed: int,
 ) -> list[str | None]:
     """The strings of what was found, each written anew at most `times` while no arrangement of its graph is left.
 
@@ -35,7 +40,7 @@ def repair_strings(
         return strings
     wrong = [number for number, each in enumerate(strings) if each is not None]
     farthest, stuck = [-1] * len(found), [0] * len(found)
-    drafts = {number: Draft() for number in wrong}
+    drafts = {number: PartialString() for number in wrong}
     for _ in range(times):
         still = []
         for number in wrong:
@@ -50,12 +55,12 @@ def repair_strings(
             farthest[number] = max(place, farthest[number])
             cut = max(place - 2 ** stuck[number] + 1, 0)
             banned = before.banned if codes[:cut] == before.kept else set()
-            drafts[number] = Draft(codes[:cut], banned | {codes[cut]})
+            drafts[number] = PartialString(codes[:cut], banned | {codes[cut]})
             still.append(number)
         wrong = still
         if not wrong:
             break
-        begun = [Draft(drafts[each].kept, set(drafts[each].banned)) for each in wrong]
+        begun = [PartialString(drafts[each].kept, set(drafts[each].banned)) for each in wrong]
         points = np.stack([found[each].point for each in wrong])
         for number, string in zip(wrong, model.decode(points, None, begun=begun), strict=True):
             strings[number] = string

@@ -44,9 +44,9 @@ def run_worker(task: Task) -> Outcome:
     """Files of the shard: `.tar`, the shapes that it found, as samples without a split, none twice, and none that a
     round before had found. Whatever is refused is counted by its reason.
     """
-    from stages.training.loop import same_arithmetic
+    from stages.training.loop import set_deterministic
 
-    same_arithmetic(1)
+    set_deterministic(1)
     params, name = task.shard.params, task.shard.name
     config = StringSamplingConfig.model_validate_json(json_bytes(params["settings"]))
     asked = config.sources[0]

@@ -13,7 +13,7 @@ from pathlib import Path
 from pipeline.config import load_config
 from pipeline.errors import ConfigError
 from pipeline.registry import find_stages
-from stages.training.stage import reads_samples
+from stages.training.stage import uses_samples
 
 
 def main(arguments: list[str]) -> int:
@@ -27,7 +27,7 @@ def main(arguments: list[str]) -> int:
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
-    return 0 if reads_samples(loaded, asked.only) else 1
+    return 0 if uses_samples(loaded, asked.only) else 1
 
 
 if __name__ == "__main__":

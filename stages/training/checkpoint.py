@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from torch import Tensor
 
-VERSION = 1
+HEADER_VERSION = 1
 """Of what stands in the header. A file of another version is refused."""
 
 _KEY = "shapemill"
@@ -26,7 +26,7 @@ def checkpoint_bytes(tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -
     """A safetensors file: equal tensors and an equal header make equal bytes."""
     from safetensors.torch import save
 
-    text = json.dumps({**header, "version": VERSION}, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    text = json.dumps({**header, "version": HEADER_VERSION}, sort_keys=True, ensure_ascii=False, allow_nan=False)
     content: bytes = save({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, {_KEY: text})
     return content
 
@@ -40,8 +40,8 @@ def load_checkpoint(path: Path, expected: Mapping[str, Any]) -> tuple[dict[str, 
     """
     from safetensors import SafetensorError, safe_open
 
-    header = weights_header(path)
-    for key, wanted in {"version": VERSION, **expected}.items():
+    header = read_header(path)
+    for key, wanted in {"version": HEADER_VERSION, **expected}.items():
         if header.get(key) != wanted:
             raise CheckpointError(f"{path} is of another {key}: {_difference(header.get(key), wanted)}")
     try:
@@ -52,7 +52,7 @@ def load_checkpoint(path: Path, expected: Mapping[str, Any]) -> tuple[dict[str, 
     return tensors, header
 
 
-def weights_header(path: Path) -> dict[str, Any]:
+def read_header(path: Path) -> dict[str, Any]:
     """What a file of weights says of itself. Raises CheckpointError for a pickle and for a file that cannot be read, is
     cut off or damaged, that Shapemill did not write, or whose header is no JSON mapping."""
     from safetensors import SafetensorError, safe_open
@@ -90,7 +90,7 @@ def weights_of_kind(folder: Path, kind: str) -> list[Path]:
 
 def _kind(path: Path) -> str | None:
     try:
-        kind: str | None = weights_header(path).get("kind")
+        kind: str | None = read_header(path).get("kind")
     except CheckpointError:
         return None
     return kind
@@ -105,6 +105,6 @@ def _difference(found: Any, wanted: Any) -> str:
     return f"{found!r}, and {wanted!r} is asked for"
 
 
-def tensors_of(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+def tensors_below(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
     """Those of `tensors` whose name begins with `prefix` and a dot, by the rest of their name."""
     return {name[len(prefix) + 1 :]: each for name, each in tensors.items() if name.startswith(f"{prefix}.")}

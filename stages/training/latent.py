@@ -9,11 +9,11 @@ import numpy.typing as npt
 import torch
 from torch import Generator, Tensor, nn
 
-Points = npt.NDArray[np.float32]
+LatentPoints = npt.NDArray[np.float32]
 """Points of the latent space, float32 (n, latent)."""
 
 
-class Standing(nn.Module):
+class LatentGaussian(nn.Module):
     """A module with a latent space, of which `centre` (latent,) and `spread` (latent, latent) say where samples stand:
     centre + spread @ noise; the prior as long as nothing has been learnt."""
 
@@ -24,7 +24,7 @@ class Standing(nn.Module):
         self.register_buffer("centre", torch.zeros(latent))
         self.register_buffer("spread", torch.eye(latent))
 
-    def stand_at(self, means: Points, variances: Points) -> None:
+    def set_gaussian(self, means: LatentPoints, variances: LatentPoints) -> None:
         """Say where samples stand, which are encoded as these means and variances, float32 (n, latent) each: as the
         Gaussian with the mean and the covariance of all of them together."""
         if not (np.isfinite(means).all() and np.isfinite(variances).all()):
@@ -34,20 +34,20 @@ class Standing(nn.Module):
         self.centre.copy_(torch.from_numpy(means.mean(axis=0, dtype=np.float64)))
         self.spread.copy_(torch.from_numpy(axes * np.sqrt(np.maximum(values, 0.0))))
 
-    def stand_where(self, encoded: Iterable[tuple[Tensor, Tensor]]) -> None:
+    def fit_posterior(self, encoded: Iterable[tuple[Tensor, Tensor]]) -> None:
         """`stand_at` of all batches of samples: means and logarithms of the variances, float (n, latent) each."""
         codes = [torch.stack([mean, spread.exp()]).detach().float().cpu().numpy() for mean, spread in encoded]
-        self.stand_at(*np.concatenate(codes, axis=1))
+        self.set_gaussian(*np.concatenate(codes, axis=1))
 
-    def points(self, count: int, rng: np.random.Generator, temperature: float) -> Points:
+    def points(self, count: int, rng: np.random.Generator, temperature: float) -> LatentPoints:
         """Random points, float32 (count, latent), of that Gaussian, which the prior is not quite: from the prior come
         crude shapes. temperature: how far from its centre they spread."""
         noise = temperature * rng.standard_normal((count, len(self.centre)))
-        found: Points = (self.centre.cpu().numpy() + noise @ self.spread.cpu().numpy().T).astype(np.float32)
+        found: LatentPoints = (self.centre.cpu().numpy() + noise @ self.spread.cpu().numpy().T).astype(np.float32)
         return found
 
 
-def drawn(mean: Tensor, log_variance: Tensor, noise: Generator) -> tuple[Tensor, Tensor]:
+def reparameterize(mean: Tensor, log_variance: Tensor, noise: Generator) -> tuple[Tensor, Tensor]:
     """A point of each sample's Gaussian, float (n, latent), and the divergence of these from the prior, in nats, mean
     over the samples."""
     points = mean + torch.exp(0.5 * log_variance) * torch.randn(mean.shape, generator=noise, device=mean.device)

@@ -12,20 +12,20 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from stages.training.checkpoint import tensors_of
-from stages.training.model_config import ModelEntry
-from stages.training.training_task import Learner
+from stages.training.checkpoint import tensors_below
+from stages.training.model_config import ModelConfig
+from stages.training.training_task import TrainingTask
 
-LAST_RATE = 0.05
+FINAL_RATE_SHARE = 0.05
 """Share of the learning rate that is left at the last step."""
-LARGEST_GRADIENT = 1.0
+MAX_GRADIENT_NORM = 1.0
 """Longer gradients are shortened to this norm: recurrent nets have rare ones that undo hours."""
 
 _BFLOAT16 = frozenset({"amx_bf16", "avx512_bf16", "bf16"})
 _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
-def same_arithmetic(threads: int) -> None:
+def set_deterministic(threads: int) -> None:
     """Let torch sum in one order, with so many threads: equal seeds give equal weights. To be called before anything
     runs on a GPU, whose matrix products read the environment when they are first used."""
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
@@ -34,12 +34,12 @@ def same_arithmetic(threads: int) -> None:
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # it only costs time
 
 
-def device_of(asked: str) -> torch.device:
+def resolve_device(asked: str) -> torch.device:
     """The device that a config asks for."""
     return torch.device("cuda" if asked == "cuda" or (asked == "auto" and torch.cuda.is_available()) else "cpu")
 
 
-def precision_of(asked: str, device: torch.device) -> str:
+def resolve_precision(asked: str, device: torch.device) -> str:
     """The numbers that a config asks for on a device: `auto` is bfloat16 where it is reckoned with as it stands, and
     not by way of float32, which takes several times as long."""
     if asked != "auto":
@@ -61,15 +61,15 @@ def _processor_flags() -> frozenset[str]:
 
 
 @dataclass
-class Trainee:
+class TrainState:
     """A learner on its way: with its optimiser, after so many steps."""
 
-    learner: Learner
+    learner: TrainingTask
     optimizer: torch.optim.Adam
     step: int = 0
 
     @classmethod
-    def of(cls, learner: Learner, entry: ModelEntry) -> Trainee:
+    def of(cls, learner: TrainingTask, entry: ModelConfig) -> TrainState:
         return cls(learner, torch.optim.Adam(learner.module.parameters(), lr=entry.learning_rate))
 
     def tensors(self) -> dict[str, Tensor]:
@@ -85,8 +85,8 @@ class Trainee:
     def restore(self, tensors: dict[str, Tensor], step: int) -> None:
         """Go on from `tensors()` as they were after `step` steps."""
         module = self.learner.module
-        module.load_state_dict(tensors_of(tensors, "weights"))
-        moments = {moment: tensors_of(tensors, moment) for moment in _MOMENTS}
+        module.load_state_dict(tensors_below(tensors, "weights"))
+        moments = {moment: tensors_below(tensors, moment) for moment in _MOMENTS}
         state = {
             number: {"step": torch.tensor(float(step)), **{moment: moments[moment][name] for moment in _MOMENTS}}
             for number, (name, _) in enumerate(module.named_parameters())
@@ -97,7 +97,7 @@ class Trainee:
 
 
 def train(
-    trainee: Trainee, entry: ModelEntry, rng: np.random.Generator, progress: Callable[[int, int], None]
+    trainee: TrainState, entry: ModelConfig, rng: np.random.Generator, progress: Callable[[int, int], None]
 ) -> dict[str, float]:
     """One round: `entry.steps` steps. Answers the mean of each figure of the learner."""
     learner, optimizer = trainee.learner, trainee.optimizer
@@ -111,11 +111,13 @@ def train(
     for done in range(entry.steps):
         for group in optimizer.param_groups:
             group["lr"] = entry.learning_rate * _rate(trainee.step, entry.steps * entry.rounds)
-        with torch.autocast(device.type, torch.bfloat16, enabled=precision_of(entry.precision, device) == "bfloat16"):
+        with torch.autocast(
+            device.type, torch.bfloat16, enabled=resolve_precision(entry.precision, device) == "bfloat16"
+        ):
             losses = learner.losses(next(stream), trainee.step, noise)
         optimizer.zero_grad()
         losses["loss"].backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(learner.module.parameters(), LARGEST_GRADIENT)
+        torch.nn.utils.clip_grad_norm_(learner.module.parameters(), MAX_GRADIENT_NORM)
         optimizer.step()
         trainee.step += 1
         for name, value in losses.items():
@@ -126,4 +128,4 @@ def train(
 
 def _rate(step: int, steps: int) -> float:
     """The share of the learning rate at a step: it falls in a straight line."""
-    return 1.0 - (1.0 - LAST_RATE) * step / steps
+    return 1.0 - (1.0 - FINAL_RATE_SHARE) * step / steps

@@ -11,12 +11,12 @@ from pipeline.config import StrictModel
 Subject = Literal["kit", "program"]
 """What a model learns from: the samples of a kit, or a program."""
 
-Source = Literal["strings", "shapes", "programs"]
+LearningSource = Literal["strings", "shapes", "programs"]
 """What models of a kit learn from: the strings that stage `strings` has written, the shapes themselves, or, where the
 kit is a category of ShapeAssembly programs, their texts."""
 
 
-class ModelEntry(StrictModel):
+class ModelConfig(StrictModel):
     """One entry of `training.models`: a model for each of its subjects and each of its seeds.
 
     subject: what a model of the kind learns from.
@@ -55,14 +55,14 @@ class ModelEntry(StrictModel):
     )
 
 
-class KitModelEntry(ModelEntry):
+class KitModelConfig(ModelConfig):
     """A model that learns from the samples of a kit.
 
     learns_from: what `prepare` of the kind reads.
     """
 
     subject: ClassVar[Subject] = "kit"
-    learns_from: ClassVar[Source] = "strings"
+    learns_from: ClassVar[LearningSource] = "strings"
 
     kits: tuple[str, ...] = Field((), description="the kits that it is trained on, each by itself; all if empty")
 

@@ -9,23 +9,23 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.stage import Outcome, Task
-from stages.training.rounds import subject_of
+from stages.training.rounds import subject_fields
 
-FILES = {"weights.safetensors", "curves.csv", "curves.png", "README.md"}
+MODEL_FILES = {"weights.safetensors", "curves.csv", "curves.png", "README.md"}
 """What a model's folder holds."""
 
 Row = Mapping[str, Any]
 
 
-def run_trained(task: Task) -> Outcome:
+def publish_model(task: Task) -> Outcome:
     """Files of the shard: those of FILES, each behind the shard's name and a dot."""
-    from stages.training.checkpoint import checkpoint_bytes, load_checkpoint, tensors_of
+    from stages.training.checkpoint import checkpoint_bytes, load_checkpoint, tensors_below
 
     params = task.shard.params
     rows = [json.loads(task.input("training", f"{each}.json").read_bytes()) for each in params["rounds"]]
     best = task.input("training", f"{params['rounds'][params['best']]}.safetensors")
-    tensors, header = load_checkpoint(best, {"kind": params["kind"], **subject_of(params)})
-    weights = tensors_of(tensors, "weights")
+    tensors, header = load_checkpoint(best, {"kind": params["kind"], **subject_fields(params)})
+    weights = tensors_below(tensors, "weights")
     header |= {key: params[key] for key in ("name", "dataset", "license")}
     figures = {"rounds": len(rows), "best": rows[params["best"]]}
     written = {
@@ -82,7 +82,7 @@ def model_card(header: Mapping[str, Any], figures: Mapping[str, Any], parameters
         for split, of_split in header["counts"].items()
     ]
     kinds = list(next(iter(header["counts"].values())))
-    subject = " ".join(f"{what} `{name}`" for what, name in subject_of(header).items())
+    subject = " ".join(f"{what} `{name}`" for what, name in subject_fields(header).items())
     lines = [
         "---",
         f"license: {header['license'].lower()}",

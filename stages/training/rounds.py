@@ -13,7 +13,7 @@ from pipeline.errors import ShardFailed
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.programs.program import program_module
-from stages.training.model_config import ModelEntry, Subject
+from stages.training.model_config import ModelConfig, Subject
 
 
 class Kind(Protocol):
@@ -22,7 +22,7 @@ class Kind(Protocol):
     def prepare(self, task: Task) -> Outcome:
         """Make samples of a kit or a program ready, as files `<shard>.<anything>`."""
 
-    def entry(self, settings: Mapping[str, Any]) -> ModelEntry:
+    def entry(self, settings: Mapping[str, Any]) -> ModelConfig:
         """The entry whose JSON is `settings`."""
 
     def learner(self, task: Task, entry: Any, seed: int) -> Any:
@@ -30,18 +30,18 @@ class Kind(Protocol):
         `prepare` made."""
 
 
-def module_of(kind: str) -> str:
+def kind_module(kind: str) -> str:
     """The module of a kind."""
     return f"{__name__.rpartition('.')[0]}.{kind}.training"
 
 
-def kind_of(kind: str) -> Kind:
+def find_kind(kind: str) -> Kind:
     """The kind of models of that name."""
-    return cast(Kind, importlib.import_module(module_of(kind)))
+    return cast(Kind, importlib.import_module(kind_module(kind)))
 
 
 @dataclass(frozen=True)
-class Chain:
+class RoundChain:
     """The rounds of one model as far as they are known.
 
     pools: what is to be made for them so far, one round ahead, so that other workers make what the next round learns
@@ -56,19 +56,19 @@ class Chain:
     ended: bool
 
 
-def model_name(entry: ModelEntry, subject: str, seed: int) -> str:
+def model_name(entry: ModelConfig, subject: str, seed: int) -> str:
     """What a model's shards and its folder are called. A program may be a module, whose dots no file name has."""
     return f"{entry.name}-{subject.replace('.', '_')}-{seed}"
 
 
-def subject_of(params: Mapping[str, Any]) -> dict[str, Any]:
+def subject_fields(params: Mapping[str, Any]) -> dict[str, Any]:
     """What a shard's model learns from: `{"kit": name}` or `{"program": name}`."""
     return {key: params[key] for key in get_args(Subject) if key in params}
 
 
 def rounds(
-    plan: Plan, entry: ModelEntry, kind: str, subject: str, seed: int, data: str, pools: Sequence[Shard] = ()
-) -> Chain:
+    plan: Plan, entry: ModelConfig, kind: str, subject: str, seed: int, data: str, pools: Sequence[Shard] = ()
+) -> RoundChain:
     """The chain of one model: a round follows the one before it, until there are `rounds`, or `patience` of them in a
     row were no better than the best. Where there are `pools`, one for each round, a round reads its own and those of
     the rounds before.
@@ -94,27 +94,27 @@ def rounds(
         shards.append(Shard(name, params, inputs, _modules(params), entry.threads))
         summary = plan.summary("training", name)
         if summary is None:
-            return Chain(tuple(shards), tuple(pools[: number + 2]), tuple(summaries), best, ended=False)
+            return RoundChain(tuple(shards), tuple(pools[: number + 2]), tuple(summaries), best, ended=False)
         summaries.append(summary)
         if summary["loss"] < summaries[best]["loss"]:
             best = number
         if number - best >= entry.patience:
             break
-    return Chain(tuple(shards), tuple(pools[: len(shards) + 1]), tuple(summaries), best, ended=True)
+    return RoundChain(tuple(shards), tuple(pools[: len(shards) + 1]), tuple(summaries), best, ended=True)
 
 
 def run_round(task: Task) -> Outcome:
     """Files of the shard: `.safetensors`, weights and moments of the optimiser; `.json`, the figures of the round."""
     from stages.training.checkpoint import checkpoint_bytes, load_checkpoint
-    from stages.training.loop import Trainee, precision_of, same_arithmetic, train
+    from stages.training.loop import TrainState, resolve_precision, set_deterministic, train
 
     params, name = task.shard.params, task.shard.name
-    kind = kind_of(params["kind"])
+    kind = find_kind(params["kind"])
     entry = kind.entry({"name": "round", **params["settings"]})
-    same_arithmetic(entry.threads)
+    set_deterministic(entry.threads)
     learner = kind.learner(task, entry, _seed(task, "weights"))
-    trainee = Trainee.of(learner, entry)
-    described = {"kind": params["kind"], **subject_of(params), "settings": params["settings"], **learner.header}
+    trainee = TrainState.of(learner, entry)
+    described = {"kind": params["kind"], **subject_fields(params), "settings": params["settings"], **learner.header}
     for before in params["before"]:
         tensors, header = load_checkpoint(task.input("training", f"{before}.safetensors"), described)
         trainee.restore(tensors, header["step"])
@@ -122,7 +122,7 @@ def run_round(task: Task) -> Outcome:
     import torch
 
     device = next(learner.module.parameters()).device
-    precision = precision_of(entry.precision, device)
+    precision = resolve_precision(entry.precision, device)
     learner.module.eval()
     with torch.no_grad():
         found = learner.validate(torch.Generator(device).manual_seed(_seed(task, "validation")))
@@ -148,7 +148,7 @@ def run_round(task: Task) -> Outcome:
 
 def _modules(params: Mapping[str, Any]) -> tuple[str, ...]:
     """The modules that a round finds by name: its kind's, and that of its program."""
-    own = (module_of(params["kind"]),)
+    own = (kind_module(params["kind"]),)
     return (*own, program_module(params["program"])) if "program" in params else own
 
 

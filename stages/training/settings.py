@@ -7,22 +7,22 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from pipeline.config import StrictModel
-from stages.training.cuboid_rnn.settings import CuboidRnnEntry
-from stages.training.edge_categories.settings import EdgeCategoriesEntry
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
-from stages.training.program_lm.settings import ProgramLmEntry
-from stages.training.program_vae.settings import ProgramVaeEntry
-from stages.training.recovery.settings import RecoveryEntry
-from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.cuboid_rnn.settings import CuboidRnnConfig
+from stages.training.edge_categories.settings import EdgeCategoriesConfig
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
+from stages.training.program_lm.settings import ProgramLmConfig
+from stages.training.program_vae.settings import ProgramVaeConfig
+from stages.training.recovery.settings import RecoveryModelConfig
+from stages.training.string_vae.settings import StringVaeConfig
 
-AnyEntry = Annotated[
-    StringVaeEntry
-    | EdgeCategoriesEntry
-    | RecoveryEntry
-    | ProgramVaeEntry
-    | ProgramLmEntry
-    | CuboidRnnEntry
-    | PartGraphVaeEntry,
+AnyModelConfig = Annotated[
+    StringVaeConfig
+    | EdgeCategoriesConfig
+    | RecoveryModelConfig
+    | ProgramVaeConfig
+    | ProgramLmConfig
+    | CuboidRnnConfig
+    | PartGraphVaeConfig,
     Field(discriminator="kind"),
 ]
 """An entry of any kind, which its key `kind` tells."""
@@ -34,7 +34,7 @@ class TrainingConfig(StrictModel):
     longest: int = Field(
         256, ge=2, le=100_000, description="longer strings are left out of the training of models; unit: tokens"
     )
-    models: tuple[AnyEntry, ...] = Field((), description="the models; each is trained by itself")
+    models: tuple[AnyModelConfig, ...] = Field((), description="the models; each is trained by itself")
 
     @model_validator(mode="after")
     def _names_differ(self) -> TrainingConfig:

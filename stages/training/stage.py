@@ -20,15 +20,15 @@ from stages.shape.collection.shards import PRODUCERS, collection_shards, planned
 from stages.shapeassembly.settings import ShapeAssemblyConfig
 from stages.sketches.settings import SketchesConfig
 from stages.strings.settings import StringsConfig
-from stages.training.model_config import KitModelEntry
-from stages.training.model_folder import FILES, run_trained
-from stages.training.recovery.settings import RecoveryEntry
-from stages.training.rounds import Chain, kind_of, model_name, module_of, rounds, run_round
-from stages.training.settings import AnyEntry, TrainingConfig
+from stages.training.model_config import KitModelConfig
+from stages.training.model_folder import MODEL_FILES, publish_model
+from stages.training.recovery.settings import RecoveryModelConfig
+from stages.training.rounds import RoundChain, find_kind, kind_module, model_name, rounds, run_round
+from stages.training.settings import AnyModelConfig, TrainingConfig
 
-LEARNT = ("train", "val")
+TRAINING_SPLITS = ("train", "val")
 """The splits that models see."""
-BYTES_A_ROUND = 16_000_000
+BYTES_PER_ROUND = 16_000_000
 """Weights and two moments of a model of about a million parameters, and what a round learns from beside them."""
 
 
@@ -37,7 +37,7 @@ def plan(plan: Plan) -> list[Shard]:
     rounds have ended."""
     shards: dict[str, Shard] = {}
     for entry, subject, seed in _models(plan):
-        if isinstance(entry, KitModelEntry):
+        if isinstance(entry, KitModelConfig):
             data, pools = _kit_shard(plan, entry, entry.kind, subject), []
         else:
             data, *pools = _program_shards(plan, entry, subject)
@@ -54,8 +54,8 @@ def plan(plan: Plan) -> list[Shard]:
 def run_shard(task: Task) -> Outcome:
     """Samples made ready, one round, or a finished model."""
     if task.shard.params["job"] == "data":
-        return kind_of(task.shard.params["kind"]).prepare(task)
-    return run_round(task) if task.shard.params["job"] == "round" else run_trained(task)
+        return find_kind(task.shard.params["kind"]).prepare(task)
+    return run_round(task) if task.shard.params["job"] == "round" else publish_model(task)
 
 
 def report(plan: Plan) -> Sequence[str]:
@@ -78,7 +78,9 @@ def publish(plan: Plan) -> Mapping[str, str]:
     folder = f"{plan.config.name}-models"
     names = (model_name(*model) for model in _models(plan))
     finished = (name for name in names if plan.summary("training", f"{name}-trained") is not None)
-    return {f"{folder}/{name}/{file}": f"{name}-trained.{file}" for name, file in product(finished, sorted(FILES))}
+    return {
+        f"{folder}/{name}/{file}": f"{name}-trained.{file}" for name, file in product(finished, sorted(MODEL_FILES))
+    }
 
 
 def check(config: Config) -> None:
@@ -86,7 +88,7 @@ def check(config: Config) -> None:
     kits = [kit.name for kit in config.section(ExemplarsConfig).kits]
     for entry in config.section(TrainingConfig).models:
         where = f"{config.path}: training.models: {entry.name}"
-        if isinstance(entry, KitModelEntry):
+        if isinstance(entry, KitModelConfig):
             known = _categories(config, entry) if entry.learns_from == "programs" else kits
             unknown = [kit for kit in entry.kits if kit not in known]
             if unknown or not known:
@@ -107,17 +109,17 @@ def check(config: Config) -> None:
             raise ConfigError(f"{where}: {error}") from error
 
 
-def reads_samples(config: Config, only: str) -> bool:
+def uses_samples(config: Config, only: str) -> bool:
     """Whether a model called so, or `<name>-<subject>`, learns from samples; where none is, or `only` is empty,
     whether any does."""
     asked = config.section(TrainingConfig).models
     chosen = [each for each in asked if f"{only}-".startswith(f"{each.name}-")]
-    return any(isinstance(each, KitModelEntry) for each in chosen or asked)
+    return any(isinstance(each, KitModelConfig) for each in chosen or asked)
 
 
 def estimate_bytes(plan: Plan) -> int:
     """All rounds of all models."""
-    return sum(entry.rounds * BYTES_A_ROUND for entry, _, _ in _models(plan))
+    return sum(entry.rounds * BYTES_PER_ROUND for entry, _, _ in _models(plan))
 
 
 def trial(config: Config) -> TrainingConfig:
@@ -125,10 +127,10 @@ def trial(config: Config) -> TrainingConfig:
     return config.section(TrainingConfig).model_copy(update={"models": ()})
 
 
-def _models(plan: Plan) -> Iterator[tuple[AnyEntry, str, int]]:
+def _models(plan: Plan) -> Iterator[tuple[AnyModelConfig, str, int]]:
     """Each model of the config: its entry, its kit or program, its seed."""
     for entry in plan.config.section(TrainingConfig).models:
-        if isinstance(entry, KitModelEntry):
+        if isinstance(entry, KitModelConfig):
             subjects: Sequence[str] = entry.kits or _categories(plan.config, entry) or plan.shards("exemplars")
         else:
             subjects = _programs(plan.config, entry)
@@ -136,7 +138,7 @@ def _models(plan: Plan) -> Iterator[tuple[AnyEntry, str, int]]:
             yield entry, subject, seed
 
 
-def _categories(config: Config, entry: KitModelEntry) -> tuple[str, ...]:
+def _categories(config: Config, entry: KitModelConfig) -> tuple[str, ...]:
     """The categories of ShapeAssembly programs that a model of such programs learns from by default."""
     if entry.learns_from != "programs":
         return ()
@@ -144,13 +146,13 @@ def _categories(config: Config, entry: KitModelEntry) -> tuple[str, ...]:
     return tuple(each.name for each in (*section.programs, *section.hierarchies))
 
 
-def _programs(config: Config, entry: RecoveryEntry) -> tuple[str, ...]:
+def _programs(config: Config, entry: RecoveryModelConfig) -> tuple[str, ...]:
     """The programs that a model learns from, by default that of the dataset."""
     own = config.section(ProgramsConfig).program if not entry.programs else ""
     return entry.programs or ((own,) if own else ())
 
 
-def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
+def _kit_shard(plan: Plan, entry: KitModelConfig, kind: str, kit: str) -> Shard:
     """The samples of a kit made ready, for all models of a kind."""
     params: dict[str, Any] = {
         "job": "data",
@@ -162,10 +164,14 @@ def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
     if entry.learns_from == "strings":
         stage = "strings"
         found = {name: plan.summary(stage, name) or {} for name in plan.shards(stage)}
-        splits = {name: each["split"] for name, each in found.items() if each.get("split") in LEARNT}
+        splits = {name: each["split"] for name, each in found.items() if each.get("split") in TRAINING_SPLITS}
     else:
         stage = planned_producer(plan) or ""
-        splits = {each.name: each.params["split"] for each in collection_shards(plan) if each.params["split"] in LEARNT}
+        splits = {
+            each.name: each.params["split"]
+            for each in collection_shards(plan)
+            if each.params["split"] in TRAINING_SPLITS
+        }
         params["producer"] = stage
         if entry.learns_from == "shapes":
             strings = plan.config.section(StringsConfig)
@@ -173,11 +179,11 @@ def _kit_shard(plan: Plan, entry: KitModelEntry, kind: str, kit: str) -> Shard:
     exemplars = () if entry.learns_from == "programs" else (f"exemplars/{kit}",)
     inputs = (*exemplars, *(f"{stage}/{name}" for name in splits))
     return Shard(
-        "-".join((kit, kind, *entry.prepared.values())), {**params, "splits": splits}, inputs, (module_of(kind),)
+        "-".join((kit, kind, *entry.prepared.values())), {**params, "splits": splits}, inputs, (kind_module(kind),)
     )
 
 
-def _program_shards(plan: Plan, entry: RecoveryEntry, program: str) -> list[Shard]:
+def _program_shards(plan: Plan, entry: RecoveryModelConfig, program: str) -> list[Shard]:
     """What the models of a program are judged by, and for each round what they learn from."""
     params: dict[str, Any] = {
         "job": "data",
@@ -187,14 +193,14 @@ def _program_shards(plan: Plan, entry: RecoveryEntry, program: str) -> list[Shar
     }
     if entry.input == "sketch":
         params["sketches"] = plan.config.section(SketchesConfig).model_dump(mode="json")
-    name, code = model_name(entry, program, 0).removesuffix("0"), (module_of(entry.kind), program_module(program))
+    name, code = model_name(entry, program, 0).removesuffix("0"), (kind_module(entry.kind), program_module(program))
     judged = {**params, "split": "val", "shapes": entry.validation}
     learnt = {**params, "split": "train", "shapes": entry.pool}
     pools = (Shard(f"{name}pool{number:04}", learnt, (), code) for number in range(entry.rounds))
     return [Shard(f"{name}data", judged, (), code), *pools]
 
 
-def _trained_shard(plan: Plan, entry: AnyEntry, subject: str, seed: int, chain: Chain) -> Shard:
+def _trained_shard(plan: Plan, entry: AnyModelConfig, subject: str, seed: int, chain: RoundChain) -> Shard:
     name = model_name(entry, subject, seed)
     names = [shard.name for shard in chain.shards]
     params = {
@@ -225,5 +231,5 @@ STAGE = Stage(
     trial=trial,
     whole_section=False,
     publishes_parts=True,
-    reads_inputs=reads_samples,
+    reads_inputs=uses_samples,
 )

@@ -12,7 +12,7 @@ from pipeline.places import file_digest
 from pipeline.stage import Task
 
 
-class Learner(Protocol):
+class TrainingTask(Protocol):
     """A model and the samples it learns from. A kind's `training.py` makes one: `learner(task, entry) -> Learner`."""
 
     @property
@@ -42,7 +42,7 @@ def sample_digests(task: Task, suffix: str) -> dict[str, str]:
     return {split: file_digest(task.input("training", f"{data}.{split}.{suffix}")) for split in ("train", "val")}
 
 
-def mean_figures(found: Iterable[tuple[Mapping[str, Tensor], int]], count: int) -> dict[str, float]:
+def weighted_means(found: Iterable[tuple[Mapping[str, Tensor], int]], count: int) -> dict[str, float]:
     """The means over `count` samples of figures that come as those of batches of so many samples each."""
     sums: dict[str, float] = {}
     for figures, samples in found:

@@ -12,7 +12,7 @@ def _heads(width: int, head: int) -> int:
     return next(number for number in range(max(width // head, 1), 0, -1) if width % number == 0)
 
 
-class Block(nn.Module):
+class TransformerBlock(nn.Module):
     """Attention to what stands before, then two layers; normed first."""
 
     HEAD = 32

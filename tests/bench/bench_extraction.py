@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stages.shapeassembly.extraction.category_rules import RULES
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.hierarchy import PartHierarchy
 from stages.shapeassembly.extraction.settings import Gates
@@ -27,7 +27,7 @@ def bench() -> Iterator[Measure]:
     for name, shape in (("table of 5 parts", table()), ("chair of 7 parts with a leaning back", chair())):
 
         def made(shape: PartHierarchy = shape) -> int:
-            extract(shape, RULES["any"], Gates())
+            extract(shape, CATEGORY_RULES["any"], Gates())
             return 1
 
         yield Measure(f"extraction, {name}", "shapes", rate(made))

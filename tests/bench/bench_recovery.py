@@ -20,7 +20,7 @@ def bench() -> Iterator[Measure]:
     from torch.nn.functional import cross_entropy
 
     from stages.programs.program import find_program
-    from stages.training.recovery.settings import RecoveryEntry
+    from stages.training.recovery.settings import RecoveryModelConfig
     from stages.training.recovery.training import new_network
     from tests.bench.published_dgcnn import PublishedDGCNN
 
@@ -30,7 +30,7 @@ def bench() -> Iterator[Measure]:
 
     rng = np.random.default_rng(0)
     targets = torch.from_numpy(np.stack([rng.integers(0, count, BATCH) for count in classes], axis=1))
-    entry = RecoveryEntry(name="bench", points=POINTS)
+    entry = RecoveryModelConfig(name="bench", points=POINTS)
     ours, peer = new_network(entry, chair, 0), PublishedDGCNN(classes)
     optimizers = {id(net): torch.optim.Adam(net.parameters()) for net in (ours, peer)}
 

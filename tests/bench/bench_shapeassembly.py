@@ -15,7 +15,7 @@ from stages.shapeassembly import execute, execute_all, parse
 from stages.shapeassembly.execution.differentiable import DifferentiableProgram
 from stages.shapeassembly.execution.parameters import parameters
 from stages.shapeassembly.sources import program_texts
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from tests.bench.measure import Measure, rate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +32,7 @@ def category_texts() -> dict[str, list[str]]:
     return {each: [text for _, text in program_texts(SHARED, f"data/{each}")][:EACH] for each in categories}
 
 
-def _differentiate(programs: list[Program]) -> int:
+def _differentiate(programs: list[AssemblyProgram]) -> int:
     for program in programs:
         values = torch.tensor(parameters(program), requires_grad=True)
         DifferentiableProgram(program).corners(values).sum().backward()  # type: ignore[no-untyped-call]

@@ -28,16 +28,16 @@ from stages.shapeassembly.syntax.errors import ProgramError
 from stages.strings.compiled_grammar import compile_grammar
 from stages.strings.grammar_mask import masks_along
 from stages.strings.kit_strings import KitStrings
-from stages.training.loop import LARGEST_GRADIENT, same_arithmetic
-from stages.training.program_vae.batches import Programs
-from stages.training.program_vae.lines import node_lines
-from stages.training.program_vae.settings import ProgramVaeEntry
-from stages.training.program_vae.training import ProgramVaeLearner
+from stages.training.loop import MAX_GRADIENT_NORM, set_deterministic
+from stages.training.program_vae.batches import ProgramCorpus
+from stages.training.program_vae.lines import assembly_lines
+from stages.training.program_vae.settings import ProgramVaeConfig
+from stages.training.program_vae.training import ProgramVaeTask
 from stages.training.program_vae.training import new_model as new_program_vae
-from stages.training.string_vae.batches import Strings
-from stages.training.string_vae.settings import StringVaeEntry
-from stages.training.string_vae.training import StringVaeLearner, new_model
-from stages.training.string_vae.vocabulary import END, Vocabulary
+from stages.training.string_vae.batches import StringCorpus
+from stages.training.string_vae.settings import StringVaeConfig
+from stages.training.string_vae.training import StringVaeTask, new_model
+from stages.training.string_vae.vocabulary import END_TOKEN, Vocabulary
 from stages.variations.search.search import Search
 from stages.variations.settings import SearchConfig
 from tests.bench.bench_shapeassembly import category_texts
@@ -48,10 +48,10 @@ SHAPES = 60
 
 def bench() -> Iterator[Measure]:
     """Strings of the castle that comes with Shapemill, forward, backward and one step of Adam."""
-    same_arithmetic(1)
+    set_deterministic(1)
     strings, vocabulary, most = castle_strings()
     note = f"{int(np.median(strings.lengths))} tokens in the median"
-    entry = StringVaeEntry(name="bench")
+    entry = StringVaeConfig(name="bench")
     peer = rate(moses_steps(strings, len(vocabulary), entry), 4.0, 2)
     arms: dict[str, dict[str, Any]] = {
         "plain": {"decoder": "plain"},
@@ -60,8 +60,8 @@ def bench() -> Iterator[Measure]:
         "transformer": {"decoder": "transformer", "hidden": 128, "layers": 3},
     }
     for name, settings in arms.items():
-        arm = StringVaeEntry.model_validate({"name": "bench", **settings})
-        learner = StringVaeLearner(new_model(arm, vocabulary, most, 0), {}, arm, vocabulary, True, strings, strings)
+        arm = StringVaeConfig.model_validate({"name": "bench", **settings})
+        learner = StringVaeTask(new_model(arm, vocabulary, most, 0), {}, arm, vocabulary, True, strings, strings)
         ours = rate(our_steps(learner), 4.0, 2)
         yield Measure(f"string VAE learns, {name}", "strings", ours, "as in MOSES", peer, note)
     yield _programs_measure()
@@ -72,18 +72,18 @@ def _programs_measure() -> Measure:
     learnt = []
     for text in next(iter(category_texts().values())):
         with suppress(ProgramError):
-            learnt.append(node_lines(parse(text)))
+            learnt.append(assembly_lines(parse(text)))
     rates = {}
     for batch in (64, 1):
-        entry = ProgramVaeEntry(name="bench", kind="program_vae", batch=batch)
-        programs = Programs.of(list(islice(cycle(learnt), max(len(learnt), batch))))
-        learner = ProgramVaeLearner(new_program_vae(entry, 0), {}, entry, programs, programs)
+        entry = ProgramVaeConfig(name="bench", kind="program_vae", batch=batch)
+        programs = ProgramCorpus.of(list(islice(cycle(learnt), max(len(learnt), batch))))
+        learner = ProgramVaeTask(new_program_vae(entry, 0), {}, entry, programs, programs)
         rates[batch] = rate(_steps(learner, lambda levels: len(levels[0].lines)), 4.0, 2)
     note = "batches of 64, levels of one batched in both"
     return Measure("program VAE learns", "programs", rates[64], "one program at a time", rates[1], note)
 
 
-def castle_strings() -> tuple[Strings, Vocabulary, int]:
+def castle_strings() -> tuple[StringCorpus, Vocabulary, int]:
     """Nine strings of each of SHAPES variants."""
     shapes = tuple(ShapeFile(path=path) for path in sorted(Path("datasets/exemplars/castle").glob("*.glb")))
     kit = read_kit(KitConfig(name="castle", shapes=shapes).resolve(STRICTEST))
@@ -93,10 +93,10 @@ def castle_strings() -> tuple[Strings, Vocabulary, int]:
     written = [[each.string for each in writer.strings(writer.graph(new.assembly), 8, rng)] for new in found]
     cycles = 12
     vocabulary, rules = Vocabulary(writer.alphabet, cycles), compile_grammar(kit.grammar, len(kit.labels), cycles)
-    codes = [np.append(vocabulary.codes(each), END).astype(np.int64) for of_shape in written for each in of_shape]
+    codes = [np.append(vocabulary.codes(each), END_TOKEN).astype(np.int64) for of_shape in written for each in of_shape]
     masks = [np.packbits(masks_along(rules, cycles, each)[0], axis=-1, bitorder="little") for each in codes]
     types = len(kit.labels)
-    strings = Strings(
+    strings = StringCorpus(
         tokens=np.concatenate(codes).astype(np.int16),
         first=np.cumsum([0, *map(len, codes)]),
         masks=np.concatenate(masks),
@@ -106,7 +106,7 @@ def castle_strings() -> tuple[Strings, Vocabulary, int]:
     return strings, vocabulary, max(map(len, codes))
 
 
-def our_steps(learner: StringVaeLearner) -> Any:
+def our_steps(learner: StringVaeTask) -> Any:
     """A function that trains one step and says how many strings it saw."""
     return _steps(learner, lambda batch: len(batch.codes))
 
@@ -126,7 +126,7 @@ def _steps(learner: Any, seen: Callable[[Any], int]) -> Any:
     return step
 
 
-def moses_steps(strings: Strings, tokens: int, entry: StringVaeEntry) -> Any:
+def moses_steps(strings: StringCorpus, tokens: int, entry: StringVaeConfig) -> Any:
     """The same for the peer."""
     model = _Moses(entry, tokens)
     optimizer = torch.optim.Adam(model.parameters())
@@ -144,12 +144,12 @@ def moses_steps(strings: Strings, tokens: int, entry: StringVaeEntry) -> Any:
 def _descend(module: nn.Module, optimizer: torch.optim.Adam, loss: Tensor) -> None:
     optimizer.zero_grad()
     loss.backward()  # type: ignore[no-untyped-call]
-    torch.nn.utils.clip_grad_norm_(module.parameters(), LARGEST_GRADIENT)
+    torch.nn.utils.clip_grad_norm_(module.parameters(), MAX_GRADIENT_NORM)
     optimizer.step()
 
 
 class _Moses(nn.Module):
-    def __init__(self, entry: StringVaeEntry, tokens: int) -> None:
+    def __init__(self, entry: StringVaeConfig, tokens: int) -> None:
         super().__init__()
         self.embedding = nn.Embedding(tokens, entry.embedding)
         self.encoder = nn.GRU(entry.embedding, entry.hidden // 2, batch_first=True, bidirectional=True)
@@ -163,7 +163,7 @@ class _Moses(nn.Module):
         summary = torch.cat([last[0], last[1]], dim=-1)
         mean, log_variance = self.mean(summary), self.log_variance(summary)
         points = mean + torch.exp(0.5 * log_variance) * torch.randn_like(mean)
-        shown = [torch.cat([each.new_full((1,), END), each[:-1]]) for each in strings]
+        shown = [torch.cat([each.new_full((1,), END_TOKEN), each[:-1]]) for each in strings]
         seen = [
             torch.cat([self.embedding(each), point.expand(len(each), -1)], dim=-1)
             for each, point in zip(shown, points, strict=True)

@@ -22,10 +22,10 @@ from stages.programs.program import Program, find_program
 from stages.shape.arrays import FloatArray
 from stages.training.recovery.augmentation import quantized_cloud
 from stages.training.recovery.clouds import frame_of
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
 from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
-from stages.training.recovery.training import RecoveryLearner, new_network
+from stages.training.recovery.training import RecoveryTask, new_network
 from tests.bench.published_dgcnn import PublishedDGCNN
 
 POINTS, BATCH, RATE = 2300, 33, 1e-2
@@ -77,11 +77,11 @@ def _clouds(program: Program, interval: tuple[float, float], count: int) -> Clou
 
 
 def _ours(program: Program, learnt: Clouds) -> Racer:
-    entry = RecoveryEntry(name="race")
+    entry = RecoveryModelConfig(name="race")
     clouds, classes, _ = learnt
     inputs = np.array([quantized_cloud(each[: 2 * entry.points]) for each in clouds])
     module = new_network(entry, program, 0)
-    learner = RecoveryLearner(module, {}, entry, program, {"inputs": inputs, "classes": classes}, {}, ())
+    learner = RecoveryTask(module, {}, entry, program, {"inputs": inputs, "classes": classes}, {}, ())
     optimizer = torch.optim.Adam(module.parameters(), lr=entry.learning_rate)
     batches: Iterator[tuple[Tensor, Tensor]] = learner.batches(np.random.default_rng(0))
     noise = torch.Generator().manual_seed(0)

@@ -127,7 +127,7 @@ ARENAS: dict[str, Datasets] = {
                 {
                     "program_sampling": {"programs_per_shard": 4},
                     "shapeassembly": {
-                        "written": [
+                        "sampled": [
                             {"name": "stool", "dataset": "read", "model": "tiny", "kit": "furniture", "samples": 12}
                         ],
                         "overflow": 100,
@@ -140,7 +140,7 @@ ARENAS: dict[str, Datasets] = {
     ),
     "texts": Datasets(
         {"texts": (("shapeassembly", "validity"), {"shapeassembly": _PROGRAMS})},
-        [{"texts": {"shapeassembly": {"least_parts": 8}}}],
+        [{"texts": {"shapeassembly": {"min_parts": 8}}}],
         tests=True,
     ),
 }

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stages.shapeassembly.analysis.statistics import cluster_curves
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
 
-def cluster_figure(programs: Mapping[str, Sequence[Program]]) -> bytes:
+def cluster_figure(programs: Mapping[str, Sequence[AssemblyProgram]]) -> bytes:
     """A PNG: for each category the share of its programs (left) and assemblies (right) that its most frequent
     structures have, against their number."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -11,7 +11,7 @@ import numpy as np
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.analysis.structure import block_signatures, signature
 from stages.shapeassembly.execution.interpreter import execute_all
-from stages.shapeassembly.syntax.program import Program, Reflect, Squeeze, Translate
+from stages.shapeassembly.syntax.program import AssemblyProgram, Reflect, Squeeze, Translate
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ProgramStatistics:
         return self.reflects + self.translates + self.squeezes
 
 
-def program_statistics(programs: Sequence[Program]) -> ProgramStatistics:
+def program_statistics(programs: Sequence[AssemblyProgram]) -> ProgramStatistics:
     """Raises ProgramError where a program cannot be executed, ValueError where there is none."""
     if not programs:
         raise ValueError("no programs")
@@ -56,7 +56,7 @@ def cluster_curve(signatures: Iterable[str]) -> FloatArray:
     return curve
 
 
-def cluster_curves(programs: Sequence[Program]) -> tuple[FloatArray, FloatArray]:
+def cluster_curves(programs: Sequence[AssemblyProgram]) -> tuple[FloatArray, FloatArray]:
     """`cluster_curve` of whole programs, and of their assemblies by themselves."""
     whole = cluster_curve(signature(program) for program in programs)
     return whole, cluster_curve(each for program in programs for each in block_signatures(program))

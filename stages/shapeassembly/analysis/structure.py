@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stages.shapeassembly.execution.tables import copy_name
+from stages.shapeassembly.execution.tables import next_copy_name
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.limits import MAX_DEPTH, MAX_TEXT
-from stages.shapeassembly.syntax.program import BBOX, Attach, Block, Cuboid, Program, Reflect, Squeeze
+from stages.shapeassembly.syntax.limits import MAX_DEPTH, MAX_TEXT_CHARACTERS
+from stages.shapeassembly.syntax.program import BBOX, AssemblyProgram, Attach, Block, Cuboid, Reflect, Squeeze
 
 
-def tokens(program: Program) -> list[str]:
+def tokens(program: AssemblyProgram) -> list[str]:
     """The program as words: commands, numbers of cuboids, flags, faces, axes, counts; no continuous parameter.
 
     Programs with equal tokens are the same up to continuous parameters (shapeassembly §7.1.4).
@@ -27,12 +27,12 @@ def tokens(program: Program) -> list[str]:
     return words
 
 
-def _add(block: Block, program: Program | None, words: list[str], depth: int) -> None:
+def _add(block: Block, program: AssemblyProgram | None, words: list[str], depth: int) -> None:
     """Append the words of one assembly, with those of its cuboids if `program` is given."""
     if depth > MAX_DEPTH:
         raise ProgramError("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle")
-    if len(words) > MAX_TEXT:
-        raise ProgramError("too long", f"expanded it has more than {MAX_TEXT} words")
+    if len(words) > MAX_TEXT_CHARACTERS:
+        raise ProgramError("too long", f"expanded it has more than {MAX_TEXT_CHARACTERS} words")
     places = {BBOX: 0}
     words.append("{")
     for line in block.lines:
@@ -49,7 +49,7 @@ def _add(block: Block, program: Program | None, words: list[str], depth: int) ->
         else:
             copies = 1 if isinstance(line, Reflect) else line.copies
             for _ in range(copies):
-                places[copy_name(places)] = len(places)
+                places[next_copy_name(places)] = len(places)
             kind = ["reflect"] if isinstance(line, Reflect) else ["translate", str(copies)]
             words += [*kind, _number(places, line.moved), line.axis]
     words.append("}")
@@ -59,12 +59,12 @@ def _number(places: dict[str, int], name: str) -> str:
     return str(places.get(name, name))
 
 
-def signature(program: Program) -> str:
+def signature(program: AssemblyProgram) -> str:
     """Hex sha256 of the program's tokens: equal exactly for programs that are the same up to continuous parameters."""
     return _digest(tokens(program))
 
 
-def block_signatures(program: Program) -> tuple[str, ...]:
+def block_signatures(program: AssemblyProgram) -> tuple[str, ...]:
     """Hex sha256 of the tokens of each assembly by itself, which cuboids are expanded being part of it."""
     digests = []
     for block in program.blocks:
@@ -75,7 +75,7 @@ def block_signatures(program: Program) -> tuple[str, ...]:
     return tuple(digests)
 
 
-def program_distance(a: Program, b: Program) -> int:
+def program_distance(a: AssemblyProgram, b: AssemblyProgram) -> int:
     """How many words must be put in, taken out or changed to make the tokens of one program those of the other."""
     return token_distance(tokens(a), tokens(b))
 

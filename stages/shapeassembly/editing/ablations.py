@@ -8,35 +8,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.execution.attachment_points import both_ends
-from stages.shapeassembly.execution.interpreter import parts_of
-from stages.shapeassembly.execution.tables import copy_name
+from stages.shapeassembly.execution.attachment_points import squeeze_attachments
+from stages.shapeassembly.execution.interpreter import execute_block
+from stages.shapeassembly.execution.tables import next_copy_name
 from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
     Point,
-    Program,
     Reflect,
     Squeeze,
     Translate,
 )
 
 
-def unaligned(program: Program) -> Program:
+def without_alignment(program: AssemblyProgram) -> AssemblyProgram:
     """The program in which no cuboid but the bounding boxes is aligned: some turn that did not."""
     return program.with_lines(
         lambda line: replace(line, aligned=False) if isinstance(line, Cuboid) and line.name != BBOX else line
     )
 
 
-def unordered(program: Program, rng: np.random.Generator) -> Program:
+def without_order(program: AssemblyProgram, rng: np.random.Generator) -> AssemblyProgram:
     """The program with its cuboids, its attachments and its macros each in random order: attachments still grounded,
     those that move one cuboid still one after another."""
-    return Program(tuple(_unordered(block, rng) for block in program.blocks))
+    return AssemblyProgram(tuple(_unordered(block, rng) for block in program.blocks))
 
 
 def _unordered(block: Block, rng: np.random.Generator) -> Block:
@@ -62,7 +62,7 @@ def _targets(line: Attach | Squeeze) -> set[str]:
     return {line.target} if isinstance(line, Attach) else {line.first, line.second}
 
 
-def without_macros(program: Program) -> Program:
+def without_macros(program: AssemblyProgram) -> AssemblyProgram:
     """The program with cuboids and attachments alone: each copy is declared and attached as the macro would, and has a
     sub-program of its own, mirrored where it is a mirror image.
 
@@ -78,7 +78,7 @@ def without_macros(program: Program) -> Program:
             ahead.append(below)
         lines: tuple[Cuboid | Attach, ...] = (*tree.cuboids, *tree.joints)
         blocks.append(Block(f"Program_{len(blocks)}", tree.bbox, tuple(_renamed(line, called) for line in lines)))
-    return Program(tuple(blocks))
+    return AssemblyProgram(tuple(blocks))
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class _Tree:
         return replace(self, joints=joints, below={name: each.mirrored(axis) for name, each in self.below.items()})
 
 
-def _expanded(block: Block, program: Program) -> _Tree:
+def _expanded(block: Block, program: AssemblyProgram) -> _Tree:
     cuboids = {each.name: each for each in block.cuboids}
     below = {name: _expanded(program.named[name], program) for name in cuboids if name in program.named}
     joints: list[Attach] = []
@@ -107,12 +107,12 @@ def _expanded(block: Block, program: Program) -> _Tree:
         if isinstance(line, Attach):
             joints.append(line)
         elif isinstance(line, Squeeze):
-            joints += both_ends(line)
+            joints += squeeze_attachments(line)
         elif isinstance(line, Reflect | Translate):
-            made = parts_of(replace(block, lines=block.lines[:number]))
+            made = execute_block(replace(block, lines=block.lines[:number]))
             boxes = {BBOX: _upright(block.bbox), **dict(zip(*made, strict=True))}
             for copy in range(1, 1 + (line.copies if isinstance(line, Translate) else 1)):
-                name = copy_name(dict.fromkeys(places, 0))
+                name = next_copy_name(dict.fromkeys(places, 0))
                 places.append(name)
                 x, y, z = boxes[line.moved][3:6].tolist()
                 cuboids[name] = Cuboid(name, (x, y, z), cuboids[line.moved].aligned)

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.execution.parameters import SMALLEST
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
 from stages.shapeassembly.syntax.printer import rounded
-from stages.shapeassembly.syntax.program import Attach, Cuboid, Line, Point, Program, Squeeze
+from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Cuboid, Line, Point, Squeeze
 
-STEEPEST = 0.6
+MAX_EXPONENT_CHANGE = 0.6
 """Largest change of an exponent: sizes and places keep their order and do not all become one."""
 
 
-def edited(program: Program, spread: float, rng: np.random.Generator) -> Program:
+def edited(program: AssemblyProgram, spread: float, rng: np.random.Generator) -> AssemblyProgram:
     """The program with other numbers, to three decimals; its structure is the same, copies and distances too.
 
     Along each axis the whole grows by a random factor, and all sizes follow one power law below that of the whole, so
@@ -25,13 +25,15 @@ def edited(program: Program, spread: float, rng: np.random.Generator) -> Program
     """
     whole = np.array(program.root.bbox.dims)
     factors = np.exp(rng.normal(0.0, spread, 3))
-    sizes, places = (1.0 + np.clip(rng.normal(0.0, spread / 2, 3), -STEEPEST, STEEPEST) for _ in range(2))
+    sizes, places = (
+        1.0 + np.clip(rng.normal(0.0, spread / 2, 3), -MAX_EXPONENT_CHANGE, MAX_EXPONENT_CHANGE) for _ in range(2)
+    )
 
     def sized(dims: Point) -> Point:
         # What reaches out of the whole grows with it.
         shares = np.array(dims) / whole
         new = whole * factors * np.where(shares < 1, shares**sizes, shares)
-        return _point(np.maximum(new, SMALLEST))
+        return _point(np.maximum(new, MIN_CUBOID_SIZE))
 
     def placed(point: Point) -> Point:
         return _point(_warped(np.array(point), places))

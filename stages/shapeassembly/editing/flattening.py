@@ -5,29 +5,31 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shapeassembly.execution.interpreter import execute
-from stages.shapeassembly.extraction.boxes import around, box_corners
-from stages.shapeassembly.extraction.category_rules import RULES
+from stages.shapeassembly.extraction.boxes import bounding_box, box_corners
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import extract
-from stages.shapeassembly.extraction.hierarchy import Part, PartHierarchy
+from stages.shapeassembly.extraction.hierarchy import PartHierarchy, PartNode
 from stages.shapeassembly.extraction.settings import Cleaning, Gates
-from stages.shapeassembly.extraction.validity import boxes_of
+from stages.shapeassembly.extraction.validity import execution_boxes
 from stages.shapeassembly.syntax.limits import MAX_PARTS
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
-GATES = Gates(fewest_leaves=1, most_leaves=MAX_PARTS)
+FIT_ONLY_GATES = Gates(min_leaves=1, max_leaves=MAX_PARTS)
 """The fit that an extracted program must have, and nothing about its size."""
 
 
-NO_ASSEMBLIES = Cleaning(pool=False)
+WITHOUT_POOLING = Cleaning(pool=False)
 
 
-def without_hierarchy(program: Program) -> Program:
+def without_hierarchy(program: AssemblyProgram) -> AssemblyProgram:
     """A program of about the same shape with one assembly, its parts attached to each other as they touch.
 
     Raises Rejected as `extract`, above all for more than ten cuboids, and ProgramError where the program cannot be
     executed.
     """
-    boxes = boxes_of(execute(program))
-    whole = around(np.concatenate([box_corners(box) for box in boxes]), np.eye(3))
-    root = Part("shape", whole, tuple(Part("part", box) for box in boxes))
-    return extract(PartHierarchy(program.root.name, root), RULES["any"], GATES, NO_ASSEMBLIES).program
+    boxes = execution_boxes(execute(program))
+    whole = bounding_box(np.concatenate([box_corners(box) for box in boxes]), np.eye(3))
+    root = PartNode("shape", whole, tuple(PartNode("part", box) for box in boxes))
+    return extract(
+        PartHierarchy(program.root.name, root), CATEGORY_RULES["any"], FIT_ONLY_GATES, WITHOUT_POOLING
+    ).program

@@ -15,11 +15,11 @@ from torch import Tensor
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.attachment import ADD, GROW, HINGE, MOVE, SCALE, STAY, across
-from stages.shapeassembly.execution.interpreter import check
-from stages.shapeassembly.execution.kernels import Executed, run
+from stages.shapeassembly.execution.interpreter import check_executed
+from stages.shapeassembly.execution.kernels import ExecutedTables, run
 from stages.shapeassembly.execution.parameters import parameter_places
-from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE, flatten
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE, program_tables
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
 _CORNERS = torch.tensor([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)], dtype=torch.float64)
 _UPRIGHT = torch.eye(3, dtype=torch.float64)
@@ -52,8 +52,8 @@ class _Box:
 class DifferentiableProgram:
     """A program whose corners can be asked for, and differentiated, at any parameters."""
 
-    def __init__(self, program: Program) -> None:
-        self._flat = flatten([program])
+    def __init__(self, program: AssemblyProgram) -> None:
+        self._flat = program_tables([program])
         self._places = parameter_places(self._flat.rows)
         self._rows: list[list[int]] = np.nan_to_num(self._flat.rows[:, :5]).astype(int).tolist()
 
@@ -64,9 +64,9 @@ class DifferentiableProgram:
         """
         rows, flat = self._flat.rows.copy(), self._flat
         rows[self._places[:, 0], self._places[:, 1]] = values.detach().numpy()
-        done: Executed
+        done: ExecutedTables
         done, starts, decisions = run(rows, flat.block_rows, flat.block_parts, flat.program_blocks)
-        check(done)
+        check_executed(done)
         table = torch.zeros(len(rows), 6, dtype=torch.float64)
         triples = table.index_put(
             (torch.from_numpy(self._places[:, 0]), torch.from_numpy(self._places[:, 1] - 4)), values

@@ -13,14 +13,14 @@ from torch import Tensor
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.differentiable import DifferentiableProgram
 from stages.shapeassembly.execution.interpreter import Execution, execute
-from stages.shapeassembly.execution.parameters import SMALLEST, parameter_ranges, parameters, with_parameters
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE, parameter_ranges, parameters, with_parameters
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
 _SIGNS = torch.tensor([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.5, -0.5)], dtype=torch.float64)
 
-RESAMPLED = 20
+STEPS_PER_RESAMPLING = 20
 """Steps for which the same points of the cuboids are followed."""
 
 
@@ -29,13 +29,13 @@ class FitResult:
     """A fitted program. before, after: Chamfer distance to the points, in their unit, on other points of the surface
     than the fit has seen."""
 
-    program: Program
+    program: AssemblyProgram
     before: float
     after: float
 
 
 def fit(
-    program: Program,
+    program: AssemblyProgram,
     points: FloatArray,
     rng: np.random.Generator,
     steps: int = 200,
@@ -78,7 +78,7 @@ def fit_cuboids(
     start = np.stack([np.concatenate([box.center, box.size, np.zeros(3)]) for box in boxes])
     axes = torch.from_numpy(np.stack([box.axes for box in boxes]))
     low = np.full(start.shape, -np.inf)
-    low[:, 3:6] = np.minimum(start[:, 3:6], SMALLEST)
+    low[:, 3:6] = np.minimum(start[:, 3:6], MIN_CUBOID_SIZE)
 
     def placed(values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Centres (n, 3), sizes (n, 3) and axes (n, 3, 3), in rows."""
@@ -124,7 +124,7 @@ def _descended(
             if step == 0:
                 raise
             break
-        if step % RESAMPLED == 0:
+        if step % STEPS_PER_RESAMPLING == 0:
             which, weights = _chosen_points(corners.detach().numpy(), samples, rng)
         surface = (corners[which] * weights[:, :, None]).sum(dim=1)
         loss, distance = _squared_chamfer(surface, seen, target)

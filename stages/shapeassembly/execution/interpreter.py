@@ -8,18 +8,18 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.execution.tables import Flat, Indices, flatten
+from stages.shapeassembly.execution.tables import IndexArray, ProgramTables, program_tables
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS, MAX_REACH
-from stages.shapeassembly.syntax.program import Block, Program
+from stages.shapeassembly.syntax.limits import MAX_BLOCK_ATTACHMENTS, MAX_DEPTH, MAX_PARTS, MAX_REACH
+from stages.shapeassembly.syntax.program import AssemblyProgram, Block
 
 if TYPE_CHECKING:
-    from stages.shapeassembly.execution.kernels import Executed
+    from stages.shapeassembly.execution.kernels import ExecutedTables
 
 _REFUSALS = {
     1: ("too many cuboids", f"expanded it has more than {MAX_PARTS}"),
     2: ("too deep", f"assemblies stand more than {MAX_DEPTH} deep within each other, or in a circle"),
-    3: ("too many attachments", f"an assembly has at most {MAX_EVENTS}, those of copies included"),
+    3: ("too many attachments", f"an assembly has at most {MAX_BLOCK_ATTACHMENTS}, those of copies included"),
     4: ("too far", f"a cuboid reaches beyond {MAX_REACH:g}"),
 }
 
@@ -37,9 +37,9 @@ class Execution:
     centres: FloatArray
     sizes: FloatArray
     frames: FloatArray
-    nodes: Indices
-    _parts: Indices
-    _tree: Indices
+    nodes: IndexArray
+    _parts: IndexArray
+    _tree: IndexArray
     _root: str
     _names: tuple[tuple[str, ...], ...]
     _originals: tuple[tuple[str, ...], ...]
@@ -76,23 +76,23 @@ class Execution:
         )
 
 
-def execute(program: Program) -> Execution:
+def execute(program: AssemblyProgram) -> Execution:
     """The geometry of one program. Raises ProgramError where it cannot be executed or is beyond the limits."""
-    return execute_flat(flatten([program]), [program])[0]
+    return execute_tables(program_tables([program]), [program])[0]
 
 
-def execute_all(programs: Sequence[Program]) -> list[Execution]:
+def execute_all(programs: Sequence[AssemblyProgram]) -> list[Execution]:
     """The geometry of many programs, together faster than one by one. Raises ProgramError like `execute`."""
-    return execute_flat(flatten(programs), programs)
+    return execute_tables(program_tables(programs), programs)
 
 
-def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
+def execute_tables(flat: ProgramTables, programs: Sequence[AssemblyProgram]) -> list[Execution]:
     """The geometry of the programs that `flat` was made of."""
     from stages.shapeassembly.execution.kernels import run
 
-    done: Executed
+    done: ExecutedTables
     done, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
-    check(done)
+    check_executed(done)
     executions = []
     leaf_starts, node_starts, blocks = (
         each.tolist() for each in (done.program_leaves, done.program_nodes, flat.program_blocks)
@@ -118,19 +118,19 @@ def execute_flat(flat: Flat, programs: Sequence[Program]) -> list[Execution]:
     return executions
 
 
-def parts_of(block: Block) -> tuple[tuple[str, ...], FloatArray]:
+def execute_block(block: Block) -> tuple[tuple[str, ...], FloatArray]:
     """The names of the cuboids and copies of one assembly, whatever expands them, without the bounding box, and what
     they are in its coordinates, float64 (n, 15): centre, sizes, axes. Raises ProgramError like `execute`."""
     from stages.shapeassembly.execution.kernels import run
 
-    flat = flatten([Program((block,))])
-    done: Executed
+    flat = program_tables([AssemblyProgram((block,))])
+    done: ExecutedTables
     done, _, _ = run(flat.rows, flat.block_rows, flat.block_parts, flat.program_blocks)
-    check(done)
+    check_executed(done)
     return flat.names[0][1:], done.boxes[1:]
 
 
-def check(done: Executed) -> None:
+def check_executed(done: ExecutedTables) -> None:
     """Raises ProgramError if a program was not executed."""
     if done.status.any():
         place = int(done.status.nonzero()[0][0])

@@ -9,12 +9,12 @@ import numpy as np
 
 from stages.shapeassembly.execution.attachment import MOVE, grow, hinge, hold, local, point, swing
 from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE
-from stages.shapeassembly.syntax.limits import MAX_DEPTH, MAX_EVENTS, MAX_PARTS, MAX_REACH
+from stages.shapeassembly.syntax.limits import MAX_BLOCK_ATTACHMENTS, MAX_DEPTH, MAX_PARTS, MAX_REACH
 
 OK, TOO_MANY_PARTS, TOO_DEEP, TOO_MANY_EVENTS, TOO_FAR = range(5)
 
 
-class Executed(NamedTuple):
+class ExecutedTables(NamedTuple):
     """All leaf cuboids of all programs, in the order of the assemblies, breadth first.
 
     status int64 (p,): OK, or why the program was not executed; program_leaves int64 (p + 1,): where each program's
@@ -92,7 +92,7 @@ def _count_events(rows, parts):
             made += copies
             more = moves[a] * copies
         total += more
-        if total > MAX_EVENTS:
+        if total > MAX_BLOCK_ATTACHMENTS:
             return -1
     return total
 
@@ -296,5 +296,5 @@ def run(rows, block_rows, block_parts, program_blocks):
             boxes[own], child[own], mirrored[own], block_parts[low : high + 1],
             node[inner], leaves[outer], corners[outer], leaf_node[outer], leaf_part[outer],
         )  # fmt: skip
-    executed = Executed(status, program_leaves, leaves, corners, leaf_node, leaf_part, program_nodes, node, boxes)
+    executed = ExecutedTables(status, program_leaves, leaves, corners, leaf_node, leaf_part, program_nodes, node, boxes)
     return executed, block_events, decisions

@@ -8,23 +8,23 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE, TRANSLATE, Indices
-from stages.shapeassembly.syntax.program import Attach, Block, Cuboid, Line, Program, Reflect, Squeeze
+from stages.shapeassembly.execution.tables import ATTACH, DECLARE, REFLECT, SQUEEZE, TRANSLATE, IndexArray
+from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Block, Cuboid, Line, Reflect, Squeeze
 
-SMALLEST = 0.01
+MIN_CUBOID_SIZE = 0.01
 """Smallest size of a cuboid that a model or a fit may choose (shapeassembly App. D)."""
 
 _FIRST = {DECLARE: 4, ATTACH: 4, SQUEEZE: 5, TRANSLATE: 4, REFLECT: 4}
 _COUNT = {DECLARE: 3, ATTACH: 6, SQUEEZE: 2, TRANSLATE: 1, REFLECT: 0}
 
 
-def parameters(program: Program) -> FloatArray:
+def parameters(program: AssemblyProgram) -> FloatArray:
     """All continuous parameters in the order of the text, float64 (k,): three a cuboid, bounding boxes included, six an
     attach, two a squeeze, one a translate."""
     return np.array([number for block in program.blocks for line in _lines(block) for number in _numbers(line)])
 
 
-def with_parameters(program: Program, values: FloatArray) -> Program:
+def with_parameters(program: AssemblyProgram, values: FloatArray) -> AssemblyProgram:
     """The program with other parameters, in the order of `parameters`. Raises ValueError for a wrong count."""
     rest = iter(np.asarray(values, dtype=np.float64).tolist())
     changed = program.with_lines(lambda line: _with_numbers(line, rest))
@@ -35,7 +35,7 @@ def with_parameters(program: Program, values: FloatArray) -> Program:
     return changed
 
 
-def parameter_ranges(program: Program) -> tuple[FloatArray, FloatArray]:
+def parameter_ranges(program: AssemblyProgram) -> tuple[FloatArray, FloatArray]:
     """Lowest and highest value of each parameter, float64 (k,) each; the program's own values lie between.
 
     Coordinates and distances lie in [0, 1]; a size is from SMALLEST to that of the root's bounding box, which itself
@@ -48,7 +48,7 @@ def parameter_ranges(program: Program) -> tuple[FloatArray, FloatArray]:
             numbers = _numbers(line)
             least, most = [0.0] * len(numbers), [1.0] * len(numbers)
             if isinstance(line, Cuboid):
-                least, most = [SMALLEST] * 3, list(whole.dims)
+                least, most = [MIN_CUBOID_SIZE] * 3, list(whole.dims)
             if line is whole:
                 least = most = numbers
             low += [min(bound, number) for bound, number in zip(least, numbers, strict=True)]
@@ -56,7 +56,7 @@ def parameter_ranges(program: Program) -> tuple[FloatArray, FloatArray]:
     return np.array(low), np.array(high)
 
 
-def parameter_places(rows: FloatArray) -> Indices:
+def parameter_places(rows: FloatArray) -> IndexArray:
     """Where the parameters stand in the rows of a Flat, int64 (k, 2)."""
     places = [
         (row, column)

@@ -9,22 +9,22 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.limits import MAX_LINES, MAX_PARTS, MIN_SIZE
+from stages.shapeassembly.syntax.limits import MAX_LINES, MAX_PARTS, MIN_DECLARED_SIZE
 from stages.shapeassembly.syntax.printer import print_line
 from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
     FACES,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
-    Program,
     Reflect,
     Squeeze,
 )
 
-Indices = np.ndarray
+IndexArray = np.ndarray
 """int64."""
 
 DECLARE, ATTACH, SQUEEZE, REFLECT, TRANSLATE = range(5)
@@ -34,7 +34,7 @@ _FACE = {face: index for index, face in enumerate(FACES)}
 
 
 @dataclass(frozen=True)
-class Flat:
+class ProgramTables:
     """One program or several.
 
     rows: float64 (r, 10), a line each, bounding boxes included. Column 0 is the command; then, by command,
@@ -50,14 +50,14 @@ class Flat:
     """
 
     rows: FloatArray
-    block_rows: Indices
-    block_parts: Indices
-    program_blocks: Indices
+    block_rows: IndexArray
+    block_parts: IndexArray
+    program_blocks: IndexArray
     names: tuple[tuple[str, ...], ...]
     originals: tuple[tuple[str, ...], ...]
 
 
-def flatten(programs: Sequence[Program]) -> Flat:
+def program_tables(programs: Sequence[AssemblyProgram]) -> ProgramTables:
     """The tables of programs.
 
     A copy made by reflect or translate is called `cubeN`, N being the number of cuboids before it without the bounding
@@ -77,7 +77,7 @@ def flatten(programs: Sequence[Program]) -> Flat:
             block_rows.append(len(rows) // 10)
             block_parts.append(block_parts[-1] + len(places))
         program_blocks.append(len(names))
-    return Flat(
+    return ProgramTables(
         rows=np.array(rows, dtype=np.float64).reshape(-1, 10),
         block_rows=np.array(block_rows),
         block_parts=np.array(block_parts),
@@ -105,7 +105,7 @@ def _flatten_block(
                     raise _refused(block, line, places)
                 rows += (ATTACH, moved, target, 0, *line.source, *line.goal)
             elif isinstance(line, Cuboid):
-                if line.name in places or min(line.dims) < MIN_SIZE:
+                if line.name in places or min(line.dims) < MIN_DECLARED_SIZE:
                     raise _refused(block, line, places)
                 expanded_by = assemblies.get(line.name, -1) if places else -1
                 places[line.name] = len(places)
@@ -129,7 +129,7 @@ def _flatten_block(
                     rows += (TRANSLATE, moved, _AXIS[line.axis], line.copies, line.distance, 0, 0, 0, 0, 0)
                     copies = line.copies
                 for _ in range(copies):
-                    places[copy_name(places)] = len(places)
+                    places[next_copy_name(places)] = len(places)
                     originals.append(originals[moved])
         except KeyError as missing:
             detail = f"{_where(block, line)}: no line before it makes {missing.args[0]!r}"
@@ -137,7 +137,7 @@ def _flatten_block(
     return places, tuple(originals)
 
 
-def copy_name(places: Mapping[str, int]) -> str:
+def next_copy_name(places: Mapping[str, int]) -> str:
     """What the next copy is called where the cuboids of `places`, bounding box included, are there."""
     number = len(places) - 1
     while f"cube{number}" in places:
@@ -154,7 +154,7 @@ def _refused(block: Block, line: Line, places: dict[str, int]) -> ProgramError:
     if isinstance(line, Cuboid):
         if line.name in places:
             return ProgramError("name taken", f"{_where(block, line)}: {line.name!r} is there already; rename one")
-        return ProgramError("size", f"{_where(block, line)}: every size must be at least {MIN_SIZE:g}")
+        return ProgramError("size", f"{_where(block, line)}: every size must be at least {MIN_DECLARED_SIZE:g}")
     if line.moved == BBOX:
         return ProgramError("bounding box moved", f"{_where(block, line)}: attach other cuboids to it instead")
     return ProgramError("attached to itself", f"{_where(block, line)}: name two different cuboids")

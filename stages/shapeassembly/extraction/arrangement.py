@@ -7,20 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import angle_between, around, box_corners, nearest_axes
-from stages.shapeassembly.extraction.category_rules import Rules
-from stages.shapeassembly.extraction.hierarchy import Box, Part
+from stages.shapeassembly.extraction.boxes import angle_between, bounding_box, box_corners, nearest_axes
+from stages.shapeassembly.extraction.category_rules import CategoryRules
+from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
 ALIGNED_DEGREES = 5.0
 """A part turned by less against its parent is aligned with it (shapeassembly §5.1)."""
 
 
-def leaf_corners(part: Part) -> FloatArray:
+def leaf_corners(part: PartNode) -> FloatArray:
     """The corners of all leaves of `part`, float64 (8 n, 3)."""
     return np.concatenate([box_corners(leaf.box) for leaf in part.leaves()])
 
 
-def arrange_parts(root: Part, rules: Rules) -> Part:
+def arrange_parts(root: PartNode, rules: CategoryRules) -> PartNode:
     """The tree flattened, collapsed and regrouped by `rules` (shapeassembly App. C).
 
     A node with one child is that child, under the node's label: it says nothing that its child does not.
@@ -32,7 +32,7 @@ def arrange_parts(root: Part, rules: Rules) -> Part:
     return _arranged(kept or root, rules)
 
 
-def _arranged(part: Part, rules: Rules) -> Part:
+def _arranged(part: PartNode, rules: CategoryRules) -> PartNode:
     if part.label in rules.collapse:
         return replace(part, children=())
     if part.label in rules.flatten:
@@ -44,9 +44,9 @@ def _arranged(part: Part, rules: Rules) -> Part:
     return replace(part, children=children)
 
 
-def _leaves(part: Part, rules: Rules) -> list[Part]:
+def _leaves(part: PartNode, rules: CategoryRules) -> list[PartNode]:
     """The leaves below a node; what collapses counts as a leaf."""
-    found: list[Part] = []
+    found: list[PartNode] = []
     for child in part.children:
         if not child.children or child.label in rules.collapse:
             found.append(replace(child, children=()))
@@ -55,7 +55,7 @@ def _leaves(part: Part, rules: Rules) -> list[Part]:
     return found
 
 
-def _gathered(part: Part, rules: Rules, *, inside_frame: bool) -> tuple[Part | None, list[Part]]:
+def _gathered(part: PartNode, rules: CategoryRules, *, inside_frame: bool) -> tuple[PartNode | None, list[PartNode]]:
     """`part` without the nodes that move, and those nodes."""
     if part.label in rules.gather and not inside_frame:
         return None, [part]
@@ -68,10 +68,10 @@ def _gathered(part: Part, rules: Rules, *, inside_frame: bool) -> tuple[Part | N
     return replace(part, children=children), moved
 
 
-def _given(part: Part, moved: tuple[Part, ...], label: str) -> Part:
+def _given(part: PartNode, moved: tuple[PartNode, ...], label: str) -> PartNode:
     """`part` with `moved` below its first node labelled `label`, or as a new child of that label."""
 
-    def place(node: Part) -> Part | None:
+    def place(node: PartNode) -> PartNode | None:
         if node.label == label:
             own = node.children or (node,)
             return replace(node, children=own + moved)
@@ -81,10 +81,10 @@ def _given(part: Part, moved: tuple[Part, ...], label: str) -> Part:
                 return replace(node, children=(*node.children[:index], changed, *node.children[index + 1 :]))
         return None
 
-    return place(part) or replace(part, children=(*part.children, Part(label, moved[0].box, moved)))
+    return place(part) or replace(part, children=(*part.children, PartNode(label, moved[0].box, moved)))
 
 
-def frame_parts(root: Part) -> Part:
+def frame_parts(root: PartNode) -> PartNode:
     """The tree with every part in the frame that the program gives it.
 
     The root stands upright. Sides are renamed so that a part is turned as little as can be against its parent, and
@@ -93,7 +93,7 @@ def frame_parts(root: Part) -> Part:
     return _framed(root, np.eye(3), root_of_all=True)
 
 
-def _framed(part: Part, frame: FloatArray, *, root_of_all: bool = False) -> Part:
+def _framed(part: PartNode, frame: FloatArray, *, root_of_all: bool = False) -> PartNode:
     box = nearest_axes(part.box, frame)
     if angle_between(box.axes, frame) < ALIGNED_DEGREES or (
         part.children and (root_of_all or _prefers(part, frame, box))
@@ -103,10 +103,10 @@ def _framed(part: Part, frame: FloatArray, *, root_of_all: bool = False) -> Part
         return replace(part, box=box)
     children = tuple(_framed(child, box.axes) for child in part.children)
     whole = replace(part, box=box, children=children)
-    return replace(whole, box=around(leaf_corners(whole), box.axes))
+    return replace(whole, box=bounding_box(leaf_corners(whole), box.axes))
 
 
-def _prefers(part: Part, frame: FloatArray, box: Box) -> bool:
+def _prefers(part: PartNode, frame: FloatArray, box: Box) -> bool:
     """Whether more leaves of `part` stand along `frame` than along its own box."""
 
     def aligned(axes: FloatArray) -> int:

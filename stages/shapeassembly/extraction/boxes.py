@@ -25,20 +25,20 @@ _PROJECTIONS = 40
 """Most rounds of alternating projections; two settle boxes with parallel sides, tilted ones take about ten."""
 
 
-def point_at(box: Box, place: FloatArray) -> FloatArray:
+def world_points(box: Box, place: FloatArray) -> FloatArray:
     """Points of the space around `box` at places (..., 3) in its own coordinates, 0 to 1 along each axis."""
     return box.center + ((place - 0.5) * box.size) @ box.axes
 
 
-def place_in(box: Box, points: FloatArray) -> FloatArray:
-    """The reverse of `point_at`; 0.5 along an axis in which the box has no size."""
+def local_points(box: Box, points: FloatArray) -> FloatArray:
+    """The reverse of `world_points`; 0.5 along an axis in which the box has no size."""
     local = (points - box.center) @ box.axes.T
     return np.where(box.size > 1e-12, local / np.maximum(box.size, 1e-12), 0.0) + 0.5
 
 
 def box_corners(box: Box) -> FloatArray:
     """The eight corners, float64 (8, 3)."""
-    return point_at(box, UNIT_CORNERS)
+    return world_points(box, UNIT_CORNERS)
 
 
 def inside(box: Box, points: FloatArray, tolerance: float) -> BoolArray:
@@ -48,14 +48,14 @@ def inside(box: Box, points: FloatArray, tolerance: float) -> BoolArray:
     return within
 
 
-def around(points: FloatArray, axes: FloatArray) -> Box:
+def bounding_box(points: FloatArray, axes: FloatArray) -> Box:
     """The smallest box with the given axes around points (n, 3)."""
     local = points @ axes.T
     low, high = local.min(axis=0), local.max(axis=0)
     return Box((low + high) / 2 @ axes, high - low, axes)
 
 
-def mirrored(points: FloatArray, center: FloatArray, axis: int) -> FloatArray:
+def mirror_points(points: FloatArray, center: FloatArray, axis: int) -> FloatArray:
     """Points (n, 3) reflected across the plane through `center` perpendicular to coordinate axis 0, 1 or 2."""
     flipped = points.copy()
     flipped[..., axis] = 2 * center[axis] - flipped[..., axis]
@@ -74,13 +74,13 @@ def angle_between(axes: FloatArray, frame: FloatArray) -> float:
     return float(np.degrees(np.arccos(np.clip(((axes * frame).sum() - 1) / 2, -1.0, 1.0))))
 
 
-def same_box(first: FloatArray, second: FloatArray, tolerance: float) -> bool:
+def boxes_match(first: FloatArray, second: FloatArray, tolerance: float) -> bool:
     """Whether two sets of corners (8, 3), in any order, lie within `tolerance` of each other."""
     distances = np.linalg.norm(first[:, None] - second[None], axis=2)
     return bool(max(distances.min(axis=0).max(), distances.min(axis=1).max()) <= tolerance)
 
 
-def gap(first: Box, second: Box) -> tuple[float, FloatArray, FloatArray]:
+def box_gap(first: Box, second: Box) -> tuple[float, FloatArray, FloatArray]:
     """The distance of two solid boxes and the nearest point (3,) of each; 0 and one common point if they meet.
 
     By alternating projections, which approach the nearest pair of two convex bodies.

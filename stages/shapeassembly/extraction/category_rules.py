@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Rules:
+class CategoryRules:
     """The rules of one category; every string is a node's label.
 
     flatten: below these the leaves become children; collapse: these become leaves. gather: nodes with these labels
@@ -24,19 +24,19 @@ class Rules:
     order: tuple[str, ...] = ()
 
 
-RULES: dict[str, Rules] = {
-    "any": Rules(),
-    "chair": Rules(
+CATEGORY_RULES: dict[str, CategoryRules] = {
+    "any": CategoryRules(),
+    "chair": CategoryRules(
         flatten=frozenset({"chair_back", "chair_arm", "chair_base", "chair_seat", "footrest", "chair_head"}),
         collapse=frozenset({"caster", "mechanical_control"}),
         order=("chair_base", "chair_seat", "chair_back", "chair_arm", "chair_head", "footrest"),
     ),
-    "table": Rules(
+    "table": CategoryRules(
         flatten=frozenset({"tabletop", "table_base"}),
         collapse=frozenset({"caster", "cabinet_door", "drawer", "keyboard_tray"}),
         order=("table_base", "tabletop"),
     ),
-    "storage": Rules(
+    "storage": CategoryRules(
         flatten=frozenset({"cabinet_frame", "cabinet_base"}),
         collapse=frozenset({"drawer", "cabinet_door", "mirror", "caster"}),
         gather=frozenset({"countertop", "shelf", "drawer", "cabinet_door", "mirror"}),

@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import box_corners, gap, inside, place_in, point_at
+from stages.shapeassembly.extraction.boxes import box_corners, box_gap, inside, local_points, world_points
 from stages.shapeassembly.extraction.hierarchy import Box
 
-BAND = 0.05
+END_BAND_SHARE = 0.05
 """Share of the height of a bounding box within which a part reaches its bottom or its top."""
 
 _GRID = np.array(list(product(np.linspace(0.0, 1.0, 15), repeat=3)))
@@ -39,7 +39,7 @@ def contact_of(first: Box, second: Box, tolerance: float) -> Contact | None:
     reach = (np.linalg.norm(first.size) + np.linalg.norm(second.size)) / 2 + tolerance
     if np.linalg.norm(first.center - second.center) > reach:
         return None
-    distance, on_first, on_second = gap(first, second)
+    distance, on_first, on_second = box_gap(first, second)
     if distance > tolerance:
         return None
     region = _shared(first, second, max(distance, 1e-6))
@@ -57,18 +57,18 @@ def bottom_or_top(box: Box, bbox: Box, *, top: bool) -> FloatArray | None:
     None if nothing of it lies within a twentieth of the height. The centre of the face that looks there is preferred.
     """
     edge = 1.0 if top else 0.0
-    heights = place_in(bbox, box_corners(box))[:, 1]
-    if np.abs(heights - edge).min() > BAND:
+    heights = local_points(bbox, box_corners(box))[:, 1]
+    if np.abs(heights - edge).min() > END_BAND_SHARE:
         return None
-    centers = point_at(box, _FACE_CENTERS)
-    away = np.abs(place_in(bbox, centers)[:, 1] - edge)
-    if away.min() <= BAND:
+    centers = world_points(box, _FACE_CENTERS)
+    away = np.abs(local_points(bbox, centers)[:, 1] - edge)
+    if away.min() <= END_BAND_SHARE:
         found: FloatArray = centers[int(away.argmin())]
         return found
-    points = point_at(box, _GRID)
-    near = np.abs(place_in(bbox, points)[:, 1] - edge) <= BAND
+    points = world_points(box, _GRID)
+    near = np.abs(local_points(bbox, points)[:, 1] - edge) <= END_BAND_SHARE
     if not near.any():
-        points, near = box_corners(box), np.abs(heights - edge) <= BAND
+        points, near = box_corners(box), np.abs(heights - edge) <= END_BAND_SHARE
     mean: FloatArray = points[near].mean(axis=0)
     return mean
 
@@ -92,7 +92,7 @@ def _face_center(first: Box, second: Box, tolerance: float) -> FloatArray | None
     best: FloatArray | None = None
     best_rank = (2, np.inf)
     for own, other in ((first, second), (second, first)):
-        centers = point_at(own, _FACE_CENTERS)
+        centers = world_points(own, _FACE_CENTERS)
         for index in np.flatnonzero(inside(other, centers, tolerance)):
             axis = int(index) // 2
             area = float(np.prod(np.delete(own.size, axis)))
@@ -105,7 +105,7 @@ def _face_center(first: Box, second: Box, tolerance: float) -> FloatArray | None
 def _faces(own: Box, other: Box, index: int, tolerance: float) -> bool:
     """Whether face `index` of `own` looks against a face of `other` that lies within `tolerance` of its centre."""
     outward = own.axes[index // 2] * (1.0 if index % 2 else -1.0)
-    local = other.axes @ (point_at(own, _FACE_CENTERS[index]) - other.center)
+    local = other.axes @ (world_points(own, _FACE_CENTERS[index]) - other.center)
     facing = -(other.axes @ outward)
     axis = int(np.abs(facing).argmax())
     return bool(
@@ -115,4 +115,4 @@ def _faces(own: Box, other: Box, index: int, tolerance: float) -> bool:
 
 def _onto(box: Box, point: FloatArray) -> FloatArray:
     """The point of the box nearest to `point`."""
-    return point_at(box, np.clip(place_in(box, point), 0.0, 1.0))
+    return world_points(box, np.clip(local_points(box, point), 0.0, 1.0))

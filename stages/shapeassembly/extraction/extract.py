@@ -10,26 +10,26 @@ from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.interpreter import execute
 from stages.shapeassembly.extraction.arrangement import arrange_parts, frame_parts, leaf_corners
-from stages.shapeassembly.extraction.boxes import around
-from stages.shapeassembly.extraction.category_rules import Rules
-from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
-from stages.shapeassembly.extraction.program_builder import Groups, Order, write_program
+from stages.shapeassembly.extraction.boxes import bounding_box
+from stages.shapeassembly.extraction.category_rules import CategoryRules
+from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode
+from stages.shapeassembly.extraction.program_builder import GroupMode, PartOrder, build_program
 from stages.shapeassembly.extraction.settings import EVERY_STEP, Cleaning, Gates
 from stages.shapeassembly.extraction.shortening import shorten_parts
-from stages.shapeassembly.extraction.validity import boxes_of, f_score, is_rooted
+from stages.shapeassembly.extraction.validity import execution_boxes, f_score, is_rooted
 from stages.shapeassembly.syntax.checks import overflow, violations
 from stages.shapeassembly.syntax.printer import rounded
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 
-USUAL_DIAGONALS = (1.0, 4.0)
+KEPT_DIAGONALS = (1.0, 4.0)
 """Of the bounding boxes of PartNet's shapes, which lie about the unit sphere: a shape of such size keeps it."""
 
-DIAGONAL = 2.0
+TARGET_DIAGONAL = 2.0
 """Of the bounding box to which other shapes are scaled."""
 
 
 @dataclass(frozen=True)
-class Extraction:
+class ExtractedProgram:
     """A program that passed every gate. program: with numbers to three decimals, centred at the origin.
 
     f_score: 0 to 100, against the leaf boxes of the input; overflow: share of the bounding box by which parts reach
@@ -37,7 +37,7 @@ class Extraction:
     center + scale * p in the input; wanted, made: the input's leaf boxes and the executed ones, in the program's frame.
     """
 
-    program: Program
+    program: AssemblyProgram
     f_score: float
     overflow: float
     leaves: int
@@ -47,17 +47,19 @@ class Extraction:
     made: tuple[Box, ...]
 
 
-def extract(hierarchy: PartHierarchy, rules: Rules, gates: Gates, cleaning: Cleaning = EVERY_STEP) -> Extraction:
+def extract(
+    hierarchy: PartHierarchy, rules: CategoryRules, gates: Gates, cleaning: Cleaning = EVERY_STEP
+) -> ExtractedProgram:
     """The canonical program of a part hierarchy.
 
     Raises Rejected with one of these reasons: "too few parts", "too many parts", "flat shape", "parts not connected",
     "breaks a rule of the language", "poor fit", "overflows its box", "not rooted".
     """
-    whole = around(leaf_corners(hierarchy.root), np.eye(3))
+    whole = bounding_box(leaf_corners(hierarchy.root), np.eye(3))
     diagonal = float(np.linalg.norm(whole.size))
     if diagonal <= 0:
         raise Rejected("flat shape", f"{hierarchy.name} has no extent")
-    scale = 1.0 if USUAL_DIAGONALS[0] <= diagonal <= USUAL_DIAGONALS[1] else diagonal / DIAGONAL
+    scale = 1.0 if KEPT_DIAGONALS[0] <= diagonal <= KEPT_DIAGONALS[1] else diagonal / TARGET_DIAGONAL
     root = _rescaled(hierarchy.root, whole.center, scale)
     shape = _Shape(hierarchy.name, tuple(leaf.box for leaf in root.leaves()), whole.center, scale)
     first: Rejected | None = None
@@ -79,7 +81,7 @@ class _Steps:
     shorten: bool
     arrange: bool
     pool: bool
-    groups: Groups
+    groups: GroupMode
 
 
 def _attempts(cleaning: Cleaning) -> list[_Steps]:
@@ -103,27 +105,27 @@ class _Shape:
     scale: float
 
 
-def _attempt(shape: _Shape, root: Part, rules: Rules, gates: Gates, steps: _Steps) -> Extraction:
+def _attempt(shape: _Shape, root: PartNode, rules: CategoryRules, gates: Gates, steps: _Steps) -> ExtractedProgram:
     if steps.shorten:
         root = shorten_parts(root)
     root = frame_parts(arrange_parts(root, rules) if steps.arrange else root)
     if not root.children:
         raise Rejected("too few parts", f"{shape.name} is one box")
-    program = rounded(write_program(root, order_of(rules), steps.groups, steps.pool))
+    program = rounded(build_program(root, canonical_order(rules), steps.groups, steps.pool))
     named = set(program.named)
     leaves = sum(cuboid.name not in named for block in program.blocks for cuboid in block.cuboids)
-    if leaves < gates.fewest_leaves:
-        raise Rejected("too few parts", f"{shape.name} has {leaves}, at least {gates.fewest_leaves} are wanted")
-    if leaves > gates.most_leaves:
-        raise Rejected("too many parts", f"{shape.name} has {leaves}, at most {gates.most_leaves} are wanted")
+    if leaves < gates.min_leaves:
+        raise Rejected("too few parts", f"{shape.name} has {leaves}, at least {gates.min_leaves} are wanted")
+    if leaves > gates.max_leaves:
+        raise Rejected("too many parts", f"{shape.name} has {leaves}, at most {gates.max_leaves} are wanted")
     return _checked(shape, program, leaves, gates)
 
 
-def order_of(rules: Rules) -> Order:
+def canonical_order(rules: CategoryRules) -> PartOrder:
     """The canonical order: by semantic label, then by place: bottom to top, left to right, back to front."""
     ranks = {label: rank for rank, label in enumerate(rules.order)}
 
-    def key(part: Part) -> tuple[object, ...]:
+    def key(part: PartNode) -> tuple[object, ...]:
         x, y, z = np.round(part.box.center, 3).tolist()
         size = np.round(part.box.size, 3).tolist()
         return (ranks.get(part.label, len(ranks)), part.label if ranks else "", y, x, z, *size)
@@ -131,13 +133,13 @@ def order_of(rules: Rules) -> Order:
     return key
 
 
-def _checked(shape: _Shape, program: Program, leaves: int, gates: Gates) -> Extraction:
+def _checked(shape: _Shape, program: AssemblyProgram, leaves: int, gates: Gates) -> ExtractedProgram:
     # A tilted part may be longer than the bounding box is wide, as in the published programs.
     broken = [each for each in violations(program) if each.rule != "size"]
     if broken:
         raise Rejected("breaks a rule of the language", f"{shape.name}: {broken[0]}")
     execution = execute(program)
-    made = tuple(boxes_of(execution))
+    made = tuple(execution_boxes(execution))
     diagonal = float(np.linalg.norm(program.root.bbox.dims))
     score = f_score(made, shape.wanted, gates.distance * diagonal)
     if not score >= gates.f_score:
@@ -147,9 +149,9 @@ def _checked(shape: _Shape, program: Program, leaves: int, gates: Gates) -> Extr
         raise Rejected("overflows its box", f"{shape.name} by {beyond:.1%}, less than {gates.overflow:.0%} is wanted")
     if not is_rooted(made):
         raise Rejected("not rooted", f"{shape.name} has a part without a way to the ground")
-    return Extraction(program, score, beyond, leaves, shape.center, shape.scale, shape.wanted, made)
+    return ExtractedProgram(program, score, beyond, leaves, shape.center, shape.scale, shape.wanted, made)
 
 
-def _rescaled(part: Part, center: FloatArray, scale: float) -> Part:
+def _rescaled(part: PartNode, center: FloatArray, scale: float) -> PartNode:
     box = Box((part.box.center - center) / scale, part.box.size / scale, part.box.axes)
     return replace(part, box=box, children=tuple(_rescaled(child, center, scale) for child in part.children))

@@ -13,20 +13,20 @@ from stages.shapeassembly.extraction.joints import (
     LEFT,
     TOP,
     Joint,
-    Standing,
+    PlacedBoxes,
     attach,
     attach_contact,
     squeeze,
 )
-from stages.shapeassembly.extraction.node_layout import BBOX, Layout
+from stages.shapeassembly.extraction.node_layout import BBOX_INDEX, NodeLayout
 from stages.shapeassembly.syntax.program import Squeeze
 
-WELL_PLACED = 0.01
+MAX_GOOD_COST = 0.01
 """Cost up to which a tilted part takes its place in canonical order; others wait for what they may be attached to."""
 
 
 @dataclass(frozen=True)
-class Placing:
+class TiltedPlacement:
     """The lines that ground a tilted part, the box that they make of it, and their cost: mean misplacement of its
     corners as a share of the bounding box's diagonal, and a little for each line."""
 
@@ -35,15 +35,15 @@ class Placing:
     cost: float
 
 
-Placer = Callable[[int, list[Joint], Standing], Placing | None]
+TiltedPlacer = Callable[[int, list[Joint], PlacedBoxes], TiltedPlacement | None]
 """Places a tilted part: given its index, the lines so far and what stands; None if it touches nothing that stands."""
 
 
-MOST_JOINTS = 2
+MAX_JOINTS = 2
 """Attachments of one aligned part, as in the published programs; the first places it, the second keeps it joined."""
 
 
-def ground(layout: Layout, place_tilted: Placer) -> list[Joint] | None:
+def ground_parts(layout: NodeLayout, place_tilted: TiltedPlacer) -> list[Joint] | None:
     """The attach and squeeze lines of a node in grounded order, or None if some part has no way to the box.
 
     Aligned parts at the bounding box come first, then in turns the aligned parts that touch what stands, in canonical
@@ -56,11 +56,11 @@ def ground(layout: Layout, place_tilted: Placer) -> list[Joint] | None:
 class _Grounding:
     """Lines so far, the boxes that stand, and the pairs of parts that a line has joined."""
 
-    def __init__(self, layout: Layout, place_tilted: Placer) -> None:
+    def __init__(self, layout: NodeLayout, place_tilted: TiltedPlacer) -> None:
         self.layout = layout
         self.place_tilted = place_tilted
         self.lines: list[Joint] = []
-        self.standing: dict[int, Box] = {BBOX: layout.bbox}
+        self.standing: dict[int, Box] = {BBOX_INDEX: layout.bbox}
         self.joined: set[tuple[int, int]] = set()
         self.joints = [0] * len(layout.parts)
 
@@ -84,7 +84,7 @@ class _Grounding:
     def _ground_one_at_box(self, part: int) -> bool:
         bottom, top = self.layout.bottoms[part], self.layout.tops[part]
         if bottom is not None and top is not None:
-            line = squeeze(self.layout, self.standing, part, (BBOX, BBOX), TOP)
+            line = squeeze(self.layout, self.standing, part, (BBOX_INDEX, BBOX_INDEX), TOP)
             return self._stand(part, [line or self._at_box(part, bottom)])
         point = bottom if bottom is not None else top
         if point is None:
@@ -94,7 +94,7 @@ class _Grounding:
         for other in self.layout.neighbours(part):
             if not self.layout.may_attach(part, other):
                 continue
-            between = squeeze(self.layout, self.standing, part, (BBOX, other), face)
+            between = squeeze(self.layout, self.standing, part, (BBOX_INDEX, other), face)
             if between is not None and other in self.standing:
                 return self._stand(part, [between], other)
             waits |= between is not None
@@ -108,7 +108,7 @@ class _Grounding:
             if not others or not self.layout.aligned(part):
                 continue
             if part in self.standing:
-                moved |= self._join(part, others[: MOST_JOINTS - self.joints[part]])
+                moved |= self._join(part, others[: MAX_JOINTS - self.joints[part]])
             elif self.layout.bottoms[part] is None and self.layout.tops[part] is None:
                 moved |= self._ground_between(part, others)
         return moved
@@ -129,19 +129,19 @@ class _Grounding:
                     line = squeeze(self.layout, self.standing, part, (first, second), face) if first != second else None
                     if line is not None:
                         return self._stand(part, [line], first, second)
-        return self._join(part, others[:MOST_JOINTS])
+        return self._join(part, others[:MAX_JOINTS])
 
     def _join(self, part: int, others: list[int]) -> bool:
         return self._stand(part, [attach_contact(self.layout, self.standing, part, each) for each in others], *others)
 
     def _ground_tilted(self) -> bool:
         """Grounds the first tilted part that can be placed well, or else the one that can be placed best."""
-        best: tuple[int, Placing] | None = None
+        best: tuple[int, TiltedPlacement] | None = None
         for part in self._loose(aligned=False):
             placing = self.place_tilted(part, self.lines, self.standing)
             if placing is not None and (best is None or placing.cost < best[1].cost):
                 best = (part, placing)
-                if placing.cost <= WELL_PLACED:
+                if placing.cost <= MAX_GOOD_COST:
                     break
         if best is None:
             return False
@@ -163,7 +163,7 @@ class _Grounding:
         return [part for part in parts if part not in self.standing and self.layout.aligned(part) == aligned]
 
     def _at_box(self, part: int, point: FloatArray) -> Joint:
-        return attach(self.layout, self.standing, part, BBOX, point, point)
+        return attach(self.layout, self.standing, part, BBOX_INDEX, point, point)
 
     def _stand(self, part: int, lines: Sequence[Joint], *others: int) -> bool:
         """Writes lines that ground or further join a part; whether there were any."""

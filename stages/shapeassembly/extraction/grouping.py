@@ -11,17 +11,24 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.arrangement import leaf_corners
-from stages.shapeassembly.extraction.boxes import around, box_corners
-from stages.shapeassembly.extraction.hierarchy import Part
-from stages.shapeassembly.extraction.node_layout import Layout, lay_out
-from stages.shapeassembly.extraction.symmetry import BOTTOM, TOP, Body, Group, reflections, translations
+from stages.shapeassembly.extraction.boxes import bounding_box, box_corners
+from stages.shapeassembly.extraction.hierarchy import PartNode
+from stages.shapeassembly.extraction.node_layout import NodeLayout, layout_parts
+from stages.shapeassembly.extraction.symmetry import (
+    BOTTOM_END,
+    TOP_END,
+    SymmetryBody,
+    SymmetryGroup,
+    reflections,
+    translations,
+)
 
 REFLECTION_AXES = (0, 2, 1)
 """Left and right first, then front and back, then bottom and top."""
 
 
 @dataclass(frozen=True)
-class Symmetry:
+class SymmetryMacro:
     """A macro on one part. copies: parts beside the first; distance: of the last copy, as a share of the box along
     `axis`, for a translation; None for a reflection."""
 
@@ -34,15 +41,15 @@ class Symmetry:
 class _Formed:
     """A group: the part that stands for it, its macro, and the parts and ends of the box to which it is anchored."""
 
-    part: Part
-    symmetry: Symmetry
-    anchors: tuple[Part, ...]
+    part: PartNode
+    symmetry: SymmetryMacro
+    anchors: tuple[PartNode, ...]
     ends: frozenset[int]
 
 
 def form_groups(
-    layout: Layout, order: Callable[[Part], Any], *, strict: bool, pool: bool
-) -> tuple[Layout, list[Symmetry | None]]:
+    layout: NodeLayout, order: Callable[[PartNode], Any], *, strict: bool, pool: bool
+) -> tuple[NodeLayout, list[SymmetryMacro | None]]:
     """The layout of the parts that remain when groups are formed, and for each the macro that makes the others.
 
     With `pool` connected components that repeat become one sub-part each, before groups of single parts are formed.
@@ -53,7 +60,7 @@ def form_groups(
     while pool and (pooled := _pool_components(layout, {id(each.part) for each in formed}, strict)) is not None:
         parts, each = pooled
         formed.append(each)
-        layout = lay_out(sorted(parts, key=order), layout.bbox.size)
+        layout = layout_parts(sorted(parts, key=order), layout.bbox.size)
     fixed = {id(each.part) for each in formed}
     bodies = _bodies(layout, [(i,) for i, part in enumerate(layout.parts) if id(part) not in fixed])
     groups = _single_groups(bodies, layout.diagonal, strict)
@@ -69,7 +76,7 @@ def form_groups(
         del groups[_at_fault(layout, members, loose)]
 
 
-def _at_fault(layout: Layout, members: Sequence[tuple[int, ...]], loose: set[int]) -> int:
+def _at_fault(layout: NodeLayout, members: Sequence[tuple[int, ...]], loose: set[int]) -> int:
     """The group to give up so that loose parts can stand: the last that is loose, or touches what is loose."""
     beside = loose | {other for part in loose for other in layout.neighbours(part)}
     for wanted in (loose, beside):
@@ -79,7 +86,9 @@ def _at_fault(layout: Layout, members: Sequence[tuple[int, ...]], loose: set[int
     return len(members) - 1
 
 
-def _searches(diagonal: float, rows_of: int, strict: bool) -> list[Callable[[Sequence[Body]], list[Group]]]:
+def _searches(
+    diagonal: float, rows_of: int, strict: bool
+) -> list[Callable[[Sequence[SymmetryBody]], list[SymmetryGroup]]]:
     """Searches for groups: mirrored pairs, then rows of at least `rows_of`, along each axis."""
     return [
         *(partial(reflections, axis=axis, diagonal=diagonal, strict=strict) for axis in REFLECTION_AXES),
@@ -87,10 +96,10 @@ def _searches(diagonal: float, rows_of: int, strict: bool) -> list[Callable[[Seq
     ]
 
 
-def _single_groups(bodies: Sequence[Body], diagonal: float, strict: bool) -> list[Group]:
+def _single_groups(bodies: Sequence[SymmetryBody], diagonal: float, strict: bool) -> list[SymmetryGroup]:
     """Groups of single parts: rows of three or more, then mirrored pairs, then rows of two."""
     long_rows = _searches(diagonal, 3, strict)[len(REFLECTION_AXES) :]
-    groups: list[Group] = []
+    groups: list[SymmetryGroup] = []
     taken: set[int] = set()
     for search in (*long_rows, *_searches(diagonal, 2, strict)):
         free = [i for i in range(len(bodies)) if i not in taken]
@@ -101,14 +110,14 @@ def _single_groups(bodies: Sequence[Body], diagonal: float, strict: bool) -> lis
     return groups
 
 
-def _pool_components(layout: Layout, fixed: set[int], strict: bool) -> tuple[list[Part], _Formed] | None:
+def _pool_components(layout: NodeLayout, fixed: set[int], strict: bool) -> tuple[list[PartNode], _Formed] | None:
     """The parts after one group of connected components has become one sub-part, and that group.
 
     fixed: identities of the parts that are already groups.
     """
     free = [i for i, part in enumerate(layout.parts) if id(part) not in fixed]
     bodies = _bodies(layout, [(i,) for i in free])
-    unattached = [replace(body, joints=((BOTTOM, body.center), (TOP, body.center))) for body in bodies]
+    unattached = [replace(body, joints=((BOTTOM_END, body.center), (TOP_END, body.center))) for body in bodies]
     for find in _searches(layout.diagonal, 2, strict):
         moving = sorted({free[i] for group in find(unattached) for i in group.bodies})
         bodies = _bodies(layout, [each for each in _components(layout, moving) if len(each) > 1])
@@ -122,41 +131,41 @@ def _pool_components(layout: Layout, fixed: set[int], strict: bool) -> tuple[lis
     return None
 
 
-def _pool(parts: Sequence[Part]) -> Part:
+def _pool(parts: Sequence[PartNode]) -> PartNode:
     """One part that is made of `parts`, in a box along the node's frame."""
     corners = np.concatenate([leaf_corners(part) for part in parts])
-    return Part(parts[0].label, around(corners, np.eye(3)), tuple(parts))
+    return PartNode(parts[0].label, bounding_box(corners, np.eye(3)), tuple(parts))
 
 
-def _formed(group: Group, layout: Layout, part: Part) -> _Formed:
+def _formed(group: SymmetryGroup, layout: NodeLayout, part: PartNode) -> _Formed:
     copies, distance = 1, None
     if group.kind == "translate":
         copies, distance = len(group.bodies) - 1, group.distance / float(layout.bbox.size[group.axis])
     anchors = tuple(layout.parts[i] for i in sorted(group.anchors) if i >= 0)
-    return _Formed(part, Symmetry(group.axis, copies, distance), anchors, group.anchors & {BOTTOM, TOP})
+    return _Formed(part, SymmetryMacro(group.axis, copies, distance), anchors, group.anchors & {BOTTOM_END, TOP_END})
 
 
-def _bodies(layout: Layout, members: Sequence[Sequence[int]]) -> list[Body]:
+def _bodies(layout: NodeLayout, members: Sequence[Sequence[int]]) -> list[SymmetryBody]:
     """The given sets of parts as bodies."""
     bodies = []
     for each in members:
         boxes: tuple[FloatArray, ...] = tuple(box_corners(leaf.box) for i in each for leaf in layout.parts[i].leaves())
-        bodies.append(Body(tuple(each), boxes, tuple(_joints(layout, each))))
+        bodies.append(SymmetryBody(tuple(each), boxes, tuple(_joints(layout, each))))
     return bodies
 
 
-def _joints(layout: Layout, members: Sequence[int]) -> Iterator[tuple[int, FloatArray]]:
+def _joints(layout: NodeLayout, members: Sequence[int]) -> Iterator[tuple[int, FloatArray]]:
     """What a set of parts is attached to beside each other, and where."""
     for i in members:
         for j in layout.neighbours(i):
             if j not in members:
                 yield j, layout.points(i, j)[0]
-        for end, point in ((BOTTOM, layout.bottoms[i]), (TOP, layout.tops[i])):
+        for end, point in ((BOTTOM_END, layout.bottoms[i]), (TOP_END, layout.tops[i])):
             if point is not None:
                 yield end, point
 
 
-def _components(layout: Layout, parts: Sequence[int]) -> list[list[int]]:
+def _components(layout: NodeLayout, parts: Sequence[int]) -> list[list[int]]:
     """The sets of `parts` that hang together through contacts, each ascending."""
     left, components = set(parts), []
     for seed in parts:
@@ -173,7 +182,9 @@ def _components(layout: Layout, parts: Sequence[int]) -> list[list[int]]:
     return components
 
 
-def _reduced(layout: Layout, kept: Sequence[int], formed: Sequence[_Formed]) -> tuple[Layout, list[Symmetry | None]]:
+def _reduced(
+    layout: NodeLayout, kept: Sequence[int], formed: Sequence[_Formed]
+) -> tuple[NodeLayout, list[SymmetryMacro | None]]:
     """The layout of the parts `kept`, ascending, those of groups anchored, and the macro of each."""
     place = {part: index for index, part in enumerate(kept)}
     named = {id(layout.parts[part]): index for part, index in place.items()}
@@ -182,9 +193,9 @@ def _reduced(layout: Layout, kept: Sequence[int], formed: Sequence[_Formed]) -> 
     bottoms, tops = [layout.bottoms[i] for i in kept], [layout.tops[i] for i in kept]
     for index, each in groups.items():
         anchors[index] = frozenset(named[id(part)] for part in each.anchors if id(part) in named)
-        bottoms[index] = bottoms[index] if BOTTOM in each.ends else None
-        tops[index] = tops[index] if TOP in each.ends else None
-    reduced = Layout(
+        bottoms[index] = bottoms[index] if BOTTOM_END in each.ends else None
+        tops[index] = tops[index] if TOP_END in each.ends else None
+    reduced = NodeLayout(
         layout.bbox,
         tuple(layout.parts[i] for i in kept),
         {(place[i], place[j]): each for (i, j), each in layout.contacts.items() if i in place and j in place},

@@ -13,10 +13,10 @@ from stages.shape.arrays import FloatArray
 UNREADABLE = "unreadable hierarchy"
 """The reason with which readers refuse a file."""
 
-MAX_PARTS = 2000
+MAX_HIERARCHY_PARTS = 2000
 """Nodes that a hierarchy may have; the largest of PartNet has some hundreds."""
 
-MAX_DEPTH = 32
+MAX_HIERARCHY_DEPTH = 32
 """Levels that a hierarchy may have; the deepest of PartNet has nine."""
 
 
@@ -31,14 +31,14 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Part:
+class PartNode:
     """A node: its semantic label, its box, and the parts that it is made of (none for a leaf)."""
 
     label: str
     box: Box
-    children: tuple[Part, ...] = ()
+    children: tuple[PartNode, ...] = ()
 
-    def leaves(self) -> Iterator[Part]:
+    def leaves(self) -> Iterator[PartNode]:
         """The parts at the end of every branch below this one, in order; itself if it has no children."""
         if not self.children:
             yield self
@@ -51,21 +51,24 @@ class PartHierarchy:
     """A shape as a part hierarchy, y up. name: what the file calls it."""
 
     name: str
-    root: Part
+    root: PartNode
 
 
-def bounded(root: Part, source: str) -> Part:
+def check_limits(root: PartNode, source: str) -> PartNode:
     """`root` itself. Raises Rejected if it has more parts or levels than a hierarchy may have."""
     level, depth, count = [root], 0, 0
     while level:
         depth, count = depth + 1, count + len(level)
-        if depth > MAX_DEPTH or count > MAX_PARTS:
-            raise Rejected(UNREADABLE, f"{source}: over {MAX_PARTS} parts or {MAX_DEPTH} levels; split or simplify it")
+        if depth > MAX_HIERARCHY_DEPTH or count > MAX_HIERARCHY_PARTS:
+            raise Rejected(
+                UNREADABLE,
+                f"{source}: over {MAX_HIERARCHY_PARTS} parts or {MAX_HIERARCHY_DEPTH} levels; split or simplify it",
+            )
         level = [child for part in level for child in part.children]
     return root
 
 
-def box_of_rows(numbers: FloatArray, place: str) -> Box:
+def box_from_numbers(numbers: FloatArray, place: str) -> Box:
     """A box from twelve numbers: its centre, its lengths, and the directions of the first two lengths.
 
     The axes are made unit and orthogonal: files give them to a few digits. Raises Rejected, naming `place`, for

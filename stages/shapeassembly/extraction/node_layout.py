@@ -8,27 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import angle_between, place_in
+from stages.shapeassembly.extraction.boxes import angle_between, local_points
 from stages.shapeassembly.extraction.contacts import Contact, bottom_or_top, contact_of
-from stages.shapeassembly.extraction.hierarchy import Box, Part
+from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
-BBOX = -1
+BBOX_INDEX = -1
 """The bounding box, where parts are meant by their index."""
 
-REACHES = (0.02, 0.05)
+CONTACT_TOLERANCES = (0.02, 0.05)
 """How far apart parts in contact may be, as shares of the largest side of the two: the first with which every part
 hangs together. The second is what the interpreter takes for touching."""
 
 
 @dataclass(frozen=True)
-class Layout:
+class NodeLayout:
     """parts: in canonical order, their boxes in the node's frame, whose origin is the centre of `bbox`.
     contacts: by pairs i < j; bottoms, tops: where each part reaches the bottom and the top of the bounding box.
     anchors: for each part the parts to which alone it may be attached, because its copies touch them too; None where
     it may be attached to any that it touches."""
 
     bbox: Box
-    parts: tuple[Part, ...]
+    parts: tuple[PartNode, ...]
     contacts: dict[tuple[int, int], Contact]
     bottoms: tuple[FloatArray | None, ...]
     tops: tuple[FloatArray | None, ...]
@@ -59,7 +59,7 @@ class Layout:
 
     def at_face_center(self, mover: int, target: int) -> bool:
         """Whether the attachment point of a contact is the centre of a face of the mover."""
-        place = place_in(self.parts[mover].box, self.points(mover, target)[0])
+        place = local_points(self.parts[mover].box, self.points(mover, target)[0])
         return bool((np.abs(place - 0.5) < 1e-3).sum() >= 2)
 
     def ungroundable(self) -> list[int]:
@@ -72,10 +72,10 @@ class Layout:
         return sorted(left)
 
 
-def lay_out(parts: Sequence[Part], size: FloatArray) -> Layout:
+def layout_parts(parts: Sequence[PartNode], size: FloatArray) -> NodeLayout:
     """The layout of parts, in canonical order and in the node's frame, in a bounding box of `size` (3,)."""
     bbox = Box(np.zeros(3), size, np.eye(3))
-    for reach in REACHES:
+    for reach in CONTACT_TOLERANCES:
         contacts = {}
         for j, second in enumerate(parts):
             for i, first in enumerate(parts[:j]):
@@ -85,13 +85,13 @@ def lay_out(parts: Sequence[Part], size: FloatArray) -> Layout:
                     contacts[i, j] = contact
         bottoms = tuple(bottom_or_top(part.box, bbox, top=False) for part in parts)
         tops = tuple(bottom_or_top(part.box, bbox, top=True) for part in parts)
-        layout = Layout(bbox, tuple(parts), contacts, bottoms, tops, (None,) * len(parts))
+        layout = NodeLayout(bbox, tuple(parts), contacts, bottoms, tops, (None,) * len(parts))
         if not layout.ungroundable():
             break
     return layout
 
 
-def localised(part: Part, frame: Box) -> Part:
+def in_frame(part: PartNode, frame: Box) -> PartNode:
     """`part` and all below it in the coordinates of `frame`, whose centre becomes the origin."""
     box = Box(frame.axes @ (part.box.center - frame.center), part.box.size, part.box.axes @ frame.axes.T)
-    return Part(part.label, box, tuple(localised(child, frame) for child in part.children))
+    return PartNode(part.label, box, tuple(in_frame(child, frame) for child in part.children))

@@ -10,35 +10,35 @@ from typing import Any, Literal
 import numpy as np
 
 from pipeline.errors import Rejected
-from stages.shapeassembly.execution.parameters import SMALLEST
-from stages.shapeassembly.extraction.grounding import ground
-from stages.shapeassembly.extraction.grouping import Symmetry, form_groups
-from stages.shapeassembly.extraction.hierarchy import Part
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
+from stages.shapeassembly.extraction.grounding import ground_parts
+from stages.shapeassembly.extraction.grouping import SymmetryMacro, form_groups
+from stages.shapeassembly.extraction.hierarchy import PartNode
 from stages.shapeassembly.extraction.joints import part_name
-from stages.shapeassembly.extraction.node_layout import lay_out, localised
-from stages.shapeassembly.extraction.tilted import cuboid_of, tilted_placer
-from stages.shapeassembly.syntax.checks import MOST_CUBOIDS
+from stages.shapeassembly.extraction.node_layout import in_frame, layout_parts
+from stages.shapeassembly.extraction.tilted import declaration_of, tilted_placer
+from stages.shapeassembly.syntax.checks import MAX_CUBOIDS
 from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
-    Program,
     Reflect,
     Squeeze,
     Translate,
 )
 
-MOST_CHILDREN = 100
+MAX_CHILDREN = 100
 """Parts of one node before groups are formed: all pairs of them are looked at, and a program declares ten at most."""
 
-Order = Callable[[Part], tuple[Any, ...]]
+PartOrder = Callable[[PartNode], tuple[Any, ...]]
 """The key of the canonical order of the parts of one node, in the node's frame."""
 
 
-Groups = Literal["alike", "common", "none"]
+GroupMode = Literal["alike", "common", "none"]
 """Which parts that repeat make a group: those attached alike to the same parts (shapeassembly App. C), those attached
 to a common part, or none."""
 
@@ -48,10 +48,10 @@ class _Node:
     """The block of a node, with parts called by their place in it, and what is to be expanded: by name, the part."""
 
     block: Block
-    expanded: dict[str, Part]
+    expanded: dict[str, PartNode]
 
 
-def write_program(root: Part, order: Order, groups: Groups, pool: bool) -> Program:
+def build_program(root: PartNode, order: PartOrder, groups: GroupMode, pool: bool) -> AssemblyProgram:
     """The program of an arranged hierarchy, root first, assemblies numbered in breadth-first order.
 
     groups: which parts that repeat are made by macros; pool: whether of what repeats together an assembly is made.
@@ -70,33 +70,33 @@ def write_program(root: Part, order: Order, groups: Groups, pool: bool) -> Progr
             waiting.append(part)
         lines = tuple(_renamed(line, names) for line in node.block.lines)
         blocks.append(Block(f"Program_{len(blocks)}", node.block.bbox, lines))
-    return Program(tuple(blocks))
+    return AssemblyProgram(tuple(blocks))
 
 
-def _write_node(part: Part, order: Order, groups: Groups, pool: bool) -> _Node:
-    children = sorted((localised(child, part.box) for child in part.children), key=order)
-    if len(children) > MOST_CHILDREN:
-        raise Rejected("too many parts", f"{len(children)} below {part.label!r}, at most {MOST_CHILDREN} are looked at")
-    whole = lay_out(children, part.box.size)
+def _write_node(part: PartNode, order: PartOrder, groups: GroupMode, pool: bool) -> _Node:
+    children = sorted((in_frame(child, part.box) for child in part.children), key=order)
+    if len(children) > MAX_CHILDREN:
+        raise Rejected("too many parts", f"{len(children)} below {part.label!r}, at most {MAX_CHILDREN} are looked at")
+    whole = layout_parts(children, part.box.size)
     layout, symmetries = (
         (whole, [None] * len(children))
         if groups == "none"
         else form_groups(whole, order, strict=groups == "alike", pool=pool)
     )
-    if len(layout.parts) > MOST_CUBOIDS:
-        raise Rejected("too many parts", f"{len(layout.parts)} below {part.label!r}, at most {MOST_CUBOIDS} are wanted")
-    joints = ground(layout, tilted_placer(layout))
+    if len(layout.parts) > MAX_CUBOIDS:
+        raise Rejected("too many parts", f"{len(layout.parts)} below {part.label!r}, at most {MAX_CUBOIDS} are wanted")
+    joints = ground_parts(layout, tilted_placer(layout))
     if joints is None:
         raise Rejected("parts not connected", f"below {part.label!r}")
     indices = range(len(layout.parts))
     macros = [_macro(index, each) for index, each in enumerate(symmetries) if each is not None]
-    lines = (*(cuboid_of(layout, index) for index in indices), *joints, *macros)
-    x, y, z = np.maximum(part.box.size, SMALLEST).tolist()
+    lines = (*(declaration_of(layout, index) for index in indices), *joints, *macros)
+    x, y, z = np.maximum(part.box.size, MIN_CUBOID_SIZE).tolist()
     block = Block("", Cuboid(BBOX, (x, y, z), True), lines)
     return _Node(block, {part_name(i): layout.parts[i] for i in indices if layout.parts[i].children})
 
 
-def _macro(part: int, symmetry: Symmetry) -> Line:
+def _macro(part: int, symmetry: SymmetryMacro) -> Line:
     if symmetry.distance is None:
         return Reflect(part_name(part), AXES[symmetry.axis])
     return Translate(part_name(part), AXES[symmetry.axis], symmetry.copies, symmetry.distance)

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 
 from pipeline.config import StrictModel
 from stages.shape.collection.origin import Credit
-from stages.shapeassembly.extraction.category_rules import RULES, Rules
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES, CategoryRules
 from stages.shapeassembly.extraction.readers.source import HierarchyKind, HierarchySource
 
 Category = Literal["any", "chair", "table", "storage"]
@@ -57,9 +57,9 @@ class HierarchyFiles(NamedFiles):
         return HierarchySource(self.path, self.kind, self.up)
 
     @property
-    def rules(self) -> Rules:
+    def rules(self) -> CategoryRules:
         """The rules of the category."""
-        return RULES[self.category]
+        return CATEGORY_RULES[self.category]
 
 
 class Gates(StrictModel):
@@ -69,8 +69,8 @@ class Gates(StrictModel):
     distance: float = Field(
         0.02, gt=0, lt=1, description="Up to which surfaces agree, as a share of the diagonal of the shape."
     )
-    fewest_leaves: int = Field(3, ge=1, description="Fewest cuboids that the program declares and does not expand.")
-    most_leaves: int = Field(12, ge=1, description="Most cuboids that the program declares and does not expand.")
+    min_leaves: int = Field(3, ge=1, description="Fewest cuboids that the program declares and does not expand.")
+    max_leaves: int = Field(12, ge=1, description="Most cuboids that the program declares and does not expand.")
     overflow: float = Field(
         0.05, gt=0, description="How far parts may reach out of the bounding box, as a share of its size; less passes."
     )

@@ -15,12 +15,12 @@ from stages.shapeassembly.extraction.extract import extract
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles
 from stages.shapeassembly.syntax.printer import print_program
 
-HIERARCHIES_A_SHARD = 1000
+HIERARCHIES_PER_SHARD = 1000
 """About a minute of work."""
 
 
 @dataclass(frozen=True)
-class Made:
+class ProgramText:
     """A program that a shard has made. kind: the name of its source in the config; name: its own in the source."""
 
     kind: str
@@ -33,8 +33,8 @@ def extraction_shards(dataset: str, hierarchies: Sequence[HierarchyFiles]) -> li
     shards: list[Shard] = []
     for index, files in enumerate(hierarchies):
         source = files.source
-        for first in range(0, len(source), HIERARCHIES_A_SHARD):
-            last = min(first + HIERARCHIES_A_SHARD, len(source))
+        for first in range(0, len(source), HIERARCHIES_PER_SHARD):
+            last = min(first + HIERARCHIES_PER_SHARD, len(source))
             params = {"job": "extraction", "source": index, "first": first, "last": last}
             name = f"{dataset}-extraction-{len(shards):06d}"
             shards.append(Shard(name, {**params, "digest": source.digest(first, last)}))
@@ -62,9 +62,9 @@ def run_extraction(task: Task, hierarchies: Sequence[HierarchyFiles], gates: Gat
     return Outcome(0, {"programs": len(rows), "f_score": round(float(np.mean(scores or [0.0])), 2)})
 
 
-def read_made(task: Task) -> Iterator[Made]:
+def read_program_texts(task: Task) -> Iterator[ProgramText]:
     """The programs of all shards among the inputs of a task that extract or write some, in order."""
     for record in task.shard.inputs:
         stage, shard = record.split("/")
         for line in task.input(stage, f"{shard}.jsonl").read_text().splitlines():
-            yield Made(**json.loads(line))
+            yield ProgramText(**json.loads(line))

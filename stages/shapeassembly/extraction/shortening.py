@@ -9,13 +9,13 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.extraction.boxes import UNIT_CORNERS, box_corners, inside
-from stages.shapeassembly.extraction.hierarchy import Box, Part
+from stages.shapeassembly.extraction.hierarchy import Box, PartNode
 
 _KEPT = 0.05
 """A part is never cut to less than this share of its length: a part hidden in another is left as it is."""
 
 
-def shorten_parts(root: Part) -> Part:
+def shorten_parts(root: PartNode) -> PartNode:
     """The tree with every leaf cut back that can be without changing what is seen (shapeassembly App. C).
 
     A leaf face that lies within another leaf moves inwards as long as what it leaves is inside that other leaf.
@@ -36,7 +36,7 @@ def shorten_parts(root: Part) -> Part:
     return _with_boxes(root, iter(boxes))
 
 
-def _with_boxes(part: Part, boxes: Iterator[Box]) -> Part:
+def _with_boxes(part: PartNode, boxes: Iterator[Box]) -> PartNode:
     """The tree with the leaves' boxes taken in order from `boxes`."""
     if not part.children:
         return replace(part, box=next(boxes))

@@ -10,18 +10,18 @@ from typing import Literal
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import mirrored, same_box
+from stages.shapeassembly.extraction.boxes import boxes_match, mirror_points
 
-BOTTOM, TOP = -1, -2
+BOTTOM_END, TOP_END = -1, -2
 """The ends of the bounding box, among indices of parts."""
 
-CLOSENESS = 0.02
+MATCH_TOLERANCE = 0.02
 """How near corners must come to those of their counterpart, as a share of the diagonal of the bounding box; how far
 lengths may differ is half of it, or a tenth of the length."""
 
 
 @dataclass(frozen=True)
-class Body:
+class SymmetryBody:
     """What symmetry moves: one part, or several that are connected.
 
     members: indices of its parts; boxes: corners (8, 3) of each leaf in the node's frame, whose origin is the centre
@@ -42,7 +42,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Group:
+class SymmetryGroup:
     """Bodies that one macro makes of the first. bodies: indices, the first at the low end of the axis.
     anchors: what all of them are attached to, as the first is. distance: from the first to the last, in the node's
     units (translate alone)."""
@@ -54,20 +54,20 @@ class Group:
     distance: float = 0.0
 
 
-def reflections(bodies: Sequence[Body], axis: int, diagonal: float, *, strict: bool) -> list[Group]:
+def reflections(bodies: Sequence[SymmetryBody], axis: int, diagonal: float, *, strict: bool) -> list[SymmetryGroup]:
     """Pairs of bodies that are mirror images across the middle of the bounding box, and so are their attachments, which
     are to the same parts; if not `strict`, it is enough that some are to one part.
 
     diagonal: of the bounding box. A body that is its own image is in no pair.
     """
-    tolerance = CLOSENESS * diagonal
+    tolerance = MATCH_TOLERANCE * diagonal
     origin = np.zeros(3)
-    groups: list[Group] = []
+    groups: list[SymmetryGroup] = []
     taken: set[int] = set()
     for i, body in enumerate(bodies):
         if i in taken or body.center[axis] > -1e-3 * diagonal:
             continue
-        image = tuple(mirrored(corners, origin, axis) for corners in body.boxes)
+        image = tuple(mirror_points(corners, origin, axis) for corners in body.boxes)
         for j, other in enumerate(bodies):
             if i == j or j in taken or other.center[axis] < 0 or not _alike(image, other.boxes, tolerance):
                 continue
@@ -77,18 +77,22 @@ def reflections(bodies: Sequence[Body], axis: int, diagonal: float, *, strict: b
             seen, there = _mirrored_joints(_seen(body, own), axis), _seen(other, own)
             common = _parts(seen) & _parts(there)
             if common and (not strict or _attached_alike(seen, there, tolerance)):
-                groups.append(Group("reflect", axis, (i, j), frozenset(_opposite(each, axis) for each in common)))
+                groups.append(
+                    SymmetryGroup("reflect", axis, (i, j), frozenset(_opposite(each, axis) for each in common))
+                )
                 taken |= {i, j}
                 break
     return groups
 
 
-def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int, *, strict: bool) -> list[Group]:
+def translations(
+    bodies: Sequence[SymmetryBody], axis: int, diagonal: float, fewest: int, *, strict: bool
+) -> list[SymmetryGroup]:
     """Rows of at least `fewest` equal bodies at equal distances along `axis` that are attached alike to the same
     parts; if not `strict`, it is enough that all are attached to one part."""
-    tolerance = CLOSENESS * diagonal
+    tolerance = MATCH_TOLERANCE * diagonal
     left = sorted(range(len(bodies)), key=lambda i: (bodies[i].center[axis], i))
-    groups: list[Group] = []
+    groups: list[SymmetryGroup] = []
     while left:
         first = bodies[left[0]]
         row = [i for i in left if _alike_translated(first, bodies[i], axis, tolerance)]
@@ -100,7 +104,7 @@ def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int
         anchors = frozenset.intersection(*(_parts(_seen(bodies[i], own)) for i in row))
         if len(row) >= fewest and anchors:
             span = float(bodies[row[-1]].center[axis] - first.center[axis])
-            groups.append(Group("translate", axis, tuple(row), anchors, span))
+            groups.append(SymmetryGroup("translate", axis, tuple(row), anchors, span))
             left = [i for i in left if i not in row]
         else:
             left = left[1:]
@@ -110,7 +114,7 @@ def translations(bodies: Sequence[Body], axis: int, diagonal: float, fewest: int
 _Joints = list[tuple[int, FloatArray]]
 
 
-def _seen(body: Body, own: frozenset[int]) -> _Joints:
+def _seen(body: SymmetryBody, own: frozenset[int]) -> _Joints:
     """The attachments of a body to what is not in its group."""
     return [each for each in body.joints if each[0] not in own]
 
@@ -122,14 +126,16 @@ def _parts(joints: _Joints) -> frozenset[int]:
 def _opposite(part: int, axis: int) -> int:
     """What the mirror image of a body is attached to: across the level plane the ends of the bounding box change
     places."""
-    return {BOTTOM: TOP, TOP: BOTTOM}.get(part, part) if axis == 1 else part
+    return {BOTTOM_END: TOP_END, TOP_END: BOTTOM_END}.get(part, part) if axis == 1 else part
 
 
 def _mirrored_joints(joints: _Joints, axis: int) -> _Joints:
-    return [(_opposite(part, axis), mirrored(point, np.zeros(3), axis)) for part, point in joints]
+    return [(_opposite(part, axis), mirror_points(point, np.zeros(3), axis)) for part, point in joints]
 
 
-def _attached_in_row(first: Body, other: Body, axis: int, own: frozenset[int], tolerance: float) -> bool:
+def _attached_in_row(
+    first: SymmetryBody, other: SymmetryBody, axis: int, own: frozenset[int], tolerance: float
+) -> bool:
     way = np.zeros(3)
     way[axis] = other.center[axis] - first.center[axis]
     return _attached_alike([(part, point + way) for part, point in _seen(first, own)], _seen(other, own), tolerance)
@@ -156,7 +162,7 @@ def _alike(first: Sequence[FloatArray], second: Sequence[FloatArray], tolerance:
     for corners in first:
         for place, other in enumerate(left):
             near = np.abs(corners.mean(axis=0) - other.mean(axis=0)).max() <= tolerance
-            if near and _same_size(corners, other, tolerance / 2) and same_box(corners, other, tolerance):
+            if near and _same_size(corners, other, tolerance / 2) and boxes_match(corners, other, tolerance):
                 del left[place]
                 break
         else:
@@ -170,7 +176,7 @@ def _same_size(first: FloatArray, second: FloatArray, tolerance: float) -> bool:
     return bool((np.abs(one - two) <= np.maximum(0.1 * one, tolerance)).all())
 
 
-def _alike_translated(first: Body, second: Body, axis: int, tolerance: float) -> bool:
+def _alike_translated(first: SymmetryBody, second: SymmetryBody, axis: int, tolerance: float) -> bool:
     away = second.center - first.center
     if np.abs(np.delete(away, axis)).max() > tolerance:
         return False
@@ -179,7 +185,9 @@ def _alike_translated(first: Body, second: Body, axis: int, tolerance: float) ->
     return _alike([corners + translation for corners in first.boxes], second.boxes, tolerance)
 
 
-def _evenly_spaced(row: list[int], first: int, bodies: Sequence[Body], axis: int, tolerance: float) -> list[int]:
+def _evenly_spaced(
+    row: list[int], first: int, bodies: Sequence[SymmetryBody], axis: int, tolerance: float
+) -> list[int]:
     """The longest row that begins with `first` and goes on in equal steps, along ascending places."""
     best = [first]
     start = bodies[first].center[axis]

@@ -9,9 +9,9 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.interpreter import execute_all
-from stages.shapeassembly.execution.parameters import SMALLEST
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
 from stages.shapeassembly.extraction.boxes import box_corners
-from stages.shapeassembly.extraction.grounding import Placer, Placing
+from stages.shapeassembly.extraction.grounding import TiltedPlacement, TiltedPlacer
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.joints import (
     BACK,
@@ -19,42 +19,42 @@ from stages.shapeassembly.extraction.joints import (
     LEFT,
     TOP,
     Joint,
-    Standing,
+    PlacedBoxes,
     attach,
     part_name,
     squeeze,
 )
-from stages.shapeassembly.extraction.node_layout import BBOX, Layout
-from stages.shapeassembly.extraction.validity import boxes_of
+from stages.shapeassembly.extraction.node_layout import BBOX_INDEX, NodeLayout
+from stages.shapeassembly.extraction.validity import execution_boxes
 from stages.shapeassembly.syntax.printer import rounded
 from stages.shapeassembly.syntax.program import BBOX as BBOX_NAME
-from stages.shapeassembly.syntax.program import Block, Cuboid, Program
+from stages.shapeassembly.syntax.program import AssemblyProgram, Block, Cuboid
 
-MOST_ATTACHMENTS = 3
+MAX_ATTACHMENTS = 3
 """A part that is held at three points is held."""
 
-MOST_POINTS = 5
+MAX_CONTACTS_TRIED = 5
 """Contacts of one part that are tried, those in canonical order first: their sequences number 85."""
 
 LINE_COST = 0.002
 """Misplacement, as a share of the bounding box's diagonal, that is worth one line less."""
 
 
-def cuboid_of(layout: Layout, part: int) -> Cuboid:
+def declaration_of(layout: NodeLayout, part: int) -> Cuboid:
     """The declaration of a part."""
-    x, y, z = np.maximum(layout.parts[part].box.size, SMALLEST).tolist()
+    x, y, z = np.maximum(layout.parts[part].box.size, MIN_CUBOID_SIZE).tolist()
     return Cuboid(part_name(part), (x, y, z), layout.aligned(part))
 
 
-def tilted_placer(layout: Layout) -> Placer:
+def tilted_placer(layout: NodeLayout) -> TiltedPlacer:
     """Places tilted parts of `layout` by trying their attachments in every order and executing each.
 
     What is best is what brings the corners nearest to where they are in the input; a line must be worth its while.
     """
 
-    known: dict[tuple[int, ...], Placing | None] = {}
+    known: dict[tuple[int, ...], TiltedPlacement | None] = {}
 
-    def place(part: int, lines: list[Joint], standing: Standing) -> Placing | None:
+    def place(part: int, lines: list[Joint], standing: PlacedBoxes) -> TiltedPlacement | None:
         about = (part, *(each for each in layout.neighbours(part) if each in standing))
         if about not in known:
             known[about] = _best(layout, part, lines, standing)
@@ -63,22 +63,22 @@ def tilted_placer(layout: Layout) -> Placer:
     return place
 
 
-def _best(layout: Layout, part: int, lines: list[Joint], standing: Standing) -> Placing | None:
+def _best(layout: NodeLayout, part: int, lines: list[Joint], standing: PlacedBoxes) -> TiltedPlacement | None:
     wanted = box_corners(layout.parts[part].box)
     candidates = list(_candidates(layout, part, standing))
-    best: Placing | None = None
+    best: TiltedPlacement | None = None
     for candidate, box in zip(candidates, _executed(layout, part, lines, candidates, standing), strict=True):
         away = float(np.linalg.norm(box_corners(box) - wanted, axis=1).mean()) / layout.diagonal
         cost = away + LINE_COST * len(candidate)
         if best is None or cost < best.cost - 1e-6:
-            best = Placing(tuple(candidate), box, cost)
+            best = TiltedPlacement(tuple(candidate), box, cost)
     return best
 
 
-def _candidates(layout: Layout, part: int, standing: Standing) -> Iterator[list[Joint]]:
+def _candidates(layout: NodeLayout, part: int, standing: PlacedBoxes) -> Iterator[list[Joint]]:
     """Sequences of lines that could ground a part: squeezes, then attachments in every order."""
     others = [other for other in layout.neighbours(part) if other in standing and layout.may_attach(part, other)]
-    at_box = [(BBOX, BBOX), *((BBOX, other) for other in others)]
+    at_box = [(BBOX_INDEX, BBOX_INDEX), *((BBOX_INDEX, other) for other in others)]
     between = list(permutations(others, 2))
     for face, pairs in ((TOP, at_box), (BOTTOM, at_box[1:]), (LEFT, between), (BOTTOM, between), (BACK, between)):
         for first, second in pairs:
@@ -86,7 +86,7 @@ def _candidates(layout: Layout, part: int, standing: Standing) -> Iterator[list[
             if line is not None:
                 yield [line]
     ends = [point for point in (layout.bottoms[part], layout.tops[part]) if point is not None]
-    usual: list[Joint] = [attach(layout, standing, part, BBOX, point, point) for point in ends]
+    usual: list[Joint] = [attach(layout, standing, part, BBOX_INDEX, point, point) for point in ends]
     turning: list[Joint] = list(usual)
     for other in others:
         own, goal = layout.points(part, other)
@@ -98,12 +98,12 @@ def _candidates(layout: Layout, part: int, standing: Standing) -> Iterator[list[
 
 
 def _sequences(joints: Sequence[Joint]) -> Iterator[list[Joint]]:
-    for count in range(1, MOST_ATTACHMENTS + 1):
-        for chosen in permutations(joints[:MOST_POINTS], count):
+    for count in range(1, MAX_ATTACHMENTS + 1):
+        for chosen in permutations(joints[:MAX_CONTACTS_TRIED], count):
             yield list(chosen)
 
 
-def _in_turning_plane(layout: Layout, part: int, other: int) -> FloatArray:
+def _in_turning_plane(layout: NodeLayout, part: int, other: int) -> FloatArray:
     """The point of a contact from which the part turns without rolling: nearest the plane through its centre that is
     perpendicular to the axis about which it is tilted."""
     box = layout.parts[part].box
@@ -118,13 +118,13 @@ def _in_turning_plane(layout: Layout, part: int, other: int) -> FloatArray:
 
 
 def _executed(
-    layout: Layout, part: int, lines: list[Joint], candidates: Sequence[list[Joint]], standing: Standing
+    layout: NodeLayout, part: int, lines: list[Joint], candidates: Sequence[list[Joint]], standing: PlacedBoxes
 ) -> list[Box]:
     """The box that each candidate after `lines` makes of a part, with numbers as they will be printed."""
     x, y, z = layout.bbox.size.tolist()
-    declared = sorted(each for each in (*standing, part) if each != BBOX)
-    cuboids = [cuboid_of(layout, each) for each in declared]
+    declared = sorted(each for each in (*standing, part) if each != BBOX_INDEX)
+    cuboids = [declaration_of(layout, each) for each in declared]
     bbox = Cuboid(BBOX_NAME, (x, y, z), True)
-    programs = [Program((Block("Program_0", bbox, (*cuboids, *lines, *each)),)) for each in candidates]
+    programs = [AssemblyProgram((Block("Program_0", bbox, (*cuboids, *lines, *each)),)) for each in candidates]
     executions = execute_all([rounded(program) for program in programs])
-    return [boxes_of(execution)[declared.index(part)] for execution in executions]
+    return [execution_boxes(execution)[declared.index(part)] for execution in executions]

@@ -8,17 +8,17 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.interpreter import Execution
-from stages.shapeassembly.extraction.boxes import around, box_corners, gap, surface_distance
+from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box_gap, surface_distance
 from stages.shapeassembly.extraction.hierarchy import Box
 
-ROOTED_SHARE = 0.02
+MAX_CONNECTED_GAP_SHARE = 0.02
 """Parts further apart than this share of the shape's diagonal are not connected (shapeassembly App. E)."""
 
 _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the additive recurrence that fills a square most evenly."""
 
 
-def boxes_of(execution: Execution) -> list[Box]:
+def execution_boxes(execution: Execution) -> list[Box]:
     """The boxes of the leaves of an executed program."""
     frames = execution.frames.transpose(0, 2, 1)
     return [Box(*each) for each in zip(execution.centres, execution.sizes, frames, strict=True)]
@@ -51,8 +51,8 @@ def f_score(made: Sequence[Box], wanted: Sequence[Box], distance: float, count: 
 def is_rooted(boxes: Sequence[Box]) -> bool:
     """Whether a way through touching boxes leads from the ground to every one of them."""
     corners = np.stack([box_corners(box) for box in boxes])
-    whole = around(corners.reshape(-1, 3), np.eye(3))
-    limit = ROOTED_SHARE * float(np.linalg.norm(whole.size))
+    whole = bounding_box(corners.reshape(-1, 3), np.eye(3))
+    limit = MAX_CONNECTED_GAP_SHARE * float(np.linalg.norm(whole.size))
     low, high = corners.min(axis=1), corners.max(axis=1)
     reached = set(np.flatnonzero(low[:, 1] <= low[:, 1].min() + limit).tolist())
     frontier = sorted(reached)
@@ -60,7 +60,7 @@ def is_rooted(boxes: Sequence[Box]) -> bool:
         i = frontier.pop()
         near = (low <= high[i] + limit).all(axis=1) & (high >= low[i] - limit).all(axis=1)
         for j in np.flatnonzero(near).tolist():
-            if j not in reached and gap(boxes[i], boxes[j])[0] <= limit:
+            if j not in reached and box_gap(boxes[i], boxes[j])[0] <= limit:
                 reached.add(j)
                 frontier.append(j)
     return len(reached) == len(boxes)

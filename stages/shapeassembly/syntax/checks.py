@@ -8,11 +8,21 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from stages.shapeassembly.execution.interpreter import Execution, parts_of
-from stages.shapeassembly.execution.parameters import SMALLEST
-from stages.shapeassembly.execution.tables import copy_name
+from stages.shapeassembly.execution.interpreter import Execution, execute_block
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
+from stages.shapeassembly.execution.tables import next_copy_name
 from stages.shapeassembly.syntax.printer import print_line
-from stages.shapeassembly.syntax.program import BBOX, Attach, Block, Cuboid, Line, Program, Reflect, Squeeze, Translate
+from stages.shapeassembly.syntax.program import (
+    BBOX,
+    AssemblyProgram,
+    Attach,
+    Block,
+    Cuboid,
+    Line,
+    Reflect,
+    Squeeze,
+    Translate,
+)
 
 Rule = Literal[
     "name taken",
@@ -30,15 +40,15 @@ Rule = Literal[
     "range",
     "too many cuboids",
 ]
-RULES: tuple[Rule, ...] = get_args(Rule)
+RULE_NAMES: tuple[Rule, ...] = get_args(Rule)
 
-MOST_CUBOIDS = 10
+MAX_CUBOIDS = 10
 """Cuboids that an assembly declares (shapeassembly §6.1)."""
 
-SIDE = 0.05
+BBOX_END_SHARE = 0.05
 """How far from the top or bottom of the bounding box an attachment to it may be, as a share of its height."""
 
-LARGER = 0.1
+MAX_EXCESS_SHARE = 0.1
 """By how much a cuboid may be larger than the bounding box, as a share."""
 
 _STEPS = {Cuboid: 0, Attach: 1, Squeeze: 1, Reflect: 2, Translate: 2}
@@ -56,7 +66,7 @@ class Violation:
         return f"line {self.number}: {self.rule}: {self.detail}" if self.number else f"{self.rule}: {self.detail}"
 
 
-def violations(program: Program) -> list[Violation]:
+def violations(program: AssemblyProgram) -> list[Violation]:
     """Every rule that the program breaks, in the order of its lines; empty for a well-made program."""
     found: list[Violation] = []
     number = 1
@@ -66,7 +76,7 @@ def violations(program: Program) -> list[Violation]:
     return [*found, *_tree_violations(program)]
 
 
-def overflow(program: Program, execution: Execution) -> float:
+def overflow(program: AssemblyProgram, execution: Execution) -> float:
     """How far the executed cuboids reach out of the root's bounding box, as a share of its size along that axis."""
     if not len(execution):
         return 0.0
@@ -74,18 +84,18 @@ def overflow(program: Program, execution: Execution) -> float:
     return max(0.0, float(reach.max()) - 0.5)
 
 
-def reaching_out(block: Block) -> list[str]:
+def protruding_parts(block: Block) -> list[str]:
     """The cuboids and copies of one assembly that reach out of its bounding box by more than LARGER of its size along
     an axis (shapeassembly App. D), by name, in the order of the lines. Raises ProgramError where the assembly by itself
     cannot be executed."""
-    names, boxes = parts_of(block)
+    names, boxes = execute_block(block)
     frames = boxes[:, 6:].reshape(-1, 3, 3)
     reach = np.abs(boxes[:, :3]) + np.einsum("nk,nkc->nc", boxes[:, 3:6] / 2, np.abs(frames))
-    beyond = (reach > (0.5 + LARGER) * np.array(block.bbox.dims) + 1e-9).any(axis=1)
+    beyond = (reach > (0.5 + MAX_EXCESS_SHARE) * np.array(block.bbox.dims) + 1e-9).any(axis=1)
     return [names[place] for place in np.flatnonzero(beyond).tolist()]
 
 
-def _tree_violations(program: Program) -> Iterator[Violation]:
+def _tree_violations(program: AssemblyProgram) -> Iterator[Violation]:
     """Assemblies that no cuboid stands for, and those that stand within themselves."""
     below = {
         block.name: [each.name for each in block.cuboids if each.name in program.named] for block in program.blocks
@@ -122,8 +132,8 @@ class _Checker:
         block = self.block
         if not block.bbox.aligned:
             self.add("bounding box not aligned", block.bbox, "write True")
-        if min(block.bbox.dims) < SMALLEST:
-            self.add("size", block.bbox, f"every size must be at least {SMALLEST}")
+        if min(block.bbox.dims) < MIN_CUBOID_SIZE:
+            self.add("size", block.bbox, f"every size must be at least {MIN_CUBOID_SIZE}")
         step = 0
         for line in block.lines:
             self.number += 1
@@ -138,10 +148,8 @@ class _Checker:
         for cuboid in block.cuboids:
             if cuboid.name not in self.grounded:
                 self.add("not grounded", cuboid, f"no line of {block.name} attaches it")
-        if len(block.cuboids) > MOST_CUBOIDS:
-            self.add(
-                "too many cuboids", block.bbox, f"{block.name} has {len(block.cuboids)}, of {MOST_CUBOIDS} at most"
-            )
+        if len(block.cuboids) > MAX_CUBOIDS:
+            self.add("too many cuboids", block.bbox, f"{block.name} has {len(block.cuboids)}, of {MAX_CUBOIDS} at most")
         return self.found
 
     def add(self, rule: Rule, line: Line, detail: str) -> None:
@@ -152,8 +160,11 @@ class _Checker:
             self.add("name taken", line, f"{line.name!r} is there already")
         self.places[line.name] = len(self.places)
         whole = self.block.bbox.dims
-        if any(not SMALLEST <= size <= (1 + LARGER) * most for size, most in zip(line.dims, whole, strict=True)):
-            self.add("size", line, f"sizes are from {SMALLEST} to those of the bounding box, {whole}")
+        if any(
+            not MIN_CUBOID_SIZE <= size <= (1 + MAX_EXCESS_SHARE) * most
+            for size, most in zip(line.dims, whole, strict=True)
+        ):
+            self.add("size", line, f"sizes are from {MIN_CUBOID_SIZE} to those of the bounding box, {whole}")
 
     def command(self, line: Attach | Squeeze | Reflect | Translate) -> None:
         names = {line.moved: None}
@@ -171,8 +182,8 @@ class _Checker:
         elif isinstance(line, Attach):
             self.in_range(line, *line.source, *line.goal)
             top = line.goal[1] > 0.5
-            if line.target == BBOX and SIDE < line.goal[1] < 1 - SIDE:
-                self.add("bounding box at its sides", line, f"y must be within {SIDE} of 0 or 1")
+            if line.target == BBOX and BBOX_END_SHARE < line.goal[1] < 1 - BBOX_END_SHARE:
+                self.add("bounding box at its sides", line, f"y must be within {BBOX_END_SHARE} of 0 or 1")
             self.attached(line, line.target, "top" if top else "bot")
         else:
             self.in_range(line, line.u, line.v)
@@ -203,6 +214,6 @@ class _Checker:
         if isinstance(line, Translate):
             self.in_range(line, line.distance)
         for _ in range(1 if isinstance(line, Reflect) else line.copies):
-            name = copy_name(self.places)
+            name = next_copy_name(self.places)
             self.places[name] = len(self.places)
             self.grounded.add(name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-MAX_TEXT = 1_000_000
+MAX_TEXT_CHARACTERS = 1_000_000
 """Characters of a program's text."""
 
 MAX_LINES = 10_000
@@ -17,13 +17,13 @@ MAX_COPIES = 1_000
 MAX_PARTS = 10_000
 """Cuboids of the executed program, those that are expanded and the bounding boxes included."""
 
-MAX_SIZE = 1e6
+MAX_NUMBER = 1e6
 """Largest number in a program."""
 
-MIN_SIZE = 1e-6
+MIN_DECLARED_SIZE = 1e-6
 """Smallest size of a declared cuboid."""
 
-MAX_EVENTS = 20_000
+MAX_BLOCK_ATTACHMENTS = 20_000
 """Attachments of one assembly, those of copies included."""
 
 MAX_REACH = 1e9

@@ -11,11 +11,12 @@ import re
 from typing import NoReturn, cast
 
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.limits import MAX_COPIES, MAX_LINES, MAX_SIZE, MAX_TEXT
+from stages.shapeassembly.syntax.limits import MAX_COPIES, MAX_LINES, MAX_NUMBER, MAX_TEXT_CHARACTERS
 from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
     FACES,
+    AssemblyProgram,
     Attach,
     Axis,
     Block,
@@ -23,7 +24,6 @@ from stages.shapeassembly.syntax.program import (
     Face,
     Line,
     Point,
-    Program,
     Reflect,
     Squeeze,
     Translate,
@@ -36,13 +36,13 @@ _NAME_START = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_")
 _NUMBER_START, _NUMBER_END = frozenset("+-.0123456789"), frozenset(".0123456789")
 
 
-def parse(text: str) -> Program:
+def parse(text: str) -> AssemblyProgram:
     """The program that `text` is.
 
     Raises ProgramError with line, column and reason at the first thing that the grammar does not allow.
     """
-    if len(text) > MAX_TEXT:
-        raise ProgramError("too long", f"{len(text)} characters; a program has at most {MAX_TEXT}")
+    if len(text) > MAX_TEXT_CHARACTERS:
+        raise ProgramError("too long", f"{len(text)} characters; a program has at most {MAX_TEXT_CHARACTERS}")
     return _Reader(text).program()
 
 
@@ -55,7 +55,7 @@ class _Reader:
         self.words.append("")
         self.place = 0
 
-    def program(self) -> Program:
+    def program(self) -> AssemblyProgram:
         blocks: list[Block] = []
         names: set[str] = set()
         if self.words[0] == "":
@@ -68,7 +68,7 @@ class _Reader:
                 self.refuse("name taken", f"an assembly named {name!r} cannot be told from another; rename it")
             names.add(name)
             blocks.append(self.block(name))
-        return Program(tuple(blocks))
+        return AssemblyProgram(tuple(blocks))
 
     def block(self, name: str) -> Block:
         self.expect("{")
@@ -171,8 +171,8 @@ class _Reader:
             value = float(word)
         except ValueError:
             self.unexpected("a number")
-        if not -MAX_SIZE <= value <= MAX_SIZE:
-            self.refuse("number too large", f"{word} is beyond {MAX_SIZE:g}")
+        if not -MAX_NUMBER <= value <= MAX_NUMBER:
+            self.refuse("number too large", f"{word} is beyond {MAX_NUMBER:g}")
         self.place += 1
         return value
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stages.shapeassembly.syntax.program import Attach, Block, Cuboid, Line, Point, Program, Reflect, Squeeze
+from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Block, Cuboid, Line, Point, Reflect, Squeeze
 
-DECIMALS = 3
+PRINTED_DECIMALS = 3
 
 
-def print_program(program: Program) -> str:
+def print_program(program: AssemblyProgram) -> str:
     """The canonical text: one line a line, one tab of indent, the shortest digits that read back as the same number.
 
     `parse(print_program(p)) == p` for every program.
@@ -35,7 +35,7 @@ def print_line(line: Line) -> str:
     return f"translate({line.moved}, {line.axis}, {line.copies}, {line.distance!r})"
 
 
-def rounded(program: Program) -> Program:
+def rounded(program: AssemblyProgram) -> AssemblyProgram:
     """The program with every number to three decimals, as the published programs have them."""
     return program.with_lines(_rounded)
 
@@ -46,10 +46,10 @@ def _rounded(line: Line) -> Line:
     if isinstance(line, Attach):
         return replace(line, source=_round(line.source), goal=_round(line.goal))
     if isinstance(line, Squeeze):
-        return replace(line, u=round(line.u, DECIMALS), v=round(line.v, DECIMALS))
+        return replace(line, u=round(line.u, PRINTED_DECIMALS), v=round(line.v, PRINTED_DECIMALS))
     if isinstance(line, Reflect):
         return line
-    return replace(line, distance=round(line.distance, DECIMALS))
+    return replace(line, distance=round(line.distance, PRINTED_DECIMALS))
 
 
 def _numbers(point: Point) -> str:
@@ -58,4 +58,4 @@ def _numbers(point: Point) -> str:
 
 def _round(point: Point) -> Point:
     x, y, z = point
-    return (round(x, DECIMALS), round(y, DECIMALS), round(z, DECIMALS))
+    return (round(x, PRINTED_DECIMALS), round(y, PRINTED_DECIMALS), round(z, PRINTED_DECIMALS))

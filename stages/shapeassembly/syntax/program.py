@@ -90,7 +90,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Program:
+class AssemblyProgram:
     """Assemblies, the root first. A cuboid that has the name of an assembly is expanded by it."""
 
     blocks: tuple[Block, ...]
@@ -104,9 +104,9 @@ class Program:
         """The assemblies by name."""
         return {block.name: block for block in self.blocks}
 
-    def with_lines(self, change: Callable[[Line], Line]) -> Program:
+    def with_lines(self, change: Callable[[Line], Line]) -> AssemblyProgram:
         """The program with `change` applied to every line, bounding boxes included."""
-        return Program(tuple(_changed(block, change) for block in self.blocks))
+        return AssemblyProgram(tuple(_changed(block, change) for block in self.blocks))
 
 
 def _changed(block: Block, change: Callable[[Line], Line]) -> Block:

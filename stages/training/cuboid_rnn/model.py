@@ -8,25 +8,25 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
-from stages.training.cuboid_rnn.batches import FLAGS, KINDS, NUMBERS, SHOWN
-from stages.training.cuboid_rnn.settings import CuboidRnnEntry
+from stages.training.cuboid_rnn.batches import FLAG_COUNT, INPUT_WIDTH, KIND_COUNT, NUMBERS_PER_STEP
+from stages.training.cuboid_rnn.settings import CuboidRnnConfig
 
-NARROWEST = 0.01
+MIN_DEVIATION = 0.01
 """Least standard deviation of a Gaussian: numbers that recur would make it endlessly narrow."""
 
 
 class CuboidRnn(nn.Module):
     """Steps of cuboids, one behind the other."""
 
-    def __init__(self, entry: CuboidRnnEntry) -> None:
+    def __init__(self, entry: CuboidRnnConfig) -> None:
         super().__init__()
         self.mixtures = entry.mixtures
-        self.reader = nn.GRU(SHOWN, entry.hidden, batch_first=True)
-        self.kinds = nn.Linear(entry.hidden, KINDS)
+        self.reader = nn.GRU(INPUT_WIDTH, entry.hidden, batch_first=True)
+        self.kinds = nn.Linear(entry.hidden, KIND_COUNT)
         self.said = nn.Sequential(
-            nn.Linear(entry.hidden + FLAGS, entry.hidden),
+            nn.Linear(entry.hidden + FLAG_COUNT, entry.hidden),
             nn.LeakyReLU(0.2),
-            nn.Linear(entry.hidden, entry.mixtures * (1 + 2 * NUMBERS)),
+            nn.Linear(entry.hidden, entry.mixtures * (1 + 2 * NUMBERS_PER_STEP)),
         )
 
     def read(self, shown: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
@@ -39,12 +39,12 @@ class CuboidRnn(nn.Module):
         """The logits of the Gaussians (n, steps, mixtures), their means and deviations (n, steps, mixtures, NUMBERS),
         of cuboids with these flags, float (n, steps, FLAGS)."""
         found = self.said(torch.cat([states, flags], dim=-1)).float()
-        weights, rest = found.split([self.mixtures, 2 * NUMBERS * self.mixtures], dim=-1)
-        means, deviations = rest.view(*rest.shape[:2], self.mixtures, 2 * NUMBERS).chunk(2, dim=-1)
-        return weights, means, softplus(deviations) + NARROWEST
+        weights, rest = found.split([self.mixtures, 2 * NUMBERS_PER_STEP * self.mixtures], dim=-1)
+        means, deviations = rest.view(*rest.shape[:2], self.mixtures, 2 * NUMBERS_PER_STEP).chunk(2, dim=-1)
+        return weights, means, softplus(deviations) + MIN_DEVIATION
 
 
-def density(weights: Tensor, means: Tensor, deviations: Tensor, numbers: Tensor, turned: Tensor) -> Tensor:
+def log_density(weights: Tensor, means: Tensor, deviations: Tensor, numbers: Tensor, turned: Tensor) -> Tensor:
     """Logarithm of the density of numbers (n, steps, NUMBERS), float (n, steps); the turn counts where a cuboid is
     `turned`, float (n, steps)."""
     away = (numbers[:, :, None] - means) / deviations

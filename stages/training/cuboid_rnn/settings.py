@@ -6,14 +6,14 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.model_config import KitModelEntry, Source
+from stages.training.model_config import KitModelConfig, LearningSource
 
 
-class CuboidRnnEntry(KitModelEntry):
+class CuboidRnnConfig(KitModelConfig):
     """A recurrent network of the cuboids that ShapeAssembly programs make: a baseline that knows neither parts of parts
     nor attachments. Its kits are the names of `shapeassembly.programs` and `shapeassembly.hierarchies`."""
 
-    learns_from: ClassVar[Source] = "programs"
+    learns_from: ClassVar[LearningSource] = "programs"
 
     kind: Literal["cuboid_rnn"] = Field(description="a recurrent network that writes cuboids, in the way of 3D-PRNN")
     hidden: int = Field(256, ge=2, le=8192, description="size of the GRU")

@@ -12,14 +12,21 @@ import torch
 
 from stages.shape.arrays import BoolArray, FloatArray
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.training.box_vectors import WIDTH, box_of_numbers
+from stages.training.box_vectors import BOX_WIDTH, box_from_vector
 from stages.training.checkpoint import CheckpointError, load_checkpoint
-from stages.training.cuboid_rnn.batches import END, FLAGS, KINDS, MOST_BOXES, NUMBERS, SHOWN
-from stages.training.cuboid_rnn.corpus import mirrored
+from stages.training.cuboid_rnn.batches import (
+    END_KIND,
+    FLAG_COUNT,
+    INPUT_WIDTH,
+    KIND_COUNT,
+    MAX_BOXES,
+    NUMBERS_PER_STEP,
+)
+from stages.training.cuboid_rnn.corpus import mirror_cuboids
 from stages.training.cuboid_rnn.model import CuboidRnn
-from stages.training.cuboid_rnn.settings import CuboidRnnEntry
+from stages.training.cuboid_rnn.settings import CuboidRnnConfig
 
-AT_ONCE = 128
+SHAPES_PER_BATCH = 128
 
 
 @dataclass(frozen=True)
@@ -37,9 +44,9 @@ class TrainedCuboidRnn:
         kept: list[tuple[Box, ...]] = []
         begun = 0
         while len(kept) < count:
-            if begun > 50 * (count + AT_ONCE):
+            if begun > 50 * (count + SHAPES_PER_BATCH):
                 raise ValueError(f"{len(kept)} of {begun} shapes had a cuboid; train the model longer")
-            for each in _written(self.module, AT_ONCE, rng, temperature):
+            for each in _written(self.module, SHAPES_PER_BATCH, rng, temperature):
                 if len(kept) < count:
                     begun += 1
                     kept += [each] if each else []
@@ -49,19 +56,19 @@ class TrainedCuboidRnn:
 @torch.no_grad()
 def _written(module: CuboidRnn, count: int, rng: np.random.Generator, temperature: float) -> list[tuple[Box, ...]]:
     """The cuboids of so many shapes, mirror images among them."""
-    found = np.zeros((MOST_BOXES, count, WIDTH))
-    flags = np.zeros((count, FLAGS), np.float32)
-    pairs = np.zeros((MOST_BOXES, count), np.bool_)
-    lengths = np.full(count, MOST_BOXES)
-    shown = np.zeros((count, SHOWN), np.float32)
+    found = np.zeros((MAX_BOXES, count, BOX_WIDTH))
+    flags = np.zeros((count, FLAG_COUNT), np.float32)
+    pairs = np.zeros((MAX_BOXES, count), np.bool_)
+    lengths = np.full(count, MAX_BOXES)
+    shown = np.zeros((count, INPUT_WIDTH), np.float32)
     state: torch.Tensor | None = None
-    for step in range(3 * MOST_BOXES):
+    for step in range(3 * MAX_BOXES):
         place, axis = divmod(step, 3)
-        shown[:, NUMBERS + FLAGS :] = np.eye(3)[axis]
+        shown[:, NUMBERS_PER_STEP + FLAG_COUNT :] = np.eye(3)[axis]
         states, state = module.read(torch.from_numpy(shown)[:, None], state)
         if axis == 0:
-            kinds = (module.kinds(states[:, 0]).double().numpy() + rng.gumbel(size=(count, KINDS))).argmax(axis=1)
-            lengths = np.where(kinds == END, np.minimum(lengths, place), lengths)
+            kinds = (module.kinds(states[:, 0]).double().numpy() + rng.gumbel(size=(count, KIND_COUNT))).argmax(axis=1)
+            lengths = np.where(kinds == END_KIND, np.minimum(lengths, place), lengths)
             pairs[place], turned = kinds // 2 == 1, kinds % 2 == 1
             flags = np.stack([pairs[place], turned], axis=1).astype(np.float32)
             if (lengths <= place).all():
@@ -72,7 +79,7 @@ def _written(module: CuboidRnn, count: int, rng: np.random.Generator, temperatur
         numbers = _drawn(said, mean, deviation, temperature, rng)
         numbers[flags[:, 1] == 0, 2] = 0
         found[place, :, axis::3] = numbers
-        shown[:, :NUMBERS], shown[:, NUMBERS : NUMBERS + FLAGS] = numbers, flags
+        shown[:, :NUMBERS_PER_STEP], shown[:, NUMBERS_PER_STEP : NUMBERS_PER_STEP + FLAG_COUNT] = numbers, flags
     return [_boxes(found[: lengths[row], row], pairs[: lengths[row], row]) for row in range(count)]
 
 
@@ -82,14 +89,14 @@ def _drawn(
     """Numbers (n, NUMBERS) of mixtures with logits (n, k), means and deviations (n, k, NUMBERS)."""
     chosen = (weights + rng.gumbel(size=weights.shape)).argmax(axis=1)
     rows = np.arange(len(chosen))
-    noise = temperature * rng.standard_normal((len(chosen), NUMBERS))
+    noise = temperature * rng.standard_normal((len(chosen), NUMBERS_PER_STEP))
     found: FloatArray = means[rows, chosen] + deviations[rows, chosen] * noise
     return found
 
 
 def _boxes(numbers: FloatArray, pairs: BoolArray) -> tuple[Box, ...]:
-    rows = np.concatenate([numbers, mirrored(numbers[pairs])])
-    return tuple(box_of_numbers(each) for each in rows)
+    rows = np.concatenate([numbers, mirror_cuboids(numbers[pairs])])
+    return tuple(box_from_vector(each) for each in rows)
 
 
 def load_cuboid_rnn(path: Path, expected: Mapping[str, Any] | None = None) -> TrainedCuboidRnn:
@@ -99,7 +106,7 @@ def load_cuboid_rnn(path: Path, expected: Mapping[str, Any] | None = None) -> Tr
     `{"kit": "chair"}`.
     """
     tensors, header = load_checkpoint(path, {"kind": "cuboid_rnn", **(expected or {})})
-    module = CuboidRnn(CuboidRnnEntry.model_validate({"name": "trained", "kind": "cuboid_rnn", **header["settings"]}))
+    module = CuboidRnn(CuboidRnnConfig.model_validate({"name": "trained", "kind": "cuboid_rnn", **header["settings"]}))
     if module.state_dict().keys() != tensors.keys():
         raise CheckpointError(f"{path} has other tensors than this version of Shapemill: train it again (make train)")
     module.load_state_dict(tensors)

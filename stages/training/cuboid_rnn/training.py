@@ -12,12 +12,12 @@ from torch import Generator, Tensor
 from torch.nn.functional import cross_entropy
 
 from pipeline.stage import Outcome, Task
-from stages.training.cuboid_rnn.batches import Batch, Cuboids, batches
+from stages.training.cuboid_rnn.batches import CuboidBatch, CuboidCorpus, batches
 from stages.training.cuboid_rnn.corpus import prepare_corpus, read_corpus
-from stages.training.cuboid_rnn.model import CuboidRnn, density
-from stages.training.cuboid_rnn.settings import CuboidRnnEntry
-from stages.training.loop import device_of
-from stages.training.training_task import mean_figures, sample_digests
+from stages.training.cuboid_rnn.model import CuboidRnn, log_density
+from stages.training.cuboid_rnn.settings import CuboidRnnConfig
+from stages.training.loop import resolve_device
+from stages.training.training_task import sample_digests, weighted_means
 
 
 def prepare(task: Task) -> Outcome:
@@ -25,20 +25,20 @@ def prepare(task: Task) -> Outcome:
     return prepare_corpus(task)
 
 
-def entry(settings: Mapping[str, Any]) -> CuboidRnnEntry:
+def entry(settings: Mapping[str, Any]) -> CuboidRnnConfig:
     """The entry whose JSON is `settings`."""
-    return CuboidRnnEntry.model_validate(settings)
+    return CuboidRnnConfig.model_validate(settings)
 
 
-def learner(task: Task, entry: CuboidRnnEntry, seed: int) -> CuboidRnnLearner:
+def learner(task: Task, entry: CuboidRnnConfig, seed: int) -> CuboidRnnTask:
     """A model with fresh weights beside the shapes of its category."""
     described, cuboids = read_corpus(task, task.shard.params["data"])
     header = {**described, "data": sample_digests(task, "safetensors")}
-    module = new_model(entry, seed).to(device_of(entry.device))
-    return CuboidRnnLearner(module, header, entry, cuboids["train"], cuboids["val"])
+    module = new_model(entry, seed).to(resolve_device(entry.device))
+    return CuboidRnnTask(module, header, entry, cuboids["train"], cuboids["val"])
 
 
-def new_model(entry: CuboidRnnEntry, seed: int) -> CuboidRnn:
+def new_model(entry: CuboidRnnConfig, seed: int) -> CuboidRnn:
     """A model with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -46,27 +46,27 @@ def new_model(entry: CuboidRnnEntry, seed: int) -> CuboidRnn:
 
 
 @dataclass(frozen=True)
-class CuboidRnnLearner:
+class CuboidRnnTask:
     """The `Learner` of a network of cuboids."""
 
     module: CuboidRnn
     header: Mapping[str, Any]
-    entry: CuboidRnnEntry
-    train: Cuboids
-    val: Cuboids
+    entry: CuboidRnnConfig
+    train: CuboidCorpus
+    val: CuboidCorpus
 
-    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+    def batches(self, rng: np.random.Generator) -> Iterator[CuboidBatch]:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
             for batch in batches(self.train, self.entry.batch, rng):
                 yield batch.to(device)
 
-    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+    def losses(self, batch: CuboidBatch, step: int, noise: Generator) -> dict[str, Tensor]:
         """Means over shapes: nats of the numbers, which may be negative, for they are densities, and of the kinds."""
         states, _ = self.module.read(batch.shown)
         gaussians = self.module.numbers(states, batch.flags)
-        numbers = -(density(*gaussians, batch.numbers, batch.flags[..., 1]) * batch.there).sum() / len(batch.shown)
+        numbers = -(log_density(*gaussians, batch.numbers, batch.flags[..., 1]) * batch.there).sum() / len(batch.shown)
         logits = self.module.kinds(states[:, ::3]).float()
         said = cross_entropy(logits.flatten(0, 1), batch.kinds.flatten(), reduction="none")
         kinds = (said * batch.asked.flatten()).sum() / len(batch.shown)
@@ -77,4 +77,4 @@ class CuboidRnnLearner:
         device = next(self.module.parameters()).device
         shown = batches(self.val, self.entry.batch, None)
         found = ((self.losses(batch.to(device), 0, noise), len(batch.shown)) for batch in shown)
-        return mean_figures(found, len(self.val))
+        return weighted_means(found, len(self.val))

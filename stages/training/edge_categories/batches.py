@@ -15,9 +15,9 @@ from stages.strings.alphabet import Alphabet
 from stages.strings.categories import CategorySpace, token_edges
 from stages.strings.decoder import decode
 from stages.strings.tokens import number_value
-from stages.training.bucketing import pooled
+from stages.training.bucketing import bucket_batches
 
-PAD = 0
+PAD_CODE = 0
 """The code of what stands behind a string; the code of a part is its label's number plus one."""
 COLUMNS = ("code", "here", "there")
 """What a string has for each token: its code, and the tokens of the parts at the two ends of its edge, or -1."""
@@ -64,7 +64,7 @@ class CategoryTables:
 
 
 @dataclass(frozen=True)
-class Strings:
+class LabelledStrings:
     """Strings of one kit and split, mapped from a file.
 
     rows: int16 (tokens, 4), COLUMNS and the category, all strings behind each other; first: int64 (strings + 1,), where
@@ -89,7 +89,7 @@ class Strings:
 
 
 @dataclass(frozen=True)
-class Batch:
+class CategoryBatch:
     """codes, here, there: int64 (n, longest); categories: int64 (n, longest), the dummy where there is no token;
     allowed: bool (n, longest, categories); lengths: int64 (n,)."""
 
@@ -100,24 +100,26 @@ class Batch:
     allowed: Tensor
     lengths: Tensor
 
-    def to(self, device: torch.device) -> Batch:
+    def to(self, device: torch.device) -> CategoryBatch:
         """The batch on another device; lengths stay."""
         move = {name: tensor.to(device) for name, tensor in vars(self).items() if name != "lengths"}
-        return Batch(**move, lengths=self.lengths)
+        return CategoryBatch(**move, lengths=self.lengths)
 
     @property
     def there_is(self) -> Tensor:
         """Where there is a token, bool (n, longest)."""
-        return self.codes != PAD
+        return self.codes != PAD_CODE
 
 
-def batches(strings: Strings, size: int, masks: BoolArray, rng: np.random.Generator | None) -> Iterator[Batch]:
+def batches(
+    strings: LabelledStrings, size: int, masks: BoolArray, rng: np.random.Generator | None
+) -> Iterator[CategoryBatch]:
     """All strings once, in random order and in batches of strings of like length; with no `rng`, in their order."""
-    for chosen in pooled(strings.lengths, size, rng):
+    for chosen in bucket_batches(strings.lengths, size, rng):
         yield batch_of([strings.row(each) for each in chosen.tolist()], masks)
 
 
-def batch_of(strings: Sequence[Rows], masks: BoolArray) -> Batch:
+def batch_of(strings: Sequence[Rows], masks: BoolArray) -> CategoryBatch:
     """The batch of some strings, int16 (tokens, 3 or 4) each; masks: those of `CategoryTables`."""
     lengths = np.array([len(each) for each in strings])
     rows = np.zeros((len(strings), int(lengths.max()), 4), dtype=np.int64)
@@ -126,7 +128,7 @@ def batch_of(strings: Sequence[Rows], masks: BoolArray) -> Batch:
         rows[place, : len(each), : each.shape[1]] = each
     codes, here, there = rows[..., 0], rows[..., 1], rows[..., 2]
     ends = [np.where(each >= 0, np.take_along_axis(codes, np.maximum(each, 0), axis=1), 0) for each in (here, there)]
-    return Batch(
+    return CategoryBatch(
         codes=torch.from_numpy(codes),
         here=torch.from_numpy(here),
         there=torch.from_numpy(there),

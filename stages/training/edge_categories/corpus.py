@@ -18,14 +18,14 @@ from stages.shape.sample import read_samples
 from stages.strings.categories import CategorySpace, NoCategoryError
 from stages.strings.encoder import NotConnectedError
 from stages.strings.kit_strings import KitStrings
-from stages.training.edge_categories.batches import CategoryTables, Strings, read_string
+from stages.training.edge_categories.batches import CategoryTables, LabelledStrings, read_string
 
-CYCLES = 16
+MAX_CYCLES = 16
 """Cycle numbers that are told apart; the greater ones are read as the last of these."""
 
 
 def prepare_corpus(task: Task) -> Outcome:
-    """Files of the shard: `.<split>.rows`, the rows of `Strings` of train and val as they stand in memory, with
+    """Files of the shard: `.<split>.rows`, the rows of `LabelledStrings` of train and val as they stand in memory, with
     `.<split>.first.npy` and `.<split>.graph.npy`; `.masks.npy` and `.poses.npy`, the `CategoryTables`
     of the kit; `.json`, what weights say of themselves.
 
@@ -55,7 +55,7 @@ def prepare_corpus(task: Task) -> Outcome:
                     elif split == "val" and each.string in learnt:
                         task.reject(each.string, "stands in train as well")
                     else:
-                        rows = np.column_stack([read_string(each.string, space.alphabet, CYCLES), each.categories])
+                        rows = np.column_stack([read_string(each.string, space.alphabet, MAX_CYCLES), each.categories])
                         stream.write(rows.astype("<i2").tobytes())
                         lengths.append(len(rows))
                         graph.append(shapes)
@@ -71,13 +71,13 @@ def prepare_corpus(task: Task) -> Outcome:
     for what, array in vars(CategoryTables.of(space)).items():
         with task.output(f"{name}.{what}.npy") as stream:
             stream.write(array_bytes(array))
-    described = {**described_space(space), "cycles": CYCLES, "counts": counts}
+    described = {**describe_space(space), "cycles": MAX_CYCLES, "counts": counts}
     with task.output(f"{name}.json") as stream:
         stream.write(json_bytes(described))
     return Outcome(samples=0, summary=counts)
 
 
-def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], CategoryTables, dict[str, Strings]]:
+def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], CategoryTables, dict[str, LabelledStrings]]:
     """What `prepare_corpus` wrote in shard `data`: a description, the tables, and the strings of train and val, mapped
     from their files."""
     described = json.loads(task.input("training", f"{data}.json").read_bytes())
@@ -85,11 +85,11 @@ def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], CategoryTables, 
     for split in ("train", "val"):
         rows = np.memmap(task.input("training", f"{data}.{split}.rows"), dtype="<i2", mode="r").reshape(-1, 4)
         first, graph = (_array(task, f"{data}.{split}.{each}") for each in ("first", "graph"))
-        strings[split] = Strings(rows, first, graph)
+        strings[split] = LabelledStrings(rows, first, graph)
     return described, CategoryTables(_array(task, f"{data}.masks"), _array(task, f"{data}.poses")), strings
 
 
-def described_space(space: CategorySpace) -> dict[str, Any]:
+def describe_space(space: CategorySpace) -> dict[str, Any]:
     """What weights say of the categories that they know: the labels of the kit, and how many places each pair of types
     has."""
     places = [[a, b, len(pair.poses)] for (a, b), pair in space.pairs.items()]

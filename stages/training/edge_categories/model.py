@@ -6,32 +6,32 @@ import torch
 from torch import Tensor, nn
 
 from stages.strings.categories import DUMMY_CATEGORY
-from stages.training.edge_categories.batches import Batch, CategoryTables
-from stages.training.edge_categories.settings import EdgeCategoriesEntry
-from stages.training.transformer import Block
+from stages.training.edge_categories.batches import CategoryBatch, CategoryTables
+from stages.training.edge_categories.settings import EdgeCategoriesConfig
+from stages.training.transformer import TransformerBlock
 
 
 class EdgeCategoriesModel(nn.Module):
     """What all models of edge categories do."""
 
-    def forward(self, batch: Batch) -> Tensor:
+    def forward(self, batch: CategoryBatch) -> Tensor:
         """Logits of each token, float (n, longest, categories). Of the categories of a batch only those of the tokens
         before may be looked at."""
         raise NotImplementedError
 
 
-class Reader(nn.Module):
+class StringReader(nn.Module):
     """An LSTM that reads a string both ways: where a part stands is also told by what comes, the branches that hang on
     it and the numbers that close cycles."""
 
-    def __init__(self, entry: EdgeCategoriesEntry, codes: int) -> None:
+    def __init__(self, entry: EdgeCategoriesConfig, codes: int) -> None:
         super().__init__()
         self.embedding = nn.Embedding(codes, entry.embedding)
         sizes = [entry.embedding, *(entry.hidden for _ in range(entry.layers - 1))]
         self.forwards = nn.ModuleList(nn.LSTM(size, entry.hidden // 2, batch_first=True) for size in sizes)
         self.backwards = nn.ModuleList(nn.LSTM(size, entry.hidden // 2, batch_first=True) for size in sizes)
 
-    def forward(self, batch: Batch) -> Tensor:
+    def forward(self, batch: CategoryBatch) -> Tensor:
         """What is known of each token, float (n, longest, hidden)."""
         known: Tensor = self.embedding(batch.codes)
         # Each string is turned around by itself: what is behind its end comes behind its beginning, and says nothing.
@@ -43,20 +43,20 @@ class Reader(nn.Module):
         return known
 
 
-class Classifier(EdgeCategoriesModel):
+class IndependentEdgeDecoder(EdgeCategoriesModel):
     """A reader and a dense layer: each token is judged by itself, as published."""
 
-    def __init__(self, entry: EdgeCategoriesEntry, codes: int, categories: int) -> None:
+    def __init__(self, entry: EdgeCategoriesConfig, codes: int, categories: int) -> None:
         super().__init__()
-        self.reader = Reader(entry, codes)
+        self.reader = StringReader(entry, codes)
         self.logits = nn.Linear(entry.hidden, categories)
 
-    def forward(self, batch: Batch) -> Tensor:
+    def forward(self, batch: CategoryBatch) -> Tensor:
         logits: Tensor = self.logits(self.reader(batch))
         return logits
 
 
-class Walker(EdgeCategoriesModel):
+class AutoregressiveEdgeDecoder(EdgeCategoriesModel):
     """A reader, and a transformer that walks the string with the parts that stand already before its eyes.
 
     A string does not tell left from right, nor how a flag is turned, so what is right depends on what was chosen
@@ -67,19 +67,19 @@ class Walker(EdgeCategoriesModel):
     poses: float (categories, 4, 4), of the child's frame in its parent's, in the length of a part.
     """
 
-    def __init__(self, entry: EdgeCategoriesEntry, codes: int, poses: Tensor) -> None:
+    def __init__(self, entry: EdgeCategoriesConfig, codes: int, poses: Tensor) -> None:
         super().__init__()
-        self.reader = Reader(entry, codes)
+        self.reader = StringReader(entry, codes)
         self.poses: Tensor
         self.register_buffer("poses", poses, persistent=False)
         self.choice = nn.Embedding(len(poses), entry.hidden)
         self.ends = nn.Linear(3 * entry.hidden, entry.hidden)
         self.places = nn.Sequential(nn.Linear(3 * 12, entry.hidden), nn.GELU(), nn.Linear(entry.hidden, entry.hidden))
-        self.blocks = nn.ModuleList(Block(entry.hidden) for _ in range(entry.layers))
+        self.blocks = nn.ModuleList(TransformerBlock(entry.hidden) for _ in range(entry.layers))
         self.norm = nn.LayerNorm(entry.hidden)
         self.logits = nn.Linear(entry.hidden, len(poses))
 
-    def forward(self, batch: Batch) -> Tensor:
+    def forward(self, batch: CategoryBatch) -> Tensor:
         tokens = torch.arange(batch.codes.shape[1], device=batch.codes.device)
         seen = self.seen(batch, self.reader(batch), self.frames(batch), tokens)
         for block in self.blocks:
@@ -88,7 +88,7 @@ class Walker(EdgeCategoriesModel):
         return logits
 
     @torch.no_grad()
-    def frames(self, batch: Batch) -> Tensor:
+    def frames(self, batch: CategoryBatch) -> Tensor:
         """Where each token leads, float (n, longest, 4, 4): to the frame of its part, or to the one that the part at
         the other end of a cycle must have."""
         frames = self.poses[batch.categories]
@@ -101,7 +101,7 @@ class Walker(EdgeCategoriesModel):
         led: Tensor = _at(frames, here.clamp(min=0)[:, None])[:, 0] @ pose
         return led
 
-    def seen(self, batch: Batch, known: Tensor, frames: Tensor, tokens: Tensor) -> Tensor:
+    def seen(self, batch: CategoryBatch, known: Tensor, frames: Tensor, tokens: Tensor) -> Tensor:
         """What the walker looks at before some tokens int64 (t,), float (n, t, width).
 
         known: float (n, longest, width), what the reader knows; frames: float (n, longest, 4, 4), those of the tokens
@@ -121,12 +121,12 @@ class Walker(EdgeCategoriesModel):
         return seen
 
 
-def make_model(entry: EdgeCategoriesEntry, tables: CategoryTables, cycles: int) -> EdgeCategoriesModel:
+def make_model(entry: EdgeCategoriesConfig, tables: CategoryTables, cycles: int) -> EdgeCategoriesModel:
     """A model of the categories of a kit, with cycle numbers below `cycles`."""
     codes = len(tables.masks) + 2 + cycles
     if entry.reader == "lstm":
-        return Classifier(entry, codes, len(tables.poses))
-    return Walker(entry, codes, torch.from_numpy(tables.poses))
+        return IndependentEdgeDecoder(entry, codes, len(tables.poses))
+    return AutoregressiveEdgeDecoder(entry, codes, torch.from_numpy(tables.poses))
 
 
 def masked(logits: Tensor, allowed: Tensor) -> Tensor:

@@ -6,13 +6,13 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.model_config import KitModelEntry, Source
+from stages.training.model_config import KitModelConfig, LearningSource
 
 
-class EdgeCategoriesEntry(KitModelEntry):
+class EdgeCategoriesConfig(KitModelConfig):
     """A model of edge categories (strings §6). Sizes are not published: these train in minutes on one core."""
 
-    learns_from: ClassVar[Source] = "shapes"
+    learns_from: ClassVar[LearningSource] = "shapes"
 
     kind: Literal["edge_categories"] = Field(
         description="reads from a string where each part stands beside the one that it hangs on"

@@ -17,14 +17,14 @@ from stages.strings.categories import CategorySpace, NoCategoryError
 from stages.strings.decoder import decode
 from stages.strings.encoder import Encoded
 from stages.training.checkpoint import load_checkpoint
-from stages.training.edge_categories.batches import Batch, CategoryTables, batch_of, read_string
-from stages.training.edge_categories.corpus import described_space
-from stages.training.edge_categories.model import EdgeCategoriesModel, Walker, make_model, masked
-from stages.training.edge_categories.settings import EdgeCategoriesEntry
+from stages.training.edge_categories.batches import CategoryBatch, CategoryTables, batch_of, read_string
+from stages.training.edge_categories.corpus import describe_space
+from stages.training.edge_categories.model import AutoregressiveEdgeDecoder, EdgeCategoriesModel, make_model, masked
+from stages.training.edge_categories.settings import EdgeCategoriesConfig
 
-AT_ONCE = 64
+STRINGS_PER_BATCH = 64
 """Strings that are judged side by side."""
-OWN_SHARE = 0.05
+OWN_OPINION_SHARE = 0.05
 """Of the probability of a category after a vote, the share that is the string's own opinion."""
 
 
@@ -59,19 +59,19 @@ class TrainedEdgeCategories:
         for each, weight in zip(ballots, weights / weights.sum(), strict=True):
             voted[np.arange(len(own)), each.categories[0]] += weight
         with np.errstate(divide="ignore"):
-            found: FloatArray = np.log((1.0 - OWN_SHARE) * voted + OWN_SHARE * np.exp(own))
+            found: FloatArray = np.log((1.0 - OWN_OPINION_SHARE) * voted + OWN_OPINION_SHARE * np.exp(own))
         return found
 
-    def steps(self, strings: Sequence[str]) -> Steps:
+    def steps(self, strings: Sequence[str]) -> CategoryDecoding:
         """The strings, before their first tokens; the same string may stand there several times."""
-        return Steps(self, self._batch(strings))
+        return CategoryDecoding(self, self._batch(strings))
 
     def choose(self, strings: Sequence[str], rng: np.random.Generator | None) -> list[IntArray]:
         """Categories of each string, int32 (tokens,): drawn by their probabilities, or, without `rng`, the likeliest of
         each token, given those before it."""
         found: list[IntArray] = []
-        for start in range(0, len(strings), AT_ONCE):
-            steps = self.steps(strings[start : start + AT_ONCE])
+        for start in range(0, len(strings), STRINGS_PER_BATCH):
+            steps = self.steps(strings[start : start + STRINGS_PER_BATCH])
             for _ in range(steps.longest):
                 scores = steps.scores()
                 if rng is not None:
@@ -80,7 +80,7 @@ class TrainedEdgeCategories:
             found += steps.chosen()
         return found
 
-    def vote(self, strings: Sequence[Encoded], likeliest: Sequence[IntArray] | None = None) -> list[Ballot]:
+    def vote(self, strings: Sequence[Encoded], likeliest: Sequence[IntArray] | None = None) -> list[VoteResult]:
         """Shapes of a graph, by what several strings of it say of them, the likeliest first.
 
         Each string proposes the shape that its likeliest categories make, those of `choose`, which are asked for unless
@@ -109,7 +109,7 @@ class TrainedEdgeCategories:
             total = sum(
                 float(of_string[np.arange(len(each)), each].sum()) for of_string, each in zip(judged, read, strict=True)
             )
-            ballots.append(Ballot(read, total / len(texts)))
+            ballots.append(VoteResult(read, total / len(texts)))
         return sorted(ballots, key=lambda each: -each.log_probability)
 
     @property
@@ -121,23 +121,23 @@ class TrainedEdgeCategories:
     def log_probabilities(self, strings: Sequence[str], categories: Sequence[IntArray]) -> list[FloatArray]:
         """Of each token given the categories of those before it, float64 (tokens, categories) each."""
         found: list[FloatArray] = []
-        for start in range(0, len(strings), AT_ONCE):
-            batch = self._batch(strings[start : start + AT_ONCE])
-            for row, each in enumerate(categories[start : start + AT_ONCE]):
+        for start in range(0, len(strings), STRINGS_PER_BATCH):
+            batch = self._batch(strings[start : start + STRINGS_PER_BATCH])
+            for row, each in enumerate(categories[start : start + STRINGS_PER_BATCH]):
                 batch.categories[row, : len(each)] = torch.from_numpy(each.astype(np.int64))
             logits = masked(self.module(batch).double(), batch.allowed)
             judged = torch.log_softmax(logits, dim=-1).numpy()
             found += [judged[row, :length] for row, length in enumerate(batch.lengths.tolist())]
         return found
 
-    def _batch(self, strings: Sequence[str]) -> Batch:
+    def _batch(self, strings: Sequence[str]) -> CategoryBatch:
         rows = [read_string(each, self.space.alphabet, self.header["cycles"]) for each in strings]
         batch = batch_of(rows, self.space.masks)
         return batch if self.is_masked else replace(batch, allowed=torch.ones_like(batch.allowed))
 
 
 @dataclass(frozen=True)
-class Ballot:
+class VoteResult:
     """A shape that was voted on: its categories along each string, and the mean over the strings of the logarithm of
     its probability."""
 
@@ -145,13 +145,13 @@ class Ballot:
     log_probability: float
 
 
-class Steps:
+class CategoryDecoding:
     """Some strings on their way, token by token.
 
     Ask `scores`, choose, `take`, until `longest` tokens are taken; what is behind the end of a string does not count.
     """
 
-    def __init__(self, model: TrainedEdgeCategories, batch: Batch) -> None:
+    def __init__(self, model: TrainedEdgeCategories, batch: CategoryBatch) -> None:
         self._space, self._is_masked = model.space, model.is_masked
         self._module = model.module
         self._batch = batch
@@ -160,7 +160,7 @@ class Steps:
         """The token that comes next."""
         self._logits: Tensor
         with torch.no_grad():
-            if isinstance(self._module, Walker):
+            if isinstance(self._module, AutoregressiveEdgeDecoder):
                 self._known = self._module.reader(batch)
                 self._frames = torch.eye(4).expand(*batch.codes.shape, 4, 4).clone()
                 width = self._known.shape[-1]
@@ -197,7 +197,7 @@ class Steps:
         # Of a part that stands already nothing is told anew.
         rows = np.flatnonzero(there >= self.token)
         self._types[rows, there[rows]] = self._space.types[chosen.numpy()[rows], 1]
-        if isinstance(self._module, Walker):
+        if isinstance(self._module, AutoregressiveEdgeDecoder):
             here = self._batch.here[:, self.token]
             self._frames[:, self.token] = self._module.step(self._frames, here, self._module.poses[chosen])
         self.token += 1
@@ -206,9 +206,9 @@ class Steps:
         """Go on with some of the strings alone, int (k,), any of them as often as it stands there: for a search that
         keeps several ways."""
         index = torch.from_numpy(np.asarray(rows, dtype=np.int64))
-        self._batch = Batch(**{name: each[index] for name, each in vars(self._batch).items()})
+        self._batch = CategoryBatch(**{name: each[index] for name, each in vars(self._batch).items()})
         self._types = self._types[rows]
-        if isinstance(self._module, Walker):
+        if isinstance(self._module, AutoregressiveEdgeDecoder):
             self._known, self._frames = self._known[index], self._frames[index]
             self._seen = [(keys[index], values[index]) for keys, values in self._seen]
         else:
@@ -229,7 +229,7 @@ class Steps:
         return fits
 
     def _next(self) -> Tensor:
-        if not isinstance(self._module, Walker):
+        if not isinstance(self._module, AutoregressiveEdgeDecoder):
             return self._logits[:, self.token]
         seen = self._module.seen(self._batch, self._known, self._frames, torch.tensor([self.token]))
         for number, block in enumerate(self._module.blocks):
@@ -246,9 +246,9 @@ def load_edge_categories(path: Path, kit: Kit) -> TrainedEdgeCategories:
     dock in other ways.
     """
     space = CategorySpace(kit)
-    expected = {"kind": "edge_categories", "kit": kit.name, **described_space(space)}
+    expected = {"kind": "edge_categories", "kit": kit.name, **describe_space(space)}
     tensors, header = load_checkpoint(path, expected)
-    entry = EdgeCategoriesEntry.model_validate({"name": "trained", **header["settings"]})
+    entry = EdgeCategoriesConfig.model_validate({"name": "trained", **header["settings"]})
     module = make_model(entry, CategoryTables.of(space), header["cycles"])
     module.load_state_dict(tensors)
     return TrainedEdgeCategories(module.eval(), space, header)

@@ -12,11 +12,11 @@ from torch import Generator, Tensor
 from torch.nn.functional import cross_entropy
 
 from pipeline.stage import Outcome, Task
-from stages.training.edge_categories.batches import Batch, CategoryTables, Strings, batches
+from stages.training.edge_categories.batches import CategoryBatch, CategoryTables, LabelledStrings, batches
 from stages.training.edge_categories.corpus import prepare_corpus, read_corpus
 from stages.training.edge_categories.model import EdgeCategoriesModel, make_model, masked
-from stages.training.edge_categories.settings import EdgeCategoriesEntry
-from stages.training.loop import device_of
+from stages.training.edge_categories.settings import EdgeCategoriesConfig
+from stages.training.loop import resolve_device
 from stages.training.training_task import sample_digests
 
 
@@ -25,20 +25,20 @@ def prepare(task: Task) -> Outcome:
     return prepare_corpus(task)
 
 
-def entry(settings: Mapping[str, Any]) -> EdgeCategoriesEntry:
+def entry(settings: Mapping[str, Any]) -> EdgeCategoriesConfig:
     """The entry whose JSON is `settings`."""
-    return EdgeCategoriesEntry.model_validate(settings)
+    return EdgeCategoriesConfig.model_validate(settings)
 
 
-def learner(task: Task, entry: EdgeCategoriesEntry, seed: int) -> EdgeCategoriesLearner:
+def learner(task: Task, entry: EdgeCategoriesConfig, seed: int) -> EdgeCategoriesTask:
     """A model with fresh weights beside the strings of its kit."""
     described, tables, strings = read_corpus(task, task.shard.params["data"])
     header = {**described, "data": sample_digests(task, "rows")}
-    module = new_model(entry, tables, described["cycles"], seed).to(device_of(entry.device))
-    return EdgeCategoriesLearner(module, header, entry, tables, strings["train"], strings["val"])
+    module = new_model(entry, tables, described["cycles"], seed).to(resolve_device(entry.device))
+    return EdgeCategoriesTask(module, header, entry, tables, strings["train"], strings["val"])
 
 
-def new_model(entry: EdgeCategoriesEntry, tables: CategoryTables, cycles: int, seed: int) -> EdgeCategoriesModel:
+def new_model(entry: EdgeCategoriesConfig, tables: CategoryTables, cycles: int, seed: int) -> EdgeCategoriesModel:
     """A model with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -46,24 +46,24 @@ def new_model(entry: EdgeCategoriesEntry, tables: CategoryTables, cycles: int, s
 
 
 @dataclass(frozen=True)
-class EdgeCategoriesLearner:
+class EdgeCategoriesTask:
     """The `Learner` of a model of edge categories."""
 
     module: EdgeCategoriesModel
     header: Mapping[str, Any]
-    entry: EdgeCategoriesEntry
+    entry: EdgeCategoriesConfig
     tables: CategoryTables
-    train: Strings
-    val: Strings
+    train: LabelledStrings
+    val: LabelledStrings
 
-    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+    def batches(self, rng: np.random.Generator) -> Iterator[CategoryBatch]:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
             for batch in batches(self.train, self.entry.batch, self.tables.masks, rng):
                 yield batch.to(device)
 
-    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+    def losses(self, batch: CategoryBatch, step: int, noise: Generator) -> dict[str, Tensor]:
         """Nats of a token, and the share of the tokens of edges that are right."""
         right, nats = self._judge(batch)
         return {"loss": nats.mean(), "accuracy": right[is_open(batch)].float().mean()}
@@ -89,7 +89,7 @@ class EdgeCategoriesLearner:
             "strings": sums["strings"] / len(self.val),
         }
 
-    def _judge(self, batch: Batch) -> tuple[Tensor, Tensor]:
+    def _judge(self, batch: CategoryBatch) -> tuple[Tensor, Tensor]:
         """Whether the likeliest category of each token is right, bool (n, longest), and the nats of those that are
         there, float (tokens,)."""
         logits = self.module(batch).float()
@@ -100,6 +100,6 @@ class EdgeCategoriesLearner:
         return logits.argmax(dim=-1) == batch.categories, nats
 
 
-def is_open(batch: Batch) -> Tensor:
+def is_open(batch: CategoryBatch) -> Tensor:
     """Tokens that may have more than one category, bool (n, longest)."""
     return (batch.allowed.sum(dim=-1) > 1) & batch.there_is

@@ -12,15 +12,15 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.training.box_vectors import WIDTH
-from stages.training.bucketing import pooled
+from stages.training.box_vectors import BOX_WIDTH
+from stages.training.bucketing import bucket_batches
 
-MOST_CHILDREN = 12
+MAX_CHILDREN = 12
 """Parts of a node. With ten, as StructureNet has, some storages and tables would be missing."""
 
 
 @dataclass(frozen=True)
-class Node:
+class GraphNode:
     """One node and its parts. boxes: float64 (k, 9), their numbers; below: int64 (k,), the node that says the parts of
     each, counted within the shape, root first, breadth first, or -1; touching: bool (k, k)."""
 
@@ -30,7 +30,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Graphs:
+class GraphCorpus:
     """Shapes of one category and split, their nodes behind each other, root first, breadth first.
 
     boxes: float32 (nodes, MOST_CHILDREN, 9), the numbers of their parts, 0 behind the last; counts: int64 (nodes,);
@@ -45,12 +45,12 @@ class Graphs:
     first: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, shapes: Sequence[Sequence[Node]]) -> Graphs:
+    def of(cls, shapes: Sequence[Sequence[GraphNode]]) -> GraphCorpus:
         """At least one shape."""
         nodes = [node for shape in shapes for node in shape]
-        boxes = np.zeros((len(nodes), MOST_CHILDREN, WIDTH), np.float32)
-        below = np.full((len(nodes), MOST_CHILDREN), -1, np.int32)
-        touching = np.zeros((len(nodes), MOST_CHILDREN, MOST_CHILDREN), np.bool_)
+        boxes = np.zeros((len(nodes), MAX_CHILDREN, BOX_WIDTH), np.float32)
+        below = np.full((len(nodes), MAX_CHILDREN), -1, np.int32)
+        touching = np.zeros((len(nodes), MAX_CHILDREN, MAX_CHILDREN), np.bool_)
         for row, node in enumerate(nodes):
             many = len(node.boxes)
             boxes[row, :many], below[row, :many], touching[row, :many, :many] = node.boxes, node.below, node.touching
@@ -58,7 +58,7 @@ class Graphs:
         return cls(boxes, counts, below, touching, np.cumsum([0, *map(len, shapes)]))
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> Graphs:
+    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> GraphCorpus:
         return cls(**{name: arrays[name] for name in cls.__dataclass_fields__})
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
@@ -70,7 +70,7 @@ class Graphs:
 
 
 @dataclass(frozen=True)
-class Level:
+class GraphLevel:
     """The nodes of one depth of all shapes of a batch.
 
     boxes: float (n, MOST_CHILDREN, 9); there, inner: float (n, MOST_CHILDREN), 1 for parts, and for those that have
@@ -84,30 +84,30 @@ class Level:
     touching: Tensor
     opened: Tensor
 
-    def to(self, device: torch.device) -> Level:
-        return Level(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
+    def to(self, device: torch.device) -> GraphLevel:
+        return GraphLevel(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
 
 
-Batch = list[Level]
+GraphBatch = list[GraphLevel]
 """The levels of some shapes, the roots first."""
 
 
-def batches(graphs: Graphs, size: int, rng: np.random.Generator | None) -> Iterator[Batch]:
+def batches(graphs: GraphCorpus, size: int, rng: np.random.Generator | None) -> Iterator[GraphBatch]:
     """All shapes once, in random order and in batches of shapes of like many nodes; with no `rng`, in their order."""
-    for rows in pooled(np.diff(graphs.first), size, rng):
+    for rows in bucket_batches(np.diff(graphs.first), size, rng):
         yield batch_of(graphs, rows)
 
 
-def batch_of(graphs: Graphs, rows: npt.NDArray[np.int64]) -> Batch:
+def batch_of(graphs: GraphCorpus, rows: npt.NDArray[np.int64]) -> GraphBatch:
     """The levels of some shapes, int64 (n,)."""
     nodes = graphs.first[rows]
     first = nodes
     levels = []
     while len(nodes):
         inner = graphs.below[nodes] >= 0
-        there = np.arange(MOST_CHILDREN) < graphs.counts[nodes][:, None]
+        there = np.arange(MAX_CHILDREN) < graphs.counts[nodes][:, None]
         levels.append(
-            Level(
+            GraphLevel(
                 boxes=torch.from_numpy(graphs.boxes[nodes]),
                 there=torch.from_numpy(there.astype(np.float32)),
                 inner=torch.from_numpy(inner.astype(np.float32)),

@@ -14,14 +14,14 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu
 
-from stages.training.box_vectors import WIDTH
-from stages.training.latent import Standing
-from stages.training.part_graph_vae.batches import MOST_CHILDREN, Level
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.training.box_vectors import BOX_WIDTH
+from stages.training.latent import LatentGaussian
+from stages.training.part_graph_vae.batches import MAX_CHILDREN, GraphLevel
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 
 
 @dataclass(frozen=True)
-class Parts:
+class DecodedParts:
     """What is said of the parts of n nodes. there, inner: logits float (n, MOST_CHILDREN); touching: logits float (n,
     MOST_CHILDREN, MOST_CHILDREN), symmetric; boxes: float (n, MOST_CHILDREN, 9); codes: float (n, MOST_CHILDREN,
     hidden), of the parts as nodes."""
@@ -33,28 +33,28 @@ class Parts:
     codes: Tensor
 
 
-class PartGraphVae(Standing):
+class PartGraphVae(LatentGaussian):
     """A VAE of part graphs."""
 
-    def __init__(self, entry: PartGraphVaeEntry) -> None:
+    def __init__(self, entry: PartGraphVaeConfig) -> None:
         super().__init__(entry.latent)
         hidden = entry.hidden
-        self.read_box = nn.Sequential(nn.Linear(WIDTH, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, hidden))
+        self.read_box = nn.Sequential(nn.Linear(BOX_WIDTH, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, hidden))
         self.read_node = nn.Linear(hidden, hidden)
-        self.heard = Messages(hidden, entry.rounds_of_messages)
+        self.heard = MessagePassing(hidden, entry.rounds_of_messages)
         self.mean = nn.Linear(hidden, entry.latent)
         self.log_variance = nn.Linear(hidden, entry.latent)
         self.root = nn.Linear(entry.latent, hidden)
         self.parts = nn.Sequential(
-            nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, MOST_CHILDREN * hidden)
+            nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, MAX_CHILDREN * hidden)
         )
         self.there = nn.Linear(hidden, 1)
         self.edges = nn.Linear(hidden, hidden)
-        self.told = Messages(hidden, entry.rounds_of_messages)
-        self.said = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, WIDTH + 1))
+        self.told = MessagePassing(hidden, entry.rounds_of_messages)
+        self.said = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, BOX_WIDTH + 1))
         self.below = nn.Sequential(nn.Linear(hidden, hidden), nn.LeakyReLU(0.2), nn.Linear(hidden, hidden))
 
-    def encode(self, levels: Sequence[Level]) -> tuple[Tensor, Tensor]:
+    def encode(self, levels: Sequence[GraphLevel]) -> tuple[Tensor, Tensor]:
         """Mean and logarithm of the variance, float (shapes, latent) each."""
         codes: Tensor | None = None
         for level in reversed(levels):
@@ -67,19 +67,19 @@ class PartGraphVae(Standing):
         assert codes is not None
         return self.mean(codes), self.log_variance(codes)
 
-    def decode(self, codes: Tensor) -> Parts:
+    def decode(self, codes: Tensor) -> DecodedParts:
         """What nodes of codes (n, hidden) say of their parts; those of roots are `root` of a point."""
-        seen: Tensor = leaky_relu(self.parts(codes), 0.2).view(len(codes), MOST_CHILDREN, codes.shape[1])
+        seen: Tensor = leaky_relu(self.parts(codes), 0.2).view(len(codes), MAX_CHILDREN, codes.shape[1])
         there = self.there(seen)[..., 0]
         ends = self.edges(seen)
         touching = ends @ ends.transpose(1, 2) / ends.shape[-1] ** 0.5
         sure = torch.sigmoid(there)
         told = self.told(seen, torch.sigmoid(touching) * sure[:, :, None] * sure[:, None])
-        boxes, inner = self.said(told).split([WIDTH, 1], dim=-1)
-        return Parts(there, inner[..., 0], touching, boxes, self.below(told))
+        boxes, inner = self.said(told).split([BOX_WIDTH, 1], dim=-1)
+        return DecodedParts(there, inner[..., 0], touching, boxes, self.below(told))
 
 
-class Messages(nn.Module):
+class MessagePassing(nn.Module):
     """Rounds in which parts hear of those that they touch."""
 
     def __init__(self, hidden: int, rounds: int) -> None:

@@ -6,14 +6,14 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.model_config import KitModelEntry, Source
+from stages.training.model_config import KitModelConfig, LearningSource
 
 
-class PartGraphVaeEntry(KitModelEntry):
+class PartGraphVaeConfig(KitModelConfig):
     """A VAE of the part graphs that ShapeAssembly programs make: a baseline that knows parts of parts and what touches,
     and no attachments. Its kits are the names of `shapeassembly.programs` and `shapeassembly.hierarchies`."""
 
-    learns_from: ClassVar[Source] = "programs"
+    learns_from: ClassVar[LearningSource] = "programs"
 
     kind: Literal["part_graph_vae"] = Field(description="a VAE of graphs of parts, in the way of StructureNet")
     latent: int = Field(256, ge=1, le=4096, description="dimensions of the latent space")

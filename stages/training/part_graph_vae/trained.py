@@ -12,16 +12,16 @@ import torch
 
 from stages.shapeassembly.execution.interpreter import Execution
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.training.box_vectors import box_of_numbers
+from stages.training.box_vectors import box_from_vector
 from stages.training.checkpoint import CheckpointError, load_checkpoint
-from stages.training.latent import Points
-from stages.training.part_graph_vae.batches import Graphs, batch_of
-from stages.training.part_graph_vae.corpus import nodes_of
+from stages.training.latent import LatentPoints
+from stages.training.part_graph_vae.batches import GraphCorpus, batch_of
+from stages.training.part_graph_vae.corpus import graph_nodes
 from stages.training.part_graph_vae.model import PartGraphVae
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
-from stages.training.program_vae.partial_assembly import MOST_DEPTH
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
+from stages.training.program_vae.partial_assembly import MAX_DEPTH
 
-AT_ONCE = 256
+SHAPES_PER_BATCH = 256
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class TrainedPartGraphVae:
         return int(self.header["settings"]["latent"])
 
     @torch.no_grad()
-    def encode(self, shapes: Sequence[Execution]) -> Points:
-        """Encode executed programs: posterior means, float32 (n, latent). Raises Rejected as `nodes_of`."""
-        graphs = Graphs.of([nodes_of(each) for each in shapes])
-        found: Points = self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
+    def encode(self, shapes: Sequence[Execution]) -> LatentPoints:
+        """Encode executed programs: posterior means, float32 (n, latent). Raises Rejected as `graph_nodes`."""
+        graphs = GraphCorpus.of([graph_nodes(each) for each in shapes])
+        found: LatentPoints = self.module.encode(batch_of(graphs, np.arange(len(graphs))))[0].numpy()
         return found
 
-    def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> Points:
+    def points(self, count: int, rng: np.random.Generator, temperature: float = 1.0) -> LatentPoints:
         """Random points, float32 (count, latent), of where shapes stand, as `Standing.points`."""
         return self.module.points(count, rng, temperature)
 
@@ -55,31 +55,31 @@ class TrainedPartGraphVae:
         kept: list[tuple[Box, ...]] = []
         begun = 0
         while len(kept) < count:
-            if begun > 50 * (count + AT_ONCE):
+            if begun > 50 * (count + SHAPES_PER_BATCH):
                 raise ValueError(f"{len(kept)} of {begun} shapes had a cuboid; train the model longer")
-            for each in self.decode(self.points(AT_ONCE, rng, temperature)):
+            for each in self.decode(self.points(SHAPES_PER_BATCH, rng, temperature)):
                 if len(kept) < count:
                     begun += 1
                     kept += [each] if each else []
         return kept, begun
 
     @torch.no_grad()
-    def decode(self, points: Points) -> list[tuple[Box, ...]]:
+    def decode(self, points: LatentPoints) -> list[tuple[Box, ...]]:
         """The cuboids at each point of the latent space, float32 (n, latent)."""
         codes = self.module.root(torch.from_numpy(points))
         found: list[list[Box]] = [[] for _ in points]
         shapes = list(range(len(points)))
-        for depth in range(MOST_DEPTH):
+        for depth in range(MAX_DEPTH):
             if not shapes:
                 break
             said = self.module.decode(codes)
             there = (said.there > 0).numpy()
             # A node without parts, and what is below the last level, is the cuboid that was said of it.
-            inner = (said.inner > 0).numpy() & there & (depth + 1 < MOST_DEPTH)
+            inner = (said.inner > 0).numpy() & there & (depth + 1 < MAX_DEPTH)
             below = self._have_parts(said.codes[torch.from_numpy(inner)])
             inner[inner] = below
             for row, place in np.argwhere(there & ~inner).tolist():
-                found[shapes[row]].append(box_of_numbers(said.boxes[row, place].double().numpy()))
+                found[shapes[row]].append(box_from_vector(said.boxes[row, place].double().numpy()))
             codes = said.codes[torch.from_numpy(inner)]
             shapes = [shapes[row] for row in np.nonzero(inner)[0].tolist()]
         return [tuple(each) for each in found]
@@ -98,7 +98,7 @@ def load_part_graph_vae(path: Path, expected: Mapping[str, Any] | None = None) -
     """
     tensors, header = load_checkpoint(path, {"kind": "part_graph_vae", **(expected or {})})
     module = PartGraphVae(
-        PartGraphVaeEntry.model_validate({"name": "trained", "kind": "part_graph_vae", **header["settings"]})
+        PartGraphVaeConfig.model_validate({"name": "trained", "kind": "part_graph_vae", **header["settings"]})
     )
     if module.state_dict().keys() != tensors.keys():
         raise CheckpointError(f"{path} has other tensors than this version of Shapemill: train it again (make train)")

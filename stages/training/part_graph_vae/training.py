@@ -13,13 +13,13 @@ from torch import Generator, Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from pipeline.stage import Outcome, Task
-from stages.training.latent import drawn
-from stages.training.loop import device_of
-from stages.training.part_graph_vae.batches import Batch, Graphs, batches
+from stages.training.latent import reparameterize
+from stages.training.loop import resolve_device
+from stages.training.part_graph_vae.batches import GraphBatch, GraphCorpus, batches
 from stages.training.part_graph_vae.corpus import prepare_corpus, read_corpus
 from stages.training.part_graph_vae.model import PartGraphVae
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
-from stages.training.training_task import mean_figures, sample_digests
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
+from stages.training.training_task import sample_digests, weighted_means
 
 
 def prepare(task: Task) -> Outcome:
@@ -27,20 +27,20 @@ def prepare(task: Task) -> Outcome:
     return prepare_corpus(task)
 
 
-def entry(settings: Mapping[str, Any]) -> PartGraphVaeEntry:
+def entry(settings: Mapping[str, Any]) -> PartGraphVaeConfig:
     """The entry whose JSON is `settings`."""
-    return PartGraphVaeEntry.model_validate(settings)
+    return PartGraphVaeConfig.model_validate(settings)
 
 
-def learner(task: Task, entry: PartGraphVaeEntry, seed: int) -> PartGraphVaeLearner:
+def learner(task: Task, entry: PartGraphVaeConfig, seed: int) -> PartGraphVaeTask:
     """A model with fresh weights beside the shapes of its category."""
     described, graphs = read_corpus(task, task.shard.params["data"])
     header = {**described, "data": sample_digests(task, "safetensors")}
-    module = new_model(entry, seed).to(device_of(entry.device))
-    return PartGraphVaeLearner(module, header, entry, graphs["train"], graphs["val"])
+    module = new_model(entry, seed).to(resolve_device(entry.device))
+    return PartGraphVaeTask(module, header, entry, graphs["train"], graphs["val"])
 
 
-def new_model(entry: PartGraphVaeEntry, seed: int) -> PartGraphVae:
+def new_model(entry: PartGraphVaeConfig, seed: int) -> PartGraphVae:
     """A model with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -48,26 +48,26 @@ def new_model(entry: PartGraphVaeEntry, seed: int) -> PartGraphVae:
 
 
 @dataclass(frozen=True)
-class PartGraphVaeLearner:
+class PartGraphVaeTask:
     """The `Learner` of a VAE of part graphs."""
 
     module: PartGraphVae
     header: Mapping[str, Any]
-    entry: PartGraphVaeEntry
-    train: Graphs
-    val: Graphs
+    entry: PartGraphVaeConfig
+    train: GraphCorpus
+    val: GraphCorpus
 
-    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+    def batches(self, rng: np.random.Generator) -> Iterator[GraphBatch]:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
             for levels in batches(self.train, self.entry.batch, rng):
                 yield [level.to(device) for level in levels]
 
-    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+    def losses(self, batch: GraphBatch, step: int, noise: Generator) -> dict[str, Tensor]:
         """Means over shapes: nats of what is there, has parts and touches, absolute errors of the numbers of boxes, and
         the divergence from the prior."""
-        points, divergence = drawn(*self.module.encode(batch), noise)
+        points, divergence = reparameterize(*self.module.encode(batch), noise)
         nats, errors = (each / len(points) for each in reconstruction(self.module, batch, points))
         loss = nats + self.entry.number_weight * errors + self.entry.kl_weight * divergence
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
@@ -76,12 +76,12 @@ class PartGraphVaeLearner:
         """The same on val; and the module learns where the shapes of train stand."""
         device = next(self.module.parameters()).device
         train, val = (batches(each, self.entry.batch, None) for each in (self.train, self.val))
-        self.module.stand_where(self.module.encode([level.to(device) for level in levels]) for levels in train)
+        self.module.fit_posterior(self.module.encode([level.to(device) for level in levels]) for levels in train)
         found = ((self.losses([each.to(device) for each in levels], 0, noise), len(levels[0].boxes)) for levels in val)
-        return mean_figures(found, len(self.val))
+        return weighted_means(found, len(self.val))
 
 
-def reconstruction(module: PartGraphVae, levels: Batch, points: Tensor) -> tuple[Tensor, Tensor]:
+def reconstruction(module: PartGraphVae, levels: GraphBatch, points: Tensor) -> tuple[Tensor, Tensor]:
     """Sums over all shapes at these points of the latent space: nats of choices, and absolute errors of numbers."""
     nats, errors = points.new_zeros(()), points.new_zeros(())
     codes = module.root(points)

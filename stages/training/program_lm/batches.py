@@ -11,13 +11,13 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from stages.training.bucketing import pooled
-from stages.training.program_lm.partial_program import SEEN
+from stages.training.bucketing import bucket_batches
+from stages.training.program_lm.partial_program import SIZE_INPUTS
 from stages.training.program_vae.lines import START
 
 
 @dataclass(frozen=True)
-class Written:
+class WordSequence:
     """One program. words: its words, int64 (k,); cues: what is known of each before it is written, int64 (k, 4); seen:
     float32 (k, SEEN), as `Text` says them."""
 
@@ -27,7 +27,7 @@ class Written:
 
 
 @dataclass(frozen=True)
-class Texts:
+class WordCorpus:
     """Programs of one category and split behind each other.
 
     words: int16 (w,); cues: int8 (w, 4); seen: float32 (w, SEEN); first: int64 (programs + 1,), where each begins.
@@ -39,7 +39,7 @@ class Texts:
     first: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, programs: Sequence[Written]) -> Texts:
+    def of(cls, programs: Sequence[WordSequence]) -> WordCorpus:
         """At least one program."""
         return cls(
             words=np.concatenate([each.words for each in programs]).astype(np.int16),
@@ -49,7 +49,7 @@ class Texts:
         )
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> Texts:
+    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> WordCorpus:
         return cls(**{name: arrays[name] for name in cls.__dataclass_fields__})
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
@@ -61,7 +61,7 @@ class Texts:
 
 
 @dataclass(frozen=True)
-class Batch:
+class WordBatch:
     """words: int64 (n, longest); cues: int64 (n, longest, 4); seen: float (n, longest, SEEN); places: int64 (k,),
     where in programs x longest the words are that a program has."""
 
@@ -70,8 +70,8 @@ class Batch:
     seen: Tensor
     places: Tensor
 
-    def to(self, device: torch.device) -> Batch:
-        return Batch(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
+    def to(self, device: torch.device) -> WordBatch:
+        return WordBatch(**{name: tensor.to(device, non_blocking=True) for name, tensor in vars(self).items()})
 
     @property
     def before(self) -> Tensor:
@@ -79,16 +79,16 @@ class Batch:
         return torch.cat([torch.full_like(self.words[:, :1], START), self.words[:, :-1]], dim=1)
 
 
-def batches(texts: Texts, size: int, rng: np.random.Generator | None) -> Iterator[Batch]:
+def batches(texts: WordCorpus, size: int, rng: np.random.Generator | None) -> Iterator[WordBatch]:
     """All programs once, in random order and in batches of programs of like length; with no `rng`, in their order."""
-    for rows in pooled(np.diff(texts.first), size, rng):
+    for rows in bucket_batches(np.diff(texts.first), size, rng):
         lengths = np.diff(texts.first)[rows]
         place = np.arange(lengths.max())
         there = place < lengths[:, None]
         at = np.where(there, texts.first[rows][:, None] + place, 0)
-        yield Batch(
+        yield WordBatch(
             words=torch.from_numpy(texts.words[at].astype(np.int64)),
             cues=torch.from_numpy(texts.cues[at].astype(np.int64)),
-            seen=torch.from_numpy(texts.seen[at]).view(*at.shape, SEEN),
+            seen=torch.from_numpy(texts.seen[at]).view(*at.shape, SIZE_INPUTS),
             places=torch.from_numpy(np.flatnonzero(there)),
         )

@@ -12,20 +12,20 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.program import Program
-from stages.training.program_lm.batches import Texts, Written
-from stages.training.program_lm.partial_program import Text
-from stages.training.program_lm.tokens import Word, middles, words_of
+from stages.shapeassembly.syntax.program import AssemblyProgram
+from stages.training.program_lm.batches import WordCorpus, WordSequence
+from stages.training.program_lm.partial_program import PartialProgram
+from stages.training.program_lm.tokens import Word, program_words, step_values
 from stages.training.program_vae.corpus import category_programs
 
-Corpus = tuple[dict[str, Any], FloatArray, dict[str, Texts]]
+Corpus = tuple[dict[str, Any], FloatArray, dict[str, WordCorpus]]
 
 
 def prepare_corpus(task: Task) -> Outcome:
     """Prepare the programs of a category as words.
 
     Files of the shard:
-        `.<split>.safetensors`: the `Texts` of train and val
+        `.<split>.safetensors`: the `WordCorpus` of train and val
         `.values.safetensors`: the values of number steps
         `.json`: counts, unit of length, words of the longest program
 
@@ -38,20 +38,20 @@ def prepare_corpus(task: Task) -> Outcome:
     read = {split: list(category_programs(task, split)) for split in ("train", "val")}
     unit = max((max(program.root.bbox.dims) for _, program in read["train"]), default=1.0)
     worded = {split: _worded(task, programs, unit) for split, programs in read.items()}
-    values = middles([words for _, words in worded["train"]])
+    values = step_values([words for _, words in worded["train"]])
     counts: dict[str, dict[str, int]] = {}
     longest = 0
     for split, programs in worded.items():
-        kept: list[Written] = []
+        kept: list[WordSequence] = []
         for key, words in programs:
-            found = written(words, values, unit)
+            found = word_sequence(words, values, unit)
             if found is None:
                 task.reject(key, "breaks a rule of the language")
             else:
                 kept.append(found)
         if not kept:
             raise Rejected(f"{params['kit']} has no programs of at most {params['longest']} words in split {split}")
-        texts = Texts.of(kept)
+        texts = WordCorpus.of(kept)
         counts[split] = {"programs": len(texts), "words": len(texts.words)}
         longest = max(longest, int(np.diff(texts.first).max()))
         with task.output(f"{name}.{split}.safetensors") as stream:
@@ -70,12 +70,12 @@ def read_corpus(task: Task, data: str) -> Corpus:
     described = json.loads(task.input("training", f"{data}.json").read_bytes())
     paths = {part: task.input("training", f"{data}.{part}.safetensors") for part in ("values", "train", "val")}
     values: FloatArray = load_file(paths.pop("values"))["values"]
-    return described, values, {split: Texts.of_arrays(load_file(path)) for split, path in paths.items()}
+    return described, values, {split: WordCorpus.of_arrays(load_file(path)) for split, path in paths.items()}
 
 
-def written(words: list[Word], values: FloatArray, unit: float) -> Written | None:
+def word_sequence(words: list[Word], values: FloatArray, unit: float) -> WordSequence | None:
     """A program as it is written, word by word; None where a word is not allowed."""
-    text = Text(values, unit)
+    text = PartialProgram(values, unit)
     cues, seen = [], []
     for _, word, _ in words:
         if not text.allowed()[word]:
@@ -83,15 +83,15 @@ def written(words: list[Word], values: FloatArray, unit: float) -> Written | Non
         cues.append(text.cue)
         seen.append(text.seen())
         text.take(word, fit=False)
-    return Written(np.array([word for _, word, _ in words]), np.array(cues), np.array(seen, np.float32))
+    return WordSequence(np.array([word for _, word, _ in words]), np.array(cues), np.array(seen, np.float32))
 
 
-def _worded(task: Task, programs: list[tuple[str, Program]], unit: float) -> list[tuple[str, list[Word]]]:
+def _worded(task: Task, programs: list[tuple[str, AssemblyProgram]], unit: float) -> list[tuple[str, list[Word]]]:
     """The words of programs, by their keys."""
     found = []
     for key, program in programs:
         try:
-            words = words_of(program, unit)
+            words = program_words(program, unit)
         except ProgramError as error:
             task.reject(key, error.reason, str(error))
             continue

@@ -9,12 +9,12 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from stages.training.program_lm.partial_program import SEEN
-from stages.training.program_lm.settings import ProgramLmEntry
-from stages.training.program_lm.tokens import STEPS, THIN, WORDS, Field, words_of_fields
-from stages.training.program_vae.lines import SLOTS
-from stages.training.program_vae.partial_assembly import MOST_DEPTH
-from stages.training.transformer import Block
+from stages.training.program_lm.partial_program import SIZE_INPUTS
+from stages.training.program_lm.settings import ProgramLmConfig
+from stages.training.program_lm.tokens import NUMBER_STEPS, THIN_SHARE, VOCABULARY_SIZE, TokenField, field_words
+from stages.training.program_vae.lines import SLOT_COUNT
+from stages.training.program_vae.partial_assembly import MAX_DEPTH
+from stages.training.transformer import TransformerBlock
 
 Cache = list[tuple[Tensor, Tensor]]
 """Keys and values of each block, float (n, most, width) each."""
@@ -23,19 +23,21 @@ Cache = list[tuple[Tensor, Tensor]]
 class ProgramLm(nn.Module):
     """`values`, float64 (fields, STEPS + 1), says what the steps of numbers stand for."""
 
-    def __init__(self, entry: ProgramLmEntry, longest: int) -> None:
+    def __init__(self, entry: ProgramLmConfig, longest: int) -> None:
         super().__init__()
-        self.words = nn.Embedding(WORDS, entry.width)
-        self.cues = nn.ModuleList(nn.Embedding(many, entry.width) for many in (len(Field), SLOTS, SLOTS, MOST_DEPTH))
+        self.words = nn.Embedding(VOCABULARY_SIZE, entry.width)
+        self.cues = nn.ModuleList(
+            nn.Embedding(many, entry.width) for many in (len(TokenField), SLOT_COUNT, SLOT_COUNT, MAX_DEPTH)
+        )
         self.places = nn.Embedding(longest, entry.width)
-        self.sizes = nn.Linear(SEEN, entry.width)
-        self.blocks = nn.ModuleList(Block(entry.width, entry.dropout) for _ in range(entry.layers))
+        self.sizes = nn.Linear(SIZE_INPUTS, entry.width)
+        self.blocks = nn.ModuleList(TransformerBlock(entry.width, entry.dropout) for _ in range(entry.layers))
         self.norm = nn.LayerNorm(entry.width)
-        self.logits = nn.Linear(entry.width, WORDS)
+        self.logits = nn.Linear(entry.width, VOCABULARY_SIZE)
         self.values: Tensor
-        self.register_buffer("values", torch.zeros(len(Field), STEPS + 1, dtype=torch.float64))
+        self.register_buffer("values", torch.zeros(len(TokenField), NUMBER_STEPS + 1, dtype=torch.float64))
         self.barred: Tensor
-        self.register_buffer("barred", torch.from_numpy(~words_of_fields()), persistent=False)
+        self.register_buffer("barred", torch.from_numpy(~field_words()), persistent=False)
 
     def forward(self, before: Tensor, cues: Tensor, seen: Tensor, places: Tensor) -> Tensor:
         """Logits float (k, WORDS) of the words at `places` in programs x longest, int64 (k,), from the words before
@@ -54,12 +56,12 @@ class ProgramLm(nn.Module):
         """Logits float (n, WORDS) of words at these places, int64 (n,); what is cached behind them does not count."""
         states = self._embedded(before, cues, seen, places)
         for block, (keys, values) in zip(self.blocks, cache, strict=True):
-            assert isinstance(block, Block)
+            assert isinstance(block, TransformerBlock)
             states = block.step(states, keys, values, places)
         return self._said(states, cues)
 
     def _embedded(self, before: Tensor, cues: Tensor, seen: Tensor, places: Tensor) -> Tensor:
-        found: Tensor = self.words(before) + self.places(places) + self.sizes(torch.log1p(seen / THIN))
+        found: Tensor = self.words(before) + self.places(places) + self.sizes(torch.log1p(seen / THIN_SHARE))
         for number, table in enumerate(self.cues):
             found = found + table(cues[..., number])
         return found

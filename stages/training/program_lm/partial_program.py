@@ -1,6 +1,6 @@
 """A program that is generated word by word: its state, and the words that may follow (shapeassembly App. D).
 
-`Draft` holds the rules of an assembly. In addition, every cuboid is attached before any is copied and before
+`PartialAssembly` holds the rules of an assembly. In addition, every cuboid is attached before any is copied and before
 the assembly ends, so that no cuboid has to be left out.
 """
 
@@ -11,40 +11,47 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stages.shape.arrays import BoolArray, FloatArray
-from stages.shapeassembly.execution.parameters import SMALLEST
-from stages.shapeassembly.syntax.checks import SIDE
-from stages.shapeassembly.syntax.program import FACES, Program
-from stages.training.program_lm.tokens import FIELDS, Field, first_word, words_of_fields
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
+from stages.shapeassembly.syntax.checks import BBOX_END_SHARE
+from stages.shapeassembly.syntax.program import FACES, AssemblyProgram
+from stages.training.program_lm.tokens import COMMAND_FIELDS, TokenField, field_words, first_word
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, STOP, TRANSLATE
-from stages.training.program_vae.partial_assembly import MOST_DEPTH, MOST_LINES, Choice, Draft, Numbers, joints_of
+from stages.training.program_vae.partial_assembly import (
+    MAX_DEPTH,
+    MAX_LINES,
+    LineChoice,
+    LineNumbers,
+    PartialAssembly,
+    joints_of,
+)
 
-SEEN = 9
+SIZE_INPUTS = 9
 """Sizes that are seen beside a word: of the box, of the cuboid that the line is about, and of that it is brought to."""
 
-_OF_FIELD = words_of_fields()
+_OF_FIELD = field_words()
 _COPIED = (TRANSLATE, REFLECT)
 _WAYS = {ATTACH: (2, 3), SQUEEZE: range(len(FACES)), TRANSLATE: range(3), REFLECT: range(3)}
-_NAMED = (Field.MOVED, Field.TARGET, Field.FIRST, Field.SECOND)
+_NAMED = (TokenField.MOVED, TokenField.TARGET, TokenField.FIRST, TokenField.SECOND)
 
 
 @dataclass
-class Text:
+class PartialProgram:
     """values: what steps stand for, float64 (fields, STEPS + 1); unit: what the root's sizes are shares of."""
 
     values: FloatArray
     unit: float
-    root: Draft | None = None
-    _draft: Draft = field(default_factory=lambda: Draft((0.0, 0.0, 0.0)))
+    root: PartialAssembly | None = None
+    _draft: PartialAssembly = field(default_factory=lambda: PartialAssembly((0.0, 0.0, 0.0)))
     _depth: int = 0
     _owner: int = 0
-    _ahead: list[tuple[Draft, int, int]] = field(default_factory=list)
+    _ahead: list[tuple[PartialAssembly, int, int]] = field(default_factory=list)
     _command: int = STOP
-    _fields: list[Field] = field(default_factory=lambda: [Field.ROOT_X, Field.ROOT_Y, Field.ROOT_Z])
+    _fields: list[TokenField] = field(default_factory=lambda: [TokenField.ROOT_X, TokenField.ROOT_Y, TokenField.ROOT_Z])
     _said: list[int] = field(default_factory=list)
-    _lines: list[Choice] = field(default_factory=list)
+    _lines: list[LineChoice] = field(default_factory=list)
 
     @property
-    def field(self) -> Field | None:
+    def field(self) -> TokenField | None:
         """What the next word says; None behind the end."""
         return self._fields[len(self._said)] if self._fields else None
 
@@ -57,9 +64,9 @@ class Text:
     def seen(self) -> FloatArray:
         """Sizes of the box, of the line's cuboid and of that it is brought to, as shares of the unit; float64 (SEEN,);
         0 where none is."""
-        found = np.zeros(SEEN)
+        found = np.zeros(SIZE_INPUTS)
         if self.root is None:
-            found[: len(self._said)] = self._numbers(Field.ROOT_X, self._said)
+            found[: len(self._said)] = self._numbers(TokenField.ROOT_X, self._said)
             return found
         sizes = [self._draft.box, *self._draft.sizes]
         found[:3] = sizes[0]
@@ -85,22 +92,22 @@ class Text:
             found[first_word(now) + np.array(places)] = True
         return found
 
-    def _places(self, now: Field) -> list[int] | None:
+    def _places(self, now: TokenField) -> list[int] | None:
         """Which of the words of a field may come; None for all."""
-        if now == Field.COMMAND:
+        if now == TokenField.COMMAND:
             return self._commands()
-        if now == Field.BUILD:
-            return None if self._depth + 1 < MOST_DEPTH else [0, 1]
+        if now == TokenField.BUILD:
+            return None if self._depth + 1 < MAX_DEPTH else [0, 1]
         if now in _NAMED:
             place = len(self._said)
             return sorted({each[place + 1] for each in self._lines if list(each[1 : place + 1]) == self._said})
-        if now == Field.FACE:
+        if now == TokenField.FACE:
             return self._ways((SQUEEZE, *self._said))
-        if now == Field.AXIS:
+        if now == TokenField.AXIS:
             return self._ways((self._command, *self._said))
-        if now == Field.GOAL_Y and self._said[1] == 0:
+        if now == TokenField.GOAL_Y and self._said[1] == 0:
             heights = self.values[now]
-            ends = {2: heights >= 1 - SIDE, 3: heights <= SIDE}
+            ends = {2: heights >= 1 - BBOX_END_SHARE, 3: heights <= BBOX_END_SHARE}
             free = [ends[way] for way in self._ways((ATTACH, *self._said[:2]))]
             return np.flatnonzero(np.logical_or.reduce(free)).tolist()
         return None
@@ -108,17 +115,17 @@ class Text:
     def _commands(self) -> list[int]:
         draft = self._draft
         loose = len(draft.sizes) - len(draft.grounded)
-        last = draft.written + loose >= MOST_LINES
+        last = draft.written + loose >= MAX_LINES
         found = []
         if draft.sizes and not loose:
             found.append(STOP)
         allowed = draft.commands()
-        if allowed[CUBOID] and draft.written + loose + 2 <= MOST_LINES:
+        if allowed[CUBOID] and draft.written + loose + 2 <= MAX_LINES:
             found.append(CUBOID)
         others = (ATTACH, SQUEEZE) if loose else (ATTACH, SQUEEZE, *_COPIED)
         return found + [each for each in others if allowed[each] and self._ways_of(each, last)]
 
-    def _ways_of(self, command: int, last: bool) -> list[Choice]:
+    def _ways_of(self, command: int, last: bool) -> list[LineChoice]:
         """The lines of a command that keep the rules; if they are the last, of cuboids that must still be attached."""
         grounded = self._draft.grounded
         return [
@@ -127,7 +134,7 @@ class Text:
             if not (last and each[0] in grounded) and self._ways((command, *each))
         ]
 
-    def _ways(self, choice: Choice) -> list[int]:
+    def _ways(self, choice: LineChoice) -> list[int]:
         """The faces or axes of a line that keep the rules."""
         ends = (2, 3) if choice[0] == SQUEEZE and 0 in choice[2:] else _WAYS[choice[0]]
         return [way for way in ends if self._draft.free(joints_of(choice, way))]
@@ -141,31 +148,33 @@ class Text:
             return True
         said, self._said = self._said, []
         if self.root is None:
-            x, y, z = np.round(np.maximum(self.unit * self._numbers(Field.ROOT_X, said), 2 * SMALLEST), 3).tolist()
-            self.root = self._draft = Draft((x, y, z))
-        elif now == Field.COMMAND:
+            x, y, z = np.round(
+                np.maximum(self.unit * self._numbers(TokenField.ROOT_X, said), 2 * MIN_CUBOID_SIZE), 3
+            ).tolist()
+            self.root = self._draft = PartialAssembly((x, y, z))
+        elif now == TokenField.COMMAND:
             self._command = said[0]
             if self._command == STOP:
                 self._stop()
                 return True
-            self._fields = list(FIELDS[self._command])
+            self._fields = list(COMMAND_FIELDS[self._command])
             if self._command != CUBOID:
                 draft = self._draft
-                last = draft.written + len(draft.sizes) - len(draft.grounded) >= MOST_LINES
+                last = draft.written + len(draft.sizes) - len(draft.grounded) >= MAX_LINES
                 self._lines = self._ways_of(self._command, last)
             return True
         elif self._command == CUBOID:
             self._declare(said)
         elif not self._write(said, fit):
             return False
-        self._command, self._fields = STOP, [Field.COMMAND]
+        self._command, self._fields = STOP, [TokenField.COMMAND]
         return True
 
     def _declare(self, said: list[int]) -> None:
         draft = self._draft
-        draft.declare(self._numbers(Field.SIZE_X, said[:3]) * draft.box, bool(said[3] % 2), None)
+        draft.declare(self._numbers(TokenField.SIZE_X, said[:3]) * draft.box, bool(said[3] % 2), None)
         if said[3] >= 2:
-            draft.below[-1] = Draft(draft.sizes[-1])
+            draft.below[-1] = PartialAssembly(draft.sizes[-1])
 
     def _write(self, said: list[int], fit: bool) -> bool:
         named = sum(each in _NAMED for each in self._fields)
@@ -173,13 +182,13 @@ class Text:
         zeros = np.zeros(6)
         rest = said[named:]
         copied = self._command in _COPIED
-        numbers = Numbers(
-            points=self._numbers(Field.SOURCE_X, rest) if self._command == ATTACH else zeros,
+        numbers = LineNumbers(
+            points=self._numbers(TokenField.SOURCE_X, rest) if self._command == ATTACH else zeros,
             face=rest[0] if self._command == SQUEEZE else 0,
-            uv=self._numbers(Field.U, rest[1:]) if self._command == SQUEEZE else zeros[:2],
+            uv=self._numbers(TokenField.U, rest[1:]) if self._command == SQUEEZE else zeros[:2],
             axis=rest[0] if copied else 0,
             copies=rest[1] + 1 if self._command == TRANSLATE else 1,
-            distance=float(self.values[Field.DISTANCE, rest[2]]) if self._command == TRANSLATE else 0.0,
+            distance=float(self.values[TokenField.DISTANCE, rest[2]]) if self._command == TRANSLATE else 0.0,
         )
         found = self._draft.line(choice, numbers)
         assert found is not None, "a word that is not allowed was taken"
@@ -194,13 +203,13 @@ class Text:
         self._fields = []
         if self._ahead:
             self._draft, self._owner, self._depth = self._ahead.pop()
-            self._fields = [Field.COMMAND]
+            self._fields = [TokenField.COMMAND]
 
-    def _numbers(self, first: Field, said: list[int]) -> FloatArray:
+    def _numbers(self, first: TokenField, said: list[int]) -> FloatArray:
         """What steps stand for in fields that follow each other."""
         return self.values[np.arange(first, first + len(said)), said]
 
-    def program(self) -> Program | None:
+    def program(self) -> AssemblyProgram | None:
         """The program behind its end; None where it cannot be executed, for copies of copies may be too many."""
         assert self.root is not None
         return self.root.program()

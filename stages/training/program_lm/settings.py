@@ -6,14 +6,14 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.model_config import KitModelEntry, Source
+from stages.training.model_config import KitModelConfig, LearningSource
 
 
-class ProgramLmEntry(KitModelEntry):
+class ProgramLmConfig(KitModelConfig):
     """A transformer that writes ShapeAssembly programs token by token. Its kits are the names of
     `shapeassembly.programs` and `shapeassembly.hierarchies`."""
 
-    learns_from: ClassVar[Source] = "programs"
+    learns_from: ClassVar[LearningSource] = "programs"
 
     kind: Literal["program_lm"] = Field(description="a language model of ShapeAssembly programs, masked by their rules")
     width: int = Field(128, ge=2, le=4096, description="size of what the transformer says of a token")

@@ -18,19 +18,19 @@ from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
     FACES,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
-    Program,
     Reflect,
     Squeeze,
 )
-from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOTS, SQUEEZE, START, STOP, TRANSLATE
-from stages.training.program_vae.partial_assembly import MOST_COPIES
+from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOT_COUNT, SQUEEZE, START, STOP, TRANSLATE
+from stages.training.program_vae.partial_assembly import MAX_COPIES
 
 
-class Field(IntEnum):
+class TokenField(IntEnum):
     """What a word says."""
 
     ROOT_X, ROOT_Y, ROOT_Z = 0, 1, 2
@@ -42,79 +42,82 @@ class Field(IntEnum):
     AXIS, COPIES, DISTANCE = 21, 22, 23
 
 
-FIELDS: dict[int, tuple[Field, ...]] = {
+COMMAND_FIELDS: dict[int, tuple[TokenField, ...]] = {
     STOP: (),
-    CUBOID: (Field.SIZE_X, Field.SIZE_Y, Field.SIZE_Z, Field.BUILD),
+    CUBOID: (TokenField.SIZE_X, TokenField.SIZE_Y, TokenField.SIZE_Z, TokenField.BUILD),
     ATTACH: (
-        Field.MOVED, Field.TARGET,
-        Field.SOURCE_X, Field.SOURCE_Y, Field.SOURCE_Z,
-        Field.GOAL_X, Field.GOAL_Y, Field.GOAL_Z,
+        TokenField.MOVED, TokenField.TARGET,
+        TokenField.SOURCE_X, TokenField.SOURCE_Y, TokenField.SOURCE_Z,
+        TokenField.GOAL_X, TokenField.GOAL_Y, TokenField.GOAL_Z,
     ),
-    SQUEEZE: (Field.MOVED, Field.FIRST, Field.SECOND, Field.FACE, Field.U, Field.V),
-    TRANSLATE: (Field.MOVED, Field.AXIS, Field.COPIES, Field.DISTANCE),
-    REFLECT: (Field.MOVED, Field.AXIS),
+    SQUEEZE: (TokenField.MOVED, TokenField.FIRST, TokenField.SECOND, TokenField.FACE, TokenField.U, TokenField.V),
+    TRANSLATE: (TokenField.MOVED, TokenField.AXIS, TokenField.COPIES, TokenField.DISTANCE),
+    REFLECT: (TokenField.MOVED, TokenField.AXIS),
 }  # fmt: skip
 """What follows each command."""
 
-STEPS = 64
+NUMBER_STEPS = 64
 """Steps from 0 to 1 of a number. Real chairs whose numbers are rounded so are rooted and stable as before."""
 
-_COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES = 7, SLOTS, 4, len(FACES), len(AXES), MOST_COPIES
-_STARTS = np.cumsum([0, _COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES, STEPS + 1]).tolist()
-WORDS: int = _STARTS[-1]
+_COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES = 7, SLOT_COUNT, 4, len(FACES), len(AXES), MAX_COPIES
+_STARTS = np.cumsum([0, _COMMANDS, _SLOTS, _BUILDS, _FACES, _AXES, _COPIES, NUMBER_STEPS + 1]).tolist()
+VOCABULARY_SIZE: int = _STARTS[-1]
 """Words of the vocabulary."""
 
 _KIND = {
-    Field.COMMAND: 0, Field.MOVED: 1, Field.TARGET: 1, Field.FIRST: 1, Field.SECOND: 1,
-    Field.BUILD: 2, Field.FACE: 3, Field.AXIS: 4, Field.COPIES: 5,
+    TokenField.COMMAND: 0, TokenField.MOVED: 1, TokenField.TARGET: 1, TokenField.FIRST: 1, TokenField.SECOND: 1,
+    TokenField.BUILD: 2, TokenField.FACE: 3, TokenField.AXIS: 4, TokenField.COPIES: 5,
 }  # fmt: skip
 _NUMBER = 6
 
-NUMBERS = tuple(each for each in Field if each not in _KIND)
+NUMBER_FIELDS = tuple(each for each in TokenField if each not in _KIND)
 """The fields that numbers fill."""
 
-THIN = 0.1
+THIN_SHARE = 0.1
 """Sizes are counted by the logarithm of 1 + share / THIN, so that those of thin parts are told apart."""
 
-Word = tuple[Field, int, float]
+Word = tuple[TokenField, int, float]
 """A field, the word that fills it, and the number that it stands for, if any."""
 
 
-def first_word(field: Field) -> int:
+def first_word(field: TokenField) -> int:
     """The first word of those that may fill a field; the others stand behind it."""
     start: int = _STARTS[_KIND.get(field, _NUMBER)]
     return start
 
 
-def words_of_fields() -> BoolArray:
+def field_words() -> BoolArray:
     """Which words may fill which field, bool (fields, WORDS)."""
-    found = np.zeros((len(Field), WORDS), np.bool_)
-    for field in Field:
+    found = np.zeros((len(TokenField), VOCABULARY_SIZE), np.bool_)
+    for field in TokenField:
         kind = _KIND.get(field, _NUMBER)
         found[field, _STARTS[kind] : _STARTS[kind + 1]] = True
-    found[Field.COMMAND, START] = False
+    found[TokenField.COMMAND, START] = False
     return found
 
 
-def step_of(field: Field, number: float) -> int:
+def step_of(field: TokenField, number: float) -> int:
     """The step of a number: of a size, a share of the box around, or of a coordinate."""
     number = min(max(number, 0.0), 1.0)
-    return round(STEPS * (number if field > Field.SIZE_Z else float(np.log1p(number / THIN) / np.log1p(1 / THIN))))
+    return round(
+        NUMBER_STEPS
+        * (number if field > TokenField.SIZE_Z else float(np.log1p(number / THIN_SHARE) / np.log1p(1 / THIN_SHARE)))
+    )
 
 
-def number_of_step(field: Field, step: int) -> float:
+def number_of_step(field: TokenField, step: int) -> float:
     """The number in the middle of a step."""
-    share = step / STEPS
-    return float(THIN * np.expm1(share * np.log1p(1 / THIN))) if field <= Field.SIZE_Z else share
+    share = step / NUMBER_STEPS
+    return float(THIN_SHARE * np.expm1(share * np.log1p(1 / THIN_SHARE))) if field <= TokenField.SIZE_Z else share
 
 
-def words_of(program: Program, unit: float) -> list[Word]:
+def program_words(program: AssemblyProgram, unit: float) -> list[Word]:
     """The words of a program. unit: the length that the sizes of its root are shares of.
 
     Raises ProgramError where an assembly has more than ten cuboids, names cuboids that no line declares (copies among
     them), is expanded twice, or copies too often.
     """
-    words = [_number(Field(axis), size / unit) for axis, size in enumerate(program.root.bbox.dims)]
+    words = [_number(TokenField(axis), size / unit) for axis, size in enumerate(program.root.bbox.dims)]
     seen: set[str] = set()
     ahead = [program.root]
     while ahead:
@@ -127,60 +130,70 @@ def words_of(program: Program, unit: float) -> list[Word]:
     return words
 
 
-def _block(block: Block, program: Program) -> Iterator[Word]:
+def _block(block: Block, program: AssemblyProgram) -> Iterator[Word]:
     slots = {name: slot for slot, name in enumerate([BBOX, *(each.name for each in block.cuboids)])}
-    if len(slots) > SLOTS:
-        raise ProgramError("too many cuboids", f"{block.name} has {len(slots) - 1}, at most {SLOTS - 1} are learnt")
+    if len(slots) > SLOT_COUNT:
+        raise ProgramError(
+            "too many cuboids", f"{block.name} has {len(slots) - 1}, at most {SLOT_COUNT - 1} are learnt"
+        )
 
-    def slot(field: Field, name: str) -> Word:
+    def slot(field: TokenField, name: str) -> Word:
         if name not in slots:
             raise ProgramError("names a copy", f"{block.name}: {name!r} is made by no Cuboid line")
         return _choice(field, slots[name])
 
     for line in block.lines:
         yield from _line(line, block, line.name in program.named if isinstance(line, Cuboid) else False, slot)
-    yield _choice(Field.COMMAND, STOP)
+    yield _choice(TokenField.COMMAND, STOP)
 
 
-def _line(line: Line, block: Block, expanded: bool, slot: Callable[[Field, str], Word]) -> Iterator[Word]:
+def _line(line: Line, block: Block, expanded: bool, slot: Callable[[TokenField, str], Word]) -> Iterator[Word]:
     if isinstance(line, Cuboid):
-        yield _choice(Field.COMMAND, CUBOID)
+        yield _choice(TokenField.COMMAND, CUBOID)
         for axis, size in enumerate(line.dims):
-            yield _number(Field(Field.SIZE_X + axis), size / block.bbox.dims[axis])
-        yield _choice(Field.BUILD, 2 * expanded + line.aligned)
+            yield _number(TokenField(TokenField.SIZE_X + axis), size / block.bbox.dims[axis])
+        yield _choice(TokenField.BUILD, 2 * expanded + line.aligned)
     elif isinstance(line, Attach):
-        yield from (_choice(Field.COMMAND, ATTACH), slot(Field.MOVED, line.moved), slot(Field.TARGET, line.target))
+        yield from (
+            _choice(TokenField.COMMAND, ATTACH),
+            slot(TokenField.MOVED, line.moved),
+            slot(TokenField.TARGET, line.target),
+        )
         for place, number in enumerate((*line.source, *line.goal)):
-            yield _number(Field(Field.SOURCE_X + place), number)
+            yield _number(TokenField(TokenField.SOURCE_X + place), number)
     elif isinstance(line, Squeeze):
-        yield from (_choice(Field.COMMAND, SQUEEZE), slot(Field.MOVED, line.moved))
-        yield from (slot(Field.FIRST, line.first), slot(Field.SECOND, line.second))
-        yield from (_choice(Field.FACE, FACES.index(line.face)), _number(Field.U, line.u), _number(Field.V, line.v))
+        yield from (_choice(TokenField.COMMAND, SQUEEZE), slot(TokenField.MOVED, line.moved))
+        yield from (slot(TokenField.FIRST, line.first), slot(TokenField.SECOND, line.second))
+        yield from (
+            _choice(TokenField.FACE, FACES.index(line.face)),
+            _number(TokenField.U, line.u),
+            _number(TokenField.V, line.v),
+        )
     elif isinstance(line, Reflect):
-        yield from (_choice(Field.COMMAND, REFLECT), slot(Field.MOVED, line.moved))
-        yield _choice(Field.AXIS, AXES.index(line.axis))
+        yield from (_choice(TokenField.COMMAND, REFLECT), slot(TokenField.MOVED, line.moved))
+        yield _choice(TokenField.AXIS, AXES.index(line.axis))
     else:
-        if line.copies > MOST_COPIES:
-            raise ProgramError("too many copies", f"{block.name}: {line.copies}, at most {MOST_COPIES} are learnt")
-        yield from (_choice(Field.COMMAND, TRANSLATE), slot(Field.MOVED, line.moved))
-        yield from (_choice(Field.AXIS, AXES.index(line.axis)), _choice(Field.COPIES, line.copies - 1))
-        yield _number(Field.DISTANCE, line.distance)
+        if line.copies > MAX_COPIES:
+            raise ProgramError("too many copies", f"{block.name}: {line.copies}, at most {MAX_COPIES} are learnt")
+        yield from (_choice(TokenField.COMMAND, TRANSLATE), slot(TokenField.MOVED, line.moved))
+        yield from (_choice(TokenField.AXIS, AXES.index(line.axis)), _choice(TokenField.COPIES, line.copies - 1))
+        yield _number(TokenField.DISTANCE, line.distance)
 
 
-def _choice(field: Field, place: int) -> Word:
+def _choice(field: TokenField, place: int) -> Word:
     return field, first_word(field) + place, 0.0
 
 
-def _number(field: Field, number: float) -> Word:
+def _number(field: TokenField, number: float) -> Word:
     return field, first_word(field) + step_of(field, number), number
 
 
-def middles(words: list[list[Word]]) -> FloatArray:
+def step_values(words: list[list[Word]]) -> FloatArray:
     """What each step of each field stands for, float64 (fields, STEPS + 1): the median of the numbers of programs that
     it was said of, so that those that recur, such as 0, 0.5 and 1, are exact; where there are none, its middle."""
-    found = np.array([[number_of_step(field, step) for step in range(STEPS + 1)] for field in Field])
-    told = [(field, word, number) for program in words for field, word, number in program if field in NUMBERS]
-    of = np.array([field * (STEPS + 1) + word - first_word(field) for field, word, _ in told])
+    found = np.array([[number_of_step(field, step) for step in range(NUMBER_STEPS + 1)] for field in TokenField])
+    told = [(field, word, number) for program in words for field, word, number in program if field in NUMBER_FIELDS]
+    of = np.array([field * (NUMBER_STEPS + 1) + word - first_word(field) for field, word, _ in told])
     numbers = np.array([number for _, _, number in told])
     order = np.argsort(of, kind="stable")
     kinds, starts = np.unique(of[order], return_index=True)

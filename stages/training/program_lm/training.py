@@ -13,15 +13,15 @@ from torch.nn.functional import cross_entropy
 
 from pipeline.stage import Outcome, Task
 from stages.shape.arrays import FloatArray
-from stages.training.loop import device_of
-from stages.training.program_lm.batches import Batch, Texts, batches
+from stages.training.loop import resolve_device
+from stages.training.program_lm.batches import WordBatch, WordCorpus, batches
 from stages.training.program_lm.corpus import prepare_corpus, read_corpus
 from stages.training.program_lm.model import ProgramLm
-from stages.training.program_lm.settings import ProgramLmEntry
-from stages.training.program_lm.tokens import STEPS, WORDS
-from stages.training.training_task import mean_figures, sample_digests
+from stages.training.program_lm.settings import ProgramLmConfig
+from stages.training.program_lm.tokens import NUMBER_STEPS, VOCABULARY_SIZE
+from stages.training.training_task import sample_digests, weighted_means
 
-FIRST_NUMBER = WORDS - STEPS - 1
+FIRST_NUMBER_WORD = VOCABULARY_SIZE - NUMBER_STEPS - 1
 
 
 def prepare(task: Task) -> Outcome:
@@ -29,20 +29,20 @@ def prepare(task: Task) -> Outcome:
     return prepare_corpus(task)
 
 
-def entry(settings: Mapping[str, Any]) -> ProgramLmEntry:
+def entry(settings: Mapping[str, Any]) -> ProgramLmConfig:
     """The entry whose JSON is `settings`."""
-    return ProgramLmEntry.model_validate(settings)
+    return ProgramLmConfig.model_validate(settings)
 
 
-def learner(task: Task, entry: ProgramLmEntry, seed: int) -> ProgramLmLearner:
+def learner(task: Task, entry: ProgramLmConfig, seed: int) -> ProgramLmTask:
     """A model with fresh weights beside the programs of its category."""
     described, values, texts = read_corpus(task, task.shard.params["data"])
     header = {**described, "data": sample_digests(task, "safetensors")}
-    module = new_model(entry, values, described["longest"], seed).to(device_of(entry.device))
-    return ProgramLmLearner(module, header, entry, texts["train"], texts["val"])
+    module = new_model(entry, values, described["longest"], seed).to(resolve_device(entry.device))
+    return ProgramLmTask(module, header, entry, texts["train"], texts["val"])
 
 
-def new_model(entry: ProgramLmEntry, values: FloatArray, longest: int, seed: int) -> ProgramLm:
+def new_model(entry: ProgramLmConfig, values: FloatArray, longest: int, seed: int) -> ProgramLm:
     """A model with random weights, by its seed alone, of programs of at most `longest` words."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -52,23 +52,23 @@ def new_model(entry: ProgramLmEntry, values: FloatArray, longest: int, seed: int
 
 
 @dataclass(frozen=True)
-class ProgramLmLearner:
+class ProgramLmTask:
     """The `Learner` of a language model of programs."""
 
     module: ProgramLm
     header: Mapping[str, Any]
-    entry: ProgramLmEntry
-    train: Texts
-    val: Texts
+    entry: ProgramLmConfig
+    train: WordCorpus
+    val: WordCorpus
 
-    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+    def batches(self, rng: np.random.Generator) -> Iterator[WordBatch]:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
             for batch in batches(self.train, self.entry.batch, rng):
                 yield batch.to(device)
 
-    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+    def losses(self, batch: WordBatch, step: int, noise: Generator) -> dict[str, Tensor]:
         """Nats of a program, in the mean; of them those of its numbers."""
         return self._nats(batch, jittered(batch.before, self.entry.jitter, noise))
 
@@ -76,14 +76,14 @@ class ProgramLmLearner:
         """The same on val, nothing jittered."""
         device = next(self.module.parameters()).device
         val = (batch.to(device) for batch in batches(self.val, self.entry.batch, None))
-        return mean_figures(((self._nats(each, each.before), len(each.words)) for each in val), len(self.val))
+        return weighted_means(((self._nats(each, each.before), len(each.words)) for each in val), len(self.val))
 
-    def _nats(self, batch: Batch, before: Tensor) -> dict[str, Tensor]:
+    def _nats(self, batch: WordBatch, before: Tensor) -> dict[str, Tensor]:
         logits = self.module(before, batch.cues, batch.seen, batch.places)
         words = batch.words.flatten()[batch.places]
         nats = cross_entropy(logits, words, reduction="none")
         loss = nats.sum() / len(batch.words)
-        return {"loss": loss, "numbers": (nats * (words >= FIRST_NUMBER)).sum() / len(batch.words)}
+        return {"loss": loss, "numbers": (nats * (words >= FIRST_NUMBER_WORD)).sum() / len(batch.words)}
 
 
 def jittered(before: Tensor, share: float, noise: Generator) -> Tensor:
@@ -91,5 +91,5 @@ def jittered(before: Tensor, share: float, noise: Generator) -> Tensor:
     is seldom just what was read."""
     drawn = torch.rand(before.shape, generator=noise, device=before.device)
     moved = before + torch.where(drawn < share / 2, -1, 1)
-    numbers = (before >= FIRST_NUMBER) & (drawn < share)
-    return torch.where(numbers, moved.clamp(FIRST_NUMBER, WORDS - 1), before)
+    numbers = (before >= FIRST_NUMBER_WORD) & (drawn < share)
+    return torch.where(numbers, moved.clamp(FIRST_NUMBER_WORD, VOCABULARY_SIZE - 1), before)

@@ -11,12 +11,12 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from stages.training.bucketing import pooled
-from stages.training.program_vae.lines import COMMAND, CUBOID, DIMS, SLOTS, START, WIDTH, NodeLines
+from stages.training.bucketing import bucket_batches
+from stages.training.program_vae.lines import COMMAND, CUBOID, DIMS, LINE_WIDTH, SLOT_COUNT, START, AssemblyLines
 
 
 @dataclass(frozen=True)
-class Programs:
+class ProgramCorpus:
     """Programs of one category and split, their assemblies behind each other, root first, breadth first.
 
     lines: float32 (lines, 63), each assembly's with STOP at its end; children: int32 (lines,), the number of the
@@ -33,7 +33,7 @@ class Programs:
     program_first: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, programs: Sequence[Sequence[NodeLines]]) -> Programs:
+    def of(cls, programs: Sequence[Sequence[AssemblyLines]]) -> ProgramCorpus:
         """At least one program."""
         nodes = [node for program in programs for node in program]
         return cls(
@@ -46,7 +46,7 @@ class Programs:
         )
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> Programs:
+    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> ProgramCorpus:
         return cls(**{name: arrays[name] for name in cls.__dataclass_fields__})
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
@@ -63,7 +63,7 @@ class Programs:
 
 
 @dataclass(frozen=True)
-class Level:
+class AssemblyLevel:
     """The assemblies of one depth of all programs of a batch.
 
     lines: float (n, longest, 63), nothing behind an end; lengths: int64 (n,), with the end; boxes: float (n, 3);
@@ -84,9 +84,9 @@ class Level:
     opened: Tensor
     counts: tuple[int, ...]
 
-    def to(self, device: torch.device) -> Level:
+    def to(self, device: torch.device) -> AssemblyLevel:
         moved = {name: each.to(device, non_blocking=True) for name, each in vars(self).items() if name != "counts"}
-        return Level(**moved, counts=self.counts)
+        return AssemblyLevel(**moved, counts=self.counts)
 
     @property
     def shown(self) -> Tensor:
@@ -96,13 +96,13 @@ class Level:
         return torch.cat([first, self.lines[:, :-1]], dim=1)
 
 
-def batches(programs: Programs, size: int, rng: np.random.Generator | None) -> Iterator[list[Level]]:
+def batches(programs: ProgramCorpus, size: int, rng: np.random.Generator | None) -> Iterator[list[AssemblyLevel]]:
     """All programs once, in random order and in batches of programs of like length; with no `rng`, in their order."""
-    for rows in pooled(programs.lengths, size, rng):
+    for rows in bucket_batches(programs.lengths, size, rng):
         yield batch_of(programs, rows)
 
 
-def batch_of(programs: Programs, rows: npt.NDArray[np.int64]) -> list[Level]:
+def batch_of(programs: ProgramCorpus, rows: npt.NDArray[np.int64]) -> list[AssemblyLevel]:
     """The levels of some programs, int64 (n,), the roots first."""
     level = programs.program_first[rows]
     parents = np.stack([np.arange(len(rows)), np.full(len(rows), -1)], axis=1)
@@ -119,23 +119,23 @@ def batch_of(programs: Programs, rows: npt.NDArray[np.int64]) -> list[Level]:
 
 
 def _level(
-    programs: Programs, nodes: npt.NDArray[np.int64], parents: npt.NDArray[np.int64]
-) -> tuple[Level, npt.NDArray[np.bool_]]:
+    programs: ProgramCorpus, nodes: npt.NDArray[np.int64], parents: npt.NDArray[np.int64]
+) -> tuple[AssemblyLevel, npt.NDArray[np.bool_]]:
     lengths = programs.node_first[nodes + 1] - programs.node_first[nodes]
     place = np.arange(lengths.max())
     there = place < lengths[:, None]
     at = np.where(there, programs.node_first[nodes][:, None] + place, 0)
     lines = np.where(there[..., None], programs.lines[at], np.float32(0))
     expanded = there & (programs.children[at] >= 0)
-    sizes = np.zeros((len(nodes), SLOTS, 3), np.float32)
+    sizes = np.zeros((len(nodes), SLOT_COUNT, 3), np.float32)
     sizes[:, 0] = programs.boxes[nodes]
     row, line = np.nonzero(lines[..., CUBOID])
     slot = np.cumsum(lines[..., CUBOID], axis=1)[row, line].astype(np.int64)
     sizes[row, slot] = lines[row, line, DIMS]
     flat = np.flatnonzero(there)
-    kinds = lines.reshape(-1, WIDTH)[flat, COMMAND].argmax(axis=1)
+    kinds = lines.reshape(-1, LINE_WIDTH)[flat, COMMAND].argmax(axis=1)
     opens = expanded[row, line]
-    return Level(
+    return AssemblyLevel(
         lines=torch.from_numpy(lines),
         lengths=torch.from_numpy(lengths),
         boxes=torch.from_numpy(programs.boxes[nodes]),

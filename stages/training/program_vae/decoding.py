@@ -12,9 +12,9 @@ import torch
 from torch import Tensor
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.execution.parameters import SMALLEST
-from stages.shapeassembly.syntax.program import AXES, FACES, Attach, Program, Reflect, Squeeze, Translate
-from stages.training.latent import Points
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
+from stages.shapeassembly.syntax.program import AXES, FACES, AssemblyProgram, Attach, Reflect, Squeeze, Translate
+from stages.training.latent import LatentPoints
 from stages.training.program_vae.lines import (
     ALIGNED,
     ATTACH,
@@ -25,19 +25,19 @@ from stages.training.program_vae.lines import (
     DIMS,
     FACE,
     INDICES,
+    LINE_WIDTH,
     POINTS,
-    SLOTS,
+    SLOT_COUNT,
     SQUEEZE,
     START,
     STOP,
     UV,
-    WIDTH,
 )
 from stages.training.program_vae.model import ProgramVae
-from stages.training.program_vae.partial_assembly import MOST_DEPTH, Choice, Draft, Numbers
+from stages.training.program_vae.partial_assembly import MAX_DEPTH, LineChoice, LineNumbers, PartialAssembly
 from stages.training.program_vae.reaching import add_line
 
-TRIES = 4
+LINE_TRIES = 4
 """Lines of each command that are tried where one breaks a rule."""
 
 
@@ -46,7 +46,7 @@ class _Node:
     """An assembly that is being written. shape: the number of its program; waiting: the cuboids that are to be
     expanded, with their codes; failed: whether a line broke a rule and no other could be found."""
 
-    draft: Draft
+    draft: PartialAssembly
     code: Tensor
     shape: int
     waiting: list[tuple[int, Tensor]] = field(default_factory=list)
@@ -55,7 +55,7 @@ class _Node:
 
 
 @torch.no_grad()
-def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[Program | None]:
+def decode_programs(module: ProgramVae, points: LatentPoints, *, reject: bool) -> list[AssemblyProgram | None]:
     """A program for each point, float32 (n, latent), its numbers to three decimals.
 
     None where a line broke a rule and no other could be found, and for a program that is beyond the limits of
@@ -64,20 +64,23 @@ def write_programs(module: ProgramVae, points: Points, *, reject: bool) -> list[
     """
     device = next(module.parameters()).device
     codes = torch.from_numpy(points).to(device)
-    boxes = np.round(np.maximum(module.root_box(codes).cpu().numpy().astype(float), 2 * SMALLEST), 3)
-    level = [_Node(Draft((float(x), float(y), float(z))), codes[shape], shape) for shape, (x, y, z) in enumerate(boxes)]
+    boxes = np.round(np.maximum(module.root_box(codes).cpu().numpy().astype(float), 2 * MIN_CUBOID_SIZE), 3)
+    level = [
+        _Node(PartialAssembly((float(x), float(y), float(z))), codes[shape], shape)
+        for shape, (x, y, z) in enumerate(boxes)
+    ]
     roots = [node.draft for node in level]
     failed: set[int] = set()
-    for depth in range(MOST_DEPTH):
+    for depth in range(MAX_DEPTH):
         if not level:
             break
         _write_level(module, level)
         failed |= {node.shape for node in level if node.failed}
         below: list[_Node] = []
         for node in level:
-            for slot, code in node.waiting if depth + 1 < MOST_DEPTH and node.shape not in failed else ():
+            for slot, code in node.waiting if depth + 1 < MAX_DEPTH and node.shape not in failed else ():
                 if slot in node.draft.grounded:
-                    draft = Draft(node.draft.sizes[slot - 1])
+                    draft = PartialAssembly(node.draft.sizes[slot - 1])
                     node.draft.below[slot - 1] = draft
                     below.append(_Node(draft, code, node.shape))
         level = below
@@ -107,9 +110,9 @@ def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor) -> 
     heads = module.lines
     logits = heads.command(states, boxes).cpu().numpy()
     commands = torch.eye(7, device=states.device).repeat(len(nodes), 1)
-    every = heads.indices(states.repeat_interleave(7, dim=0), commands).view(len(nodes), 7, 3, SLOTS).cpu().numpy()
+    every = heads.indices(states.repeat_interleave(7, dim=0), commands).view(len(nodes), 7, 3, SLOT_COUNT).cpu().numpy()
     sizes, aligned = (each.cpu().numpy() for each in heads.cuboid(states, boxes))
-    tries = [_tries(node.draft.choices(logits[row], every[row], TRIES)) for row, node in enumerate(nodes)]
+    tries = [_tries(node.draft.choices(logits[row], every[row], LINE_TRIES)) for row, node in enumerate(nodes)]
     ended = [False] * len(nodes)
     pending = list(range(len(nodes)))
     tried = 0
@@ -139,10 +142,10 @@ def _write_lines(module: ProgramVae, nodes: Sequence[_Node], states: Tensor) -> 
     return ended
 
 
-def _tries(choices: Sequence[Choice]) -> list[tuple[Choice, bool]]:
+def _tries(choices: Sequence[LineChoice]) -> list[tuple[LineChoice, bool]]:
     """The lines in the order in which they are tried, and whether a cuboid must reach where one attaches it: first with
     this, then without, before another command is."""
-    found: list[tuple[Choice, bool]] = []
+    found: list[tuple[LineChoice, bool]] = []
     for command, alike in groupby(choices, key=lambda choice: choice[0]):
         lines = list(alike)
         found += [(each, True) for each in lines] if command in (ATTACH, SQUEEZE) else []
@@ -162,12 +165,14 @@ def _declare(module: ProgramVae, node: _Node, state: Tensor, sizes: FloatArray, 
     node.last[ALIGNED] = float(aligned)
 
 
-def _numbers(module: ProgramVae, nodes: Sequence[_Node], states: Tensor, choices: Sequence[Choice]) -> list[Numbers]:
+def _numbers(
+    module: ProgramVae, nodes: Sequence[_Node], states: Tensor, choices: Sequence[LineChoice]
+) -> list[LineNumbers]:
     """What the line decoder says of lines with these commands and slots."""
     if not nodes:
         return []
-    slots = torch.zeros(len(nodes), 3, SLOTS)
-    sizes = torch.zeros(len(nodes), SLOTS, 3)
+    slots = torch.zeros(len(nodes), 3, SLOT_COUNT)
+    sizes = torch.zeros(len(nodes), SLOT_COUNT, 3)
     for row, (node, (_, *named)) in enumerate(zip(nodes, choices, strict=True)):
         for place, slot in enumerate(named):
             slots[row, place, slot] = 1
@@ -180,7 +185,7 @@ def _numbers(module: ProgramVae, nodes: Sequence[_Node], states: Tensor, choices
     faces, uv = heads.squeeze(states, slots, three)
     axes, copies = heads.symmetry(states, slots[:, 0], three[:, 0], sizes[:, 0])
     return [
-        Numbers(
+        LineNumbers(
             points=points[row].cpu().numpy(),
             face=int(faces[row].argmax()),
             uv=uv[row].cpu().numpy(),
@@ -192,12 +197,12 @@ def _numbers(module: ProgramVae, nodes: Sequence[_Node], states: Tensor, choices
     ]
 
 
-def _line_of(draft: Draft, choice: Choice) -> Tensor:
+def _line_of(draft: PartialAssembly, choice: LineChoice) -> Tensor:
     """The line that was written last, as the decoder sees it."""
     command, *named = choice
     row = _one_hot(command)
     for place, slot in enumerate(named):
-        row[INDICES.start + SLOTS * place + slot] = 1
+        row[INDICES.start + SLOT_COUNT * place + slot] = 1
     line = draft.lines[-1]
     if isinstance(line, Attach):
         row[POINTS] = torch.tensor([*line.source, *line.goal])
@@ -213,6 +218,6 @@ def _line_of(draft: Draft, choice: Choice) -> Tensor:
 
 
 def _one_hot(command: int) -> Tensor:
-    row = torch.zeros(WIDTH)
+    row = torch.zeros(LINE_WIDTH)
     row[command] = 1
     return row

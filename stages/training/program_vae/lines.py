@@ -14,11 +14,11 @@ from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
     FACES,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
-    Program,
     Reflect,
     Squeeze,
 )
@@ -26,20 +26,20 @@ from stages.shapeassembly.syntax.program import (
 START, STOP, CUBOID, ATTACH, SQUEEZE, TRANSLATE, REFLECT = range(7)
 Rows = npt.NDArray[np.float32]
 
-SLOTS = 11
+SLOT_COUNT = 11
 """The cuboids that a line may name: the bounding box, and ten in the order of their declarations."""
 
 COMMAND, INDICES = slice(0, 7), slice(7, 40)
 DIMS, POINTS, AXIS, COPIES, FACE, UV, ALIGNED = (
     slice(40, 43), slice(43, 49), slice(49, 52), slice(52, 54), slice(54, 60), slice(60, 62), slice(62, 63),
 )  # fmt: skip
-WIDTH = 63
+LINE_WIDTH = 63
 COPIES_UNIT = 10.0
 """Copies are counted in tens, so that they weigh like the other numbers."""
 
 
 @dataclass(frozen=True)
-class NodeLines:
+class AssemblyLines:
     """One assembly, without the line of its bounding box.
 
     numbers: float32 (lines + 1, 63), the last line being STOP; children: int64 (lines + 1,), the number of the
@@ -55,13 +55,13 @@ class NodeLines:
     line: int
 
 
-def node_lines(program: Program) -> list[NodeLines]:
+def assembly_lines(program: AssemblyProgram) -> list[AssemblyLines]:
     """The assemblies of a program, root first, breadth first.
 
     Raises ProgramError where an assembly has more than ten cuboids, names cuboids that no line declares (copies among
     them), or is expanded twice.
     """
-    found: list[NodeLines] = []
+    found: list[AssemblyLines] = []
     ahead = [(program.root, -1, -1)]
     seen = {program.root.name}
     for number, (block, parent, line) in enumerate(ahead):
@@ -74,20 +74,22 @@ def node_lines(program: Program) -> list[NodeLines]:
                 seen.add(below.name)
                 children[place] = len(ahead)
                 ahead.append((below, number, place))
-        found.append(NodeLines(_numbers(block), children, np.array(block.bbox.dims), parent, line))
+        found.append(AssemblyLines(_numbers(block), children, np.array(block.bbox.dims), parent, line))
     return found
 
 
 def _numbers(block: Block) -> Rows:
     slots = {name: slot for slot, name in enumerate([BBOX, *(each.name for each in block.cuboids)])}
-    if len(slots) > SLOTS:
-        raise ProgramError("too many cuboids", f"{block.name} has {len(slots) - 1}, at most {SLOTS - 1} are learnt")
-    numbers = np.zeros((len(block.lines) + 1, WIDTH), np.float32)
+    if len(slots) > SLOT_COUNT:
+        raise ProgramError(
+            "too many cuboids", f"{block.name} has {len(slots) - 1}, at most {SLOT_COUNT - 1} are learnt"
+        )
+    numbers = np.zeros((len(block.lines) + 1, LINE_WIDTH), np.float32)
     for row, line in zip(numbers, block.lines, strict=False):
         for place, name in enumerate(_named(line)):
             if name not in slots:
                 raise ProgramError("names a copy", f"{block.name}: {name!r} is made by no Cuboid line")
-            row[INDICES.start + SLOTS * place + slots[name]] = 1
+            row[INDICES.start + SLOT_COUNT * place + slots[name]] = 1
         _fill(row, line)
     numbers[-1, STOP] = 1
     return numbers

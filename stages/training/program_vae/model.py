@@ -12,31 +12,31 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from stages.training.latent import Standing
-from stages.training.program_vae.batches import Level
-from stages.training.program_vae.lines import SLOTS, WIDTH
-from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.latent import LatentGaussian
+from stages.training.program_vae.batches import AssemblyLevel
+from stages.training.program_vae.lines import LINE_WIDTH, SLOT_COUNT
+from stages.training.program_vae.settings import ProgramVaeConfig
 
-COMMANDS = 7
+COMMAND_COUNT = 7
 
 
-class ProgramVae(Standing):
+class ProgramVae(LatentGaussian):
     """Programs to points of a latent space, and back to what a line decoder says of each line."""
 
-    def __init__(self, entry: ProgramVaeEntry) -> None:
+    def __init__(self, entry: ProgramVaeConfig) -> None:
         super().__init__(entry.latent)
         hidden, latent = entry.hidden, entry.latent
-        self.read_line = nn.Linear(WIDTH + 3, hidden)
+        self.read_line = nn.Linear(LINE_WIDTH + 3, hidden)
         self.read_child = nn.Linear(hidden, hidden)
         self.reader = nn.GRU(hidden, hidden, batch_first=True)
         self.mean = nn.Linear(hidden, latent)
         self.log_variance = nn.Linear(hidden, latent)
         self.root_box = _layers(latent, hidden, 3)
         self.first = nn.Linear(latent, hidden)
-        self.writer = nn.GRU(WIDTH, hidden, batch_first=True)
+        self.writer = nn.GRU(LINE_WIDTH, hidden, batch_first=True)
         self.lines = LineDecoder(hidden, latent)
 
-    def encode(self, levels: Sequence[Level]) -> tuple[Tensor, Tensor]:
+    def encode(self, levels: Sequence[AssemblyLevel]) -> tuple[Tensor, Tensor]:
         """Mean and logarithm of the variance, float (programs, latent) each."""
         codes: Tensor | None = None
         for depth in reversed(range(len(levels))):
@@ -68,12 +68,12 @@ class LineDecoder(nn.Module):
 
     def __init__(self, hidden: int, latent: int) -> None:
         super().__init__()
-        self._command = _layers(hidden + 3, hidden, COMMANDS)
+        self._command = _layers(hidden + 3, hidden, COMMAND_COUNT)
         self._cuboid = _layers(hidden + 3, hidden, 4)
-        self._indices = _layers(hidden + COMMANDS, hidden, 3 * SLOTS)
-        self._attach = _layers(hidden + 2 * (SLOTS + 3), hidden, 6)
-        self._squeeze = _layers(hidden + 3 * (SLOTS + 3), hidden, 8)
-        self._symmetry = _layers(hidden + SLOTS + 6, hidden, 5)
+        self._indices = _layers(hidden + COMMAND_COUNT, hidden, 3 * SLOT_COUNT)
+        self._attach = _layers(hidden + 2 * (SLOT_COUNT + 3), hidden, 6)
+        self._squeeze = _layers(hidden + 3 * (SLOT_COUNT + 3), hidden, 8)
+        self._symmetry = _layers(hidden + SLOT_COUNT + 6, hidden, 5)
         self._child = _layers(hidden + 3 + latent, hidden, 1 + latent)
 
     def command(self, states: Tensor, boxes: Tensor) -> Tensor:
@@ -88,7 +88,7 @@ class LineDecoder(nn.Module):
 
     def indices(self, states: Tensor, commands: Tensor) -> Tensor:
         """Logits (q, 3, 11) of the cuboids in lines of these commands, one-hot (q, 7)."""
-        found: Tensor = self._indices(torch.cat([states, commands], dim=-1)).view(-1, 3, SLOTS)
+        found: Tensor = self._indices(torch.cat([states, commands], dim=-1)).view(-1, 3, SLOT_COUNT)
         return found
 
     def attach(self, states: Tensor, slots: Tensor, sizes: Tensor) -> Tensor:

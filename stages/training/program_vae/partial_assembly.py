@@ -16,53 +16,53 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray
 from stages.shapeassembly.execution.interpreter import execute
-from stages.shapeassembly.execution.parameters import SMALLEST
-from stages.shapeassembly.syntax.checks import SIDE, reaching_out
+from stages.shapeassembly.execution.parameters import MIN_CUBOID_SIZE
+from stages.shapeassembly.syntax.checks import BBOX_END_SHARE, protruding_parts
 from stages.shapeassembly.syntax.errors import ProgramError
-from stages.shapeassembly.syntax.limits import MIN_SIZE
+from stages.shapeassembly.syntax.limits import MIN_DECLARED_SIZE
 from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
     FACES,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
     Point,
-    Program,
     Reflect,
     Squeeze,
     Translate,
 )
-from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOTS, SQUEEZE, STOP, TRANSLATE
+from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SLOT_COUNT, SQUEEZE, STOP, TRANSLATE
 
-MOST_DEPTH = 4
+MAX_DEPTH = 4
 """Levels of a program; the real ones have three."""
 
-MOST_LINES = 60
+MAX_LINES = 60
 """Lines after which an assembly ends; those of the real programs end before."""
 
-MOST_COPIES = 40
+MAX_COPIES = 40
 """Copies of one translate; the real programs have 29 at most."""
 
-UNLIKELY = 4.6
+MAX_LOGIT_GAP = 4.6
 """Commands a hundred times less likely than the likeliest that may follow are no way out, in nats."""
 
 _PHASES = {CUBOID: 0, ATTACH: 1, SQUEEZE: 1, TRANSLATE: 2, REFLECT: 2}
 
-Choice = tuple[int, ...]
+LineChoice = tuple[int, ...]
 """A command, and the slots of the cuboids that it names."""
 
 Joint = tuple[int, ...]
 """What an assembly may have once: a cuboid on another, on the bottom or the top of the bounding box, or copied along an
 axis by a command."""
 
-Written = Attach | Squeeze | Translate | Reflect
+AttachedLine = Attach | Squeeze | Translate | Reflect
 """A line behind the declarations."""
 
 
 @dataclass(frozen=True)
-class Numbers:
+class LineNumbers:
     """What else a line needs: points (6,), face, u and v (2,), axis, copies and distance."""
 
     points: FloatArray
@@ -74,14 +74,14 @@ class Numbers:
 
 
 @dataclass
-class Draft:
+class PartialAssembly:
     """An assembly in a bounding box of sizes `box`. sizes, aligned: of each cuboid declared; below: for each, what
     expands it, if anything; lines: those after the declarations, cuboids called by their slots."""
 
     box: Point
     sizes: list[Point] = field(default_factory=list)
     aligned: list[bool] = field(default_factory=list)
-    below: list[Draft | None] = field(default_factory=list)
+    below: list[PartialAssembly | None] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     written: int = 0
     _phase: int = 0
@@ -93,24 +93,24 @@ class Draft:
         allowed = np.zeros(7, bool)
         grounded = len(self._grounded) > 1
         allowed[STOP] = grounded
-        if self.written < MOST_LINES:
-            allowed[CUBOID] = self._phase == 0 and len(self.sizes) < SLOTS - 1
+        if self.written < MAX_LINES:
+            allowed[CUBOID] = self._phase == 0 and len(self.sizes) < SLOT_COUNT - 1
             allowed[[ATTACH, SQUEEZE]] = self._phase <= 1 and bool(self.sizes)
             allowed[[TRANSLATE, REFLECT]] = grounded
         return allowed
 
-    def choices(self, logits: FloatArray, indices: FloatArray, most: int) -> list[Choice]:
+    def choices(self, logits: FloatArray, indices: FloatArray, most: int) -> list[LineChoice]:
         """The likeliest lines that may follow, at most `most` of each command, by the logits (7,) of commands and, for
         each command, (7, 3, 11) of slots: the likeliest command first, as the paper goes back from what cannot be."""
         allowed = self.commands()
-        least = logits[allowed].max(initial=-np.inf) - UNLIKELY
-        found: list[Choice] = []
+        least = logits[allowed].max(initial=-np.inf) - MAX_LOGIT_GAP
+        found: list[LineChoice] = []
         for command in np.argsort(-logits, kind="stable").tolist():
             if allowed[command] and logits[command] >= least:
                 found += self._likeliest(command, indices[command])[:most]
         return found
 
-    def _likeliest(self, command: int, logits: FloatArray) -> list[Choice]:
+    def _likeliest(self, command: int, logits: FloatArray) -> list[LineChoice]:
         """The lines of one command, the likeliest first."""
         score = {
             each: sum(float(logits[place, slot]) for place, slot in enumerate(each)) for each in self.named(command)
@@ -137,23 +137,23 @@ class Draft:
         """Whether the assembly has none of them yet."""
         return not any(each in self._joined for each in joints)
 
-    def declare(self, sizes: FloatArray, aligned: bool, below: Draft | None) -> None:
+    def declare(self, sizes: FloatArray, aligned: bool, below: PartialAssembly | None) -> None:
         """A cuboid, its sizes clamped."""
-        clamped = np.clip(sizes.astype(float), SMALLEST, np.maximum(self.box, SMALLEST))
-        x, y, z = np.round(np.maximum(clamped, MIN_SIZE), 3).tolist()
+        clamped = np.clip(sizes.astype(float), MIN_CUBOID_SIZE, np.maximum(self.box, MIN_CUBOID_SIZE))
+        x, y, z = np.round(np.maximum(clamped, MIN_DECLARED_SIZE), 3).tolist()
         self.sizes.append((x, y, z))
         self.aligned.append(aligned)
         self.below.append(below)
         self.written += 1
 
-    def line(self, choice: Choice, numbers: Numbers) -> tuple[Written, list[Joint]] | None:
+    def line(self, choice: LineChoice, numbers: LineNumbers) -> tuple[AttachedLine, list[Joint]] | None:
         """The line, its numbers to three decimals, with its joints; None where it breaks a rule that can be told$
         without executing it."""
         command, moved, *others = choice
-        line: Written
+        line: AttachedLine
         if command == ATTACH:
             points = np.round(np.clip(numbers.points.astype(float), 0, 1), 3).tolist()
-            if others[0] == 0 and SIDE < points[4] < 1 - SIDE:
+            if others[0] == 0 and BBOX_END_SHARE < points[4] < 1 - BBOX_END_SHARE:
                 return None
             joints = joints_of(choice, 2 if points[4] > 0.5 else 3)
             source, goal = points[:3], points[3:]
@@ -171,11 +171,11 @@ class Draft:
             line = Reflect(_name(moved), AXES[numbers.axis])
         else:
             joints = joints_of(choice, numbers.axis)
-            copies = min(max(numbers.copies, 1), MOST_COPIES)
+            copies = min(max(numbers.copies, 1), MAX_COPIES)
             line = Translate(_name(moved), AXES[numbers.axis], copies, round(min(max(numbers.distance, 0.0), 1.0), 3))
         return (line, joints) if self.free(joints) else None
 
-    def put(self, choice: Choice, line: Written, joints: Sequence[Joint]) -> None:
+    def put(self, choice: LineChoice, line: AttachedLine, joints: Sequence[Joint]) -> None:
         """Writes a line."""
         command, moved, *_ = choice
         self._joined.update(joints)
@@ -184,14 +184,14 @@ class Draft:
         self.lines.append(line)
         self.written += 1
 
-    def with_line(self, line: Written, moved: int) -> Draft:
+    def with_line(self, line: AttachedLine, moved: int) -> PartialAssembly:
         """With one line more, by which the cuboid of a slot is grounded: to be looked at, not to be written on."""
         return replace(self, lines=[*self.lines, line], _grounded={*self._grounded, moved})
 
     def fits(self) -> bool:
         """Whether what is grounded stays within the bounding box."""
         try:
-            return not reaching_out(self.block("Program_0", {}))
+            return not protruding_parts(self.block("Program_0", {}))
         except ProgramError:
             return False
 
@@ -208,11 +208,11 @@ class Draft:
         """The slots of the cuboids that are grounded."""
         return sorted(self._grounded - {0})
 
-    def program(self) -> Program | None:
+    def program(self) -> AssemblyProgram | None:
         """The program whose root is this assembly, its assemblies named in breadth-first order; a cuboid whose
         sub-program has no cuboid is one. None where it cannot be executed: each of its assemblies could be, and copies
         of copies may still be too many."""
-        ahead: list[Draft] = [self]
+        ahead: list[PartialAssembly] = [self]
         blocks: list[Block] = []
         while len(blocks) < len(ahead):
             draft = ahead[len(blocks)]
@@ -223,7 +223,7 @@ class Draft:
                     names[slot] = f"Program_{len(ahead)}"
                     ahead.append(below)
             blocks.append(draft.block(f"Program_{len(blocks)}", names))
-        program = Program(tuple(blocks))
+        program = AssemblyProgram(tuple(blocks))
         try:
             execute(program)
         except ProgramError:
@@ -231,7 +231,7 @@ class Draft:
         return program
 
 
-def joints_of(choice: Choice, way: int) -> list[Joint]:
+def joints_of(choice: LineChoice, way: int) -> list[Joint]:
     """The joints of a line. way: of a copy the axis, of a squeeze the face, of an attach the face of the target that is
     attached to, of which only top and bottom count, and only of the bounding box."""
     command, moved, *others = choice

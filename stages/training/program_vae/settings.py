@@ -6,20 +6,20 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.model_config import KitModelEntry, Source
+from stages.training.model_config import KitModelConfig, LearningSource
 
-Without = Literal["nothing", "hierarchy", "macros", "order", "align"]
+Ablation = Literal["nothing", "hierarchy", "macros", "order", "align"]
 """What of the language programs are without (shapeassembly §7.1.1)."""
 
 
-class ProgramVaeEntry(KitModelEntry):
+class ProgramVaeConfig(KitModelConfig):
     """A hierarchical sequence VAE of ShapeAssembly programs (shapeassembly §6). Its kits are the names of
     `shapeassembly.programs` and `shapeassembly.hierarchies`."""
 
-    learns_from: ClassVar[Source] = "programs"
+    learns_from: ClassVar[LearningSource] = "programs"
 
     kind: Literal["program_vae"] = Field(description="a variational autoencoder of ShapeAssembly programs")
-    without: Without = Field(
+    without: Ablation = Field(
         "nothing",
         description="what of the language it learns without: `hierarchy`, programs of one assembly, extracted again "
         "from the cuboids; `macros`, cuboids and attachments alone; `order`, lines in random order; `align`, no cuboid "

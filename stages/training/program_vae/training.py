@@ -12,9 +12,9 @@ from torch import Generator, Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 
 from pipeline.stage import Outcome, Task
-from stages.training.latent import drawn
-from stages.training.loop import device_of
-from stages.training.program_vae.batches import Level, Programs, batches
+from stages.training.latent import reparameterize
+from stages.training.loop import resolve_device
+from stages.training.program_vae.batches import AssemblyLevel, ProgramCorpus, batches
 from stages.training.program_vae.corpus import prepare_corpus, read_corpus
 from stages.training.program_vae.lines import (
     ALIGNED,
@@ -28,14 +28,14 @@ from stages.training.program_vae.lines import (
     INDICES,
     POINTS,
     REFLECT,
-    SLOTS,
+    SLOT_COUNT,
     SQUEEZE,
     TRANSLATE,
     UV,
 )
 from stages.training.program_vae.model import ProgramVae, sizes_of
-from stages.training.program_vae.settings import ProgramVaeEntry
-from stages.training.training_task import mean_figures, sample_digests
+from stages.training.program_vae.settings import ProgramVaeConfig
+from stages.training.training_task import sample_digests, weighted_means
 
 
 def prepare(task: Task) -> Outcome:
@@ -43,20 +43,20 @@ def prepare(task: Task) -> Outcome:
     return prepare_corpus(task)
 
 
-def entry(settings: Mapping[str, Any]) -> ProgramVaeEntry:
+def entry(settings: Mapping[str, Any]) -> ProgramVaeConfig:
     """The entry whose JSON is `settings`."""
-    return ProgramVaeEntry.model_validate(settings)
+    return ProgramVaeConfig.model_validate(settings)
 
 
-def learner(task: Task, entry: ProgramVaeEntry, seed: int) -> ProgramVaeLearner:
+def learner(task: Task, entry: ProgramVaeConfig, seed: int) -> ProgramVaeTask:
     """A model with fresh weights beside the programs of its category."""
     described, programs = read_corpus(task, task.shard.params["data"])
     header = {"counts": described["counts"], "data": sample_digests(task, "safetensors")}
-    module = new_model(entry, seed).to(device_of(entry.device))
-    return ProgramVaeLearner(module, header, entry, programs["train"], programs["val"])
+    module = new_model(entry, seed).to(resolve_device(entry.device))
+    return ProgramVaeTask(module, header, entry, programs["train"], programs["val"])
 
 
-def new_model(entry: ProgramVaeEntry, seed: int) -> ProgramVae:
+def new_model(entry: ProgramVaeConfig, seed: int) -> ProgramVae:
     """A model with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -64,26 +64,26 @@ def new_model(entry: ProgramVaeEntry, seed: int) -> ProgramVae:
 
 
 @dataclass(frozen=True)
-class ProgramVaeLearner:
+class ProgramVaeTask:
     """The `Learner` of a model of programs."""
 
     module: ProgramVae
     header: Mapping[str, Any]
-    entry: ProgramVaeEntry
-    train: Programs
-    val: Programs
+    entry: ProgramVaeConfig
+    train: ProgramCorpus
+    val: ProgramCorpus
 
-    def batches(self, rng: np.random.Generator) -> Iterator[list[Level]]:
+    def batches(self, rng: np.random.Generator) -> Iterator[list[AssemblyLevel]]:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
             for levels in batches(self.train, self.entry.batch, rng):
                 yield [level.to(device) for level in levels]
 
-    def losses(self, batch: Sequence[Level], step: int, noise: Generator) -> dict[str, Tensor]:
+    def losses(self, batch: Sequence[AssemblyLevel], step: int, noise: Generator) -> dict[str, Tensor]:
         """Means over programs: nats of what lines choose, absolute errors of their numbers, and the divergence from
         the prior."""
-        codes, divergence = drawn(*self.module.encode(batch), noise)
+        codes, divergence = reparameterize(*self.module.encode(batch), noise)
         nats, errors = (each / len(codes) for each in reconstruction(self.module, batch, codes))
         loss = nats + self.entry.number_weight * errors + self.entry.kl_weight * divergence
         return {"loss": loss, "nats": nats, "errors": errors, "divergence": divergence}
@@ -92,12 +92,12 @@ class ProgramVaeLearner:
         """The same on val; and the module learns where the programs of train stand."""
         device = next(self.module.parameters()).device
         train, val = (batches(each, self.entry.batch, None) for each in (self.train, self.val))
-        self.module.stand_where(self.module.encode([level.to(device) for level in levels]) for levels in train)
+        self.module.fit_posterior(self.module.encode([level.to(device) for level in levels]) for levels in train)
         found = ((self.losses([each.to(device) for each in levels], 0, noise), len(levels[0].lines)) for levels in val)
-        return mean_figures(found, len(self.val))
+        return weighted_means(found, len(self.val))
 
 
-def reconstruction(module: ProgramVae, levels: Sequence[Level], codes: Tensor) -> tuple[Tensor, Tensor]:
+def reconstruction(module: ProgramVae, levels: Sequence[AssemblyLevel], codes: Tensor) -> tuple[Tensor, Tensor]:
     """Sums over all programs, whose roots have `codes`: nats of choices, and absolute errors of numbers."""
     nats = codes.new_zeros(())
     errors = (module.root_box(codes) - levels[0].boxes).abs().sum()
@@ -111,7 +111,7 @@ def reconstruction(module: ProgramVae, levels: Sequence[Level], codes: Tensor) -
 
 
 def _line_losses(
-    module: ProgramVae, level: Level, states: Tensor, codes: Tensor
+    module: ProgramVae, level: AssemblyLevel, states: Tensor, codes: Tensor
 ) -> tuple[tuple[Tensor, Tensor], Tensor]:
     """Nats and errors of all lines of a level, summed, and what the model would expand each cuboid of it by, float
     (cuboids, latent). Lines of one command stand together, so that its head reads a slice."""
@@ -125,7 +125,7 @@ def _line_losses(
     cuboid, attach, squeeze, translate, reflect = (
         slice(ends[each] - counts[each], ends[each]) for each in (CUBOID, ATTACH, SQUEEZE, TRANSLATE, REFLECT)
     )
-    slots = lines[:, INDICES].view(-1, 3, SLOTS)
+    slots = lines[:, INDICES].view(-1, 3, SLOT_COUNT)
     logits = heads.indices(state[attach.start :], commands[attach.start :])
     # Behind the attachments stand the squeezes, which alone name three cuboids, and what names but one.
     for place, last in enumerate((reflect.stop, squeeze.stop, squeeze.stop)):

@@ -15,7 +15,7 @@ from stages.programs.parameters import Parameter
 from stages.training.recovery.drawings import DRAWING_SIDE_PIXELS
 from stages.training.recovery.neighbors import edge_maximum, nearest_neighbors
 from stages.training.recovery.outputs import regressed
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 
 SLOPE = 0.2
 
@@ -30,7 +30,7 @@ class RecoveryNet(nn.Module):
 
     continuous: Tensor
 
-    def __init__(self, entry: RecoveryEntry, parameters: Sequence[Parameter]) -> None:
+    def __init__(self, entry: RecoveryModelConfig, parameters: Sequence[Parameter]) -> None:
         super().__init__()
         encoder = Dgcnn if entry.input == "points" else Vgg
         self.encoder: nn.Module = encoder(entry)
@@ -56,7 +56,7 @@ class Dgcnn(nn.Module):
     Published is a graph that is made anew of the features before each convolution.
     """
 
-    def __init__(self, entry: RecoveryEntry) -> None:
+    def __init__(self, entry: RecoveryModelConfig) -> None:
         super().__init__()
         self.neighbors = entry.neighbors
         self.convolutions = nn.ModuleList(EdgeConvolution(a, b) for a, b in pairwise((3, *entry.widths)))
@@ -103,7 +103,7 @@ class Vgg(nn.Module):
 
     PATCH = 4
 
-    def __init__(self, entry: RecoveryEntry) -> None:
+    def __init__(self, entry: RecoveryModelConfig) -> None:
         super().__init__()
         layers: list[nn.Module] = [nn.PixelUnshuffle(self.PATCH)]
         for place, (before, after) in enumerate(pairwise((self.PATCH**2, *entry.channels))):

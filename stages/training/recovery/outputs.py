@@ -14,10 +14,10 @@ from torch import Tensor
 from torch.nn.functional import cross_entropy
 
 from stages.programs.parameters import Parameter
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 
 
-def regressed(entry: RecoveryEntry, parameters: Sequence[Parameter]) -> list[bool]:
+def regressed(entry: RecoveryModelConfig, parameters: Sequence[Parameter]) -> list[bool]:
     """Which parameters are regressed: the continuous ones, if any."""
     return [entry.answers != "classes" and each.kind == "continuous" for each in parameters]
 
@@ -32,7 +32,7 @@ class ParameterOutputs:
     existence: bool
 
     @classmethod
-    def of(cls, entry: RecoveryEntry, parameters: Sequence[Parameter]) -> ParameterOutputs:
+    def of(cls, entry: RecoveryModelConfig, parameters: Sequence[Parameter]) -> ParameterOutputs:
         counts = torch.tensor([len(each.values) for each in parameters])
         return cls(counts, torch.tensor(regressed(entry, parameters)), entry.existence)
 

@@ -6,12 +6,12 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from stages.training.model_config import ModelEntry, Subject
+from stages.training.model_config import ModelConfig, Subject
 
 Size = Annotated[int, Field(ge=1, le=4096)]
 
 
-class RecoveryEntry(ModelEntry):
+class RecoveryModelConfig(ModelConfig):
     """Point clouds or drawings back to parameters (geocode §3.3): an encoder, and a decoder for each parameter."""
 
     subject: ClassVar[Subject] = "program"

@@ -20,7 +20,7 @@ from stages.training.recovery.clouds import frame_of, subsample
 from stages.training.recovery.estimate import ParameterEstimate, estimate_from_probabilities
 from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.outputs import ParameterOutputs
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.training import parameter_descriptions
 
 RECOVERY_KIND = "recovery"
@@ -38,7 +38,7 @@ class TrainedRecovery:
 
     module: RecoveryNet
     program: Program
-    entry: RecoveryEntry
+    entry: RecoveryModelConfig
     header: Mapping[str, Any]
 
     @property
@@ -83,8 +83,8 @@ def load_recovery(path: Path, expected: Mapping[str, Any] | None = None) -> Trai
     if header["parameters"] != parameter_descriptions(program):
         raise CheckpointError(f"{path} is of a {program.name} with other parameters than it has now: train it anew")
     # what a network is has not changed where keys of its training have gone
-    settings = {key: value for key, value in header["settings"].items() if key in RecoveryEntry.model_fields}
-    entry = RecoveryEntry.model_validate({"name": "trained", **settings})
+    settings = {key: value for key, value in header["settings"].items() if key in RecoveryModelConfig.model_fields}
+    entry = RecoveryModelConfig.model_validate({"name": "trained", **settings})
     module = RecoveryNet(entry, program.parameters)
     module.load_state_dict(_in_floats(tensors))
     return TrainedRecovery(module.eval(), program, entry, header)

@@ -20,14 +20,14 @@ from pipeline.stage import Outcome, Task
 from stages.programs.program import Program, find_program
 from stages.shape.arrays import FloatArray
 from stages.sketches.settings import SketchesConfig
-from stages.training.loop import device_of
+from stages.training.loop import resolve_device
 from stages.training.recovery.augmentation import augment_clouds, augment_drawings, quantized_cloud, unpack_drawings
 from stages.training.recovery.clouds import frame_of
 from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.estimate import estimate_from_probabilities
 from stages.training.recovery.model import RecoveryNet
 from stages.training.recovery.outputs import ParameterOutputs
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TRAIN_INTERVAL, VALIDATION_INTERVAL, nearest_valid_values, random_shapes
 from stages.training.recovery.surface import sample_points, shape_points, squared_chamfer_distance
 
@@ -80,12 +80,12 @@ def prepare(task: Task) -> Outcome:
     return Outcome(samples=0, summary={"shapes": params["shapes"]})
 
 
-def entry(settings: Mapping[str, Any]) -> RecoveryEntry:
+def entry(settings: Mapping[str, Any]) -> RecoveryModelConfig:
     """The entry whose JSON is `settings`."""
-    return RecoveryEntry.model_validate(settings)
+    return RecoveryModelConfig.model_validate(settings)
 
 
-def learner(task: Task, entry: RecoveryEntry, seed: int) -> RecoveryLearner:
+def learner(task: Task, entry: RecoveryModelConfig, seed: int) -> RecoveryTask:
     """A network with fresh weights beside what it learns from."""
     from safetensors.numpy import load_file
 
@@ -102,11 +102,11 @@ def learner(task: Task, entry: RecoveryEntry, seed: int) -> RecoveryLearner:
     }
     learnt = [load_file(task.input("training", f"{pool}.safetensors")) for pool in pools]
     train = {key: np.concatenate([each[key] for each in learnt]) for key in ("inputs", "classes")}
-    module = new_network(entry, program, seed).to(device_of(entry.device))
-    return RecoveryLearner(module, header, entry, program, train, load_file(judged), described["texts"])
+    module = new_network(entry, program, seed).to(resolve_device(entry.device))
+    return RecoveryTask(module, header, entry, program, train, load_file(judged), described["texts"])
 
 
-def new_network(entry: RecoveryEntry, program: Program, seed: int) -> RecoveryNet:
+def new_network(entry: RecoveryModelConfig, program: Program, seed: int) -> RecoveryNet:
     """A network for a program with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -119,12 +119,12 @@ def parameter_descriptions(program: Program) -> list[list[Any]]:
 
 
 @dataclass(frozen=True)
-class RecoveryLearner:
+class RecoveryTask:
     """The `Learner` of a recovery model. train, val: their `inputs` and `classes`; texts: the validation shapes."""
 
     module: RecoveryNet
     header: Mapping[str, Any]
-    entry: RecoveryEntry
+    entry: RecoveryModelConfig
     program: Program
     train: Mapping[str, npt.NDArray[Any]]
     val: Mapping[str, npt.NDArray[Any]]

@@ -11,11 +11,11 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from stages.training.bucketing import pooled
+from stages.training.bucketing import bucket_batches
 
 
 @dataclass(frozen=True)
-class Strings:
+class StringCorpus:
     """Strings of one kit and split.
 
     tokens: int16, all strings behind each other, each with its end; first: int64 (strings + 1,), where each begins;
@@ -30,7 +30,7 @@ class Strings:
     histograms: npt.NDArray[np.int32]
 
     @classmethod
-    def of(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> Strings:
+    def of(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> StringCorpus:
         return cls(**{name: arrays[name] for name in cls.__dataclass_fields__})
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
@@ -52,7 +52,7 @@ class Strings:
 
 
 @dataclass(frozen=True)
-class Batch:
+class StringBatch:
     """read: int64 (n, longest read), the strings that the encoder reads, END behind their ends; codes: int64 (n,
     longest), those that the decoder is to write; read_lengths, lengths: int64 (n,), with their ends; allowed: bool (n,
     longest, vocabulary), of `codes`; open_until: int64 (n, longest), for each of `codes` at which a cycle begins the
@@ -66,32 +66,34 @@ class Batch:
     open_until: Tensor
     histograms: Tensor
 
-    def to(self, device: torch.device) -> Batch:
+    def to(self, device: torch.device) -> StringBatch:
         """The batch on another device; lengths stay."""
-        return Batch(
+        return StringBatch(
             **{name: tensor if name.endswith("lengths") else tensor.to(device) for name, tensor in vars(self).items()}
         )
 
 
 def batches(
-    strings: Strings, size: int, vocabulary: int, canonical: bool, rng: np.random.Generator | None
-) -> Iterator[Batch]:
+    strings: StringCorpus, size: int, vocabulary: int, canonical: bool, rng: np.random.Generator | None
+) -> Iterator[StringBatch]:
     """All strings once, in random order and in batches of strings of like length; with no `rng`, in their order.
 
     canonical: whether the canonical string of the graph is to be written, or the one that was read.
     """
     written = strings.canonical if canonical else np.arange(len(strings))
-    for rows in pooled(strings.lengths, size, rng):
+    for rows in bucket_batches(strings.lengths, size, rng):
         yield _batch(strings, rows, written[rows], vocabulary)
 
 
-def _batch(strings: Strings, read: npt.NDArray[np.int64], written: npt.NDArray[np.int64], vocabulary: int) -> Batch:
+def _batch(
+    strings: StringCorpus, read: npt.NDArray[np.int64], written: npt.NDArray[np.int64], vocabulary: int
+) -> StringBatch:
     """The batch of the strings that are read and of those that are to be written, int64 (n,) each."""
     there, at = _padded(strings, written)
     allowed = np.unpackbits(strings.masks[at], axis=-1, count=vocabulary, bitorder="little").astype(np.bool_)
     allowed[~there] = True
     codes = _codes(strings, there, at)
-    return Batch(
+    return StringBatch(
         read=_codes(strings, *_padded(strings, read)),
         read_lengths=torch.from_numpy(strings.lengths[read]),
         codes=codes,
@@ -102,7 +104,7 @@ def _batch(strings: Strings, read: npt.NDArray[np.int64], written: npt.NDArray[n
     )
 
 
-def _padded(strings: Strings, rows: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
+def _padded(strings: StringCorpus, rows: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
     """Which places of some strings, padded to the longest, are theirs, bool (n, longest), and which token stands there,
     int64, 0 where none does."""
     lengths = strings.lengths[rows]
@@ -111,7 +113,7 @@ def _padded(strings: Strings, rows: npt.NDArray[np.int64]) -> tuple[npt.NDArray[
     return there, np.where(there, strings.first[rows][:, None] + place, 0)
 
 
-def _codes(strings: Strings, there: npt.NDArray[np.bool_], at: npt.NDArray[np.int64]) -> Tensor:
+def _codes(strings: StringCorpus, there: npt.NDArray[np.bool_], at: npt.NDArray[np.int64]) -> Tensor:
     return torch.from_numpy(np.where(there, strings.tokens[at], 0).astype(np.int64))
 
 

@@ -18,14 +18,14 @@ from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import CompiledGrammar, compile_grammar, patterns_json
 from stages.strings.settings import StringsConfig
 from stages.strings.tokens import number_value, split_tokens
-from stages.training.string_vae.batches import Strings
-from stages.training.string_vae.vocabulary import END, Vocabulary
+from stages.training.string_vae.batches import StringCorpus
+from stages.training.string_vae.vocabulary import END_TOKEN, Vocabulary
 
 Masks = npt.NDArray[np.bool_]
 
 
 def prepare_corpus(task: Task) -> Outcome:
-    """Files of the shard: `.<split>.safetensors`, the `Strings` of each split; `.json`, what the tokens stand for.
+    """Files of the shard: `.<split>.safetensors`, the `StringCorpus` of each split; `.json`, what the tokens stand for.
 
     The strings of train say which cycle numbers there are; strings of other splits with more are refused, and so are
     those of more than `longest` tokens, and those that train has as well; and with its first, canonical string all of a
@@ -71,7 +71,7 @@ def prepare_corpus(task: Task) -> Outcome:
     return Outcome(samples=0, summary=counts)
 
 
-def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], Vocabulary, dict[str, Strings]]:
+def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], Vocabulary, dict[str, StringCorpus]]:
     """What `prepare_corpus` wrote in shard `data`: a description, the vocabulary, the strings of train and val."""
     from safetensors.numpy import load_file
 
@@ -80,7 +80,7 @@ def read_corpus(task: Task, data: str) -> tuple[dict[str, Any], Vocabulary, dict
     paths: Mapping[str, Path] = {
         split: task.input("training", f"{data}.{split}.safetensors") for split in ("train", "val")
     }
-    return described, vocabulary, {split: Strings.of(load_file(path)) for split, path in paths.items()}
+    return described, vocabulary, {split: StringCorpus.of(load_file(path)) for split, path in paths.items()}
 
 
 def _strings_of(task: Task, kit: str, shard: str) -> Iterator[tuple[str, list[str]]]:
@@ -103,14 +103,14 @@ def _followed(rules: CompiledGrammar, vocabulary: Vocabulary, codes: npt.NDArray
     from stages.strings.grammar_mask import masks_along
 
     try:
-        return masks_along(rules, vocabulary.cycles, np.append(codes, END).astype(np.int64))
+        return masks_along(rules, vocabulary.cycles, np.append(codes, END_TOKEN).astype(np.int64))
     except ValueError:
         return None
 
 
 def _numbered(
     task: Task, vocabulary: Vocabulary, rules: CompiledGrammar, shapes: list[list[str]], elsewhere: set[str]
-) -> tuple[Strings, int]:
+) -> tuple[StringCorpus, int]:
     """The strings that are not `elsewhere`, with their masks, and the most tokens that any beginning of them needs."""
     types = len(vocabulary.alphabet.tokens)
     codes: list[npt.NDArray[np.int16]] = [np.empty(0, np.int16)]
@@ -136,12 +136,12 @@ def _numbered(
                 task.reject(string, "not admitted by the grammar")
                 continue
             masks.append(np.packbits(followed[0], axis=-1, bitorder="little"))
-            codes.append(np.append(each, np.int16(END)))
+            codes.append(np.append(each, np.int16(END_TOKEN)))
             graph.append(len(histograms))
             most = max(most, followed[1])
         if len(graph) > before:
             histograms.append(np.bincount(codes[-1], minlength=types + 1)[1 : types + 1])
-    return Strings(
+    return StringCorpus(
         tokens=np.concatenate(codes),
         first=np.cumsum([len(each) for each in codes], dtype=np.int64),
         masks=np.concatenate(masks),
@@ -155,7 +155,7 @@ def _knows(vocabulary: Vocabulary, string: str) -> bool:
     return all(number is None or number < vocabulary.cycles for number in numbers)
 
 
-def _write(task: Task, file: str, strings: Strings) -> None:
+def _write(task: Task, file: str, strings: StringCorpus) -> None:
     from safetensors.numpy import save
 
     with task.output(file) as stream:

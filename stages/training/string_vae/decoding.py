@@ -12,16 +12,16 @@ from torch import Tensor
 
 from stages.strings.compiled_grammar import CompiledGrammar
 from stages.training.string_vae.model import StringVae
-from stages.training.string_vae.vocabulary import END
+from stages.training.string_vae.vocabulary import END_TOKEN
 
-AT_ONCE = 256
+STRINGS_PER_BATCH = 256
 """Strings that are written side by side."""
-TRIES = 8
+MAX_DEAD_ENDS = 8
 """After so many dead ends a string is ended without further cycles."""
 
 
 @dataclass
-class Draft:
+class PartialString:
     """One string on its way. kept: its tokens up to where it was cut; banned: tokens that must not come next there;
     acyclic: whether no cycle may begin any more; ends: dead ends so far."""
 
@@ -39,7 +39,7 @@ class Draft:
         the end that opens none, unless none of its strings is a tree.
         """
         self.ends += 1
-        if self.ends == TRIES:
+        if self.ends == MAX_DEAD_ENDS:
             self.kept, self.banned, self.acyclic = self.codes[: self._last_acyclic(numbers)], set(), True
             return
         place = max(len(self.codes) - 2 ** (self.ends - 1), 0)
@@ -60,7 +60,7 @@ class Draft:
 
 
 @torch.no_grad()
-def write_codes(
+def decode_codes(
     module: StringVae,
     points: npt.NDArray[np.float32],
     most: int,
@@ -68,7 +68,7 @@ def write_codes(
     cycles: int,
     rng: np.random.Generator | None,
     temperature: float,
-    begun: Sequence[Draft] = (),
+    begun: Sequence[PartialString] = (),
 ) -> list[list[int]]:
     """The tokens of a string for each point, float32 (n, latent), at most `most`, without an end.
 
@@ -79,11 +79,11 @@ def write_codes(
     """
     module.eval()
     found: list[list[int]] = []
-    for start in range(0, len(points), AT_ONCE):
-        here = torch.from_numpy(points[start : start + AT_ONCE])
-        drafts = list(begun[start : start + AT_ONCE]) or [Draft() for _ in range(len(here))]
+    for start in range(0, len(points), STRINGS_PER_BATCH):
+        here = torch.from_numpy(points[start : start + STRINGS_PER_BATCH])
+        drafts = list(begun[start : start + STRINGS_PER_BATCH]) or [PartialString() for _ in range(len(here))]
         waiting = list(range(len(drafts)))
-        for _ in range(TRIES + 1 if rules is not None else 1):
+        for _ in range(MAX_DEAD_ENDS + 1 if rules is not None else 1):
             ended = _write(
                 module, here[waiting], [drafts[row] for row in waiting], most, rules, cycles, rng, temperature
             )
@@ -100,7 +100,7 @@ def write_codes(
 def _write(
     module: StringVae,
     points: Tensor,
-    drafts: list[Draft],
+    drafts: list[PartialString],
     most: int,
     rules: CompiledGrammar | None,
     cycles: int,
@@ -114,7 +114,7 @@ def _write(
     points = points.to(device)
     acceptor = None if rules is None else GrammarMask(rules, cycles, len(drafts), most)
     state = module.start(points)
-    shown = torch.full((len(drafts),), END, device=device)
+    shown = torch.full((len(drafts),), END_TOKEN, device=device)
     ended, dead = np.zeros(len(drafts), np.bool_), np.zeros(len(drafts), np.bool_)
     for draft in drafts:
         draft.codes = []
@@ -137,11 +137,11 @@ def _write(
                     scores[row, scores.shape[1] - cycles :] = -np.inf
             tokens = acceptor.choose(scores, kept)
             dead |= (tokens == NO_TOKEN) & ~ended
-        tokens[dead | ended] = END
+        tokens[dead | ended] = END_TOKEN
         for row in np.flatnonzero(~dead & ~ended).tolist():
-            if tokens[row] != END:
+            if tokens[row] != END_TOKEN:
                 drafts[row].codes.append(int(tokens[row]))
-        ended |= (tokens == END) & ~dead
+        ended |= (tokens == END_TOKEN) & ~dead
         if (ended | dead).all():
             break
         if acceptor is not None:

@@ -14,9 +14,9 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from stages.shape.graphs.histograms import histogram_metric
 
-NEAREST_POINTS = 4
+POINT_NEIGHBOURS = 4
 """Neighbours of a node in the search graph besides its equals: "between 3 and 5" (strings §5.3)."""
-NEAREST_STRINGS = 3
+STRING_NEIGHBOURS = 3
 """The same in the naive graph (strings Table 2)."""
 
 Links = npt.NDArray[np.int64]
@@ -42,12 +42,12 @@ def search_graph(points: npt.NDArray[np.float32], graphs: Sequence[str], histogr
     points: float32 (n, latent); graphs: what names the shape graph of each; histograms: int64 (n, types), its parts.
     The weights are E: 0 between equals. float64 (n, n), symmetric; a zero that is stored is an edge.
     """
-    return _weighted(nearest_points(points, NEAREST_POINTS), graphs, histograms)
+    return _weighted(nearest_points(points, POINT_NEIGHBOURS), graphs, histograms)
 
 
 def naive_graph(codes: Sequence[Codes], graphs: Sequence[str], histograms: Histograms) -> csr_matrix:
     """The same, but joined to the nearest strings by edit distance of their tokens (strings Table 2)."""
-    return _weighted(nearest_strings(codes, NEAREST_STRINGS), graphs, histograms)
+    return _weighted(nearest_strings(codes, STRING_NEIGHBOURS), graphs, histograms)
 
 
 def path_figures(graph: csr_matrix) -> PathFigures:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from stages.training.string_vae.settings import StringVaeEntry
-from stages.training.string_vae.vocabulary import END
-from stages.training.transformer import Block
+from stages.training.string_vae.settings import StringVaeConfig
+from stages.training.string_vae.vocabulary import END_TOKEN
+from stages.training.transformer import TransformerBlock
 
 DecoderState = list[Tensor]
 
@@ -19,19 +19,19 @@ class StringVae(nn.Module):
     point at each (as in the model that the paper builds on).
     """
 
-    def __init__(self, entry: StringVaeEntry, tokens: int, cycles: int, longest: int) -> None:
+    def __init__(self, entry: StringVaeConfig, tokens: int, cycles: int, longest: int) -> None:
         """For `tokens` kinds of tokens, of which the last `cycles` are the numbers of cycles."""
         super().__init__()
         self.embedding = nn.Embedding(tokens, entry.embedding)
         self.readers = nn.ModuleList(nn.GRU(entry.embedding, entry.hidden // 2, batch_first=True) for _ in range(2))
         self.mean = nn.Linear(entry.hidden, entry.latent)
         self.log_variance = nn.Linear(entry.hidden, entry.latent)
-        self.decoder: Decoder
+        self.decoder: TokenDecoder
         if entry.decoder == "transformer":
             self.decoder = TransformerDecoder(entry, tokens, longest)
         else:
             self.decoder = GruDecoder(entry, tokens)
-        looks_back = entry.look_back and entry.decoder != "plain"
+        looks_back = entry.cycle_attention and entry.decoder != "plain"
         self.ends = CycleEnds(entry.hidden, tokens, cycles) if looks_back else None
 
     def encode(self, codes: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
@@ -57,7 +57,7 @@ class StringVae(nn.Module):
         bool (n, longest), whether something that is shown is kept from the decoder: it sees END in its place.
         """
         logits: Tensor
-        seen = shown if hidden is None else shown.masked_fill(hidden, END)
+        seen = shown if hidden is None else shown.masked_fill(hidden, END_TOKEN)
         logits, written = self.decoder(seen, points)
         if self.ends is not None:
             logits = self.ends(logits, written, shown, open_until)
@@ -121,7 +121,7 @@ class CycleEnds(nn.Module):
         return logits, [keys, is_open]
 
 
-class Decoder(nn.Module):
+class TokenDecoder(nn.Module):
     """What all decoders do: `forward` for whole strings, `start` and `step` for one token after another. Each answers
     logits, and what it has written at each token, from which they come."""
 
@@ -135,10 +135,10 @@ class Decoder(nn.Module):
         raise NotImplementedError
 
 
-class GruDecoder(Decoder):
+class GruDecoder(TokenDecoder):
     """A GRU that begins with the latent point and sees it beside each token."""
 
-    def __init__(self, entry: StringVaeEntry, tokens: int) -> None:
+    def __init__(self, entry: StringVaeConfig, tokens: int) -> None:
         super().__init__()
         self.layers = entry.layers
         self.embedding = nn.Embedding(tokens, entry.embedding)
@@ -163,15 +163,15 @@ class GruDecoder(Decoder):
         return state[0].transpose(0, 1).contiguous()
 
 
-class TransformerDecoder(Decoder):
+class TransformerDecoder(TokenDecoder):
     """A transformer whose tokens see those before them, the latent point added to each."""
 
-    def __init__(self, entry: StringVaeEntry, tokens: int, longest: int) -> None:
+    def __init__(self, entry: StringVaeConfig, tokens: int, longest: int) -> None:
         super().__init__()
         self.embedding = nn.Embedding(tokens, entry.hidden)
         self.places = nn.Embedding(longest + 1, entry.hidden)
         self.point = nn.Linear(entry.latent, entry.hidden)
-        self.blocks = nn.ModuleList(Block(entry.hidden, entry.dropout) for _ in range(entry.layers))
+        self.blocks = nn.ModuleList(TransformerBlock(entry.hidden, entry.dropout) for _ in range(entry.layers))
         self.norm = nn.LayerNorm(entry.hidden)
         self.logits = nn.Linear(entry.hidden, tokens)
 
@@ -199,4 +199,4 @@ class TransformerDecoder(Decoder):
 
 def shifted(codes: Tensor) -> Tensor:
     """What a decoder sees at each place of strings int64 (n, longest): the token before it, at first the end."""
-    return torch.cat([torch.full_like(codes[:, :1], END), codes[:, :-1]], dim=1)
+    return torch.cat([torch.full_like(codes[:, :1], END_TOKEN), codes[:, :-1]], dim=1)

@@ -6,10 +6,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from stages.training.model_config import KitModelEntry
+from stages.training.model_config import KitModelConfig
 
 
-class StringVaeEntry(KitModelEntry):
+class StringVaeConfig(KitModelConfig):
     """A string VAE (strings §5). Sizes are not published: these train in minutes on one core."""
 
     kind: Literal["string_vae"] = Field("string_vae", description="a variational autoencoder of strings")
@@ -30,7 +30,7 @@ class StringVaeEntry(KitModelEntry):
         256, ge=2, le=8192, multiple_of=2, description="size of the GRUs, or width of the transformer; even"
     )
     layers: int = Field(1, ge=1, le=24, description="layers of the decoder")
-    look_back: bool = Field(
+    cycle_attention: bool = Field(
         True,
         description="whether a masked decoder judges the end of an open cycle by what it wrote where the cycle began, "
         "too; strings of a hundred parts need it",

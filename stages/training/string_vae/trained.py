@@ -17,15 +17,15 @@ from stages.strings.decoder import decode
 from stages.strings.encoder import canonical_string
 from stages.strings.tokens import StringError
 from stages.training.checkpoint import load_checkpoint
-from stages.training.string_vae.decoding import Draft, write_codes
+from stages.training.string_vae.decoding import PartialString, decode_codes
 from stages.training.string_vae.model import StringVae
-from stages.training.string_vae.settings import StringVaeEntry
-from stages.training.string_vae.vocabulary import END, Vocabulary
+from stages.training.string_vae.settings import StringVaeConfig
+from stages.training.string_vae.vocabulary import END_TOKEN, Vocabulary
 
-Points = npt.NDArray[np.float32]
+LatentPoints = npt.NDArray[np.float32]
 """Points of a latent space, float32 (n, latent)."""
 
-AT_ONCE = 256
+STRINGS_PER_BATCH = 256
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ class TrainedStringVae:
         return canonical_string(graph.types, graph.edges, alphabet).string
 
     @torch.no_grad()
-    def encode(self, strings: Sequence[str]) -> Points:
+    def encode(self, strings: Sequence[str]) -> LatentPoints:
         """The mean of each string in the latent space. Raises StringError for a token that is not known, and ValueError
         for an empty string."""
-        means: list[Points] = [np.empty((0, self.latent), np.float32)]
+        means: list[LatentPoints] = [np.empty((0, self.latent), np.float32)]
         device = next(self.module.parameters()).device
-        for start in range(0, len(strings), AT_ONCE):
+        for start in range(0, len(strings), STRINGS_PER_BATCH):
             codes = [
-                np.append(self.vocabulary.codes(each), END).astype(np.int64)
-                for each in strings[start : start + AT_ONCE]
+                np.append(self.vocabulary.codes(each), END_TOKEN).astype(np.int64)
+                for each in strings[start : start + STRINGS_PER_BATCH]
             ]
             lengths = torch.tensor([len(each) for each in codes])
             padded = np.zeros((len(codes), int(lengths.max())), np.int64)
@@ -76,10 +76,10 @@ class TrainedStringVae:
 
     def decode(
         self,
-        points: Points,
+        points: LatentPoints,
         rng: np.random.Generator | None,
         temperature: float = 1.0,
-        begun: Sequence[Draft] = (),
+        begun: Sequence[PartialString] = (),
     ) -> list[str]:
         """A string for each point: each token drawn at a temperature, or, without `rng`, the likeliest. Those that are
         `begun`, one for each point, go on from there.
@@ -88,7 +88,7 @@ class TrainedStringVae:
         """
         rules = self.rules if self.is_masked else None
         most, cycles = self.header["most"], self.vocabulary.cycles
-        written = write_codes(self.module, points, most, rules, cycles, rng, temperature, begun)
+        written = decode_codes(self.module, points, most, rules, cycles, rng, temperature, begun)
         return [self.vocabulary.string(each) for each in written]
 
     def is_valid(self, string: str) -> bool:
@@ -96,7 +96,7 @@ class TrainedStringVae:
         from stages.strings.grammar_mask import follows_grammar
 
         try:
-            codes = np.append(self.vocabulary.codes(string), END).astype(np.int64)
+            codes = np.append(self.vocabulary.codes(string), END_TOKEN).astype(np.int64)
         except StringError:
             return False
         return follows_grammar(self.rules, self.vocabulary.cycles, codes)
@@ -110,8 +110,8 @@ def load_string_vae(path: Path, expected: Mapping[str, Any] | None = None) -> Tr
     """
     tensors, header = load_checkpoint(path, {"kind": "string_vae", **(expected or {})})
     vocabulary = Vocabulary(make_alphabet(header["names"]), header["cycles"])
-    # weights from before there was `look_back` have none
-    entry = StringVaeEntry.model_validate({"name": "trained", "look_back": False, **header["settings"]})
+    # weights from before there was `cycle_attention` have none
+    entry = StringVaeConfig.model_validate({"name": "trained", "cycle_attention": False, **header["settings"]})
     module = StringVae(entry, len(vocabulary), header["cycles"], header["most"] + 1)
     module.load_state_dict(tensors)
     return TrainedStringVae(module.eval(), vocabulary, compile_patterns(header["patterns"], header["cycles"]), header)

@@ -13,13 +13,13 @@ from torch.nn.functional import relu
 
 from pipeline.stage import Outcome, Task
 from stages.shape.graphs.histograms import histogram_metric
-from stages.training.loop import device_of
-from stages.training.string_vae.batches import Batch, Strings, batches
+from stages.training.loop import resolve_device
+from stages.training.string_vae.batches import StringBatch, StringCorpus, batches
 from stages.training.string_vae.corpus import prepare_corpus, read_corpus
 from stages.training.string_vae.model import StringVae, shifted
-from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.vocabulary import Vocabulary
-from stages.training.training_task import mean_figures, sample_digests
+from stages.training.training_task import sample_digests, weighted_means
 
 ANNEAL_STEEPNESS = 12.0
 """The weight of the divergence goes from 0.25 % to 99.75 % of its value along its S."""
@@ -30,15 +30,15 @@ def prepare(task: Task) -> Outcome:
     return prepare_corpus(task)
 
 
-def entry(settings: Mapping[str, Any]) -> StringVaeEntry:
+def entry(settings: Mapping[str, Any]) -> StringVaeConfig:
     """The entry whose JSON is `settings`."""
-    return StringVaeEntry.model_validate(settings)
+    return StringVaeConfig.model_validate(settings)
 
 
-def learner(task: Task, entry: StringVaeEntry, seed: int) -> StringVaeLearner:
+def learner(task: Task, entry: StringVaeConfig, seed: int) -> StringVaeTask:
     """A string VAE with fresh weights beside the strings of its kit."""
     described, vocabulary, strings = read_corpus(task, task.shard.params["data"])
-    device = device_of(entry.device)
+    device = resolve_device(entry.device)
     canonical = entry.target == "canonical" and described["edges"] != "tree"  # of a tree's graph there are many trees
     header = {
         **{key: described[key] for key in ("names", "edges", "cycles", "most", "patterns", "counts")},
@@ -47,10 +47,10 @@ def learner(task: Task, entry: StringVaeEntry, seed: int) -> StringVaeLearner:
         "data": sample_digests(task, "safetensors"),
     }
     module = new_model(entry, vocabulary, described["most"], seed).to(device)
-    return StringVaeLearner(module, header, entry, vocabulary, canonical, strings["train"], strings["val"])
+    return StringVaeTask(module, header, entry, vocabulary, canonical, strings["train"], strings["val"])
 
 
-def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, most: int, seed: int) -> StringVae:
+def new_model(entry: StringVaeConfig, vocabulary: Vocabulary, most: int, seed: int) -> StringVae:
     """A model of strings of at most `most` tokens with random weights, by its seed alone."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -58,7 +58,7 @@ def new_model(entry: StringVaeEntry, vocabulary: Vocabulary, most: int, seed: in
 
 
 @dataclass(frozen=True)
-class StringVaeLearner:
+class StringVaeTask:
     """The `Learner` of a string VAE.
 
     canonical: whether the decoder learns the canonical string of the graph instead of the one that was read.
@@ -66,20 +66,20 @@ class StringVaeLearner:
 
     module: StringVae
     header: Mapping[str, Any]
-    entry: StringVaeEntry
+    entry: StringVaeConfig
     vocabulary: Vocabulary
     canonical: bool
-    train: Strings
-    val: Strings
+    train: StringCorpus
+    val: StringCorpus
 
-    def batches(self, rng: np.random.Generator) -> Iterator[Batch]:
+    def batches(self, rng: np.random.Generator) -> Iterator[StringBatch]:
         """Random batches of train, one pass after another."""
         device = next(self.module.parameters()).device
         while True:
             for batch in self._batches(self.train, rng):
                 yield batch.to(device)
 
-    def losses(self, batch: Batch, step: int, noise: Generator) -> dict[str, Tensor]:
+    def losses(self, batch: StringBatch, step: int, noise: Generator) -> dict[str, Tensor]:
         """Nats of a string, the divergence from the prior, and the triplet loss where it is asked for."""
         mean, log_variance = self.module.encode(batch.read, batch.read_lengths)
         points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
@@ -100,9 +100,9 @@ class StringVaeLearner:
         likeliest where all before them are right."""
         device = next(self.module.parameters()).device
         val = (each.to(device) for each in self._batches(self.val, None))
-        return mean_figures(((self._figures(each, noise), len(each.codes)) for each in val), len(self.val))
+        return weighted_means(((self._figures(each, noise), len(each.codes)) for each in val), len(self.val))
 
-    def _figures(self, batch: Batch, noise: Generator) -> dict[str, Tensor]:
+    def _figures(self, batch: StringBatch, noise: Generator) -> dict[str, Tensor]:
         mean, log_variance = self.module.encode(batch.read, batch.read_lengths)
         points = mean + torch.exp(0.5 * log_variance) * _normal(mean, noise)
         logits = self.module.decode(shifted(batch.codes), points, batch.open_until)
@@ -111,10 +111,10 @@ class StringVaeLearner:
         loss = nats + self.entry.kl_weight * divergence
         return {"loss": loss, "nats": nats, "divergence": divergence, "accuracy": accuracy}
 
-    def _batches(self, strings: Strings, rng: np.random.Generator | None) -> Iterator[Batch]:
+    def _batches(self, strings: StringCorpus, rng: np.random.Generator | None) -> Iterator[StringBatch]:
         return batches(strings, self.entry.batch, len(self.vocabulary), self.canonical, rng)
 
-    def _reconstruction(self, logits: Tensor, batch: Batch) -> tuple[Tensor, Tensor]:
+    def _reconstruction(self, logits: Tensor, batch: StringBatch) -> tuple[Tensor, Tensor]:
         """Nats of a string, mean over the batch, and the share of the tokens that are the likeliest."""
         if self.entry.decoder != "plain":
             logits = logits.masked_fill(~batch.allowed, -torch.inf)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from stages.strings.alphabet import Alphabet
 from stages.strings.tokens import StringError, number_text, number_value, split_tokens
 
-END = 0
+END_TOKEN = 0
 """The token that ends a string, and, as what stands before it, begins one."""
 
 
@@ -52,7 +52,7 @@ class Vocabulary:
         """The string of some tokens, up to the first end."""
         texts = []
         for code in codes:
-            if code == END:
+            if code == END_TOKEN:
                 break
             texts.append(self.texts[code])
         return "".join(texts)

@@ -17,10 +17,10 @@ from eval.programs.cloud_reconstruction import (
 )
 from eval.programs.quality import boxes_of_programs, clouds_of
 from stages.shapeassembly import execute_all, parse
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.part_graph_vae.training import new_model as new_part_graph_vae
-from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.program_vae.settings import ProgramVaeConfig
 from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.program_vae.training import new_model
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
@@ -52,9 +52,9 @@ def test_the_score_is_full_for_the_shape_itself_and_none_far_away() -> None:
 
 
 def test_what_a_model_has_is_fitted_as_cuboids_and_as_a_program() -> None:
-    entry = ProgramVaeEntry(name="tiny", kind="program_vae", latent=8, hidden=16)
+    entry = ProgramVaeConfig(name="tiny", kind="program_vae", latent=8, hidden=16)
     programs = TrainedProgramVae(new_model(entry, 0).eval(), {"settings": entry.model_dump()})
-    drawn = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
+    drawn = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
     parts = TrainedPartGraphVae(new_part_graph_vae(drawn, 0).eval(), {"settings": drawn.model_dump()})
     cloud = clouds_of(boxes_of_programs(PROGRAMS[1:]), 256)[0]
     for model, learnt in ((programs, PROGRAMS), (parts, execute_all(PROGRAMS))):

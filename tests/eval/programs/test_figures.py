@@ -18,10 +18,10 @@ from eval.programs.quality import boxes_of_programs, clouds_of
 from stages.shapeassembly import execute_all, parse
 from stages.shapeassembly.analysis.structure import program_distance
 from stages.shapeassembly.extraction.boxes import box_corners
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.part_graph_vae.training import new_model as new_part_graph_vae
-from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.program_vae.settings import ProgramVaeConfig
 from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.program_vae.training import new_model
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
@@ -65,9 +65,9 @@ def test_figures_8_and_9_have_a_picture_for_each_sample() -> None:
 
 
 def test_figure_12_goes_from_shape_to_shape_by_every_model() -> None:
-    entry = ProgramVaeEntry(name="tiny", kind="program_vae", latent=8, hidden=16)
+    entry = ProgramVaeConfig(name="tiny", kind="program_vae", latent=8, hidden=16)
     programs = TrainedProgramVae(new_model(entry, 0).eval(), {"settings": entry.model_dump()})
-    drawn = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
+    drawn = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
     parts = TrainedPartGraphVae(new_part_graph_vae(drawn, 0).eval(), {"settings": drawn.model_dump()})
     assert parts.encode(execute_all(PROGRAMS)).shape == (2, 8)
     models = [TrainedModel("tiny", "box", 0, programs), TrainedModel("parts", "box", 0, parts)]

@@ -19,10 +19,10 @@ from eval.programs.quality import (
 from eval.programs.tables import editability_table, quality_table, smoothness_table, variability_table
 from eval.programs.two_sample_test import Realism
 from stages.shapeassembly import parse
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
 from stages.training.part_graph_vae.training import new_model as new_part_graph_vae
-from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.program_vae.settings import ProgramVaeConfig
 from stages.training.program_vae.trained import TrainedProgramVae
 from stages.training.program_vae.training import new_model
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
@@ -70,14 +70,14 @@ def test_a_cloud_lies_on_the_surface_and_what_train_has_is_not_new() -> None:
 
 
 def test_steps_between_points_are_measured_and_tables_hold_the_published_rows() -> None:
-    entry = ProgramVaeEntry(name="tiny", kind="program_vae", latent=8, hidden=16)
+    entry = ProgramVaeConfig(name="tiny", kind="program_vae", latent=8, hidden=16)
     module = new_model(entry, 0)
     model = TrainedProgramVae(module.eval(), {"settings": entry.model_dump()})
     assert len(unrejected(model, 5, np.random.default_rng(0), 1.0)) == 5
     boxes = boxes_of_programs(PROGRAMS)
     smooth = smoothness(model, 2, 5, np.random.default_rng(0))
     assert smooth[0] == "" or float(smooth[0]) >= 0
-    drawn = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
+    drawn = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=8, hidden=16)
     parts = TrainedPartGraphVae(new_part_graph_vae(drawn, 0).eval(), {"settings": drawn.model_dump()})
     assert smoothness(parts, 2, 5, np.random.default_rng(0))[1] == "", "it writes no programs"
     tables = [

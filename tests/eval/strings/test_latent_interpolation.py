@@ -14,7 +14,7 @@ from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
 from stages.strings.kit_strings import KitStrings
-from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.trained import TrainedStringVae
 from stages.training.string_vae.training import new_model
 from stages.training.string_vae.vocabulary import Vocabulary
@@ -39,7 +39,7 @@ def strings(maker: Instantiator) -> list[str]:
 def model(maker: Instantiator) -> TrainedStringVae:
     vocabulary = Vocabulary(make_alphabet(maker.kit.labels), 2)
     rules = compile_grammar(maker.kit.grammar, len(maker.kit.labels), 2)
-    settings = StringVaeEntry(name="tiny", latent=4, embedding=4, hidden=16)
+    settings = StringVaeConfig(name="tiny", latent=4, embedding=4, hidden=16)
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "most": MOST,

@@ -26,7 +26,7 @@ from pipeline.errors import ConfigError
 from stages.training.checkpoint import checkpoint_bytes
 from stages.training.model_folder import curves_csv
 from stages.training.string_vae.latent_graph import PathFigures
-from stages.training.string_vae.latent_sampling import WAYS, sample
+from stages.training.string_vae.latent_sampling import SAMPLING_METHODS, sample
 from stages.training.string_vae.trained import TrainedStringVae
 from tests.stages.training.string_vae.models import MOST, random_vae, toy_strings, trained_vae
 
@@ -41,7 +41,7 @@ def test_what_was_learnt_by_heart_comes_back_and_what_was_not_does_not() -> None
     assert learnt.tokens > learnt.same
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", SAMPLING_METHODS)
 def test_figures_of_a_way_are_shares_of_what_it_found(way: str) -> None:
     strings = toy_strings()
     model = random_vae("masked")

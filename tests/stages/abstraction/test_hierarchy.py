@@ -8,10 +8,10 @@ import pytest
 from stages.abstraction.hierarchy import Boxes, hierarchy_of
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.shape import Shape
-from stages.shapeassembly.extraction.boxes import around, box_corners, gap
-from stages.shapeassembly.extraction.category_rules import RULES
+from stages.shapeassembly.extraction.boxes import bounding_box, box_corners, box_gap
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
 from stages.shapeassembly.extraction.extract import extract
-from stages.shapeassembly.extraction.hierarchy import Part
+from stages.shapeassembly.extraction.hierarchy import PartNode
 from stages.shapeassembly.extraction.settings import Gates
 
 
@@ -42,7 +42,7 @@ def towers(count: int, storeys: int) -> Shape:
     return shape_of([box("slab", 2.0 * count, 0.5, 2.0), box("cube", 1.0, 1.0, 1.0)], placed)
 
 
-def nodes(part: Part) -> list[Part]:
+def nodes(part: PartNode) -> list[PartNode]:
     return [part, *(below for child in part.children for below in nodes(child))] if part.children else []
 
 
@@ -62,12 +62,14 @@ def test_every_part_is_a_leaf_once_and_assemblies_are_small_and_hang_together(
         reached, edge = {0}, [0]
         while edge:
             here = edge.pop()
-            near = [n for n in range(len(below)) if n not in reached and gap(below[here].box, below[n].box)[0] < 0.01]
+            near = [
+                n for n in range(len(below)) if n not in reached and box_gap(below[here].box, below[n].box)[0] < 0.01
+            ]
             reached.update(near)
             edge += near
         assert len(reached) == len(below)
         corners = np.concatenate([box_corners(leaf.box) for leaf in below])
-        assert np.allclose(around(corners, np.eye(3)).size, node.box.size)
+        assert np.allclose(bounding_box(corners, np.eye(3)).size, node.box.size)
 
 
 def test_a_box_turns_with_its_part_and_a_roof_stands_upright() -> None:
@@ -88,5 +90,5 @@ def test_parts_that_do_not_touch_make_a_wider_node() -> None:
 
 
 def test_towers_on_a_slab_become_a_program_of_their_boxes() -> None:
-    found = extract(hierarchy_of(towers(4, 3), 9, Boxes()), RULES["any"], Gates(fewest_leaves=1, most_leaves=200))
+    found = extract(hierarchy_of(towers(4, 3), 9, Boxes()), CATEGORY_RULES["any"], Gates(min_leaves=1, max_leaves=200))
     assert found.f_score > 99

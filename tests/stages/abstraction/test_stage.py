@@ -37,7 +37,7 @@ def members(root: Path) -> dict[str, bytes]:
 
 
 def test_a_sample_without_a_program_says_why_and_stays(tmp_path: Path) -> None:
-    gates = {"fewest_leaves": 1, "most_leaves": 1}
+    gates = {"min_leaves": 1, "max_leaves": 1}
     found = members(made(tmp_path, "few", {"programs": True, "gates": gates}, ("programs", "abstraction"))[1])
     assert len(found) == 6
     assert all(content == b"" for name, content in found.items() if name.endswith(".txt"))

@@ -26,7 +26,7 @@ from stages.sketches.settings import SketchesConfig, SketchView
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
 from stages.training.recovery.drawings import draw_fitted
 from stages.training.recovery.estimate import base_estimate
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.shapes import TEST_INTERVAL, TRAIN_INTERVAL, VALIDATION_INTERVAL, random_shapes
 from stages.training.recovery.ship import slim_bytes
 from stages.training.recovery.surface import shape_points, squared_chamfer_distance
@@ -164,7 +164,7 @@ def test_command_uses_the_trained_model(kind: str, tmp_path: Path, capsys: pytes
 
 
 def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) -> None:
-    entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
+    entry = RecoveryModelConfig.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
     tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {name: value for name, value in SMALL.items() if name != "name"}
     good = {
@@ -199,7 +199,7 @@ def test_models_that_cannot_be_used_are_told_and_stop_nothing(tmp_path: Path) ->
 
 
 def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_path: Path) -> None:
-    entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
+    entry = RecoveryModelConfig.model_validate({**SMALL, "widths": (8, 8)}, strict=False)
     tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {name: value for name, value in SMALL.items() if name != "name"}
     for folder, loss in (("own/mill-models/a", 3.0), ("own/mill-models/b", 2.5), ("shipped/a", 1.0)):
@@ -228,7 +228,7 @@ def test_own_models_go_before_those_that_ship_and_the_best_before_others(tmp_pat
 def test_weights_too_large_in_halves_ship_their_largest_tensors_as_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    entry = RecoveryEntry.model_validate({**SMALL, "widths": (8, 8), "decoder": (64, 32)}, strict=False)
+    entry = RecoveryModelConfig.model_validate({**SMALL, "widths": (8, 8), "decoder": (64, 32)}, strict=False)
     tensors = new_network(entry, STOOL, 0).state_dict()
     settings = {**{name: value for name, value in SMALL.items() if name != "name"}, "decoder": [64, 32]}
     header = {"kind": "recovery", "program": PROGRAM, "parameters": parameter_descriptions(STOOL), "settings": settings}

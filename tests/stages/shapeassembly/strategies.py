@@ -8,11 +8,11 @@ from stages.shapeassembly.syntax.program import (
     AXES,
     BBOX,
     FACES,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
-    Program,
     Reflect,
     Squeeze,
     Translate,
@@ -23,12 +23,12 @@ SIZES = st.integers(20, 100).map(lambda number: number / 100)
 
 
 @st.composite
-def programs(draw: st.DrawFn, depth: int = 2, aligned: bool = False) -> Program:
+def programs(draw: st.DrawFn, depth: int = 2, aligned: bool = False) -> AssemblyProgram:
     """Programs of at most `depth` levels; aligned: without cuboids that turn."""
     blocks: list[Block] = []
     size = (draw(SIZES) * 2, draw(SIZES) * 2, draw(SIZES) * 2)
     _draw_block(draw, blocks, size, depth, aligned)
-    return Program(tuple(sorted(blocks, key=lambda block: int(block.name.partition("_")[2]))))
+    return AssemblyProgram(tuple(sorted(blocks, key=lambda block: int(block.name.partition("_")[2]))))
 
 
 def _draw_block(

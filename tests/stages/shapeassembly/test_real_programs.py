@@ -8,7 +8,7 @@ import pytest
 from stages.shapeassembly import execute, execute_all, parse, print_program
 from stages.shapeassembly.analysis.statistics import cluster_curves, program_statistics
 from stages.shapeassembly.syntax.checks import overflow, violations
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from tests.stages.shapeassembly.shared_programs import CATEGORIES, SHARED, needs_shared, shared_texts
 
 pytestmark = needs_shared
@@ -20,13 +20,13 @@ def category(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope="module")
-def programs(category: str) -> list[Program]:
+def programs(category: str) -> list[AssemblyProgram]:
     """All programs of a category, in the order of their texts: of one category at a time, for they are many."""
     return [parse(text) for text in shared_texts(category).values()]
 
 
 def test_every_program_prints_back_equal_and_is_executed_to_finite_boxes(
-    category: str, programs: list[Program]
+    category: str, programs: list[AssemblyProgram]
 ) -> None:
     texts = shared_texts(category)
     assert len(texts) == CATEGORIES[category]
@@ -66,7 +66,7 @@ PUBLISHED = {
 Reflects are left out: the table's 0.0880 for chairs and its total do not agree by 0.003, ours do."""
 
 
-def test_statistics_are_the_published_ones(category: str, programs: list[Program]) -> None:
+def test_statistics_are_the_published_ones(category: str, programs: list[AssemblyProgram]) -> None:
     found = program_statistics(programs)
     lines, translates, squeezes, macros, parts = PUBLISHED[category]
     assert found.lines == pytest.approx(lines, abs=0.1)

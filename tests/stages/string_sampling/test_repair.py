@@ -13,7 +13,7 @@ from stages.string_sampling.instantiation.state import STANDARD_METHOD
 from stages.string_sampling.repair import first_impossible_token, repair_strings
 from stages.strings.alphabet import make_alphabet
 from stages.strings.decoder import decode
-from stages.training.string_vae.latent_sampling import Found, sample
+from stages.training.string_vae.latent_sampling import LatentSearchResult, sample
 from stages.training.string_vae.trained import TrainedStringVae, load_string_vae
 from tests.stages.string_sampling.trained_model import publish_model
 from tests.toy_kits.chains_and_rings import ROAD, kit_of, ring
@@ -73,8 +73,8 @@ def test_what_goes_wrong_goes_on_otherwise_from_its_first_wrong_token(
     assert kept > 6  # others came to a dead end and went farther back
     assert repair_strings(model, found, roads, LOOSE, 1, 0) == once
     assert repair_strings(model, found, roads, LOOSE, 0, 0) == drawn
-    assert repair_strings(model, [Found(None, 1, 0, found[0].point)], roads, LOOSE, 8, 0) == [None]
+    assert repair_strings(model, [LatentSearchResult(None, 1, 0, found[0].point)], roads, LOOSE, 8, 0) == [None]
     lone = model.vocabulary.alphabet.tokens[0]
-    (other,) = repair_strings(model, [Found(lone, 1, 1, found[0].point)], roads, LOOSE, 1, 0)
+    (other,) = repair_strings(model, [LatentSearchResult(lone, 1, 1, found[0].point)], roads, LOOSE, 1, 0)
     assert other is not None
     assert not other.startswith(lone)

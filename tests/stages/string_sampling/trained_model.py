@@ -13,7 +13,7 @@ from stages.shape.kit import Kit
 from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.training.checkpoint import checkpoint_bytes
-from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.training import new_model
 from stages.training.string_vae.vocabulary import Vocabulary
 
@@ -26,8 +26,8 @@ def publish_model(
     """Put a model called `tiny`, its header `changed`, and the training strings of a dataset below `out`; the path of
     the weights."""
     vocabulary = Vocabulary(make_alphabet(kit.labels), 1)
-    sizes = {"latent": 4, "embedding": 4, "hidden": 16, "rounds": 1, "decoder": "masked", "look_back": False}
-    entry = StringVaeEntry.model_validate({"name": "tiny", "kind": "string_vae", **sizes})
+    sizes = {"latent": 4, "embedding": 4, "hidden": 16, "rounds": 1, "decoder": "masked", "cycle_attention": False}
+    entry = StringVaeConfig.model_validate({"name": "tiny", "kind": "string_vae", **sizes})
     module = new_model(entry, vocabulary, MOST, 7)
     header = {
         "kind": "string_vae",

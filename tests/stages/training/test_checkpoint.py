@@ -9,7 +9,7 @@ import pytest
 import torch
 from safetensors.torch import save
 
-from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint, weights_header
+from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint, read_header
 
 TENSORS = {"b": torch.arange(6.0).reshape(2, 3), "a": torch.ones(4, dtype=torch.int64)}
 HEADER = {"kit": "castle", "tokens": ["", "A", "B", "(", ")"]}
@@ -63,12 +63,12 @@ def test_weights_of_somebody_else_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("header", ["{", "[]", "null", "[" * 100_000])
 def test_header_that_is_no_mapping_is_refused(tmp_path: Path, header: str) -> None:
     with pytest.raises(CheckpointError, match="what its header says of itself is no"):
-        weights_header(written(tmp_path, save(TENSORS, {"shapemill": header})))
+        read_header(written(tmp_path, save(TENSORS, {"shapemill": header})))
 
 
 def test_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CheckpointError, match="cannot be read"):
-        weights_header(tmp_path)
+        read_header(tmp_path)
 
 
 @pytest.mark.parametrize(

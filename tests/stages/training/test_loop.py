@@ -12,19 +12,19 @@ import pytest
 import torch
 from torch import nn
 
-from stages.training.loop import Trainee, precision_of, train
-from stages.training.program_lm.settings import ProgramLmEntry
+from stages.training.loop import TrainState, resolve_precision, train
+from stages.training.program_lm.settings import ProgramLmConfig
 
 
 @pytest.mark.parametrize("asked", ["float32", "bfloat16"])
 def test_numbers_that_are_asked_for_by_name_are_taken(asked: str) -> None:
-    assert precision_of(asked, torch.device("cpu")) == asked
+    assert resolve_precision(asked, torch.device("cpu")) == asked
 
 
 def test_half_precision_is_chosen_only_where_the_processor_reckons_with_it() -> None:
     words = set(Path("/proc/cpuinfo").read_text().split())
     knows = bool(words & {"avx512_bf16", "amx_bf16", "bf16"})
-    assert precision_of("auto", torch.device("cpu")) == ("bfloat16" if knows else "float32")
+    assert resolve_precision("auto", torch.device("cpu")) == ("bfloat16" if knows else "float32")
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ def _trained(before: int, seed: int) -> torch.Tensor:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
         module = nn.Sequential(nn.Linear(4, 4), nn.Dropout(0.5))
-    entry = ProgramLmEntry(name="halving", kind="program_lm", steps=5, rounds=1)
-    trainee = Trainee.of(_Halving(module), entry)
+    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, rounds=1)
+    trainee = TrainState.of(_Halving(module), entry)
     train(trainee, entry, np.random.default_rng(seed), lambda done, total: None)
     return module[0].weight.detach()
 
@@ -76,12 +76,12 @@ class _Half(nn.Module):
 
 def _rounds(stops: bool) -> dict[str, torch.Tensor]:
     """What is kept after two rounds, which are taken up again after each where it `stops`."""
-    entry = ProgramLmEntry(name="halving", kind="program_lm", steps=5, rounds=2)
+    entry = ProgramLmConfig(name="halving", kind="program_lm", steps=5, rounds=2)
 
-    def fresh() -> Trainee:
+    def fresh() -> TrainState:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(0)
-            return Trainee.of(_Halving(_Half()), entry)
+            return TrainState.of(_Halving(_Half()), entry)
 
     trainee = fresh()
     for number in range(2):

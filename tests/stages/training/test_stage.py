@@ -15,7 +15,7 @@ from safetensors import safe_open
 
 from pipeline.places import Places
 from pipeline.survey import Survey
-from stages.training.model_folder import FILES
+from stages.training.model_folder import MODEL_FILES
 from tests.pipeline.conftest import made
 from tests.stages.training.toy_training import STAGES, config, train
 
@@ -44,7 +44,7 @@ def weights(out: Path) -> dict[str, bytes]:
 
 def test_model_is_published_with_curves_and_card(out: Path) -> None:
     folder = out / "toys-models/tiny-toy-0"
-    assert {path.name for path in folder.iterdir()} == FILES
+    assert {path.name for path in folder.iterdir()} == MODEL_FILES
     rows = list(csv.DictReader((folder / "curves.csv").read_text().splitlines()))
     assert [int(row["step"]) for row in rows] == [4, 8, 12, 16]
     card = (folder / "README.md").read_text()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from stages.training.transformer import Block
+from stages.training.transformer import TransformerBlock
 
 
 @pytest.mark.parametrize("width", [2, 32, 100, 128, 130])
 @torch.no_grad()
 def test_one_token_after_another_is_the_whole_sequence(width: int) -> None:
     torch.manual_seed(0)
-    block = Block(width)
+    block = TransformerBlock(width)
     seen = torch.randn(3, 5, width)
     whole, _, _ = block(seen, None)
     before = (torch.zeros(3, 0, width),) * 2

@@ -12,21 +12,21 @@ import numpy as np
 
 from pipeline.bounded import Escaped, in_child
 from pipeline.errors import Rejected
-from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Box, Part, PartHierarchy
+from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Box, PartHierarchy, PartNode
 from stages.shapeassembly.extraction.readers.grass import GrassFile, read_grass
 
-CPU_SECONDS = 120
-MEMORY_MB = 4000
+MAX_CPU_SECONDS = 120
+MAX_MEMORY_MB = 4000
 
 
-def read_apart(read: Callable[[Path], PartHierarchy], path: Path) -> PartHierarchy:
+def read_in_child(read: Callable[[Path], PartHierarchy], path: Path) -> PartHierarchy:
     """What `read` makes of the file `path`, in a child process. Raises Rejected, naming the file, where `read` does,
     and for a file that takes more than it may."""
     said = json.loads(_content(lambda: json.dumps(_said(read(path))).encode(), path))
     return PartHierarchy(said["name"], _part(said["root"]))
 
 
-def grass_read_apart(path: Path) -> GrassFile:
+def read_grass_in_child(path: Path) -> GrassFile:
     """`read_grass`, in a child process. Raises Rejected as it does, and for a file that takes more than it may."""
 
     def arrays() -> bytes:
@@ -51,7 +51,7 @@ def _content(work: Callable[[], bytes], path: Path) -> bytes:
             raise _Refused(json.dumps([error.reason, error.detail])) from None
 
     try:
-        return in_child(told, cpu_seconds=CPU_SECONDS, memory_mb=MEMORY_MB, refusal=_Refused)
+        return in_child(told, cpu_seconds=MAX_CPU_SECONDS, memory_mb=MAX_MEMORY_MB, refusal=_Refused)
     except _Refused as error:
         raise Rejected(*json.loads(str(error))) from None
     except Escaped as error:
@@ -59,13 +59,13 @@ def _content(work: Callable[[], bytes], path: Path) -> bytes:
 
 
 def _said(hierarchy: PartHierarchy) -> dict[str, Any]:
-    def part(each: Part) -> list[Any]:
+    def part(each: PartNode) -> list[Any]:
         box = each.box
         return [each.label, box.center.tolist(), box.size.tolist(), box.axes.tolist(), [*map(part, each.children)]]
 
     return {"name": hierarchy.name, "root": part(hierarchy.root)}
 
 
-def _part(said: list[Any]) -> Part:
+def _part(said: list[Any]) -> PartNode:
     label, center, size, axes, children = said
-    return Part(label, Box(np.array(center), np.array(size), np.array(axes)), tuple(map(_part, children)))
+    return PartNode(label, Box(np.array(center), np.array(size), np.array(axes)), tuple(map(_part, children)))

@@ -11,7 +11,13 @@ import numpy as np
 
 from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded
+from stages.shapeassembly.extraction.hierarchy import (
+    MAX_HIERARCHY_DEPTH,
+    UNREADABLE,
+    PartHierarchy,
+    PartNode,
+    check_limits,
+)
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -38,15 +44,15 @@ def read_glb(path: Path, up: Literal["y", "z"]) -> PartHierarchy:
     found = _part(scene, children, root, rotation, path.name, 0)
     if found is None:
         raise Rejected(UNREADABLE, f"{path.name}: no node has a mesh; export the meshes with the scene")
-    return PartHierarchy(path.stem, bounded(found[0], path.name))
+    return PartHierarchy(path.stem, check_limits(found[0], path.name))
 
 
 def _part(
     scene: Any, tree: Any, node: str, rotation: FloatArray, place: str, depth: int
-) -> tuple[Part, FloatArray] | None:
+) -> tuple[PartNode, FloatArray] | None:
     """The part of a node and its points, float64 (n, 3) y up; None where no mesh is below it."""
-    if depth > MAX_DEPTH:
-        raise Rejected(UNREADABLE, f"{place}: more than {MAX_DEPTH} levels; simplify the scene")
+    if depth > MAX_HIERARCHY_DEPTH:
+        raise Rejected(UNREADABLE, f"{place}: more than {MAX_HIERARCHY_DEPTH} levels; simplify the scene")
     label = _NUMBER.sub("", node.rsplit("/", 1)[-1]) or "part"
     found = [_part(scene, tree, child, rotation, place, depth + 1) for child in sorted(tree.get(node, []))]
     below = [each for each in found if each is not None]
@@ -56,10 +62,10 @@ def _part(
         points = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ rotation.T
         if not len(points) or not np.isfinite(points).all():
             raise Rejected(UNREADABLE, f"{place}: node {node!r} has no vertices, or some that are not finite")
-        below.insert(0, (Part(label, minimum_box(points)), points))
+        below.insert(0, (PartNode(label, minimum_box(points)), points))
         if len(below) == 1:
             return below[0]
     if not below:
         return None
     points = np.concatenate([each for _, each in below])
-    return Part(label, minimum_box(points), tuple(part for part, _ in below)), points
+    return PartNode(label, minimum_box(points), tuple(part for part, _ in below)), points

@@ -10,7 +10,13 @@ import numpy as np
 
 from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Part, PartHierarchy, bounded, box_of_rows
+from stages.shapeassembly.extraction.hierarchy import (
+    UNREADABLE,
+    PartHierarchy,
+    PartNode,
+    box_from_numbers,
+    check_limits,
+)
 
 
 @dataclass(frozen=True)
@@ -32,8 +38,10 @@ class GrassFile:
         """
         name = f"{self.name}_{index:05d}"
         rows = range(int(self.offsets[index]), int(self.offsets[index + 1]))
-        leaves = tuple(Part("part", box_of_rows(self.boxes[row], f"{self.name}.npz, row {row}")) for row in rows)
-        return PartHierarchy(name, bounded(Part("root", leaves[0].box, leaves), name))
+        leaves = tuple(
+            PartNode("part", box_from_numbers(self.boxes[row], f"{self.name}.npz, row {row}")) for row in rows
+        )
+        return PartHierarchy(name, check_limits(PartNode("root", leaves[0].box, leaves), name))
 
 
 def read_grass(path: Path) -> GrassFile:

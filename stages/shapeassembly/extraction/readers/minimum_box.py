@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.boxes import around
+from stages.shapeassembly.extraction.boxes import bounding_box
 from stages.shapeassembly.extraction.hierarchy import Box
 
-MOST_SIDES = 100
+MAX_HULL_SIDES = 100
 """Sides of the convex hull on which a side of the box may lie, the largest first: a rounded part has thousands."""
 
-WORTH_TURNING = 0.99
+MAX_TURNED_SHARE = 0.99
 """How large a turned box may be, as a share of the upright one: a round or square part has many smallest boxes."""
 
 
-def minimum_box(points: FloatArray, worth_turning: float = WORTH_TURNING) -> Box:
+def minimum_box(points: FloatArray, worth_turning: float = MAX_TURNED_SHARE) -> Box:
     """The box of least volume around `points`, float64 (n, 3), among those with a side on a large side of their hull.
 
     It stands along the coordinate axes unless a turned one has less than `worth_turning` of its volume. Points in a
@@ -23,7 +23,7 @@ def minimum_box(points: FloatArray, worth_turning: float = WORTH_TURNING) -> Box
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    upright = around(points, np.eye(3))
+    upright = bounding_box(points, np.eye(3))
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):
@@ -42,7 +42,7 @@ def _largest_sides(normals: FloatArray, triangles: FloatArray) -> FloatArray:
     areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     total = np.bincount(kind.ravel(), areas, len(kinds))
     first = np.unique(kind.ravel(), return_index=True)[1]
-    chosen = np.argsort(-total, kind="stable")[:MOST_SIDES]
+    chosen = np.argsort(-total, kind="stable")[:MAX_HULL_SIDES]
     sides: FloatArray = flipped[first[chosen]]
     return sides
 
@@ -51,7 +51,7 @@ def _flat(points: FloatArray, upright: Box) -> Box:
     """The box of points in a plane, on a line, or all in one place."""
     normal = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2][2]
     turned = _on_side(points, normal)
-    return turned if turned.size.sum() < WORTH_TURNING * upright.size.sum() else upright
+    return turned if turned.size.sum() < MAX_TURNED_SHARE * upright.size.sum() else upright
 
 
 def _on_side(points: FloatArray, normal: FloatArray) -> Box:
@@ -72,4 +72,4 @@ def _on_side(points: FloatArray, normal: FloatArray) -> Box:
     beside = np.stack([-edges[:, 1], edges[:, 0]], axis=1)
     areas = np.ptp(outline @ edges.T, axis=0) * np.ptp(outline @ beside.T, axis=0)
     right = edges[int(areas.argmin())] @ plane
-    return around(points, np.stack([right, normal, np.cross(right, normal)]))
+    return bounding_box(points, np.stack([right, normal, np.cross(right, normal)]))

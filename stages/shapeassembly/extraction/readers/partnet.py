@@ -10,7 +10,13 @@ import numpy as np
 
 from pipeline.errors import Rejected
 from stages.shape.arrays import FloatArray
-from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded
+from stages.shapeassembly.extraction.hierarchy import (
+    MAX_HIERARCHY_DEPTH,
+    UNREADABLE,
+    PartHierarchy,
+    PartNode,
+    check_limits,
+)
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
 
 
@@ -28,13 +34,13 @@ def read_partnet(path: Path) -> PartHierarchy:
         raise Rejected(UNREADABLE, f"{path.name}: a PartNet hierarchy is a list with one tree")
     name = path.resolve().parent.name
     root, _ = _part(trees[0], path.parent / "objs", path.name, 0)
-    return PartHierarchy(name, bounded(root, name))
+    return PartHierarchy(name, check_limits(root, name))
 
 
-def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[Part, FloatArray]:
+def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[PartNode, FloatArray]:
     """A part and the points of its meshes, float64 (n, 3)."""
-    if depth > MAX_DEPTH or not isinstance(node, dict):
-        raise Rejected(UNREADABLE, f"{place}: a part is an object, at most {MAX_DEPTH} levels deep")
+    if depth > MAX_HIERARCHY_DEPTH or not isinstance(node, dict):
+        raise Rejected(UNREADABLE, f"{place}: a part is an object, at most {MAX_HIERARCHY_DEPTH} levels deep")
     label = node.get("name")
     if not isinstance(label, str) or not label:
         raise Rejected(UNREADABLE, f"{place}: a part has no `name`")
@@ -45,11 +51,11 @@ def _part(node: Any, folder: Path, place: str, depth: int) -> tuple[Part, FloatA
     if children:
         parts = [_part(child, folder, here, depth + 1) for child in children]
         points = np.concatenate([each for _, each in parts])
-        return Part(label, minimum_box(points), tuple(part for part, _ in parts)), points
+        return PartNode(label, minimum_box(points), tuple(part for part, _ in parts)), points
     if not meshes:
         raise Rejected(UNREADABLE, f"{here}: a leaf names its meshes in `objs`")
     points = np.concatenate([_points(mesh, folder, here) for mesh in meshes])
-    return Part(label, minimum_box(points)), points
+    return PartNode(label, minimum_box(points)), points
 
 
 def _points(mesh: Any, folder: Path, place: str) -> FloatArray:

@@ -12,7 +12,7 @@ from typing import Literal
 from pipeline.errors import Rejected
 from pipeline.places import file_digest
 from stages.shapeassembly.extraction.hierarchy import PartHierarchy
-from stages.shapeassembly.extraction.readers.child_process import grass_read_apart, read_apart
+from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child, read_in_child
 from stages.shapeassembly.extraction.readers.glb import read_glb
 from stages.shapeassembly.extraction.readers.grass import GrassFile
 from stages.shapeassembly.extraction.readers.partnet import read_partnet
@@ -77,7 +77,7 @@ class HierarchySource:
 
     def _read(self, file: Path) -> PartHierarchy:
         readers = {"structurenet": read_structurenet, "partnet": read_partnet}
-        return read_apart(readers.get(self.kind, lambda path: read_glb(path, self.up)), file)
+        return read_in_child(readers.get(self.kind, lambda path: read_glb(path, self.up)), file)
 
 
 @lru_cache(maxsize=65536)
@@ -88,4 +88,4 @@ def _known_digest(file: Path, modified: int, size: int) -> str:
 
 @lru_cache(maxsize=4)
 def _known_grass(file: Path, modified: int, size: int) -> GrassFile:
-    return grass_read_apart(file)
+    return read_grass_in_child(file)

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import Rejected
-from stages.shapeassembly.extraction.hierarchy import MAX_DEPTH, UNREADABLE, Part, PartHierarchy, bounded, box_of_rows
+from stages.shapeassembly.extraction.hierarchy import (
+    MAX_HIERARCHY_DEPTH,
+    UNREADABLE,
+    PartHierarchy,
+    PartNode,
+    box_from_numbers,
+    check_limits,
+)
 
 
 def read_structurenet(path: Path) -> PartHierarchy:
@@ -22,12 +29,12 @@ def read_structurenet(path: Path) -> PartHierarchy:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise Rejected(UNREADABLE, f"{path.name}: not JSON ({type(error).__name__}); export it again") from None
-    return PartHierarchy(path.stem, bounded(_part(tree, path.name, 0), path.name))
+    return PartHierarchy(path.stem, check_limits(_part(tree, path.name, 0), path.name))
 
 
-def _part(node: Any, place: str, depth: int) -> Part:
-    if depth > MAX_DEPTH:
-        raise Rejected(UNREADABLE, f"{place}: more than {MAX_DEPTH} levels; simplify it")
+def _part(node: Any, place: str, depth: int) -> PartNode:
+    if depth > MAX_HIERARCHY_DEPTH:
+        raise Rejected(UNREADABLE, f"{place}: more than {MAX_HIERARCHY_DEPTH} levels; simplify it")
     if not isinstance(node, dict):
         raise Rejected(UNREADABLE, f"{place}: a part is an object with `label`, `box` and `children`")
     label = node.get("label")
@@ -42,5 +49,5 @@ def _part(node: Any, place: str, depth: int) -> Part:
     children = node.get("children") or []
     if not isinstance(children, list):
         raise Rejected(UNREADABLE, f"{here}: `children` is a list of parts")
-    box = box_of_rows(np.array(numbers, dtype=np.float64), here)
-    return Part(label, box, tuple(_part(child, here, depth + 1) for child in children))
+    box = box_from_numbers(np.array(numbers, dtype=np.float64), here)
+    return PartNode(label, box, tuple(_part(child, here, depth + 1) for child in children))

@@ -12,7 +12,7 @@ from stages.shapeassembly.analysis.figures import cluster_figure
 from stages.shapeassembly.analysis.statistics import cluster_curve, program_statistics
 from stages.shapeassembly.analysis.structure import block_signatures, program_distance, signature, tokens
 from stages.shapeassembly.execution.parameters import parameters, with_parameters
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from tests.stages.shapeassembly.execution.test_interpreter import renamed
 from tests.stages.shapeassembly.strategies import programs
 
@@ -30,7 +30,7 @@ def test_tokens_of_a_program() -> None:
 
 @settings(deadline=None)
 @given(programs())
-def test_names_and_numbers_are_no_structure(program: Program) -> None:
+def test_names_and_numbers_are_no_structure(program: AssemblyProgram) -> None:
     assert signature(renamed(program)) == signature(program)
     other = with_parameters(program, parameters(program) * 0.5)
     assert signature(other) == signature(program)

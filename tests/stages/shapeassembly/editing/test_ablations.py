@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.shapeassembly import Execution, execute, parse
-from stages.shapeassembly.editing.ablations import unaligned, unordered, without_macros
+from stages.shapeassembly.editing.ablations import without_alignment, without_macros, without_order
 from stages.shapeassembly.syntax.checks import violations
 from stages.shapeassembly.syntax.program import Attach, Cuboid
 from tests.stages.shapeassembly.shared_programs import CATEGORIES, needs_shared, shared_texts
@@ -56,16 +56,16 @@ def test_lines_in_another_order_keep_the_rules_and_the_parts() -> None:
     program = parse(SHELF)
     texts = set()
     for seed in range(8):
-        other = unordered(program, np.random.default_rng(seed))
+        other = without_order(program, np.random.default_rng(seed))
         assert [each for each in violations(other) if each.rule == "not grounded"] == []
         assert all(set(one.lines) == set(two.lines) for one, two in zip(program.blocks, other.blocks, strict=True))
         assert len(execute(other)) == len(execute(program))
         texts.add(str(other))
     assert len(texts) > 4
-    assert unordered(program, np.random.default_rng(1)) == unordered(program, np.random.default_rng(1))
+    assert without_order(program, np.random.default_rng(1)) == without_order(program, np.random.default_rng(1))
 
 
 def test_without_alignment_only_the_bounding_boxes_are_aligned() -> None:
-    program = unaligned(parse(SHELF))
+    program = without_alignment(parse(SHELF))
     assert all(block.bbox.aligned and not any(each.aligned for each in block.cuboids) for block in program.blocks)
     assert [len(block.lines) for block in program.blocks] == [len(block.lines) for block in parse(SHELF).blocks]

@@ -12,11 +12,11 @@ from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.editing.edits import edited
 from stages.shapeassembly.syntax.printer import print_program
-from stages.shapeassembly.syntax.program import Attach, Cuboid, Program, Squeeze
+from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Cuboid, Squeeze
 from tests.stages.shapeassembly.strategies import programs
 
 
-def numbers(program: Program) -> list[tuple[float, ...]]:
+def numbers(program: AssemblyProgram) -> list[tuple[float, ...]]:
     """Sizes and places of all lines in order; none of what an edit must leave alone."""
     found: list[tuple[float, ...]] = []
     for block in program.blocks:
@@ -31,7 +31,7 @@ def numbers(program: Program) -> list[tuple[float, ...]]:
 
 
 @given(programs(), st.integers(0, 99))
-def test_an_edit_is_a_program_of_the_same_structure(program: Program, seed: int) -> None:
+def test_an_edit_is_a_program_of_the_same_structure(program: AssemblyProgram, seed: int) -> None:
     made = edited(program, 0.3, np.random.default_rng(seed))
     assert signature(made) == signature(program)
     assert parse(print_program(made)) == made
@@ -39,10 +39,10 @@ def test_an_edit_is_a_program_of_the_same_structure(program: Program, seed: int)
 
 
 @given(programs(), st.integers(0, 99))
-def test_sizes_keep_their_order_and_places_their_side(program: Program, seed: int) -> None:
+def test_sizes_keep_their_order_and_places_their_side(program: AssemblyProgram, seed: int) -> None:
     made = edited(program, 0.3, np.random.default_rng(seed))
 
-    def sizes(of: Program, axis: int) -> list[float]:
+    def sizes(of: AssemblyProgram, axis: int) -> list[float]:
         return [line.dims[axis] for block in of.blocks for line in (block.bbox, *block.cuboids)]
 
     for axis in range(3):

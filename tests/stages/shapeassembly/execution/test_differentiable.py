@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from stages.shapeassembly import ProgramError, execute, parse
 from stages.shapeassembly.execution.differentiable import DifferentiableProgram
 from stages.shapeassembly.execution.parameters import parameter_ranges, parameters, with_parameters
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from tests.stages.shapeassembly.shared_programs import CATEGORIES, needs_shared, shared_texts
 from tests.stages.shapeassembly.strategies import programs
 
 
-def difference(program: Program) -> float:
+def difference(program: AssemblyProgram) -> float:
     """How far the corners of the two interpreters are apart; gradients must be finite."""
     values = torch.tensor(parameters(program), requires_grad=True)
     corners = DifferentiableProgram(program).corners(values)
@@ -29,7 +29,7 @@ def difference(program: Program) -> float:
 
 @settings(deadline=None, max_examples=60)
 @given(programs(depth=3))
-def test_both_interpreters_agree(program: Program) -> None:
+def test_both_interpreters_agree(program: AssemblyProgram) -> None:
     assert difference(program) < 1e-8
 
 
@@ -95,7 +95,7 @@ def test_parameters_that_cannot_be_executed_are_refused() -> None:
 
 
 @given(programs())
-def test_parameters_can_be_taken_out_and_put_back(program: Program) -> None:
+def test_parameters_can_be_taken_out_and_put_back(program: AssemblyProgram) -> None:
     values = parameters(program)
     assert with_parameters(program, values) == program
     low, high = parameter_ranges(program)

@@ -13,7 +13,7 @@ from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.execution.fitting import chamfer_distance, fit, fit_cuboids, surface_points
 from stages.shapeassembly.execution.parameters import parameter_ranges, parameters, with_parameters
 from stages.shapeassembly.extraction.hierarchy import Box
-from stages.shapeassembly.extraction.validity import boxes_of
+from stages.shapeassembly.extraction.validity import execution_boxes
 
 CHAIR = parse(Path("datasets/exemplars/programs/chair-slats.txt").read_text())
 
@@ -36,7 +36,7 @@ def test_a_perturbed_chair_is_fitted_back() -> None:
 def test_cuboids_are_fitted_each_by_itself() -> None:
     """Moved, turned and too thick, and back: what was attached need not be so any more."""
     rng = np.random.default_rng(4)
-    wanted = boxes_of(execute(CHAIR))
+    wanted = execution_boxes(execute(CHAIR))
     points = surface_points(execute(CHAIR), 3000, rng)
     turn = Rotation.from_rotvec([0.05, 0.1, 0.0]).as_matrix()
     moved = [Box(each.center + rng.normal(0, 0.03, 3), 1.1 * each.size, each.axes @ turn) for each in wanted]

@@ -14,12 +14,12 @@ from stages.shapeassembly import Execution, ProgramError, execute, execute_all, 
 from stages.shapeassembly.syntax.limits import MAX_COPIES
 from stages.shapeassembly.syntax.program import (
     BBOX,
+    AssemblyProgram,
     Attach,
     Block,
     Cuboid,
     Line,
     Point,
-    Program,
     Reflect,
     Squeeze,
     Translate,
@@ -242,7 +242,7 @@ def test_programs_together_are_the_same_as_one_by_one() -> None:
 
 @settings(deadline=None, max_examples=200)
 @given(programs(depth=3))
-def test_every_valid_program_is_executed_to_finite_boxes(program: Program) -> None:
+def test_every_valid_program_is_executed_to_finite_boxes(program: AssemblyProgram) -> None:
     done = execute(program)
     assert np.isfinite(done.corners).all()
     assert (done.sizes > 0).all()
@@ -252,7 +252,7 @@ def test_every_valid_program_is_executed_to_finite_boxes(program: Program) -> No
     np.testing.assert_allclose(lengths, done.sizes, rtol=1e-6, atol=1e-9)
 
 
-def renamed(program: Program) -> Program:
+def renamed(program: AssemblyProgram) -> AssemblyProgram:
     """The program with other names for assemblies and cuboids; copies keep theirs."""
     names = {block.name: f"assembly_{block.name}" for block in program.blocks}
     names |= {each.name: names.get(each.name, f"part_{each.name}") for b in program.blocks for each in b.cuboids}
@@ -267,12 +267,12 @@ def renamed(program: Program) -> Program:
             return replace(line, moved=names[line.moved], first=names[line.first], second=names[line.second])
         return replace(line, moved=names[line.moved])
 
-    return Program(tuple(replace(block, name=names[block.name]) for block in program.with_lines(change).blocks))
+    return AssemblyProgram(tuple(replace(block, name=names[block.name]) for block in program.with_lines(change).blocks))
 
 
 @settings(deadline=None)
 @given(programs())
-def test_names_mean_nothing(program: Program) -> None:
+def test_names_mean_nothing(program: AssemblyProgram) -> None:
     assert np.array_equal(execute(renamed(program)).corners, execute(program).corners)
 
 
@@ -313,12 +313,12 @@ def test_a_hierarchy_is_what_it_is_when_written_in_one_assembly(
     ]
     below = Block("child", Cuboid(BBOX, size, True), (*cuboids, *joints))
     inner = [replace(each, target="child") if each.target == BBOX else each for each in joints]
-    deep = execute(Program((Block("root", WHOLE, (child, STAND)), below)))
-    flat = execute(Program((Block("root", WHOLE, (child, *cuboids, STAND, *inner)),)))
+    deep = execute(AssemblyProgram((Block("root", WHOLE, (child, STAND)), below)))
+    flat = execute(AssemblyProgram((Block("root", WHOLE, (child, *cuboids, STAND, *inner)),)))
     same(deep.corners, flat.corners[1:])
     # Where the child is stretched and turned, its cuboids are stretched like it, in place, and turned with it.
-    turned = execute(Program((Block("root", WHOLE, (child, STAND, TURN)), below)))
-    outer = execute(Program((Block("root", WHOLE, (child, STAND, TURN)),)))
+    turned = execute(AssemblyProgram((Block("root", WHOLE, (child, STAND, TURN)), below)))
+    outer = execute(AssemblyProgram((Block("root", WHOLE, (child, STAND, TURN)),)))
     frame, stretched = outer.frames[0], outer.sizes[0] / size
     same(turned.sizes, deep.sizes * stretched)
     same(turned.frames, np.broadcast_to(frame, turned.frames.shape))
@@ -384,12 +384,12 @@ def test_a_program_that_grows_without_end_is_refused() -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(programs())
-def test_copies_can_be_named_by_later_lines(program: Program) -> None:
+def test_copies_can_be_named_by_later_lines(program: AssemblyProgram) -> None:
     """Only where a copy is: the number in its name is that of the cuboids before it."""
     first = program.root.cuboids[0].name
     block = Block(program.root.name, program.root.bbox, (*program.root.lines, Translate(first, "X", 2, 0.1)))
     made = sum(1 if isinstance(x, Reflect) else x.copies for x in block.lines if isinstance(x, Reflect | Translate))
     last = f"cube{len(block.cuboids) + made - 1}"
     more = replace(block, lines=(*block.lines, Reflect(last, "Z")))
-    text = print_program(Program((more, *program.blocks[1:])))
+    text = print_program(AssemblyProgram((more, *program.blocks[1:])))
     assert len(execute(parse(text)).node_names) >= len(program.blocks)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
+from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode
 
 Three = tuple[float, float, float]
 
@@ -15,15 +15,15 @@ def box(center: Three, size: Three, axes: np.ndarray | None = None) -> Box:
     return Box(np.array(center), np.array(size), np.eye(3) if axes is None else axes)
 
 
-def leaf(label: str, center: Three, size: Three, axes: np.ndarray | None = None) -> Part:
-    return Part(label, box(center, size, axes))
+def leaf(label: str, center: Three, size: Three, axes: np.ndarray | None = None) -> PartNode:
+    return PartNode(label, box(center, size, axes))
 
 
-def node(label: str, children: Sequence[Part]) -> Part:
-    return Part(label, children[0].box, tuple(children))
+def node(label: str, children: Sequence[PartNode]) -> PartNode:
+    return PartNode(label, children[0].box, tuple(children))
 
 
-def hierarchy(*children: Part) -> PartHierarchy:
+def hierarchy(*children: PartNode) -> PartHierarchy:
     return PartHierarchy("shape", node("root", children))
 
 

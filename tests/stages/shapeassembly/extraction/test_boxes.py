@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from stages.shapeassembly.extraction.boxes import (
     angle_between,
     box_corners,
-    gap,
-    mirrored,
+    box_gap,
+    boxes_match,
+    local_points,
+    mirror_points,
     nearest_axes,
-    place_in,
-    point_at,
-    same_box,
     surface_distance,
+    world_points,
 )
 from stages.shapeassembly.extraction.hierarchy import Box
 from stages.shapeassembly.extraction.readers.minimum_box import minimum_box
@@ -33,34 +33,34 @@ boxes = st.builds(
 
 @given(boxes, st.tuples(number, number, number))
 def test_place_in_a_box_is_the_reverse_of_point_at(some: Box, place: tuple[float, float, float]) -> None:
-    np.testing.assert_allclose(place_in(some, point_at(some, np.array(place))), place, atol=1e-9)
+    np.testing.assert_allclose(local_points(some, world_points(some, np.array(place))), place, atol=1e-9)
 
 
 @given(boxes)
 def test_renaming_the_axes_keeps_the_box_and_turns_it_less_than_half_the_cube_allows(some: Box) -> None:
     renamed = nearest_axes(some, np.eye(3))
-    assert same_box(box_corners(some), box_corners(renamed), 1e-9)
+    assert boxes_match(box_corners(some), box_corners(renamed), 1e-9)
     assert np.linalg.det(renamed.axes) == pytest.approx(1.0)
     assert angle_between(renamed.axes, np.eye(3)) <= 62.8 + 1e-6, "the farthest rotation from the 24 of the cube"
 
 
 @given(boxes, boxes)
 def test_gap_is_no_more_than_any_distance_of_points_and_is_reached(first: Box, second: Box) -> None:
-    distance, on_first, on_second = gap(first, second)
+    distance, on_first, on_second = box_gap(first, second)
     grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 6)] * 3), axis=-1).reshape(-1, 3)
-    away = np.linalg.norm(point_at(first, grid)[:, None] - point_at(second, grid)[None], axis=2)
+    away = np.linalg.norm(world_points(first, grid)[:, None] - world_points(second, grid)[None], axis=2)
     assert distance <= away.min() + 1e-2
     assert distance == pytest.approx(float(np.linalg.norm(on_first - on_second)), abs=1e-9)
     for own, point in ((first, on_first), (second, on_second)):
-        assert (np.abs(place_in(own, point) - 0.5) <= 0.5 + 1e-9).all()
+        assert (np.abs(local_points(own, point) - 0.5) <= 0.5 + 1e-9).all()
 
 
 def test_gap_of_boxes_face_to_face_edge_to_edge_and_crossing() -> None:
     cube = box((0, 0, 0), (1, 1, 1))
-    assert gap(cube, box((3, 0.2, 0), (1, 1, 1)))[0] == pytest.approx(2.0)
-    assert gap(cube, box((2, 2, 0), (1, 1, 1)))[0] == pytest.approx(np.sqrt(2))
-    assert gap(box((0, 0, 0), (9, 0.1, 0.1)), box((0, 0, 0.1), (0.1, 9, 0.1)))[0] == pytest.approx(0.0, abs=1e-9)
-    assert gap(cube, box((2, 0, 0), (1, 1, 1), turned(2, 45)))[0] == pytest.approx(1.5 - np.sqrt(0.5))
+    assert box_gap(cube, box((3, 0.2, 0), (1, 1, 1)))[0] == pytest.approx(2.0)
+    assert box_gap(cube, box((2, 2, 0), (1, 1, 1)))[0] == pytest.approx(np.sqrt(2))
+    assert box_gap(box((0, 0, 0), (9, 0.1, 0.1)), box((0, 0, 0.1), (0.1, 9, 0.1)))[0] == pytest.approx(0.0, abs=1e-9)
+    assert box_gap(cube, box((2, 0, 0), (1, 1, 1), turned(2, 45)))[0] == pytest.approx(1.5 - np.sqrt(0.5))
 
 
 def test_surface_distance_is_exact_inside_and_outside() -> None:
@@ -73,7 +73,9 @@ def test_surface_distance_is_exact_inside_and_outside() -> None:
 @given(boxes, st.sampled_from([0, 1, 2]))
 def test_reflection_twice_is_identity(some: Box, axis: int) -> None:
     corners = box_corners(some)
-    np.testing.assert_allclose(mirrored(mirrored(corners, some.center, axis), some.center, axis), corners, atol=1e-12)
+    np.testing.assert_allclose(
+        mirror_points(mirror_points(corners, some.center, axis), some.center, axis), corners, atol=1e-12
+    )
 
 
 @given(boxes)

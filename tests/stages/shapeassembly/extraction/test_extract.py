@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from pipeline.errors import Rejected
 from stages.shapeassembly import execute, parse, print_program
 from stages.shapeassembly.analysis.structure import program_distance
-from stages.shapeassembly.extraction.boxes import box_corners, same_box
-from stages.shapeassembly.extraction.category_rules import RULES
-from stages.shapeassembly.extraction.extract import Extraction, extract
-from stages.shapeassembly.extraction.hierarchy import Box, Part, PartHierarchy
+from stages.shapeassembly.extraction.boxes import box_corners, boxes_match
+from stages.shapeassembly.extraction.category_rules import CATEGORY_RULES
+from stages.shapeassembly.extraction.extract import ExtractedProgram, extract
+from stages.shapeassembly.extraction.hierarchy import Box, PartHierarchy, PartNode
 from stages.shapeassembly.extraction.readers.glb import read_glb
 from stages.shapeassembly.extraction.readers.grass import read_grass
 from stages.shapeassembly.extraction.readers.structurenet import read_structurenet
 from stages.shapeassembly.extraction.settings import Cleaning, Gates
-from stages.shapeassembly.extraction.validity import boxes_of
+from stages.shapeassembly.extraction.validity import execution_boxes
 from stages.shapeassembly.syntax.checks import violations
 from tests.stages.shapeassembly.extraction.shapes import hierarchy, leaf, node, table, turned
 
@@ -28,8 +28,8 @@ SHARED = Path(__file__).resolve().parents[4].parent / "shared"
 GATES = Gates()
 
 
-def extracted(shape: PartHierarchy, gates: Gates = GATES) -> Extraction:
-    return extract(shape, RULES["any"], gates)
+def extracted(shape: PartHierarchy, gates: Gates = GATES) -> ExtractedProgram:
+    return extract(shape, CATEGORY_RULES["any"], gates)
 
 
 def lines(shape: PartHierarchy, gates: Gates = GATES) -> list[str]:
@@ -42,7 +42,7 @@ def covers(made: Sequence[Box], wanted: Sequence[Box], tolerance: float = 0.005)
     """Whether each box of one list is a box of the other, and their numbers agree."""
     corners = [box_corners(box) for box in made]
     return len(made) == len(wanted) and all(
-        any(same_box(box_corners(box), each, tolerance) for each in corners) for box in wanted
+        any(boxes_match(box_corners(box), each, tolerance) for each in corners) for box in wanted
     )
 
 
@@ -65,14 +65,14 @@ def test_program_makes_the_boxes_of_the_input() -> None:
     assert extraction.f_score == 100
     assert extraction.leaves == 3
     assert extraction.overflow == pytest.approx(0, abs=1e-3)
-    again = boxes_of(execute(parse(print_program(extraction.program))))
+    again = execution_boxes(execute(parse(print_program(extraction.program))))
     assert covers(again, extraction.wanted)
 
 
 def test_slats_at_equal_distances_are_translated() -> None:
     rails = [leaf("rail", (0, y, 0), (2.0, 0.2, 0.1)) for y in (-0.5, 0.5)]
     slats = [leaf("slat", (x, 0, 0), (0.1, 0.8, 0.05)) for x in (-0.8, -0.4, 0, 0.4, 0.8)]
-    assert lines(hierarchy(*rails, *slats), Gates(fewest_leaves=2))[2:] == [
+    assert lines(hierarchy(*rails, *slats), Gates(min_leaves=2))[2:] == [
         "attach(cube0, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5)",
         "attach(cube1, cube0, 0.5, 0.0, 0.5, 0.1, 1.0, 0.5)",
         "reflect(cube0, Y)",
@@ -95,7 +95,7 @@ def test_shelf_between_two_sides_is_squeezed() -> None:
 
 
 def test_sides_that_stand_on_two_feet_each_become_a_sub_program() -> None:
-    def frame(x: float) -> list[Part]:
+    def frame(x: float) -> list[PartNode]:
         posts = [leaf("post", (x, 0, z), (0.1, 1.0, 0.1)) for z in (-0.4, 0.4)]
         return [*posts, leaf("bar", (x, 0.1, 0), (0.1, 0.1, 0.7))]
 
@@ -107,7 +107,7 @@ def test_sides_that_stand_on_two_feet_each_become_a_sub_program() -> None:
 
 
 def test_hierarchy_of_the_input_becomes_sub_programs_numbered_level_by_level() -> None:
-    def box_of_two(label: str, x: float) -> Part:
+    def box_of_two(label: str, x: float) -> PartNode:
         return node(label, [leaf("a", (x, 0, 0), (0.5, 1, 0.5)), leaf("b", (x, 0.6, 0), (0.4, 0.2, 0.3))])
 
     base = leaf("base", (0, -0.6, 0), (3, 0.2, 1))
@@ -124,23 +124,23 @@ BEAM = leaf("beam", (0, 0.55, 0), (2, 0.1, 0.4))
 def test_members_of_a_group_are_attached_alike() -> None:
     """A brace that one post alone touches makes the posts two; where that is too many they are one and its image."""
     brace = leaf("brace", (0.65, 0.3, 0), (0.4, 0.4, 0.1))
-    assert lines(hierarchy(*POSTS, BEAM), Gates(fewest_leaves=1))[-1] == "reflect(cube0, X)"
+    assert lines(hierarchy(*POSTS, BEAM), Gates(min_leaves=1))[-1] == "reflect(cube0, X)"
     braced = hierarchy(*POSTS, BEAM, brace)
     assert not any("reflect" in line for line in lines(braced))
-    assert lines(braced, Gates(most_leaves=3))[-1] == "reflect(cube0, X)"
+    assert lines(braced, Gates(max_leaves=3))[-1] == "reflect(cube0, X)"
 
 
 def test_steps_of_cleaning_can_be_left_out() -> None:
     deep = hierarchy(*(leaf("post", (x, 0.02, 0), (0.1, 1.04, 0.1)) for x in (-0.9, 0.9)), BEAM)
-    gates = Gates(fewest_leaves=1, f_score=0)
-    assert extract(deep, RULES["any"], gates).program.root.cuboids[0].dims[1] == 1.0
-    assert extract(deep, RULES["any"], gates, Cleaning(shorten=False)).program.root.cuboids[0].dims[1] == 1.04
-    alone = extract(deep, RULES["any"], gates, Cleaning(group=False)).program
+    gates = Gates(min_leaves=1, f_score=0)
+    assert extract(deep, CATEGORY_RULES["any"], gates).program.root.cuboids[0].dims[1] == 1.0
+    assert extract(deep, CATEGORY_RULES["any"], gates, Cleaning(shorten=False)).program.root.cuboids[0].dims[1] == 1.04
+    alone = extract(deep, CATEGORY_RULES["any"], gates, Cleaning(group=False)).program
     assert (len(alone.root.cuboids), "reflect" in print_program(alone)) == (3, False)
     caster = node("caster", [leaf("a", (0, 0, 0), (1, 0.1, 1)), leaf("b", (0, -0.1, 0), (0.9, 0.1, 0.9))])
     chair = hierarchy(caster, leaf("chair_seat", (0, 0.45, 0), (0.2, 0.8, 0.2)))
-    kept = extract(chair, RULES["chair"], gates, Cleaning(arrange=False)).program
-    assert (len(kept.blocks), len(extract(chair, RULES["chair"], gates).program.blocks)) == (2, 1)
+    kept = extract(chair, CATEGORY_RULES["chair"], gates, Cleaning(arrange=False)).program
+    assert (len(kept.blocks), len(extract(chair, CATEGORY_RULES["chair"], gates).program.blocks)) == (2, 1)
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -157,7 +157,7 @@ def test_tilted_back_between_seat_and_top_is_where_it_was(axis: int, degrees: fl
 def test_mirrored_tilted_parts_are_reflected() -> None:
     top = leaf("top", (0, 0.5, 0), (2, 0.1, 1))
     legs = [leaf("leg", (sign * 0.8, 0, 0), (0.1, 0.98, 0.6), turned(2, sign * 12)) for sign in (-1, 1)]
-    extraction = extracted(hierarchy(top, *legs), Gates(fewest_leaves=2))
+    extraction = extracted(hierarchy(top, *legs), Gates(min_leaves=2))
     assert print_program(extraction.program).count("reflect(") == 1
     assert covers(extraction.made, extraction.wanted, 0.05), "shortened where they are sunk in the top"
 
@@ -242,7 +242,7 @@ def test_fit_below_the_gate_is_refused() -> None:
     ],
     ids=["coincident", "no thickness", "horseshoe"],
 )
-def test_boxes_of_odd_kinds_are_kept(parts: list[Part]) -> None:
+def test_boxes_of_odd_kinds_are_kept(parts: list[PartNode]) -> None:
     extraction = extracted(hierarchy(*parts))
     assert covers(extraction.made, extraction.wanted, 0.02)
 
@@ -264,7 +264,7 @@ def test_labels_order_the_lines_of_a_known_category() -> None:
     back = leaf("chair_back", (0, 0.1, -0.45), (0.9, 0.8, 0.1))
     base = leaf("chair_base", (0, 0.6, 0), (0.3, 0.2, 0.2))
     holder = leaf("chair_head", (0, 0.55, -0.3), (0.3, 0.1, 0.4))
-    program = extract(hierarchy(back, holder, seat, base), RULES["chair"], Gates(f_score=0)).program
+    program = extract(hierarchy(back, holder, seat, base), CATEGORY_RULES["chair"], Gates(f_score=0)).program
     assert [cuboid.dims[0] for cuboid in program.root.cuboids] == [0.3, 1.0, 0.9, 0.3]
 
 

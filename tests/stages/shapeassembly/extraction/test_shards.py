@@ -13,11 +13,11 @@ import yaml
 
 from stages.shape.sample import Sample, read_samples
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.extraction.hierarchy import Part
+from stages.shapeassembly.extraction.hierarchy import PartNode
 from tests.stages.shapeassembly.extraction.shapes import hierarchy, leaf
 
 
-def structurenet(part: Part) -> dict[str, object]:
+def structurenet(part: PartNode) -> dict[str, object]:
     box = part.box
     numbers = [*box.center.tolist(), *box.size.tolist(), *box.axes[0].tolist(), *box.axes[1].tolist()]
     return {"label": part.label, "box": numbers, "children": [structurenet(child) for child in part.children]}

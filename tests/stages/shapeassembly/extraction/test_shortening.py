@@ -3,12 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.shapeassembly.extraction.hierarchy import Part
+from stages.shapeassembly.extraction.hierarchy import PartNode
 from stages.shapeassembly.extraction.shortening import shorten_parts
 from tests.stages.shapeassembly.extraction.shapes import leaf, node, turned
 
 
-def shortened(*parts: Part) -> dict[str, Part]:
+def shortened(*parts: PartNode) -> dict[str, PartNode]:
     return {part.label: part for part in shorten_parts(node("root", parts)).leaves()}
 
 
@@ -36,7 +36,7 @@ def test_bar_through_two_posts_is_cut_at_both() -> None:
     ],
     ids=["hidden", "coincident", "touching", "half beside"],
 )
-def test_part_that_would_vanish_or_whose_end_can_be_seen_stays(part: Part) -> None:
+def test_part_that_would_vanish_or_whose_end_can_be_seen_stays(part: PartNode) -> None:
     box = shortened(leaf("top", (0, 1, 0), (2, 0.2, 2)), part)["part"].box
     np.testing.assert_allclose(box.size, part.box.size)
     np.testing.assert_allclose(box.center, part.box.center)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.syntax.checks import RULES, overflow, reaching_out, violations
-from stages.shapeassembly.syntax.program import Program
+from stages.shapeassembly.syntax.checks import RULE_NAMES, overflow, protruding_parts, violations
+from stages.shapeassembly.syntax.program import AssemblyProgram
 from tests.stages.shapeassembly.strategies import programs
 
 HEAD = "Assembly P { bbox = Cuboid(1.0, 1.0, 1.0, True) "
@@ -60,7 +60,7 @@ def test_a_broken_rule_is_named_with_its_line(rule: str, number: int, text: str)
 
 def test_every_rule_is_tried_above() -> None:
     [cases] = test_a_broken_rule_is_named_with_its_line.pytestmark  # type: ignore[attr-defined]
-    assert {case[0] for case in cases.args[1]} == set(RULES)
+    assert {case[0] for case in cases.args[1]} == set(RULE_NAMES)
 
 
 def test_top_and_bottom_of_the_bounding_box_can_both_be_attached_to() -> None:
@@ -69,7 +69,7 @@ def test_top_and_bottom_of_the_bounding_box_can_both_be_attached_to() -> None:
 
 
 @given(programs())
-def test_programs_of_the_grammar_keep_every_rule(program: Program) -> None:
+def test_programs_of_the_grammar_keep_every_rule(program: AssemblyProgram) -> None:
     assert violations(program) == []
 
 
@@ -85,4 +85,4 @@ def test_cuboids_and_copies_may_reach_out_of_their_assembly_by_a_tenth(x: float,
     """The box is 1 wide, the cuboid 0.5: its side comes to x + 0.25."""
     text = f"""Assembly P {{ bbox = Cuboid(1.0, 1.0, 1.0, True) c = Cuboid(0.5, 0.5, 0.5, True)
     attach(c, bbox, 0.5, 0.0, 0.5, {x}, 0.0, 0.5) reflect(c, X) }}"""
-    assert reaching_out(parse(text).root) == beyond
+    assert protruding_parts(parse(text).root) == beyond

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 
 from stages.shapeassembly import ProgramError, parse, print_program
-from stages.shapeassembly.syntax.limits import MAX_TEXT
+from stages.shapeassembly.syntax.limits import MAX_TEXT_CHARACTERS
 from stages.shapeassembly.syntax.printer import rounded
-from stages.shapeassembly.syntax.program import Attach, Block, Cuboid, Program, Reflect, Squeeze, Translate
+from stages.shapeassembly.syntax.program import AssemblyProgram, Attach, Block, Cuboid, Reflect, Squeeze, Translate
 from tests.stages.shapeassembly.strategies import programs
 
 TABLE = """Assembly Table {
@@ -21,7 +21,7 @@ TABLE = """Assembly Table {
 	translate(leg, Z, 2, 0.25)
 }
 """
-TREE = Program(
+TREE = AssemblyProgram(
     (
         Block(
             "Table",
@@ -45,7 +45,7 @@ def test_text_and_tree_are_the_same_program() -> None:
 
 
 @given(programs())
-def test_a_printed_program_reads_back_equal(program: Program) -> None:
+def test_a_printed_program_reads_back_equal(program: AssemblyProgram) -> None:
     text = print_program(program)
     assert parse(text) == program
     assert print_program(parse(text)) == text
@@ -53,7 +53,7 @@ def test_a_printed_program_reads_back_equal(program: Program) -> None:
 
 def test_every_number_survives_printing() -> None:
     dims = (0.1 + 0.2, 1e-5, 123456.789)
-    program = Program((Block("P", Cuboid("bbox", dims, True), ()),))
+    program = AssemblyProgram((Block("P", Cuboid("bbox", dims, True), ()),))
     assert parse(print_program(program)) == program
     assert rounded(program).root.bbox.dims == (0.3, 0.0, 123456.789)
 
@@ -123,4 +123,4 @@ def test_a_mistake_is_shown_with_a_caret() -> None:
 
 def test_a_text_beyond_the_limit_is_refused_unread() -> None:
     with pytest.raises(ProgramError, match="too long"):
-        parse(" " * (MAX_TEXT + 1))
+        parse(" " * (MAX_TEXT_CHARACTERS + 1))

@@ -7,48 +7,48 @@ import pytest
 import torch
 
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.extraction.boxes import box_corners, same_box
-from stages.shapeassembly.extraction.validity import boxes_of
-from stages.training.box_vectors import box_of_numbers, numbers_of_box
-from stages.training.cuboid_rnn.batches import END, Cuboids, batch_of
-from stages.training.cuboid_rnn.corpus import mirrored, rows_of
-from stages.training.cuboid_rnn.model import density
-from stages.training.cuboid_rnn.settings import CuboidRnnEntry
+from stages.shapeassembly.extraction.boxes import box_corners, boxes_match
+from stages.shapeassembly.extraction.validity import execution_boxes
+from stages.training.box_vectors import box_from_vector, box_vector
+from stages.training.cuboid_rnn.batches import END_KIND, CuboidCorpus, batch_of
+from stages.training.cuboid_rnn.corpus import cuboid_rows, mirror_cuboids
+from stages.training.cuboid_rnn.model import log_density
+from stages.training.cuboid_rnn.settings import CuboidRnnConfig
 from stages.training.cuboid_rnn.trained import TrainedCuboidRnn
-from stages.training.cuboid_rnn.training import CuboidRnnLearner, new_model
+from stages.training.cuboid_rnn.training import CuboidRnnTask, new_model
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 TWO_LEGS = """Assembly P { bbox = Cuboid(1.0, 1.0, 0.4, True)
 top = Cuboid(1.0, 0.1, 0.4, True) leg = Cuboid(0.1, 0.9, 0.1, False)
 attach(top, bbox, 0.5, 1.0, 0.5, 0.5, 1.0, 0.5) attach(leg, bbox, 0.5, 0.0, 0.5, 0.05, 0.0, 0.5)
 attach(leg, top, 0.5, 1.0, 0.5, 0.2, 0.0, 0.5) reflect(leg, X) }"""
-ENTRY = CuboidRnnEntry(name="tiny", kind="cuboid_rnn", hidden=48, mixtures=1, batch=2)
+ENTRY = CuboidRnnConfig(name="tiny", kind="cuboid_rnn", hidden=48, mixtures=1, batch=2)
 
 
 @pytest.mark.parametrize("text", [BOX, STOOL, TWO_LEGS])
 def test_cuboids_come_back_from_their_numbers(text: str) -> None:
-    for box in boxes_of(execute(parse(text))):
-        again = box_of_numbers(numbers_of_box(box))
-        assert same_box(box_corners(box), box_corners(again), 1e-6)
+    for box in execution_boxes(execute(parse(text))):
+        again = box_from_vector(box_vector(box))
+        assert boxes_match(box_corners(box), box_corners(again), 1e-6)
 
 
 def test_what_is_there_mirrored_is_said_once_and_the_lowest_first() -> None:
-    boxes = boxes_of(execute(parse(TWO_LEGS)))
-    rows = rows_of(boxes)
+    boxes = execution_boxes(execute(parse(TWO_LEGS)))
+    rows = cuboid_rows(boxes)
     assert rows[:, 9].tolist() == [1, 0]
     assert (rows[0, 6:9] != 0).any(), "the leg leans"
-    told = [box_of_numbers(row) for row in (*rows[:, :9], *mirrored(rows[:1, :9]))]
+    told = [box_from_vector(row) for row in (*rows[:, :9], *mirror_cuboids(rows[:1, :9]))]
     for box in boxes:
-        assert any(same_box(box_corners(box), box_corners(each), 1e-3) for each in told)
+        assert any(boxes_match(box_corners(box), box_corners(each), 1e-3) for each in told)
 
 
 def test_a_batch_says_axis_after_axis_and_what_stood_before() -> None:
-    rows = rows_of(boxes_of(execute(parse(TWO_LEGS))))
-    cuboids = Cuboids.of([rows, rows[1:]])
+    rows = cuboid_rows(execution_boxes(execute(parse(TWO_LEGS))))
+    cuboids = CuboidCorpus.of([rows, rows[1:]])
     batch = batch_of(cuboids, np.array([0, 1]))
     assert batch.numbers.shape == (2, 9, 3)
     np.testing.assert_allclose(batch.numbers[0, :6].reshape(2, 3, 3).mT.flatten(1), rows[:, :9], atol=1e-6)
-    assert batch.kinds.tolist() == [[3, 0, END], [0, END, END]]
+    assert batch.kinds.tolist() == [[3, 0, END_KIND], [0, END_KIND, END_KIND]]
     assert batch.flags[:, ::3].tolist() == [[[1, 1], [0, 0], [0, 0]], [[0, 0], [0, 0], [0, 0]]]
     assert batch.there.sum(dim=1).tolist() == [6, 3]
     assert batch.asked.sum(dim=1).tolist() == [3, 2]
@@ -66,13 +66,13 @@ def test_a_density_is_that_of_the_mixture_and_an_upright_cuboid_has_no_turn() ->
     shares = weights.softmax(dim=-1)
     for turned, some in ((0.0, each[..., :2]), (1.0, each)):
         wanted = (shares * some.prod(dim=-1)).sum(dim=-1).log()
-        torch.testing.assert_close(density(weights, means, wide, numbers, torch.full((1, 1), turned)), wanted)
+        torch.testing.assert_close(log_density(weights, means, wide, numbers, torch.full((1, 1), turned)), wanted)
 
 
 def test_a_network_learns_two_shapes_and_writes_them() -> None:
-    shapes = [rows_of(boxes_of(execute(parse(text)))) for text in (BOX, TWO_LEGS)]
-    cuboids = Cuboids.of(shapes)
-    learner = CuboidRnnLearner(new_model(ENTRY, 0), {}, ENTRY, cuboids, cuboids)
+    shapes = [cuboid_rows(execution_boxes(execute(parse(text)))) for text in (BOX, TWO_LEGS)]
+    cuboids = CuboidCorpus.of(shapes)
+    learner = CuboidRnnTask(new_model(ENTRY, 0), {}, ENTRY, cuboids, cuboids)
     optimizer = torch.optim.Adam(learner.module.parameters(), lr=4e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
@@ -87,11 +87,11 @@ def test_a_network_learns_two_shapes_and_writes_them() -> None:
     model = TrainedCuboidRnn(learner.module.eval(), {})
     found, begun = model.sample(20, np.random.default_rng(0), 0.0)
     assert begun >= 20
-    wanted = [boxes_of(execute(parse(text))) for text in (BOX, TWO_LEGS)]
+    wanted = [execution_boxes(execute(parse(text))) for text in (BOX, TWO_LEGS)]
     alike = [
         sum(
             len(each) == len(boxes)
-            and all(any(same_box(box_corners(a), box_corners(b), 0.1) for b in each) for a in boxes)
+            and all(any(boxes_match(box_corners(a), box_corners(b), 0.1) for b in each) for a in boxes)
             for each in found
         )
         for boxes in wanted

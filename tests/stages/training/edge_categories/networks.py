@@ -23,12 +23,12 @@ from stages.sketches.settings import SketchesConfig
 from stages.strings.categories import CategorySpace
 from stages.strings.kit_strings import KitStrings
 from stages.strings.settings import StringsConfig
-from stages.training.edge_categories.batches import CategoryTables, Strings, read_string
+from stages.training.edge_categories.batches import CategoryTables, LabelledStrings, read_string
 from stages.training.edge_categories.model import make_model
-from stages.training.edge_categories.settings import EdgeCategoriesEntry
+from stages.training.edge_categories.settings import EdgeCategoriesConfig
 from stages.training.edge_categories.trained import TrainedEdgeCategories
-from stages.training.edge_categories.training import EdgeCategoriesLearner, new_model
-from stages.training.loop import Trainee, train
+from stages.training.edge_categories.training import EdgeCategoriesTask, new_model
+from stages.training.loop import TrainState, train
 from stages.training.settings import TrainingConfig
 from stages.training.stage import STAGE
 from tests.stages.shape.collection.absent import ABSENT_SECTIONS, ABSENT_STAGES, named_inputs
@@ -93,7 +93,7 @@ def network(seed: int, size: int = 4) -> Assembly:
 
 
 def labelled(assembly: Assembly, count: int, seed: int) -> list[np.ndarray]:
-    """Rows of `Strings` of an assembly."""
+    """Rows of `LabelledStrings` of an assembly."""
     strings = writer().strings(writer().graph(assembly), count, np.random.default_rng(seed))
     found = space().label(assembly, strings, either_hand=True)
     return [
@@ -102,23 +102,23 @@ def labelled(assembly: Assembly, count: int, seed: int) -> list[np.ndarray]:
     ]
 
 
-def strings_of(shapes: int) -> Strings:
+def strings_of(shapes: int) -> LabelledStrings:
     each = [labelled(network(seed), 3, seed) for seed in range(shapes)]
     rows = [row for of_shape in each for row in of_shape]
-    return Strings(
+    return LabelledStrings(
         np.concatenate(rows),
         np.cumsum([0, *map(len, rows)]),
         np.repeat(np.arange(shapes, dtype=np.int32), [len(of_shape) for of_shape in each]),
     )
 
 
-def entry(**changes: Any) -> EdgeCategoriesEntry:
+def entry(**changes: Any) -> EdgeCategoriesConfig:
     """Settings of a model that learns in seconds."""
     settings = {"kind": "edge_categories", "name": "tiny", "embedding": 8, "hidden": 32, "layers": 1, "batch": 16}
-    return EdgeCategoriesEntry.model_validate({**settings, "steps": 150, "rounds": 1, **changes})
+    return EdgeCategoriesConfig.model_validate({**settings, "steps": 150, "rounds": 1, **changes})
 
 
-def header(settings: EdgeCategoriesEntry) -> dict[str, Any]:
+def header(settings: EdgeCategoriesConfig) -> dict[str, Any]:
     """What weights say of themselves."""
     places = [[a, b, len(pair.poses)] for (a, b), pair in space().pairs.items()]
     return {
@@ -143,10 +143,10 @@ def random_model(**changes: Any) -> TrainedEdgeCategories:
     return TrainedEdgeCategories(module.eval(), space(), header(settings))
 
 
-def learner(settings: EdgeCategoriesEntry, shapes: int = 12) -> EdgeCategoriesLearner:
+def learner(settings: EdgeCategoriesConfig, shapes: int = 12) -> EdgeCategoriesTask:
     """A learner of some shapes, on which it is validated as well."""
     strings = strings_of(shapes)
-    return EdgeCategoriesLearner(
+    return EdgeCategoriesTask(
         new_model(settings, CategoryTables.of(space()), CYCLES, 1),
         {},
         settings,
@@ -161,7 +161,7 @@ def trained_model(**changes: Any) -> TrainedEdgeCategories:
     """A model that has learnt some shapes."""
     settings = entry(learning_rate=0.01, **changes)
     learning = learner(settings)
-    train(Trainee.of(learning, settings), settings, np.random.default_rng(2), lambda done, total: None)
+    train(TrainState.of(learning, settings), settings, np.random.default_rng(2), lambda done, total: None)
     module = make_model(settings, CategoryTables.of(space()), CYCLES)
     module.load_state_dict(learning.module.state_dict())
     return TrainedEdgeCategories(module.eval(), space(), header(settings))

@@ -17,9 +17,9 @@ from stages.strings.encoder import Encoded
 from stages.strings.kit_strings import KitStrings
 from stages.strings.tokens import split_tokens
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
-from stages.training.edge_categories.batches import PAD, CategoryTables, batch_of, batches, read_string
-from stages.training.edge_categories.model import Walker
-from stages.training.edge_categories.settings import EdgeCategoriesEntry
+from stages.training.edge_categories.batches import PAD_CODE, CategoryTables, batch_of, batches, read_string
+from stages.training.edge_categories.model import AutoregressiveEdgeDecoder
+from stages.training.edge_categories.settings import EdgeCategoriesConfig
 from stages.training.edge_categories.trained import TrainedEdgeCategories, load_edge_categories
 from stages.training.edge_categories.training import new_model
 from tests.stages.training.edge_categories.networks import (
@@ -67,7 +67,7 @@ def test_a_batch_holds_the_mask_of_each_token_by_the_labels_of_its_edge() -> Non
         count = len(rows[place])
         assert np.array_equal(batch.allowed[place, :count].numpy(), space().allowed(encoded.string))
         assert batch.categories[place, :count].tolist() == right(seed).tolist()
-        assert (batch.codes[place, count:] == PAD).all()
+        assert (batch.codes[place, count:] == PAD_CODE).all()
         assert batch.there_is[place].sum() == count == len(split_tokens(encoded.string))
 
 
@@ -103,7 +103,7 @@ def test_a_walker_sees_the_categories_before_a_token_and_no_others() -> None:
 
 def test_frames_of_a_walker_are_those_of_the_categories() -> None:
     module = random_model(reader="walker").module
-    assert isinstance(module, Walker)
+    assert isinstance(module, AutoregressiveEdgeDecoder)
     (encoded,) = strings(4)
     row = labelled(network(4), 0, 0)[0]
     frames = module.frames(batch_of([row], space().masks))[0].double().numpy()
@@ -178,8 +178,8 @@ def test_parts_of_one_label_have_one_surface_in_all_their_categories(tmp_path: P
                     types[there] = int(of_chairs.types[each, 1])
 
 
-def model_entry(model: TrainedEdgeCategories) -> EdgeCategoriesEntry:
-    return EdgeCategoriesEntry.model_validate({"name": "tiny", **model.header["settings"]})
+def model_entry(model: TrainedEdgeCategories) -> EdgeCategoriesConfig:
+    return EdgeCategoriesConfig.model_validate({"name": "tiny", **model.header["settings"]})
 
 
 @pytest.mark.slow

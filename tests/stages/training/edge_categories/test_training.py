@@ -12,7 +12,7 @@ import pytest
 from pipeline.places import Places
 from pipeline.shards import bytes_array
 from pipeline.survey import Survey
-from stages.training.edge_categories.batches import Strings
+from stages.training.edge_categories.batches import LabelledStrings
 from stages.training.edge_categories.trained import load_edge_categories
 from tests.stages.training.edge_categories.networks import STAGES, config, kit, network, space, train_networks, writer
 
@@ -28,10 +28,10 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def made_ready(out: Path, split: str) -> Strings:
+def made_ready(out: Path, split: str) -> LabelledStrings:
     name = out / WORK / f"toy-edge_categories.{split}"
     rows = np.fromfile(f"{name}.rows", dtype="<i2").reshape(-1, 4)
-    return Strings(
+    return LabelledStrings(
         rows, bytes_array(Path(f"{name}.first.npy").read_bytes()), bytes_array(Path(f"{name}.graph.npy").read_bytes())
     )
 

@@ -10,26 +10,26 @@ import torch
 
 from pipeline.errors import Rejected
 from stages.shapeassembly import execute, parse
-from stages.shapeassembly.extraction.boxes import box_corners, same_box
-from stages.shapeassembly.extraction.validity import boxes_of
-from stages.training.part_graph_vae.batches import Graphs, batch_of
-from stages.training.part_graph_vae.corpus import nodes_of
-from stages.training.part_graph_vae.settings import PartGraphVaeEntry
+from stages.shapeassembly.extraction.boxes import box_corners, boxes_match
+from stages.shapeassembly.extraction.validity import execution_boxes
+from stages.training.part_graph_vae.batches import GraphCorpus, batch_of
+from stages.training.part_graph_vae.corpus import graph_nodes
+from stages.training.part_graph_vae.settings import PartGraphVaeConfig
 from stages.training.part_graph_vae.trained import TrainedPartGraphVae
-from stages.training.part_graph_vae.training import PartGraphVaeLearner, new_model, reconstruction
+from stages.training.part_graph_vae.training import PartGraphVaeTask, new_model, reconstruction
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
-ENTRY = PartGraphVaeEntry(name="tiny", kind="part_graph_vae", latent=8, hidden=48, batch=2, kl_weight=0.0)
+ENTRY = PartGraphVaeConfig(name="tiny", kind="part_graph_vae", latent=8, hidden=48, batch=2, kl_weight=0.0)
 
 
 @cache
-def graphs() -> Graphs:
-    return Graphs.of([nodes_of(execute(parse(text))) for text in (BOX, STOOL)])
+def graphs() -> GraphCorpus:
+    return GraphCorpus.of([graph_nodes(execute(parse(text))) for text in (BOX, STOOL)])
 
 
 def test_nodes_are_the_assemblies_and_their_parts_the_cuboids_and_copies() -> None:
     """The stool has its two legs in an assembly of their own, and a top with four copies."""
-    nodes = nodes_of(execute(parse(STOOL)))
+    nodes = graph_nodes(execute(parse(STOOL)))
     assert [each.below.tolist() for each in nodes] == [[1, -1, -1, -1, -1, -1], [-1, -1]]
     leaves = sum(int((each.below == -1).sum()) for each in nodes)
     assert leaves == len(execute(parse(STOOL)))
@@ -41,7 +41,7 @@ def test_nodes_are_the_assemblies_and_their_parts_the_cuboids_and_copies() -> No
 def test_a_node_with_too_many_parts_is_refused() -> None:
     many = BOX[:-1] + "translate(c, X, 13, 0.5) }"
     with pytest.raises(Rejected) as caught:
-        nodes_of(execute(parse(many)))
+        graph_nodes(execute(parse(many)))
     assert caught.value.reason == "too many parts"
 
 
@@ -58,7 +58,7 @@ def test_losses_of_a_batch_are_those_of_its_shapes_one_by_one() -> None:
 
 
 def test_a_model_learns_two_shapes_and_writes_them() -> None:
-    learner = PartGraphVaeLearner(new_model(ENTRY, 0), {}, ENTRY, graphs(), graphs())
+    learner = PartGraphVaeTask(new_model(ENTRY, 0), {}, ENTRY, graphs(), graphs())
     optimizer = torch.optim.Adam(learner.module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
@@ -72,10 +72,10 @@ def test_a_model_learns_two_shapes_and_writes_them() -> None:
         means = learner.module.encode(batch_of(graphs(), np.array([0, 1])))[0].numpy()
     model = TrainedPartGraphVae(learner.module.eval(), {})
     for text, found in zip((BOX, STOOL), model.decode(means), strict=True):
-        wanted = boxes_of(execute(parse(text)))
+        wanted = execution_boxes(execute(parse(text)))
         assert len(found) == len(wanted)
         for box in wanted:
-            assert any(same_box(box_corners(box), box_corners(each), 0.15) for each in found)
+            assert any(boxes_match(box_corners(box), box_corners(each), 0.15) for each in found)
     one, other = (model.sample(5, np.random.default_rng(0)) for _ in range(2))
     assert one[1] == other[1] >= 5
     assert all(np.array_equal(a[0].center, b[0].center) for a, b in zip(one[0], other[0], strict=True))

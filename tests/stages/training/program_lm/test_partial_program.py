@@ -10,23 +10,23 @@ import pytest
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.syntax.checks import violations
-from stages.shapeassembly.syntax.program import Program
-from stages.training.program_lm.corpus import written
-from stages.training.program_lm.partial_program import Text
-from stages.training.program_lm.tokens import Field, first_word, middles, words_of
+from stages.shapeassembly.syntax.program import AssemblyProgram
+from stages.training.program_lm.corpus import word_sequence
+from stages.training.program_lm.partial_program import PartialProgram
+from stages.training.program_lm.tokens import TokenField, first_word, program_words, step_values
 from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, STOP
-from stages.training.program_vae.partial_assembly import MOST_DEPTH, MOST_LINES
+from stages.training.program_vae.partial_assembly import MAX_DEPTH, MAX_LINES
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 EXAMPLES = [parse(path.read_text()) for path in sorted(Path("datasets/exemplars/programs").glob("*.txt"))]
 PROGRAMS = [*EXAMPLES, parse(STOOL), parse(BOX)]
 UNIT = max(max(each.root.bbox.dims) for each in PROGRAMS)
-WORDED = [words_of(each, UNIT) for each in PROGRAMS]
-VALUES = middles(WORDED)
+WORDED = [program_words(each, UNIT) for each in PROGRAMS]
+VALUES = step_values(WORDED)
 
 
-def again(number: int) -> Program | None:
-    text = Text(VALUES, UNIT)
+def again(number: int) -> AssemblyProgram | None:
+    text = PartialProgram(VALUES, UNIT)
     for _, word, _ in WORDED[number]:
         text.take(word, fit=False)
     assert text.field is None
@@ -35,7 +35,7 @@ def again(number: int) -> Program | None:
 
 @pytest.mark.parametrize("number", range(len(PROGRAMS)))
 def test_programs_may_be_written_and_are_the_same_but_for_the_steps_of_numbers(number: int) -> None:
-    assert written(WORDED[number], VALUES, UNIT) is not None
+    assert word_sequence(WORDED[number], VALUES, UNIT) is not None
     program, wanted = again(number), PROGRAMS[number]
     assert program is not None
     assert signature(program) == signature(wanted)
@@ -43,17 +43,17 @@ def test_programs_may_be_written_and_are_the_same_but_for_the_steps_of_numbers(n
     assert away < 0.05 * np.linalg.norm(wanted.root.bbox.dims)
 
 
-def chance(seed: int, often: set[int]) -> Program | None:
+def chance(seed: int, often: set[int]) -> AssemblyProgram | None:
     """A program of random words; commands of `often` come whenever they may, but for one time in eight."""
     rng = np.random.default_rng(seed)
-    text = Text(VALUES, UNIT)
+    text = PartialProgram(VALUES, UNIT)
     for _ in range(20_000):
         if text.field is None:
             return text.program()
         places = np.flatnonzero(text.allowed())
-        if text.field == Field.COMMAND and often & set(places.tolist()) and rng.random() < 0.875:
+        if text.field == TokenField.COMMAND and often & set(places.tolist()) and rng.random() < 0.875:
             places = np.array(sorted(often & set(places.tolist())))
-        if text.field == Field.BUILD and rng.random() < 0.8:
+        if text.field == TokenField.BUILD and rng.random() < 0.8:
             places = places[:2]
         text.take(int(rng.choice(places)), fit=False)
     raise AssertionError("no end")
@@ -66,13 +66,13 @@ def test_whatever_is_written_breaks_no_rule_and_comes_to_an_end(often: set[int])
         program = chance(seed, often)
         if program is not None:
             assert violations(program) == []
-            assert max(len(block.lines) for block in program.blocks) <= MOST_LINES
+            assert max(len(block.lines) for block in program.blocks) <= MAX_LINES
             assert len(program.blocks) == 1 or program.root.cuboids
             lines += len(program.root.lines)
     assert lines > 12
 
 
-def said(text: Text, *places: int) -> None:
+def said(text: PartialProgram, *places: int) -> None:
     """Write words, by their place among those of their field."""
     for place in places:
         field = text.field
@@ -82,14 +82,14 @@ def said(text: Text, *places: int) -> None:
         text.take(word, fit=False)
 
 
-def may(text: Text) -> set[int]:
+def may(text: PartialProgram) -> set[int]:
     field = text.field
     assert field is not None
     return set((np.flatnonzero(text.allowed()) - first_word(field)).tolist())
 
 
 def test_lines_follow_in_order_every_cuboid_is_attached_and_nothing_is_joined_twice() -> None:
-    text = Text(VALUES, UNIT)
+    text = PartialProgram(VALUES, UNIT)
     said(text, 30, 30, 30)
     assert may(text) == {CUBOID}
     said(text, CUBOID, 20, 20, 20, 1, CUBOID, 20, 20, 20)
@@ -101,7 +101,7 @@ def test_lines_follow_in_order_every_cuboid_is_attached_and_nothing_is_joined_tw
     said(text, 1)
     assert may(text) == {0}, "the other is not grounded"
     said(text, 0, 32, 0, 32, 32)
-    ends = VALUES[Field.GOAL_Y][sorted(may(text))]
+    ends = VALUES[TokenField.GOAL_Y][sorted(may(text))]
     assert ((ends <= 0.05) | (ends >= 0.95)).all()
     assert len(set(ends > 0.5)) == 2
     said(text, 0, 32)
@@ -111,7 +111,7 @@ def test_lines_follow_in_order_every_cuboid_is_attached_and_nothing_is_joined_tw
     said(text, 1, 32, 0, 32, 32, 20, 32)
     assert may(text) >= {STOP, REFLECT}
     said(text, ATTACH, 1, 0, 32, 64, 32, 32)
-    assert (VALUES[Field.GOAL_Y][sorted(may(text))] >= 0.95).all(), "its bottom is attached already"
+    assert (VALUES[TokenField.GOAL_Y][sorted(may(text))] >= 0.95).all(), "its bottom is attached already"
     said(text, 64, 32, REFLECT, 1, 0)
     assert ATTACH not in may(text)
     said(text, REFLECT, 1)
@@ -121,13 +121,13 @@ def test_lines_follow_in_order_every_cuboid_is_attached_and_nothing_is_joined_tw
 
 
 def test_what_expands_a_cuboid_is_as_large_and_none_is_expanded_too_deep() -> None:
-    text = Text(VALUES, UNIT)
+    text = PartialProgram(VALUES, UNIT)
     said(text, 50, 50, 50)
-    for depth in range(1, MOST_DEPTH):
+    for depth in range(1, MAX_DEPTH):
         said(text, CUBOID, 40, 40, 40, 3)
-        size = text.seen()[:3] * (VALUES[[Field.SIZE_X, Field.SIZE_Y, Field.SIZE_Z], 40])
+        size = text.seen()[:3] * (VALUES[[TokenField.SIZE_X, TokenField.SIZE_Y, TokenField.SIZE_Z], 40])
         said(text, ATTACH, 1, 0, 32, 0, 32, 32, 0, 32, STOP)
-        assert text.cue == (Field.COMMAND, 0, 1, depth)
+        assert text.cue == (TokenField.COMMAND, 0, 1, depth)
         np.testing.assert_allclose(text.seen()[:3], size, atol=1e-3)
     said(text, CUBOID, 40, 40, 40)
     assert may(text) == {0, 1}

@@ -8,29 +8,29 @@ import torch
 
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
-from stages.shapeassembly.syntax.checks import reaching_out, violations
-from stages.training.program_lm.batches import Texts, Written, batches
-from stages.training.program_lm.corpus import written
+from stages.shapeassembly.syntax.checks import protruding_parts, violations
+from stages.training.program_lm.batches import WordCorpus, WordSequence, batches
+from stages.training.program_lm.corpus import word_sequence
 from stages.training.program_lm.model import ProgramLm
-from stages.training.program_lm.sampling import drawn
-from stages.training.program_lm.settings import ProgramLmEntry
-from stages.training.program_lm.tokens import STEPS, WORDS, middles, words_of
+from stages.training.program_lm.sampling import sample_words
+from stages.training.program_lm.settings import ProgramLmConfig
+from stages.training.program_lm.tokens import NUMBER_STEPS, VOCABULARY_SIZE, program_words, step_values
 from stages.training.program_lm.trained import TrainedProgramLm
-from stages.training.program_lm.training import FIRST_NUMBER, ProgramLmLearner, jittered, new_model
+from stages.training.program_lm.training import FIRST_NUMBER_WORD, ProgramLmTask, jittered, new_model
 from stages.training.program_vae.lines import START
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
-ENTRY = ProgramLmEntry(name="tiny", kind="program_lm", width=32, layers=2, batch=2)
+ENTRY = ProgramLmConfig(name="tiny", kind="program_lm", width=32, layers=2, batch=2)
 PROGRAMS = [parse(text) for text in (BOX, STOOL)]
-WORDED = [words_of(each, 1.2) for each in PROGRAMS]
-VALUES = middles(WORDED)
-READ = [each for each in (written(words, VALUES, 1.2) for words in WORDED) if each is not None]
-TEXTS = Texts.of(READ)
+WORDED = [program_words(each, 1.2) for each in PROGRAMS]
+VALUES = step_values(WORDED)
+READ = [each for each in (word_sequence(words, VALUES, 1.2) for words in WORDED) if each is not None]
+TEXTS = WordCorpus.of(READ)
 LONGEST = 100
 
 
-def trained(module: ProgramLm, nucleus: float) -> TrainedProgramLm:
-    return TrainedProgramLm(module.eval(), {"unit": 1.2}, nucleus)
+def trained(module: ProgramLm, top_p: float) -> TrainedProgramLm:
+    return TrainedProgramLm(module.eval(), {"unit": 1.2}, top_p)
 
 
 def test_a_batch_holds_each_program_behind_its_start() -> None:
@@ -48,7 +48,7 @@ def test_a_batch_holds_each_program_behind_its_start() -> None:
 def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and_after_going_back() -> None:
     module = new_model(ENTRY, VALUES, LONGEST, 1)
     (batch,) = batches(TEXTS, 2, None)
-    whole = torch.zeros(*batch.words.shape, WORDS)
+    whole = torch.zeros(*batch.words.shape, VOCABULARY_SIZE)
     whole.flatten(0, 1)[batch.places] = module(batch.before, batch.cues, batch.seen, batch.places)
     cache = module.start(2)
     # The second program is ahead of the first; the first goes back once, over places that hold other words.
@@ -65,13 +65,13 @@ def test_words_one_by_one_are_said_as_in_whole_programs_wherever_each_stands_and
 
 
 def test_numbers_alone_are_jittered_by_a_step_and_stay_numbers() -> None:
-    before = torch.arange(WORDS).repeat(400, 1)
+    before = torch.arange(VOCABULARY_SIZE).repeat(400, 1)
     found = jittered(before, 0.2, torch.Generator().manual_seed(0))
-    moved = (found - before)[:, FIRST_NUMBER:]
-    assert (found[:, :FIRST_NUMBER] == before[:, :FIRST_NUMBER]).all()
+    moved = (found - before)[:, FIRST_NUMBER_WORD:]
+    assert (found[:, :FIRST_NUMBER_WORD] == before[:, :FIRST_NUMBER_WORD]).all()
     assert set(moved.unique().tolist()) == {-1, 0, 1}
-    assert found.max() == WORDS - 1
-    assert (moved != 0).float().mean().item() == pytest.approx(0.2 * STEPS / (STEPS + 1), abs=0.01)
+    assert found.max() == VOCABULARY_SIZE - 1
+    assert (moved != 0).float().mean().item() == pytest.approx(0.2 * NUMBER_STEPS / (NUMBER_STEPS + 1), abs=0.01)
 
 
 def test_words_are_drawn_by_their_shares_among_those_allowed_and_the_likeliest() -> None:
@@ -79,10 +79,10 @@ def test_words_are_drawn_by_their_shares_among_those_allowed_and_the_likeliest()
     allowed = np.array([True, True, True, True])
     rows = 20_000
 
-    def found(nucleus: float, temperature: float, allowed: np.ndarray) -> np.ndarray:
+    def found(top_p: float, temperature: float, allowed: np.ndarray) -> np.ndarray:
         logits = np.tile(np.log(shares), (rows, 1))
-        words = drawn(
-            logits, np.tile(allowed, (rows, 1)), temperature, np.full(rows, nucleus), np.random.default_rng(0)
+        words = sample_words(
+            logits, np.tile(allowed, (rows, 1)), temperature, np.full(rows, top_p), np.random.default_rng(0)
         )
         return np.bincount(words, minlength=4) / rows
 
@@ -96,7 +96,7 @@ def test_words_are_drawn_by_their_shares_among_those_allowed_and_the_likeliest()
 
 def test_a_model_learns_two_programs_and_writes_them() -> None:
     module = new_model(ENTRY, VALUES, LONGEST, 0)
-    learner = ProgramLmLearner(module, {}, ENTRY, TEXTS, TEXTS)
+    learner = ProgramLmTask(module, {}, ENTRY, TEXTS, TEXTS)
     optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
@@ -127,7 +127,7 @@ def test_what_is_written_keeps_every_rule_and_its_box_whatever_the_weights(seed:
     assert begun > 8, "many are given up"
     for program in programs:
         assert violations(program) == []
-        assert not any(reaching_out(block) for block in program.blocks)
+        assert not any(protruding_parts(block) for block in program.blocks)
         execute(program)
     again, _ = model.sample(8, np.random.default_rng(seed))
     assert again == programs
@@ -135,5 +135,5 @@ def test_what_is_written_keeps_every_rule_and_its_box_whatever_the_weights(seed:
 
 def test_a_program_that_breaks_a_rule_is_not_learnt() -> None:
     twice = BOX[:-1] + "attach(c, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5) }"
-    found: Written | None = written(words_of(parse(twice), 1.2), VALUES, 1.2)
+    found: WordSequence | None = word_sequence(program_words(parse(twice), 1.2), VALUES, 1.2)
     assert found is None

@@ -7,57 +7,59 @@ import pytest
 
 from stages.shapeassembly import ProgramError, parse
 from stages.training.program_lm.tokens import (
-    NUMBERS,
-    STEPS,
-    WORDS,
-    Field,
+    NUMBER_FIELDS,
+    NUMBER_STEPS,
+    VOCABULARY_SIZE,
+    TokenField,
+    field_words,
     first_word,
-    middles,
     number_of_step,
+    program_words,
     step_of,
-    words_of,
-    words_of_fields,
+    step_values,
 )
 from stages.training.program_vae.lines import CUBOID, STOP
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
 
 def test_a_program_is_its_lines_word_by_word_and_each_assembly_stands_behind_the_one_it_expands_a_cuboid_of() -> None:
-    words = words_of(parse(STOOL), 1.2)
+    words = program_words(parse(STOOL), 1.2)
     fields = [field for field, _, _ in words]
-    assert fields[:3] == [Field.ROOT_X, Field.ROOT_Y, Field.ROOT_Z]
-    commands = [word for field, word, _ in words if field == Field.COMMAND]
+    assert fields[:3] == [TokenField.ROOT_X, TokenField.ROOT_Y, TokenField.ROOT_Z]
+    commands = [word for field, word, _ in words if field == TokenField.COMMAND]
     assert [commands.count(each) for each in (STOP, CUBOID)] == [2, 3]
     assert commands.index(STOP) == 6, "the root ends before what expands its first cuboid begins"
     said = [(field, word - first_word(field)) for field, word, _ in words]
-    cuboid = said.index((Field.COMMAND, CUBOID))
-    assert said[cuboid + 4] == (Field.BUILD, 3), "aligned and expanded"
-    assert (Field.BUILD, 0) in said
-    assert said.count((Field.COPIES, 2)) == 1
-    numbers = [number for field, _, number in words if field in NUMBERS]
+    cuboid = said.index((TokenField.COMMAND, CUBOID))
+    assert said[cuboid + 4] == (TokenField.BUILD, 3), "aligned and expanded"
+    assert (TokenField.BUILD, 0) in said
+    assert said.count((TokenField.COPIES, 2)) == 1
+    numbers = [number for field, _, number in words if field in NUMBER_FIELDS]
     np.testing.assert_allclose(numbers[:9], [1 / 1.2, 1.0, 0.8 / 1.2, 0.9, 0.5 / 1.2, 0.7 / 0.8, 0.4, 0.1 / 1.2, 0.375])
-    table = words_of_fields()
+    table = field_words()
     assert all(table[field, word] for field, word, _ in words)
     assert table.any(axis=1).all()
-    assert table.shape[1] == WORDS
+    assert table.shape[1] == VOCABULARY_SIZE
 
 
-@pytest.mark.parametrize("field", [Field.SIZE_Y, Field.GOAL_X])
-def test_steps_cover_all_numbers_and_are_the_nearest(field: Field) -> None:
-    steps = [number_of_step(field, step) for step in range(STEPS + 1)]
+@pytest.mark.parametrize("field", [TokenField.SIZE_Y, TokenField.GOAL_X])
+def test_steps_cover_all_numbers_and_are_the_nearest(field: TokenField) -> None:
+    steps = [number_of_step(field, step) for step in range(NUMBER_STEPS + 1)]
     assert (steps[0], steps[-1]) == (0, pytest.approx(1))
-    assert [step_of(field, number) for number in steps] == list(range(STEPS + 1))
+    assert [step_of(field, number) for number in steps] == list(range(NUMBER_STEPS + 1))
     thin = np.diff(steps)[:10]
-    assert thin.max() < (0.006 if field == Field.SIZE_Y else 0.016)
-    assert [step_of(field, number) for number in (-1.0, 7.0)] == [0, STEPS]
+    assert thin.max() < (0.006 if field == TokenField.SIZE_Y else 0.016)
+    assert [step_of(field, number) for number in (-1.0, 7.0)] == [0, NUMBER_STEPS]
 
 
 def test_a_step_stands_for_the_median_of_what_was_said_so_that_recurring_numbers_are_exact() -> None:
-    word = first_word(Field.GOAL_X) + 32
-    values = middles([[(Field.GOAL_X, word, number) for number in (0.5, 0.5, 0.503)], [(Field.GOAL_X, word, 0.497)]])
-    assert values[Field.GOAL_X, 32] == 0.5
-    assert values[Field.GOAL_X, 33] == 33 / STEPS
-    assert values[Field.GOAL_Y, 32] == 0.5
+    word = first_word(TokenField.GOAL_X) + 32
+    values = step_values(
+        [[(TokenField.GOAL_X, word, number) for number in (0.5, 0.5, 0.503)], [(TokenField.GOAL_X, word, 0.497)]]
+    )
+    assert values[TokenField.GOAL_X, 32] == 0.5
+    assert values[TokenField.GOAL_X, 33] == 33 / NUMBER_STEPS
+    assert values[TokenField.GOAL_Y, 32] == 0.5
 
 
 @pytest.mark.parametrize(
@@ -66,5 +68,5 @@ def test_a_step_stands_for_the_median_of_what_was_said_so_that_recurring_numbers
 )
 def test_what_has_no_words_is_refused(line: str, reason: str) -> None:
     with pytest.raises(ProgramError, match=reason.split()[0]) as raised:
-        words_of(parse(BOX[:-1] + line + " }"), 1.0)
+        program_words(parse(BOX[:-1] + line + " }"), 1.0)
     assert raised.value.reason == reason

@@ -9,18 +9,18 @@ import pytest
 
 from stages.shapeassembly import parse
 from stages.shapeassembly.syntax.program import Attach, Cuboid
-from stages.training.program_vae.corpus import told_without
-from stages.training.program_vae.lines import ALIGNED, CUBOID, node_lines
-from stages.training.program_vae.settings import ProgramVaeEntry, Without
+from stages.training.program_vae.corpus import ablate_program
+from stages.training.program_vae.lines import ALIGNED, CUBOID, assembly_lines
+from stages.training.program_vae.settings import Ablation, ProgramVaeConfig
 from tests.stages.shapeassembly.editing.test_flattening import BENCH
 
 PROGRAM = parse(BENCH)
 
 
-@pytest.mark.parametrize("without", get_args(Without))
-def test_what_a_model_is_to_do_without_is_not_in_its_programs(without: Without) -> None:
-    found = told_without(PROGRAM, without, np.random.default_rng(0))
-    nodes = node_lines(found)
+@pytest.mark.parametrize("without", get_args(Ablation))
+def test_what_a_model_is_to_do_without_is_not_in_its_programs(without: Ablation) -> None:
+    found = ablate_program(PROGRAM, without, np.random.default_rng(0))
+    nodes = assembly_lines(found)
     kinds = {type(line) for block in found.blocks for line in block.lines}
     assert (found == PROGRAM) == (without == "nothing") or without == "order"
     assert (len(nodes) == 1) == (without == "hierarchy")
@@ -30,14 +30,14 @@ def test_what_a_model_is_to_do_without_is_not_in_its_programs(without: Without) 
 
 
 def test_order_is_drawn_from_the_generator_alone() -> None:
-    told = [told_without(PROGRAM, "order", np.random.default_rng(seed)) for seed in (1, 1, *range(2, 9))]
+    told = [ablate_program(PROGRAM, "order", np.random.default_rng(seed)) for seed in (1, 1, *range(2, 9))]
     assert told[0] == told[1]
     assert any(each != told[0] for each in told)
 
 
 def test_models_that_learn_the_same_share_what_is_made_ready() -> None:
-    def entry(without: Without) -> ProgramVaeEntry:
-        return ProgramVaeEntry(name="any", kind="program_vae", without=without)
+    def entry(without: Ablation) -> ProgramVaeConfig:
+        return ProgramVaeConfig(name="any", kind="program_vae", without=without)
 
     assert entry("nothing").prepared == {}
     assert entry("macros").prepared == {"without": "macros"}

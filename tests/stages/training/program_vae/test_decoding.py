@@ -8,20 +8,20 @@ import torch
 
 from stages.shapeassembly import execute, parse
 from stages.shapeassembly.analysis.structure import signature
-from stages.shapeassembly.syntax.checks import reaching_out, violations
+from stages.shapeassembly.syntax.checks import protruding_parts, violations
 from stages.shapeassembly.syntax.program import BBOX
-from stages.training.program_vae.batches import Programs, batch_of
-from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, STOP, TRANSLATE, node_lines
+from stages.training.program_vae.batches import ProgramCorpus, batch_of
+from stages.training.program_vae.lines import ATTACH, CUBOID, REFLECT, SQUEEZE, STOP, TRANSLATE, assembly_lines
 from stages.training.program_vae.model import ProgramVae
-from stages.training.program_vae.partial_assembly import Draft, Numbers
+from stages.training.program_vae.partial_assembly import LineNumbers, PartialAssembly
 from stages.training.program_vae.reaching import add_line
-from stages.training.program_vae.settings import ProgramVaeEntry
+from stages.training.program_vae.settings import ProgramVaeConfig
 from stages.training.program_vae.trained import TrainedProgramVae
-from stages.training.program_vae.training import ProgramVaeLearner, new_model, reconstruction
+from stages.training.program_vae.training import ProgramVaeTask, new_model, reconstruction
 from tests.stages.training.program_vae.test_lines import BOX, STOOL
 
-ENTRY = ProgramVaeEntry(name="tiny", kind="program_vae", latent=16, hidden=48, kl_weight=0.0, batch=2)
-PROGRAMS = Programs.of([node_lines(parse(text)) for text in (BOX, STOOL)])
+ENTRY = ProgramVaeConfig(name="tiny", kind="program_vae", latent=16, hidden=48, kl_weight=0.0, batch=2)
+PROGRAMS = ProgramCorpus.of([assembly_lines(parse(text)) for text in (BOX, STOOL)])
 
 
 def trained(module: ProgramVae) -> TrainedProgramVae:
@@ -43,7 +43,7 @@ def test_losses_of_a_batch_are_those_of_its_programs_one_by_one() -> None:
 
 def test_a_model_learns_two_programs_and_writes_them() -> None:
     module = new_model(ENTRY, 0)
-    learner = ProgramVaeLearner(module, {}, ENTRY, PROGRAMS, PROGRAMS)
+    learner = ProgramVaeTask(module, {}, ENTRY, PROGRAMS, PROGRAMS)
     optimizer = torch.optim.Adam(module.parameters(), lr=3e-3)
     noise = torch.Generator().manual_seed(0)
     stream = learner.batches(np.random.default_rng(0))
@@ -78,25 +78,25 @@ def test_what_is_written_keeps_every_rule_whatever_the_weights(seed: int) -> Non
         programs = [each for each in trained(module).decode(points, reject=reject) if each is not None]
         for program in programs:
             assert violations(program) == []
-            assert not any(reaching_out(block) for block in program.blocks)
+            assert not any(protruding_parts(block) for block in program.blocks)
             execute(program)
 
 
-NUMBERS = Numbers(np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5]), 2, np.array([0.5, 0.5]), 0, 2, 0.5)
+NUMBERS = LineNumbers(np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5]), 2, np.array([0.5, 0.5]), 0, 2, 0.5)
 
 
-def draft() -> Draft:
-    made = Draft((1.0, 1.0, 1.0))
+def draft() -> PartialAssembly:
+    made = PartialAssembly((1.0, 1.0, 1.0))
     for _ in range(2):
         made.declare(np.array([0.2, 0.4, 2.0]), True, None)
     return made
 
 
-def allowed(made: Draft) -> set[int]:
+def allowed(made: PartialAssembly) -> set[int]:
     return set(np.flatnonzero(made.commands()).tolist())
 
 
-def choices(made: Draft, command: int) -> set[tuple[int, ...]]:
+def choices(made: PartialAssembly, command: int) -> set[tuple[int, ...]]:
     logits = np.full(7, -1.0)
     logits[command] = 0.0
     return {each[1:] for each in made.choices(logits, np.zeros((7, 3, 11)), 100) if each[0] == command}
@@ -124,6 +124,6 @@ def test_lines_follow_in_the_order_of_the_grammar_and_only_grounded_cuboids_bear
 )
 def test_the_box_is_attached_to_at_its_ends_and_not_left_by_more_than_a_tenth(goal: list[float], kept: bool) -> None:
     made = draft()
-    numbers = Numbers(np.array([0.5, 0.0, 0.5, *goal]), 0, np.zeros(2), 0, 1, 0.0)
+    numbers = LineNumbers(np.array([0.5, 0.0, 0.5, *goal]), 0, np.zeros(2), 0, 1, 0.0)
     assert add_line(made, (ATTACH, 1, 0), numbers, reaching=False) == kept
     assert (BBOX in str(made.block("P", {}).lines)) == kept

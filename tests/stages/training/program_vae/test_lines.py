@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.shapeassembly import ProgramError, parse
-from stages.training.program_vae.batches import Programs, batch_of, batches
+from stages.training.program_vae.batches import ProgramCorpus, batch_of, batches
 from stages.training.program_vae.lines import (
     ALIGNED,
     AXIS,
@@ -15,12 +15,12 @@ from stages.training.program_vae.lines import (
     DIMS,
     FACE,
     INDICES,
+    LINE_WIDTH,
     POINTS,
     STOP,
     TRANSLATE,
     UV,
-    WIDTH,
-    node_lines,
+    assembly_lines,
 )
 
 STOOL = """Assembly P { bbox = Cuboid(1.0, 1.2, 0.8, True)
@@ -36,8 +36,8 @@ attach(c, bbox, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5) }"""
 
 
 def test_a_line_is_63_numbers_of_which_only_its_own_are_set() -> None:
-    root, legs = node_lines(parse(STOOL))
-    assert root.numbers.shape == (7, WIDTH)
+    root, legs = assembly_lines(parse(STOOL))
+    assert root.numbers.shape == (7, LINE_WIDTH)
     cuboid, _, attach, squeeze, translate, reflect, stop = root.numbers
     np.testing.assert_allclose(cuboid[DIMS], [0.9, 0.5, 0.7])
     assert (cuboid[ALIGNED][0], root.numbers[1][ALIGNED][0], cuboid.sum()) == (1, 0, pytest.approx(4.1))
@@ -63,12 +63,12 @@ def test_a_line_is_63_numbers_of_which_only_its_own_are_set() -> None:
 )
 def test_what_63_numbers_cannot_say_is_refused(line: str, reason: str) -> None:
     with pytest.raises(ProgramError) as caught:
-        node_lines(parse(BOX[:-1] + line + "}"))
+        assembly_lines(parse(BOX[:-1] + line + "}"))
     assert caught.value.reason == reason
 
 
 def test_levels_hold_the_assemblies_of_one_depth_and_know_where_they_stand() -> None:
-    programs = Programs.of([node_lines(parse(text)) for text in (BOX, STOOL)])
+    programs = ProgramCorpus.of([assembly_lines(parse(text)) for text in (BOX, STOOL)])
     roots, below = batch_of(programs, np.array([1, 0]))
     assert roots.lengths.tolist() == [7, 3]
     assert not roots.lines[1, 3:].any()
@@ -85,10 +85,10 @@ def test_levels_hold_the_assemblies_of_one_depth_and_know_where_they_stand() -> 
 
 
 def test_a_pass_sees_every_program_once_and_arrays_come_back() -> None:
-    programs = Programs.of([node_lines(parse(text)) for text in (BOX, STOOL, BOX, STOOL, BOX)])
+    programs = ProgramCorpus.of([assembly_lines(parse(text)) for text in (BOX, STOOL, BOX, STOOL, BOX)])
     sizes = [len(levels[0].lines) for levels in batches(programs, 2, np.random.default_rng(0))]
     assert sorted(sizes) == [1, 2, 2]
-    again = Programs.of_arrays(programs.arrays())
+    again = ProgramCorpus.of_arrays(programs.arrays())
     assert all(
         np.array_equal(one, other) for one, other in zip(vars(programs).values(), vars(again).values(), strict=True)
     )

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from stages.training.program_vae.lines import ATTACH, SQUEEZE
-from stages.training.program_vae.partial_assembly import Draft, Numbers
-from stages.training.program_vae.reaching import APART, add_line, gap
+from stages.training.program_vae.partial_assembly import LineNumbers, PartialAssembly
+from stages.training.program_vae.reaching import MAX_GAP_SHARE, add_line, attachment_gap
 
-BOTTOM = Numbers(np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5]), 2, np.array([0.5, 0.5]), 0, 2, 0.5)
-LEG = Numbers(np.zeros(6), 2, np.array([0.2, 0.5]), 0, 1, 0.0)
+BOTTOM = LineNumbers(np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5]), 2, np.array([0.5, 0.5]), 0, 2, 0.5)
+LEG = LineNumbers(np.zeros(6), 2, np.array([0.2, 0.5]), 0, 1, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -20,21 +20,21 @@ def test_an_aligned_cuboid_that_is_too_short_gets_the_size_with_which_it_reaches
     height: float, aligned: bool, written: float
 ) -> None:
     """What is not aligned is stretched where it is attached; a hundredth of the diagonal is no gap."""
-    made = Draft((1.0, 1.0, 1.0))
+    made = PartialAssembly((1.0, 1.0, 1.0))
     made.declare(np.array([0.1, height, 0.1]), aligned, None)
     assert add_line(made, (SQUEEZE, 1, 0, 0), LEG, reaching=True)
     assert made.sizes == [(0.1, written, 0.1)]
-    assert gap(made, 1) <= APART
+    assert attachment_gap(made, 1) <= MAX_GAP_SHARE
 
 
 def test_a_line_that_leaves_a_gap_is_written_only_if_it_may() -> None:
     """Two attachments side by side, at the middle of the cuboid both: no size brings them together."""
-    made = Draft((1.0, 1.0, 1.0))
+    made = PartialAssembly((1.0, 1.0, 1.0))
     made.declare(np.array([0.2, 0.4, 1.0]), True, None)
     assert add_line(made, (ATTACH, 1, 0), BOTTOM, reaching=False)
-    beside = Numbers(np.array([0.5, 1.0, 0.5, 0.8, 1.0, 0.5]), 2, np.zeros(2), 0, 1, 0.0)
+    beside = LineNumbers(np.array([0.5, 1.0, 0.5, 0.8, 1.0, 0.5]), 2, np.zeros(2), 0, 1, 0.0)
     assert not add_line(made, (ATTACH, 1, 0), beside, reaching=True)
     assert made.lines[1:] == []
     assert add_line(made, (ATTACH, 1, 0), beside, reaching=False)
-    assert gap(made, 1) > APART
+    assert attachment_gap(made, 1) > MAX_GAP_SHARE
     assert made.sizes[0] == (0.2, 1.0, 1.0), "it reaches the top, and not the side"

@@ -6,7 +6,7 @@ import torch
 from torch.nn.functional import max_pool2d
 
 from stages.training.recovery.model import RecoveryNet, halve_resolution
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 from tests.stages.programs.stool import PROGRAM as STOOL
 
 
@@ -22,7 +22,7 @@ def test_squares_are_halved_on_a_gpu_as_they_are_elsewhere() -> None:
 
 
 def test_places_of_points_are_read_in_full_whatever_the_precision() -> None:
-    net = RecoveryNet(RecoveryEntry(name="small", points=64), STOOL.parameters)
+    net = RecoveryNet(RecoveryModelConfig(name="small", points=64), STOOL.parameters)
     seen: list[torch.Tensor] = []
     net.encoder.convolutions[0].register_forward_hook(lambda _, __, features: seen.append(features))
     clouds = torch.rand(2, 64, 3, generator=torch.Generator().manual_seed(1)) - 0.5

@@ -11,7 +11,7 @@ import torch
 from stages.programs.parameters import Parameter
 from stages.programs.program import find_program
 from stages.training.recovery.outputs import ParameterOutputs
-from stages.training.recovery.settings import RecoveryEntry
+from stages.training.recovery.settings import RecoveryModelConfig
 from stages.training.recovery.trained import TrainedRecovery
 from stages.training.recovery.training import new_network
 from tests.stages.training.recovery.toy import PROGRAM, SMALL
@@ -22,7 +22,7 @@ LEGS = Parameter("legs", "discrete", (3, 4), 3, "all", "How many.")
 
 
 def answers(**changes: object) -> ParameterOutputs:
-    return ParameterOutputs.of(RecoveryEntry.model_validate({**SMALL, **changes}, strict=False), (LENGTH, LEGS))
+    return ParameterOutputs.of(RecoveryModelConfig.model_validate({**SMALL, **changes}, strict=False), (LENGTH, LEGS))
 
 
 def test_classes_are_cross_entropies_summed_over_the_parameters() -> None:
@@ -51,7 +51,7 @@ def test_without_the_existence_label_nothing_is_learnt_of_what_is_hidden() -> No
 
 
 def test_two_networks_share_no_weight_but_see_the_same_cloud() -> None:
-    entry = RecoveryEntry.model_validate({**SMALL, "answers": "apart"}, strict=False)
+    entry = RecoveryModelConfig.model_validate({**SMALL, "answers": "apart"}, strict=False)
     net = new_network(entry, STOOL, 0)
     told = ParameterOutputs.of(entry, STOOL.parameters)
     outputs = net(torch.rand(4, 64, 3))
@@ -63,7 +63,7 @@ def test_two_networks_share_no_weight_but_see_the_same_cloud() -> None:
 
 @pytest.mark.parametrize("answer", ["classes", "values"])
 def test_a_guess_is_the_mean_of_what_is_likely(answer: str) -> None:
-    entry = RecoveryEntry.model_validate({**SMALL, "answers": answer}, strict=False)
+    entry = RecoveryModelConfig.model_validate({**SMALL, "answers": answer}, strict=False)
     trained = TrainedRecovery(new_network(entry, STOOL, 0).eval(), STOOL, entry, {})
     guess = trained.estimate_from_cloud(np.random.default_rng(0).random((100, 3)), np.random.default_rng(0))
     values = guess.values(STOOL)

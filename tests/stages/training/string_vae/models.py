@@ -10,12 +10,12 @@ import torch
 
 from stages.strings.compiled_grammar import CompiledGrammar, compile_grammar, patterns_json
 from stages.strings.grammar_mask import masks_along
-from stages.training.loop import Trainee, train
-from stages.training.string_vae.batches import Strings
-from stages.training.string_vae.settings import StringVaeEntry
+from stages.training.loop import TrainState, train
+from stages.training.string_vae.batches import StringCorpus
+from stages.training.string_vae.settings import StringVaeConfig
 from stages.training.string_vae.trained import TrainedStringVae
-from stages.training.string_vae.training import StringVaeLearner, new_model
-from stages.training.string_vae.vocabulary import END, Vocabulary
+from stages.training.string_vae.training import StringVaeTask, new_model
+from stages.training.string_vae.vocabulary import END_TOKEN, Vocabulary
 from tests.stages.training import toy_training
 
 VOCABULARY = Vocabulary(toy_training.ALPHABET, 2)
@@ -27,10 +27,10 @@ def rules() -> CompiledGrammar:
     return compile_grammar(toy_training.grammar(), 3, 2)
 
 
-def entry(**changes: Any) -> StringVaeEntry:
+def entry(**changes: Any) -> StringVaeConfig:
     """Settings of a model that learns in seconds."""
     settings = {"name": "tiny", "latent": 8, "embedding": 8, "hidden": 64, "batch": 20, "steps": 300, "rounds": 1}
-    return StringVaeEntry.model_validate({**settings, "anneal": 50, "kl_weight": 0.01, "word_dropout": 0.1, **changes})
+    return StringVaeConfig.model_validate({**settings, "anneal": 50, "kl_weight": 0.01, "word_dropout": 0.1, **changes})
 
 
 @cache
@@ -41,12 +41,12 @@ def toy_strings() -> tuple[str, ...]:
     )
 
 
-def numbered() -> Strings:
+def numbered() -> StringCorpus:
     """The strings as a learner takes them."""
     shapes = [strings for shard in toy_training.SPLITS for _, strings in toy_training.strings(shard)]
-    codes = [np.append(VOCABULARY.codes(each), np.int16(END)) for each in toy_strings()]
+    codes = [np.append(VOCABULARY.codes(each), np.int16(END_TOKEN)) for each in toy_strings()]
     masks = [masks_along(rules(), 2, each.astype(np.int64))[0] for each in codes]
-    return Strings(
+    return StringCorpus(
         tokens=np.concatenate(codes),
         first=np.cumsum([0, *map(len, codes)]),
         masks=np.packbits(np.concatenate(masks), axis=-1, bitorder="little"),
@@ -57,7 +57,7 @@ def numbered() -> Strings:
     )
 
 
-def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringVae:
+def wrapped(module: torch.nn.Module, settings: StringVaeConfig) -> TrainedStringVae:
     header = {
         "settings": settings.model_dump(mode="json", exclude={"name", "kits", "seeds", "patience"}),
         "most": MOST,
@@ -69,9 +69,9 @@ def wrapped(module: torch.nn.Module, settings: StringVaeEntry) -> TrainedStringV
     return TrainedStringVae(module.eval(), VOCABULARY, rules(), header)
 
 
-def random_vae(decoder: str, seed: int = 0, look_back: bool = True) -> TrainedStringVae:
+def random_vae(decoder: str, seed: int = 0, cycle_attention: bool = True) -> TrainedStringVae:
     """A model with random weights, which are larger than fresh ones, so that it has preferences."""
-    settings = entry(decoder=decoder, look_back=look_back)
+    settings = entry(decoder=decoder, cycle_attention=cycle_attention)
     module = new_model(settings, VOCABULARY, MOST, seed)
     with torch.no_grad():
         for parameter in module.parameters():
@@ -84,8 +84,6 @@ def trained_vae(decoder: str = "masked", **changes: Any) -> TrainedStringVae:
     """A model that has learnt the strings of the toy, some hundred steps."""
     settings = entry(decoder=decoder, learning_rate=0.01, **changes)
     strings = numbered()
-    learner = StringVaeLearner(
-        new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, True, strings, strings
-    )
-    train(Trainee.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
+    learner = StringVaeTask(new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, True, strings, strings)
+    train(TrainState.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
     return wrapped(learner.module, settings)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.training.string_vae.latent_sampling import (
-    WAYS,
+    SAMPLING_METHODS,
     gaussian_points,
     linear_points,
     path_points,
@@ -80,7 +80,7 @@ def test_search_that_finds_nothing_ends_at_the_largest_offset() -> None:
     assert 0.09 <= np.abs(np.concatenate(model.points)).max() <= 0.1
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", SAMPLING_METHODS)
 def test_each_way_makes_as_many_searches_as_asked_and_finds_valid_strings(way: str) -> None:
     model, strings = random_vae("masked"), toy_strings()
     found = sample(model, way, strings, 10, np.random.default_rng(4))

@@ -10,12 +10,12 @@ import torch
 
 from stages.strings.grammar_check import check_string
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes
-from stages.training.loop import Trainee, train
+from stages.training.loop import TrainState, train
 from stages.training.string_vae.batches import batches, open_until
 from stages.training.string_vae.model import shifted
 from stages.training.string_vae.trained import load_string_vae
-from stages.training.string_vae.training import StringVaeLearner, annealed, new_model, triplet_loss
-from stages.training.string_vae.vocabulary import END
+from stages.training.string_vae.training import StringVaeTask, annealed, new_model, triplet_loss
+from stages.training.string_vae.vocabulary import END_TOKEN
 from tests.stages.training import toy_training
 from tests.stages.training.string_vae.models import (
     MOST,
@@ -45,8 +45,8 @@ def test_a_cycle_is_open_from_its_number_to_the_same_number_again() -> None:
 
 
 def test_looking_back_bears_on_open_cycles_alone_each_by_where_it_began() -> None:
-    assert random_vae("plain", look_back=True).module.ends is None
-    module = random_vae("masked", look_back=True).module
+    assert random_vae("plain", cycle_attention=True).module.ends is None
+    module = random_vae("masked", cycle_attention=True).module
     assert module.ends is not None
     codes, points = torch.tensor([[1, 7, 2, 6, 1, 6, 1, 7, 1]]), torch.zeros((1, 8))
     before = module.decode(shifted(codes), points, until_of(codes))
@@ -57,10 +57,10 @@ def test_looking_back_bears_on_open_cycles_alone_each_by_where_it_began() -> Non
     assert not changed[:, :-2].any()
 
 
-@pytest.mark.parametrize("look_back", [False, True])
+@pytest.mark.parametrize("cycle_attention", [False, True])
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str, look_back: bool) -> None:
-    module = random_vae(decoder, look_back=look_back).module
+def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str, cycle_attention: bool) -> None:
+    module = random_vae(decoder, cycle_attention=cycle_attention).module
     rng = np.random.default_rng(1)
     codes = torch.from_numpy(rng.integers(0, len(VOCABULARY), (3, 11)))
     points = torch.from_numpy(rng.standard_normal((3, 8)).astype(np.float32))
@@ -71,10 +71,10 @@ def test_token_by_token_the_decoder_says_what_it_says_of_the_whole(decoder: str,
         torch.testing.assert_close(logits, whole[:, place], rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize("look_back", [False, True])
+@pytest.mark.parametrize("cycle_attention", [False, True])
 @pytest.mark.parametrize("decoder", DECODERS)
-def test_a_token_is_told_by_those_before_it_alone(decoder: str, look_back: bool) -> None:
-    module = random_vae(decoder, look_back=look_back).module
+def test_a_token_is_told_by_those_before_it_alone(decoder: str, cycle_attention: bool) -> None:
+    module = random_vae(decoder, cycle_attention=cycle_attention).module
     codes = torch.ones((1, 9), dtype=torch.int64)
     codes[0, [1, 7]] = len(VOCABULARY) - 1
     changed = codes.clone()
@@ -145,10 +145,10 @@ def test_half_precision_learns_nearly_the_same() -> None:
     losses = []
     for precision in ("float32", "bfloat16"):
         settings, strings = entry(precision=precision, steps=4), numbered()
-        learner = StringVaeLearner(
+        learner = StringVaeTask(
             new_model(settings, VOCABULARY, MOST, 1), {}, settings, VOCABULARY, True, strings, strings
         )
-        learnt = train(Trainee.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
+        learnt = train(TrainState.of(learner, settings), settings, np.random.default_rng(2), lambda done, total: None)
         losses.append(learnt["loss"])
     assert losses[0] != losses[1]
     assert losses[1] == pytest.approx(losses[0], rel=0.02)
@@ -163,7 +163,7 @@ def test_batches_hold_every_string_once_beside_what_is_to_be_written(canonical: 
         for read, read_length, codes, length, allowed in rows:
             text, written = VOCABULARY.string(read.tolist()), VOCABULARY.string(codes.tolist())
             seen.append(text)
-            assert read[read_length - 1] == codes[length - 1] == END
+            assert read[read_length - 1] == codes[length - 1] == END_TOKEN
             assert len(VOCABULARY.codes(text)) == read_length - 1
             assert len(VOCABULARY.codes(written)) == length - 1
             assert written == (model.written_for(text) if canonical else text)
@@ -218,8 +218,10 @@ def test_low_temperature_writes_the_likeliest_string_and_a_higher_one_others_mor
 
 
 def test_weights_from_before_models_looked_back_are_read_as_they_are(tmp_path: Path) -> None:
-    model = random_vae("masked", look_back=False)
-    settings = {key: value for key, value in model.header["settings"].items() if key not in ("look_back", "dropout")}
+    model = random_vae("masked", cycle_attention=False)
+    settings = {
+        key: value for key, value in model.header["settings"].items() if key not in ("cycle_attention", "dropout")
+    }
     path = tmp_path / "weights.safetensors"
     path.write_bytes(
         checkpoint_bytes(model.module.state_dict(), {**model.header, "kind": "string_vae", "settings": settings})

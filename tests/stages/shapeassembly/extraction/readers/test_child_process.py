@@ -9,25 +9,27 @@ import numpy as np
 import pytest
 
 from pipeline.errors import Rejected
-from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Box, Part, PartHierarchy
-from stages.shapeassembly.extraction.readers.child_process import grass_read_apart, read_apart
+from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Box, PartHierarchy, PartNode
+from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child, read_in_child
 from stages.shapeassembly.extraction.readers.grass import read_grass
 
 RNG = np.random.default_rng(0)
 
 
-def part(label: str, *children: Part) -> Part:
-    return Part(label, Box(RNG.normal(size=3), RNG.random(3) / 3, np.linalg.qr(RNG.normal(size=(3, 3)))[0]), children)
+def part(label: str, *children: PartNode) -> PartNode:
+    return PartNode(
+        label, Box(RNG.normal(size=3), RNG.random(3) / 3, np.linalg.qr(RNG.normal(size=(3, 3)))[0]), children
+    )
 
 
-def flat(root: Part) -> list[float | str]:
+def flat(root: PartNode) -> list[float | str]:
     numbers = [*root.box.center.tolist(), *root.box.size.tolist(), *root.box.axes.ravel().tolist()]
     return [root.label, *numbers, len(root.children), *(each for child in root.children for each in flat(child))]
 
 
 def test_hierarchy_comes_back_to_the_last_digit() -> None:
     whole = PartHierarchy("stuhl ä", part("root", part("seat"), part("back", part("slat"), part("slat"))))
-    found = read_apart(lambda _: whole, Path("chair.json"))
+    found = read_in_child(lambda _: whole, Path("chair.json"))
     assert found.name == whole.name
     assert flat(found.root) == flat(whole.root)
 
@@ -37,7 +39,7 @@ def test_refusal_keeps_reason_and_detail() -> None:
         raise Rejected("some reason", f"{path.name}: no `label`")
 
     with pytest.raises(Rejected) as caught:
-        read_apart(read, Path("folder/chair.json"))
+        read_in_child(read, Path("folder/chair.json"))
     assert (caught.value.reason, caught.value.detail) == ("some reason", "chair.json: no `label`")
 
 
@@ -47,17 +49,17 @@ def test_crash_of_a_reader_is_a_refusal_that_names_the_file() -> None:
         raise AssertionError
 
     with pytest.raises(Rejected, match=r"chair\.glb: cannot be read: a native library crashed on it") as caught:
-        read_apart(read, Path("chair.glb"))
+        read_in_child(read, Path("chair.glb"))
     assert caught.value.reason == UNREADABLE
 
 
 def test_shapes_of_grass_come_back_as_they_are(tmp_path: Path) -> None:
     path = tmp_path / "chairs.npz"
     np.savez(path, full_boxes=RNG.normal(size=(5, 12)), full_offsets=np.array([0, 2, 5]))
-    here, there = read_grass(path), grass_read_apart(path)
+    here, there = read_grass(path), read_grass_in_child(path)
     assert here.name == there.name
     np.testing.assert_array_equal(here.boxes, there.boxes)
     np.testing.assert_array_equal(here.offsets, there.offsets)
     path.write_bytes(path.read_bytes()[:-30])
     with pytest.raises(Rejected, match="not a whole GRASS file"):
-        grass_read_apart(path)
+        read_grass_in_child(path)
