@@ -21,7 +21,7 @@ from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
 from stages.shape.shape import Shape, kit_shape
-from stages.variations.settings import CHOSEN_INSTEAD, CHOSEN_INSTEAD_STABLE
+from stages.variations.settings import FALLBACK_KEY, FALLBACK_STABLE_KEY
 
 TRIES = 36
 """Draws of a probe, of all exemplars together."""
@@ -79,8 +79,8 @@ def resize_fallback(reading: ResolvedKit, expected: YieldEstimate, shown: int) -
         return None
     why = f"{found.holds:.0%} of what is drawn holds together; of other layouts {expected.sentence}"
     stands = "the exemplars stand" if found.stable else "not even the exemplars stand"
-    values = {**unvaried.values, CHOSEN_INSTEAD: "proportions", CHOSEN_INSTEAD_STABLE: found.stable}
-    reasons = {**unvaried.reasons, CHOSEN_INSTEAD: why, CHOSEN_INSTEAD_STABLE: stands}
+    values = {**unvaried.values, FALLBACK_KEY: "proportions", FALLBACK_STABLE_KEY: found.stable}
+    reasons = {**unvaried.reasons, FALLBACK_KEY: why, FALLBACK_STABLE_KEY: stands}
     return ResizeFallback(replace(unvaried, values=values, reasons=reasons), built, found)
 
 

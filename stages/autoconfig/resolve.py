@@ -33,7 +33,7 @@ from stages.shape.physics.settings import Requirements
 from stages.shape.shape import kit_shape
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.requirements.required_labels import spanning_labels
-from stages.variations.settings import CHOSEN_CARCASS, CHOSEN_COPIED, CHOSEN_STABLE
+from stages.variations.settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class Resolution:
         if self.finds is not None:
             probe = {**self.finds.as_json(), "rejects": dict(self.finds.rejects)}
         return {
-            "chosen": {key: list(each) if isinstance(each, tuple) else each for key, each in self.values.items()},
-            "why": dict(self.reasons),
+            "resolved": {key: list(each) if isinstance(each, tuple) else each for key, each in self.values.items()},
+            "reasons": dict(self.reasons),
             "probe": probe,
             "kept": round(self.kept, 4),
             "enough": self.enough,
@@ -68,7 +68,7 @@ class Resolution:
         }
 
 
-REQUIREMENT_KEYS = (CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS)
+REQUIREMENT_KEYS = (MAX_COPIED_SHARE_KEY, STABLE_KEY, REQUIRED_LABELS_KEY)
 
 
 def resolve_settings(
@@ -148,16 +148,20 @@ def _required(sight: ContactAnalysis, rungs: Sequence[CandidateSetting]) -> dict
     """Value and reason of each of REQUIREMENTS, after the rung that was chosen, the last."""
     if not rungs:
         nothing = "there is nothing to search"
-        return {CHOSEN_COPIED: resolve_max_copied(None), CHOSEN_STABLE: (False, nothing), CHOSEN_CARCASS: ((), nothing)}
+        return {
+            MAX_COPIED_SHARE_KEY: resolve_max_copied(None),
+            STABLE_KEY: (False, nothing),
+            REQUIRED_LABELS_KEY: ((), nothing),
+        }
     kit, finds = sight.kit(rungs[-1].setting), rungs[-1].finds
     spanning = spanning_labels(kit)
     why = (
         "the exemplars have parts of these as large as themselves" if spanning else "no part is as large as an exemplar"
     )
     return {
-        CHOSEN_COPIED: resolve_max_copied(finds),
-        CHOSEN_STABLE: resolve_stable(kit, rungs[-1].different),
-        CHOSEN_CARCASS: (spanning, why),
+        MAX_COPIED_SHARE_KEY: resolve_max_copied(finds),
+        STABLE_KEY: resolve_stable(kit, rungs[-1].different),
+        REQUIRED_LABELS_KEY: (spanning, why),
     }
 
 

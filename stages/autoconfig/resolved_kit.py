@@ -16,7 +16,7 @@ from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
-from stages.variations.settings import CHOSEN_COPIED
+from stages.variations.settings import MAX_COPIED_SHARE_KEY
 
 PARTS_KEY = "parts"
 """What `parts` is called among the keys that are chosen for a kit."""
@@ -90,5 +90,5 @@ def _is_dataset(reading: ResolvedKit, tries: int) -> bool:
     built = reading.observe(choices.values)
     if built.refusals:
         return False
-    copied = choices.values.get(CHOSEN_COPIED, 1.0)
+    copied = choices.values.get(MAX_COPIED_SHARE_KEY, 1.0)
     return not estimate_yield(built.kit, ContactOracle(built.kit), tries, choices.finds.graphs, copied=copied).is_poor

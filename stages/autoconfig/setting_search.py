@@ -16,7 +16,7 @@ from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
 from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
-from stages.variations.settings import CHOSEN_HUBS
+from stages.variations.settings import RESOLVED_HUB_SHARE
 
 SUFFICIENT_GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""
@@ -131,7 +131,7 @@ def search_settings(sight: ContactAnalysis, rails: SearchSpace, tries: int) -> l
         any_grammar = replace(setting, grammar=CANDIDATE_GRAMMARS[0])
         if any_grammar not in copies:
             copies[any_grammar] = CopyDetector(kit, answers.dockings)
-        return _rung(answers, setting, tries, kept, 1 if rails.hubs else CHOSEN_HUBS, copies[any_grammar])
+        return _rung(answers, setting, tries, kept, 1 if rails.hubs else RESOLVED_HUB_SHARE, copies[any_grammar])
 
     for setting in _settings(sight, rails):
         if setting.grammar not in SLOT_LEVELS:

@@ -12,8 +12,8 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.autoconfig.settings import AutoconfigConfig
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
-from stages.variations.instead import comes_instead
-from stages.variations.settings import CHOSEN_CARCASS, VariationsConfig
+from stages.variations.fallback import allows_fallback
+from stages.variations.settings import REQUIRED_LABELS_KEY, VariationsConfig
 
 BYTES_A_KIT = 4_000
 
@@ -24,7 +24,7 @@ def plan(plan: Plan) -> list[Shard]:
     variations = plan.config.section(VariationsConfig)
     left_open = variations.require.auto_keys if variations.samples_per_kit else ()
     if variations.search.sub_assemblies:  # what is asked for by this name has no carcass
-        left_open = tuple(key for key in left_open if key != CHOSEN_CARCASS)
+        left_open = tuple(key for key in left_open if key != REQUIRED_LABELS_KEY)
     return [
         Shard(
             kit.name,
@@ -32,7 +32,7 @@ def plan(plan: Plan) -> list[Shard]:
                 "kit": kit.model_dump(mode="json"),
                 "digests": [file_digest(shape.path) for shape in kit.shapes],
                 "require": list(left_open),
-                "instead": comes_instead(plan.config),
+                "fallback": allows_fallback(plan.config),
             },
         )
         for kit in _open_kits(plan.config)
@@ -50,7 +50,7 @@ def run_shard(task: Task) -> Outcome:
     limits, tries = task.config.section(ExemplarsConfig).limits, task.config.section(AutoconfigConfig).max_tries
     reading = read_and_resolve(config, limits, tries, task.shard.params["require"])
     choices = reading.choices
-    if task.shard.params["instead"] and not choices.enough:
+    if task.shard.params["fallback"] and not choices.enough:
         built = reading.observe(choices.values)
         if not built.refusals:
             expected = foreseen(config, reading, ContactOracle(built.kit), tries)
@@ -68,7 +68,9 @@ def report(plan: Plan) -> Sequence[str]:
     for name in plan.shards("autoconfig"):
         made = plan.summary("autoconfig", name)
         if made is not None:
-            lines += [f"{name}: {key}: {_shown(each)}: {made['why'][key]}" for key, each in made["chosen"].items()]
+            lines += [
+                f"{name}: {key}: {_shown(each)}: {made['reasons'][key]}" for key, each in made["resolved"].items()
+            ]
     return lines
 
 

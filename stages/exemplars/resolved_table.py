@@ -11,10 +11,10 @@ def resolved_table(plan: Plan) -> Sequence[str]:
     """What was chosen for each kit whose config left keys open, and why, as a table."""
     rows = []
     for kit in plan.shards("exemplars"):
-        summary = plan.summary("exemplars", kit) or {"chosen": {}}
-        for key, value in summary["chosen"].items():
+        summary = plan.summary("exemplars", kit) or {"resolved": {}}
+        for key, value in summary["resolved"].items():
             shown = ", ".join(value) if isinstance(value, list) else value
-            rows.append(f"| {kit} | `{key}` | {shown} | {summary['why'][key]} |")
+            rows.append(f"| {kit} | `{key}` | {shown} | {summary['reasons'][key]} |")
     if not rows:
         return []
     return ["\n".join(["| kit | key | chosen | why |", "|---|---|---|---|", *rows])]

@@ -37,11 +37,11 @@ def run_shard(task: Task) -> Outcome:
 
     section = task.config.section(ExemplarsConfig)
     config = next(kit for kit in section.kits if kit.name == task.shard.params["kit"])
-    chosen: dict[str, Any] = {"chosen": {}, "why": {}}
+    chosen: dict[str, Any] = {"resolved": {}, "reasons": {}}
     if config.auto_keys():
         chosen = json.loads(task.input("autoconfig", f"{config.name}.json").read_bytes())
-        config = config.resolve(chosen["chosen"])
-        config = config.model_copy(update={"parts": chosen["chosen"].get("parts", config.parts)})
+        config = config.resolve(chosen["resolved"])
+        config = config.model_copy(update={"parts": chosen["resolved"].get("parts", config.parts)})
     models = [read_model(shape.path, config.parts, section.limits) for shape in config.shapes]
     kit, report = build_kit(config, models)
     with task.output(f"{kit.name}.json") as text, task.output(f"{kit.name}.tar") as arrays:
@@ -62,8 +62,8 @@ def run_shard(task: Task) -> Outcome:
             "aliases": {name: list(words) for name, words in report.aliases.items()},
             "hubs": [kit.types[index].name for index in kit.grammar.hubs],
             "warnings": list(report.warnings),
-            "chosen": chosen["chosen"],
-            "why": chosen["why"],
+            "resolved": chosen["resolved"],
+            "reasons": chosen["reasons"],
         },
     )
 

@@ -12,7 +12,7 @@ import yaml
 
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
-from stages.variations.settings import CHOSEN_HUBS
+from stages.variations.settings import RESOLVED_HUB_SHARE
 
 MAX_SAMPLES_REQUESTED = 200
 """Variants that the config asks for, if there are as many."""
@@ -104,7 +104,7 @@ def variations_section(
     ]
     if config.resolved().hubs and config.hubs.restore:
         lines.append(
-            _line(2, "hubs", CHOSEN_HUBS, "a variant with a smaller share of what the exemplars have is refused")
+            _line(2, "hubs", RESOLVED_HUB_SHARE, "a variant with a smaller share of what the exemplars have is refused")
         )
     return [
         *lines,

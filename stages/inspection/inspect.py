@@ -28,7 +28,7 @@ from stages.inspection.observation import describe_observation, observation_line
 from stages.inspection.report import InspectionReport, inspect_models
 from stages.inspection.sample_figure import sample_figure
 from stages.shape.kit import ContactKind, Strictness
-from stages.variations.settings import CHOSEN_INSTEAD_STABLE
+from stages.variations.settings import FALLBACK_STABLE_KEY
 
 FOLDER = Path("datasets", "inspect")
 """Where the config and the pictures go if nobody says where."""
@@ -99,7 +99,7 @@ def _written(folder: Path, paths: Sequence[Path], found: InspectionReport) -> It
         sheet = sample_figure(found.built.kit, found.shapes, title, name, note)
         yield "sheet", write_file(folder / f"{name}-forecast.png", sheet)
     if found.proportioned is not None:
-        why = found.choices.reasons[CHOSEN_INSTEAD_STABLE]
+        why = found.choices.reasons[FALLBACK_STABLE_KEY]
         others = found.yield_estimate.sentence if found.yield_estimate else "nothing"
         asked = proportions_section(found.proportioned.different, found.proportioned.stable, why, others)
     else:

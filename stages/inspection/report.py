@@ -23,7 +23,7 @@ from stages.shape.physics.settings import Requirements
 from stages.shape.shape import Shape, kit_shape
 from stages.variations.requirements.hub_restoration import HubRestorer, auto_min_hubs
 from stages.variations.selection.orientation import OrientationFix
-from stages.variations.settings import CHOSEN_COPIED, CHOSEN_STABLE
+from stages.variations.settings import MAX_COPIED_SHARE_KEY, STABLE_KEY
 
 ACROSS = (
     "cut it across, between bays and storeys with all that passes there: `parts: sections`; or where it is like itself "
@@ -122,7 +122,7 @@ def inspect_models(
         expected = foreseen(config, reading, answers, tries)
         rate = expected.finds.graphs / max(time.process_time() - begun, 1e-6)
         backdrop = HubRestorer(answers, upright=True)
-        asked = Requirements(stable=choices.values[CHOSEN_STABLE])
+        asked = Requirements(stable=choices.values[STABLE_KEY])
         fitted = (backdrop.fit(each.assembly) for each in expected.chosen)
         kept = (each for each in fitted if unmet(asked, kit_shape(built.kit, each)) is None)
         facing = OrientationFix(built.kit)
@@ -146,7 +146,7 @@ def foreseen(asked: KitConfig, reading: ResolvedKit, answers: ContactOracle, tri
     choices = reading.choices
     known = choices.finds.graphs if choices.finds is not None else 0
     hubs = auto_min_hubs(asked, answers.kit)
-    return estimate_yield(answers.kit, answers, tries, known, hubs, choices.values.get(CHOSEN_COPIED, 1.0))
+    return estimate_yield(answers.kit, answers, tries, known, hubs, choices.values.get(MAX_COPIED_SHARE_KEY, 1.0))
 
 
 def _shown(value: Any) -> str:

@@ -29,8 +29,8 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
 from stages.shape.sample import Sample, write_sample
-from stages.variations.instead import chosen_instead
-from stages.variations.settings import CHOSEN_INSTEAD_STABLE, VariationsConfig
+from stages.variations.fallback import resolved_fallback
+from stages.variations.settings import FALLBACK_STABLE_KEY, VariationsConfig
 
 BYTES_A_SAMPLE = 8_000
 OVERSAMPLED = 2
@@ -64,12 +64,12 @@ def plan(plan: Plan) -> list[Shard]:
 def _wanted(plan: Plan) -> ProportionsConfig:
     """The section, or where proportions come instead of layouts, with what is asked of these: how many, shared out how,
     and that they stand where the exemplars do."""
-    own, chosen = plan.config.section(ProportionsConfig), chosen_instead(plan)
+    own, chosen = plan.config.section(ProportionsConfig), resolved_fallback(plan)
     if own.samples_per_kit or not chosen:
         return own
     layouts = plan.config.section(VariationsConfig)
     shared = ProportionSplitConfig(**layouts.splits.model_dump(include=set(ProportionSplitConfig.model_fields)))
-    stable = own.require.stable or chosen[CHOSEN_INSTEAD_STABLE]
+    stable = own.require.stable or chosen[FALLBACK_STABLE_KEY]
     require = own.require.model_copy(update={"stable": stable})
     return own.model_copy(
         update={"samples_per_kit": min(layouts.samples_per_kit, MOST), "splits": shared, "require": require}

@@ -10,12 +10,12 @@ from pipeline.config import StrictModel
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.variations.novelty.features import Axis
 
-CHOSEN_HUBS = 0.5
+RESOLVED_HUB_SHARE = 0.5
 """What is required of hubs that were chosen and not stated: a mile of rail on which one brick of the road fits is no
 bridge."""
-CHOSEN_COPIED, CHOSEN_STABLE, CHOSEN_CARCASS = "require.max_copied_share", "require.stable", "require.labels"
+MAX_COPIED_SHARE_KEY, STABLE_KEY, REQUIRED_LABELS_KEY = "require.max_copied_share", "require.stable", "require.labels"
 """What these keys of `require` are called among those that are chosen for a kit."""
-CHOSEN_INSTEAD, CHOSEN_INSTEAD_STABLE = "instead", "proportions.require.stable"
+FALLBACK_KEY, FALLBACK_STABLE_KEY = "fallback", "proportions.require.stable"
 """So are called `proportions`, where they come instead of layouts, and what is required of them."""
 
 
@@ -253,7 +253,7 @@ class VariantRequirements(StrictModel):
     @property
     def auto_keys(self) -> tuple[str, ...]:
         """Those of CHOSEN_COPIED, CHOSEN_STABLE and CHOSEN_CARCASS that are left at `auto`."""
-        said = {CHOSEN_COPIED: self.max_copied_share, CHOSEN_STABLE: self.stable, CHOSEN_CARCASS: self.labels}
+        said = {MAX_COPIED_SHARE_KEY: self.max_copied_share, STABLE_KEY: self.stable, REQUIRED_LABELS_KEY: self.labels}
         return tuple(key for key, each in said.items() if each == "auto")
 
     def physical(self, stable: bool) -> Requirements:

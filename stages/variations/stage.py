@@ -14,7 +14,7 @@ from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.assignment import shard_sizes
 from stages.variations.constraint import unknown_in
-from stages.variations.instead import chosen_instead
+from stages.variations.fallback import resolved_fallback
 from stages.variations.report.measures import described, growth
 from stages.variations.search.rounds import last_pool, run_lane, run_pool, search_shards
 from stages.variations.selection.collection import (
@@ -35,7 +35,7 @@ def plan(plan: Plan) -> list[Shard]:
     if (
         not plan.shards("exemplars")
         or not plan.config.section(VariationsConfig).samples_per_kit
-        or chosen_instead(plan)
+        or resolved_fallback(plan)
     ):
         return []
     search: list[Shard] = []

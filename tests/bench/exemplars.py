@@ -94,7 +94,7 @@ def measured(models: Sequence[Path], folder: Path, minutes: float, template: boo
         config.parent.mkdir(parents=True, exist_ok=True)
         config.write_text(TEMPLATE.format(name=config.stem, shapes=json.dumps([str(each) for each in models])))
     made, ends = _made(config, folder, minutes)
-    chosen, foreseen = seen["autoconfig"]["chosen"], seen["yield_estimate"]
+    chosen, foreseen = seen["autoconfig"]["resolved"], seen["yield_estimate"]
     decided = {key: each for key, each in chosen.items() if key != "disconnected" and not key.startswith("require.")}
     parts = sum(len(each["parts"]) for each in seen.get("models", [seen]))
     row = [

@@ -17,7 +17,7 @@ from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 from stages.shape.kit_input import input_kit
 from stages.variations.kernels.structs import FORBIDDEN, NONE
 from stages.variations.requirements.required_labels import spanning_hubs
-from stages.variations.settings import CHOSEN_HUBS, VariationsConfig
+from stages.variations.settings import RESOLVED_HUB_SHARE, VariationsConfig
 
 HUBS_NOT_RESTORED = "no backdrop"
 """Why a variant is refused that does not get back the hubs that are required."""
@@ -219,7 +219,7 @@ def auto_min_hubs(asked: KitConfig, kit: Kit) -> float:
     """The share of what exemplars have of hub parts that a variant of `kit` must get back, where nobody states it: of a
     kit whose hubs were chosen, and are put back."""
     chosen = asked.hubs.types == "auto" and asked.hubs.restore and bool(kit.grammar.hubs)
-    return CHOSEN_HUBS if chosen else 0
+    return RESOLVED_HUB_SHARE if chosen else 0
 
 
 def _has_most(kit: Kit, hub: int, around: np.ndarray) -> bool:

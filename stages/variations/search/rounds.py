@@ -32,9 +32,9 @@ from stages.variations.requirements.required_labels import LABELS_MISSING, label
 from stages.variations.search.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search.search import SPARE, Search, Variant
 from stages.variations.settings import (
-    CHOSEN_CARCASS,
-    CHOSEN_COPIED,
-    CHOSEN_STABLE,
+    MAX_COPIED_SHARE_KEY,
+    REQUIRED_LABELS_KEY,
+    STABLE_KEY,
     VariationsConfig,
 )
 
@@ -193,14 +193,14 @@ def _constrained(
 def _chosen(plan: Plan, kit: str) -> dict[str, Any]:
     """What is required of a variant of `kit` by the keys that can be left open, as stated or as was chosen."""
     require = plan.config.section(VariationsConfig).require
-    built = plan.summary("exemplars", kit) or {"chosen": {}}
+    built = plan.summary("exemplars", kit) or {"resolved": {}}
     found: dict[str, Any] = {}
     for key, said, otherwise in (
-        (CHOSEN_COPIED, require.max_copied_share, 1.0),
-        (CHOSEN_STABLE, require.stable, False),
-        (CHOSEN_CARCASS, require.labels, ()),
+        (MAX_COPIED_SHARE_KEY, require.max_copied_share, 1.0),
+        (STABLE_KEY, require.stable, False),
+        (REQUIRED_LABELS_KEY, require.labels, ()),
     ):
-        value = built["chosen"].get(key, otherwise) if said == "auto" else said
+        value = built["resolved"].get(key, otherwise) if said == "auto" else said
         found[key.removeprefix("require.")] = list(value) if isinstance(value, tuple) else value
     return found
 

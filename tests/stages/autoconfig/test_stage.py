@@ -59,11 +59,11 @@ def test_only_a_kit_that_leaves_something_open_is_probed(made: tuple[Path, str])
 def test_the_kit_is_built_as_was_chosen_and_the_record_says_why(made: tuple[Path, str]) -> None:
     chosen = record(made[0], "autoconfig", "open")["summary"]
     built = record(made[0], "exemplars", "open")["summary"]
-    assert chosen["chosen"]["up"] == "z"
-    assert (built["chosen"], built["why"]) == (chosen["chosen"], chosen["why"])
+    assert chosen["resolved"]["up"] == "z"
+    assert (built["resolved"], built["reasons"]) == (chosen["resolved"], chosen["reasons"])
     kit = json.loads((made[0] / "out" / ".work" / "toy" / "exemplars" / "open.json").read_text())
-    assert (kit["up"], kit["strictness"]) == ("z", chosen["chosen"]["grammar"])
-    assert record(made[0], "exemplars", "stated")["summary"]["chosen"] == {}
+    assert (kit["up"], kit["strictness"]) == ("z", chosen["resolved"]["grammar"])
+    assert record(made[0], "exemplars", "stated")["summary"]["resolved"] == {}
 
 
 def test_people_are_told_what_was_chosen(made: tuple[Path, str]) -> None:
@@ -78,7 +78,7 @@ def test_near_copies_are_refused_where_the_choice_found_enough_beside_them(tmp_p
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("autoconfig", "exemplars", "variations"))
     unasked = {"require.stable": False, "require.labels": []}
-    chosen = record(tmp_path, "autoconfig", "open")["summary"]["chosen"]
+    chosen = record(tmp_path, "autoconfig", "open")["summary"]["resolved"]
     assert chosen == {"disconnected": "error", "require.max_copied_share": 0.9, **unasked}
     samples = [
         sample
@@ -111,12 +111,12 @@ def test_other_proportions_come_instead_of_next_to_no_layouts_as_inspect_foretel
     capsys.readouterr()
     assert main([*paths, "--json", "--tries", "200"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["autoconfig"]["chosen"] == record(tmp_path, "autoconfig", "rings")["summary"]["chosen"]
-    assert found["autoconfig"]["chosen"]["proportions.require.stable"] is True
+    assert found["autoconfig"]["resolved"] == record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
+    assert found["autoconfig"]["resolved"]["proportions.require.stable"] is True
     config["variations"] |= {"fallback": "nothing"}
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     run(tmp_path, ("autoconfig",))
-    assert "instead" not in record(tmp_path, "autoconfig", "rings")["summary"]["chosen"]
+    assert "fallback" not in record(tmp_path, "autoconfig", "rings")["summary"]["resolved"]
 
 
 def test_the_written_config_makes_shapes(made: tuple[Path, str], tmp_path: Path) -> None:
