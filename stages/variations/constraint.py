@@ -26,7 +26,7 @@ Repair = Callable[[Assembly], Assembly | None]
 
 
 @dataclass(frozen=True)
-class Constraint:
+class GlobalConstraint:
     """needs: the names of the lists of labels without which it says nothing; may: those that may be left out; test:
     makes the test of a kit's assemblies, with what is known of its exemplars; mend: where resizing parts may help,
     makes what tries it."""
@@ -37,12 +37,12 @@ class Constraint:
     repair: Callable[[Kit, Labels, Resizer], Repair] | None = None
 
 
-def find_constraints(package: str = "stages.variations.constraints") -> dict[str, Constraint]:
+def find_constraints(package: str = "stages.variations.constraints") -> dict[str, GlobalConstraint]:
     """All constraints there are, by name. Raises TypeError for a module that declares none."""
-    found: dict[str, Constraint] = {}
+    found: dict[str, GlobalConstraint] = {}
     for name in sorted(each.name for each in iter_modules(importlib.import_module(package).__path__)):
         declared = getattr(importlib.import_module(f"{package}.{name}"), "CONSTRAINT", None)
-        if not isinstance(declared, Constraint):
+        if not isinstance(declared, GlobalConstraint):
             raise TypeError(f"{package.replace('.', '/')}/{name}.py must hold CONSTRAINT = Constraint(...)")
         found[name] = declared
     return found

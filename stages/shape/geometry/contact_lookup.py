@@ -14,7 +14,7 @@ from stages.variations.kernels.structs import MISSING
 
 
 @numba.njit(cache=True)
-def quantise(first_rotation, first_translation, rotation, translation, reach, quantum, out):
+def quantize_pose(first_rotation, first_translation, rotation, translation, reach, quantum, out):
     """The pose of the second part in coordinates of the first in whole quanta, int64 (12,): translation, rotation."""
     for i in range(3):
         x = 0.0
@@ -36,7 +36,7 @@ def mix(x):
 
 
 @numba.njit(cache=True)
-def hash_key(a, b, quanta):
+def contact_key(a, b, quanta):
     """A key of a type pair and a quantised pose, uint64, never 0."""
     x = mix(np.uint64(a) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(b) + np.uint64(1))
     for k in range(12):
@@ -45,7 +45,7 @@ def hash_key(a, b, quanta):
 
 
 @numba.njit(cache=True)
-def ask(keys, values, key):
+def look_up(keys, values, key):
     mask = np.uint64(len(keys) - 1)
     slot = key & mask
     while keys[slot] != np.uint64(0):
@@ -56,18 +56,18 @@ def ask(keys, values, key):
 
 
 @numba.njit(cache=True)
-def ask_around(keys, values, types, rotations, translations, b, rotation, translation, reach, quantum):
+def look_up_around(keys, values, types, rotations, translations, b, rotation, translation, reach, quantum):
     """What is known of a part of type b beside each of some others, int64 (n,)."""
     known = np.empty(len(types), dtype=np.int64)
     quanta = np.empty(12, dtype=np.int64)
     for i in range(len(types)):
-        quantise(rotations[i], translations[i], rotation, translation, reach, quantum, quanta)
-        known[i] = ask(keys, values, hash_key(types[i], b, quanta))
+        quantize_pose(rotations[i], translations[i], rotation, translation, reach, quantum, quanta)
+        known[i] = look_up(keys, values, contact_key(types[i], b, quanta))
     return known
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def ask_python(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any, Any]:
+def call_oracle(typing_context: Any, address: Any, a: Any, b: Any) -> tuple[Any, Any]:
     """Call the C function of two int64 that returns one and lies at an address: an answer that only Python has, in the
     middle of a kernel."""
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from stages.shape.arrays import FloatArray, IntArray
 from stages.shape.geometry.contact import ContactTest
-from stages.shape.geometry.contact_lookup import ask_around, hash_key, quantise
+from stages.shape.geometry.contact_lookup import contact_key, look_up_around, quantize_pose
 from stages.shape.geometry.docking import DockingTable, symmetric_images
 from stages.shape.geometry.penetration import PenetrationTest, depth_bound
 from stages.shape.geometry.pose import invert
 from stages.shape.kit import ContactKind, Kit
-from stages.variations.kernels.structs import FORBIDDEN, LABELS, MISSING, NONE, Answers, Workspace
+from stages.variations.kernels.structs import FORBIDDEN, LABELS, MISSING, NONE, ContactTable, Workspace
 from stages.variations.kernels.tables import QUANTUM
 
 BORDERLINE = 1.06
@@ -35,7 +35,7 @@ class ContactOracle:
         self.kit = kit
         self.contact = ContactTest(kit.types, kit.contact_tolerance)
         self.dockings = DockingTable.of(kit)
-        self.table = Answers(np.zeros(1 << 16, dtype=np.uint64), np.zeros(1 << 16, dtype=np.int64))
+        self.table = ContactTable(np.zeros(1 << 16, dtype=np.uint64), np.zeros(1 << 16, dtype=np.int64))
         self.geometry_queries = 0
         self._broken: BaseException | None = None
         self._size = 0
@@ -49,7 +49,7 @@ class ContactOracle:
         admits, and in nothing else."""
         other = copy.copy(self)
         other.kit = kit
-        other.table = Answers(self.table.keys.copy(), self.table.values.copy())
+        other.table = ContactTable(self.table.keys.copy(), self.table.values.copy())
         return other
 
     def answer_unknown(self, ws: Workspace, count: int) -> bool:
@@ -58,9 +58,11 @@ class ContactOracle:
         for i, j in ws.unknown[:count].tolist():
             a, b = int(ws.types[i]), int(ws.types[j])
             reach, quantum = self.kit.types[b].diagonal / 2, self._quantum
-            quantise(ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], reach, quantum, quanta)
+            quantize_pose(
+                ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], reach, quantum, quanta
+            )
             value = self._answer(a, b, quanta)
-            self._insert(int(hash_key(a, b, quanta)), value)
+            self._insert(int(contact_key(a, b, quanta)), value)
             if value == FORBIDDEN:
                 return False
         return True
@@ -75,9 +77,9 @@ class ContactOracle:
                 quanta = np.empty(12, dtype=np.int64)
                 a, b = int(types[i]), int(types[j])
                 reach, quantum = self.kit.types[b].diagonal / 2, self._quantum
-                quantise(rotations[i], translations[i], rotations[j], translations[j], reach, quantum, quanta)
+                quantize_pose(rotations[i], translations[i], rotations[j], translations[j], reach, quantum, quanta)
                 value = self._answer(a, b, quanta)
-                self._insert(int(hash_key(a, b, quanta)), value)
+                self._insert(int(contact_key(a, b, quanta)), value)
                 return value
             except BaseException as error:
                 self._broken = error
@@ -97,15 +99,15 @@ class ContactOracle:
         rotations, translations = np.ascontiguousarray(poses[:, :3, :3]), np.ascontiguousarray(poses[:, :3, 3])
         rotation, translation = np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3])
         reach, quantum = self.kit.types[b].diagonal / 2, self._quantum
-        values = ask_around(
+        values = look_up_around(
             self.table.keys, self.table.values, types, rotations, translations, b, rotation, translation, reach, quantum
         )
         if not (values == FORBIDDEN).any():
             quanta = np.empty(12, dtype=np.int64)
             for each in np.flatnonzero(values == MISSING).tolist():
-                quantise(rotations[each], translations[each], rotation, translation, reach, quantum, quanta)
+                quantize_pose(rotations[each], translations[each], rotation, translation, reach, quantum, quanta)
                 values[each] = self._answer(int(types[each]), b, quanta)
-                self._insert(int(hash_key(types[each], b, quanta)), int(values[each]))
+                self._insert(int(contact_key(types[each], b, quanta)), int(values[each]))
         found: IntArray = values
         return found
 
@@ -169,7 +171,7 @@ class ContactOracle:
     def _insert(self, key: int, value: int) -> None:
         if 2 * (self._size + 1) > len(self.table.keys):
             old = self.table
-            self.table = Answers(
+            self.table = ContactTable(
                 np.zeros(2 * len(old.keys), dtype=np.uint64), np.zeros(2 * len(old.keys), dtype=np.int64)
             )
             self._size = 0

@@ -19,7 +19,7 @@ from stages.string_sampling.instantiation.reach import new_reach
 from stages.string_sampling.instantiation.solver import BUDGET, IMPOSSIBLE, NO_ROOM, SOLVED, solve
 from stages.string_sampling.instantiation.state import STANDARD_METHOD, TRIES, SolverMethod, graph_tables, new_state
 from stages.strings.compiled_grammar import compile_grammar
-from stages.variations.growth.state import Contacts
+from stages.variations.growth.state import KnownContacts
 from stages.variations.kernels.structs import FORBIDDEN, NONE
 from stages.variations.kernels.tables import kit_tables
 
@@ -97,7 +97,7 @@ class Instantiator:
         graph, tries = graph_tables(labels, edges), 0
         for _ in range(MAX_SLOT_ARRANGEMENTS):
             table = self.answers.table
-            contacts = Contacts(table.keys, table.values, self._address)
+            contacts = KnownContacts(table.keys, table.values, self._address)
             left = method._replace(budget=method.budget - tries)
             outcome = solve(
                 rng, self._tables, self.candidates, self._rules, contacts, graph, guide, left, self._reach, within

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import ask, ask_python, hash_key, quantise
+from stages.shape.geometry.contact_lookup import call_oracle, contact_key, look_up, quantize_pose
 from stages.string_sampling.instantiation.guidance import drop_frames, propagate_frames, score_by_category
 from stages.string_sampling.instantiation.reach import LONGEST, can_reach
 from stages.string_sampling.instantiation.state import FAILS, PLACED, TRAIL, TRIES, VALUES
@@ -276,12 +276,12 @@ def _relation(kit, contacts, s, a, b):
         a, b = b, a
     quanta = np.empty(12, dtype=np.int64)
     kind = s.types[b]
-    quantise(
+    quantize_pose(
         s.rotations[a], s.translations[a], s.rotations[b], s.translations[b], kit.reach[kind], kit.limits[2], quanta
     )
-    answer = ask(contacts.keys, contacts.values, hash_key(s.types[a], kind, quanta))
+    answer = look_up(contacts.keys, contacts.values, contact_key(s.types[a], kind, quanta))
     if answer == MISSING:
-        answer = ask_python(contacts.c_callback, a, b)
+        answer = call_oracle(contacts.oracle_address, a, b)
     return answer
 
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from stages.shape.kit import Assembly, Kit
-from stages.variations.constraint import Constraint, Labels, Repair, Test
+from stages.variations.constraint import GlobalConstraint, Labels, Repair, Test
 from stages.variations.requirements.resizing import Resizer, heights_of, spans_of
 from stages.variations.substitution.ground import GroundTest
 
@@ -137,4 +137,4 @@ def _named(kit: Kit, names: Sequence[str]) -> np.ndarray:
     return found
 
 
-CONSTRAINT = Constraint(needs=("entries", "exits"), may=("through",), test=_test, repair=_mend)
+CONSTRAINT = GlobalConstraint(needs=("entries", "exits"), may=("through",), test=_test, repair=_mend)

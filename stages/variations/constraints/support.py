@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.shape.kit import Assembly, Kit
-from stages.variations.constraint import Constraint, Labels, Repair, Test
+from stages.variations.constraint import GlobalConstraint, Labels, Repair, Test
 from stages.variations.requirements.resizing import Resizer, spans_of
 from stages.variations.substitution.ground import GroundTest
 
@@ -59,4 +59,4 @@ def _supported(kit: Kit, assembly: Assembly) -> np.ndarray:
     return found
 
 
-CONSTRAINT = Constraint(needs=(), may=(), test=_test, repair=_mend)
+CONSTRAINT = GlobalConstraint(needs=(), may=(), test=_test, repair=_mend)

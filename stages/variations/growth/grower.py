@@ -13,7 +13,7 @@ from stages.shape.graphs.slots import SlotGrammar
 from stages.shape.kit import Assembly, Kit
 from stages.variations.growth.grow import grow, take_over
 from stages.variations.growth.pattern_tables import pattern_tables
-from stages.variations.growth.state import WORK, Contacts, Field, growing
+from stages.variations.growth.state import WORK, GrowthField, KnownContacts, growing
 from stages.variations.kernels.structs import PARTS, UNKNOWNS, KitTables, Outcome, Workspace
 
 LONGEST = 2.5
@@ -73,7 +73,7 @@ class Grower:
         """
         field = self._field(rng)
         table = self.answers.table
-        contacts = Contacts(table.keys, table.values, self._address)
+        contacts = KnownContacts(table.keys, table.values, self._address)
         grown = grow(rng, self.tables, self._tables, contacts, self._g, field)
         self.answers.raise_pending()
         work = 1.0 + float(self._g.counts[WORK]) / WORK_A_TRY
@@ -88,7 +88,7 @@ class Grower:
             outcome = self._size(ws, field)
         return outcome, work
 
-    def _size(self, ws: Workspace, field: Field) -> int:
+    def _size(self, ws: Workspace, field: GrowthField) -> int:
         """OK, TOO_SMALL or TOO_LARGE by what was asked for; and what was learnt of it for the next shape."""
         count = int(ws.counts[PARTS])
         self._room = MEMORY * self._room + (1 - MEMORY) * float(np.clip(np.log(field.target / count), -1.0, 1.0))
@@ -109,7 +109,7 @@ class Grower:
                 return Outcome.TOO_LARGE
         return Outcome.OK
 
-    def _field(self, rng: np.random.Generator) -> Field:
+    def _field(self, rng: np.random.Generator) -> GrowthField:
         """Where the next shape begins, and the room that it has."""
         sizes = np.array([len(each.assembly) for each in self.kit.exemplars])
         number = int(np.searchsorted(sizes.cumsum(), rng.random() * sizes.sum(), side="right").clip(0, len(sizes) - 1))
@@ -145,7 +145,7 @@ class Grower:
         else:
             field_low[self._up] -= height
             field_high[self._up] += height
-        return Field(
+        return GrowthField(
             int(assembly.types[part]),
             np.ascontiguousarray(pose[:3, :3]),
             np.ascontiguousarray(pose[:3, 3]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import ask, ask_python, hash_key, mix, quantise
+from stages.shape.geometry.contact_lookup import call_oracle, contact_key, look_up, mix, quantize_pose
 from stages.shape.geometry.pose_kernels import same_rotation, squared_distance
 from stages.variations.growth.state import FREE, GROWN_PARTS, NODES, SPOTS, WORK
 from stages.variations.kernels.structs import FORBIDDEN, MISSING, NONE
@@ -107,13 +107,13 @@ def relation(kit, answers, g, a, b):
         a, b = b, a
     quanta = np.empty(12, dtype=np.int64)
     first, second = g.spot_types[a], g.spot_types[b]
-    quantise(
+    quantize_pose(
         g.spot_rotations[a], g.spot_translations[a], g.spot_rotations[b], g.spot_translations[b], kit.reach[second],
         kit.limits[2], quanta,
     )  # fmt: skip
-    answer = ask(answers.keys, answers.values, hash_key(first, second, quanta))
+    answer = look_up(answers.keys, answers.values, contact_key(first, second, quanta))
     if answer == MISSING:
-        answer = ask_python(answers.asker, a, b)
+        answer = call_oracle(answers.oracle_address, a, b)
     return answer
 
 

@@ -38,16 +38,16 @@ class PatternTables(NamedTuple):
     shares: np.ndarray
 
 
-class Contacts(NamedTuple):
+class KnownContacts(NamedTuple):
     """Known contact answers, `keys` and `values` of an `Answers`, and whom to ask for others: the address of a C
     function of two spots (`ContactOracle.asker`)."""
 
     keys: np.ndarray
     values: np.ndarray
-    asker: int
+    oracle_address: int
 
 
-class Field(NamedTuple):
+class GrowthField(NamedTuple):
     """What one shape is to be: a part of `seed_type` stands at `rotation` (3, 3) and `translation` (3,); every part
     lies within `low` and `high`, both (3,); from `target` parts on it is brought to an end, more than `most` it must
     not have."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import ask, hash_key, quantise
+from stages.shape.geometry.contact_lookup import contact_key, look_up, quantize_pose
 from stages.variations.kernels.membership import admitted, neighbourhood_key, recalled
 from stages.variations.kernels.structs import EDGES, FORBIDDEN, LABELS, MISSING, PARTS, TRY, UNKNOWNS, Outcome
 from stages.variations.kernels.variant_graph import set_edge
@@ -44,8 +44,8 @@ def _overlaps(boxes, count, origin, between_sides, slack, pairs):
 def _contact(kit, answers, ws, i, j, quanta):
     """The answer for a pair: NONE, FORBIDDEN, MISSING or a packed pair of labels."""
     reach, quantum = kit.reach[ws.types[j]], kit.limits[2]
-    quantise(ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], reach, quantum, quanta)
-    return ask(answers.keys, answers.values, hash_key(ws.types[i], ws.types[j], quanta))
+    quantize_pose(ws.rotations[i], ws.translations[i], ws.rotations[j], ws.translations[j], reach, quantum, quanta)
+    return look_up(answers.keys, answers.values, contact_key(ws.types[i], ws.types[j], quanta))
 
 
 @numba.njit(cache=True)

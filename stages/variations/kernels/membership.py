@@ -8,7 +8,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from stages.shape.geometry.contact_lookup import ask, mix
+from stages.shape.geometry.contact_lookup import look_up, mix
 from stages.variations.kernels.structs import MISSING
 
 
@@ -21,7 +21,7 @@ def neighbourhood_key(kit, part_type):
 @numba.njit(cache=True)
 def recalled(rules, key):
     """1 or 0 where the neighbourhood of this key is known to be admitted or not, else MISSING."""
-    verdict = ask(rules.keys, rules.verdicts, key)
+    verdict = look_up(rules.keys, rules.verdicts, key)
     return 0 if verdict == MISSING and rules.level == 0 else verdict
 
 

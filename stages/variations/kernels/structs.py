@@ -1,7 +1,7 @@
 """What the compiled kernels of a try work on; numba makes the constants part of them.
 
-All arrays live in four tuples: `KitTables` (fixed for a kit), `ShapeTables` (fixed for a shape), `Answers` (contact
-answers by relative pose) and `Workspace` (the try in hand). Indices below: `s` parts of the source shape A, `t`
+All arrays live in four tuples: `KitTables` (fixed for a kit), `ShapeTables` (fixed for a shape),
+`ContactTable` and `Workspace` (the try in hand). Indices below: `s` parts of the source shape A, `t`
 parts of the target shape B, `v` parts of the variant.
 """
 
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Rules(NamedTuple):
+class NeighbourhoodRules(NamedTuple):
     """Which neighbourhoods the grammar admits, by rule: what a loose grammar admits is too much to be listed.
 
     Types are places of labels here, `KitTables.label_of`.
@@ -55,7 +55,7 @@ class KitTables(NamedTuple):
     reach: np.ndarray
     weights: np.ndarray
     label_of: np.ndarray
-    rules: Rules
+    rules: NeighbourhoodRules
     limits: np.ndarray
     up: int
 
@@ -76,7 +76,7 @@ class ShapeTables(NamedTuple):
     by_type: np.ndarray
 
 
-class Answers(NamedTuple):
+class ContactTable(NamedTuple):
     """An open-addressing table: keys uint64 (c,), 0 where free; values int64 (c,): NONE, FORBIDDEN or a packed pair of
     labels."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from stages.shape.arrays import IntArray
 from stages.shape.graphs.neighbourhoods import STRICTNESS
 from stages.shape.kit import Assembly, Grammar, Kit
-from stages.variations.kernels.structs import KitTables, Rules, ShapeTables, Workspace
+from stages.variations.kernels.structs import KitTables, NeighbourhoodRules, ShapeTables, Workspace
 
 QUANTUM = 1 / 64
 """Step of the poses by which contact answers are looked up, as a share of the contact tolerance."""
@@ -38,7 +38,7 @@ def multiset_weights(types: int) -> np.ndarray:
     return np.random.Generator(np.random.PCG64(types)).integers(1, 2**63, types, dtype=np.uint64)
 
 
-def _rules(grammar: Grammar, weights: np.ndarray) -> Rules:
+def _rules(grammar: Grammar, weights: np.ndarray) -> NeighbourhoodRules:
     """The neighbourhoods that `grammar` admits, for the kernels; weights: uint64 (labels,)."""
     types = len(weights)
     observed = {part_type: list(each) for part_type, each in grammar.neighbourhoods.items()}
@@ -74,7 +74,7 @@ def _rules(grammar: Grammar, weights: np.ndarray) -> Rules:
         while keys[slot] != 0:
             slot = (slot + 1) % room
         keys[slot], verdicts[slot] = key, 1
-    return Rules(
+    return NeighbourhoodRules(
         level=STRICTNESS.index(grammar.strictness) if grammar.strictness in STRICTNESS else len(STRICTNESS),
         keys=keys,
         verdicts=verdicts,

@@ -35,7 +35,7 @@ Named = tuple[str, Assembly]
 
 
 @dataclass(frozen=True)
-class Replacement:
+class DrawnReplacement:
     """base and giver: what they are called, and their parts; taken bool (n,) and piece bool (m,): which parts of them
     leave and come; result: what was made, where the base stands; came bool (k,): which parts of it are the giver's."""
 
@@ -71,7 +71,7 @@ def known_shapes(kit: Kit, samples: Sequence[Sample]) -> dict[str, Named]:
     return known | {each.lineage["name"]: (each.key, _as_made(kit, each)) for each in samples}
 
 
-def replacement_of(kit: Kit, sample: Sample, known: Mapping[str, Named]) -> Replacement | None:
+def replacement_of(kit: Kit, sample: Sample, known: Mapping[str, Named]) -> DrawnReplacement | None:
     """What took the place of what in a sample that was made of `known` shapes, once and rigidly, the base being the one
     of which more is in it; None of others, and where what stayed of the base moved to make room."""
     lineage = sample.lineage
@@ -90,8 +90,8 @@ def replacement_of(kit: Kit, sample: Sample, known: Mapping[str, Named]) -> Repl
     came = np.arange(len(result)) < come
     if come > stay:
         moved = replace(result, poses=invert(motion) @ result.poses)
-        return Replacement(giver, base, ~piece, stays, moved, ~came)
-    return Replacement(base, giver, ~stays, piece, result, came)
+        return DrawnReplacement(giver, base, ~piece, stays, moved, ~came)
+    return DrawnReplacement(base, giver, ~stays, piece, result, came)
 
 
 def _as_made(kit: Kit, sample: Sample) -> Assembly:
@@ -108,7 +108,7 @@ def _found(kit: Kit, assembly: Assembly, poses: FloatArray, there: Assembly) -> 
     return found
 
 
-def _row(kit: Kit, key: str, found: Replacement) -> list[Cell]:
+def _row(kit: Kit, key: str, found: DrawnReplacement) -> list[Cell]:
     """The four pictures of a replacement; all but the giver's from where most is seen of what leaves and comes."""
     (base_name, base), (giver_name, giver), result = found.base, found.giver, found.result
     leave, come = int(found.taken.sum()), int(found.piece.sum())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.shape.geometry.contact_lookup import ask, hash_key, quantise
+from stages.shape.geometry.contact_lookup import contact_key, look_up, quantize_pose
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly
@@ -69,12 +69,12 @@ def test_contact_answers_do_not_depend_on_what_was_asked_before(chains: Search) 
             ws.unknown[0] = 0, 1
             fresh.answer_unknown(ws, 1)
             quanta = np.empty(12, dtype=np.int64)
-            quantise(
+            quantize_pose(
                 ws.rotations[0], ws.translations[0], ws.rotations[1], ws.translations[1], kit.types[link].diagonal / 2,
                 kit.contact_tolerance / 64, quanta,
             )  # fmt: skip
-            key = np.uint64(hash_key(link, link, quanta))
-            given[name] = int(ask(fresh.table.keys, fresh.table.values, key))
+            key = np.uint64(contact_key(link, link, quanta))
+            given[name] = int(look_up(fresh.table.keys, fresh.table.values, key))
         answers.append([given[name] for name in cases])
     assert answers[0] == answers[1]
     for (_, _, expected), answer in zip(cases.values(), answers[0], strict=True):

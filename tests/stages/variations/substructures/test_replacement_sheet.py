@@ -13,7 +13,7 @@ from stages.shape.kit import Kit
 from stages.shape.sample import Sample
 from stages.variations.selection.orientation import vertical_turn
 from stages.variations.substructures.replacement_sheet import (
-    Replacement,
+    DrawnReplacement,
     known_shapes,
     replacement_of,
     replacements_sheet,
@@ -41,7 +41,7 @@ def samples_of(kit: Kit, turned: float = 0.0) -> list[Sample]:
     ]
 
 
-def shown(kit: Kit, samples: list[Sample]) -> list[tuple[Sample, Replacement]]:
+def shown(kit: Kit, samples: list[Sample]) -> list[tuple[Sample, DrawnReplacement]]:
     known = known_shapes(kit, samples)
     told = [(each, replacement_of(kit, each, known)) for each in samples]
     return [(sample, found) for sample, found in told if found is not None]
