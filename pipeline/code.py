@@ -36,7 +36,7 @@ _BEHIND_THE_TASK = "pipeline.randomness"
 
 def starts_of(module: str, also: Iterable[str] = ()) -> tuple[str, ...]:
     """Where the code of a shard begins: the module of its stage, what is declared beside it, and the modules `also`."""
-    folder, house = module.rpartition(".")[0], _House([module])
+    folder, house = module.rpartition(".")[0], SourceTree([module])
     beside = [f"{folder}.{name}" for name in _DECLARATIONS] if folder else []
     return (module, _BEHIND_THE_TASK, *(each for each in beside if house.file(each) is not None), *also)
 
@@ -47,7 +47,7 @@ def reached(starts: Iterable[str]) -> dict[str, str]:
     Raises ValueError for a start without a Python file.
     """
     waiting = list(starts)
-    house = _House(waiting)
+    house = SourceTree(waiting)
     for start in waiting:
         if house.file(start) is None:
             raise ValueError(f"no Python file of module {start} is found")
@@ -64,7 +64,7 @@ def reached(starts: Iterable[str]) -> dict[str, str]:
         state = file.stat()
         found[module], imported = _read(str(file), state.st_mtime_ns, state.st_size)
         package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-        waiting += [module.rpartition(".")[0], *(_absolute(each, package) for each in imported)]
+        waiting += [module.rpartition(".")[0], *(absolute_name(each, package) for each in imported)]
     return dict(sorted(found.items()))
 
 
@@ -73,7 +73,7 @@ def code_digest(modules: Mapping[str, str]) -> str:
     return hashlib.sha256(json_bytes(dict(modules))).hexdigest()
 
 
-class _House:
+class SourceTree:
     """Finds the files of the project's modules without importing any.
 
     The project is what is neither Python's own nor installed, and the packages of `starts`, wherever they are.
@@ -143,12 +143,13 @@ _Said = tuple[str, tuple[tuple[int, str], ...]]
 def _read(file: str, modified: int, size: int) -> _Said:
     """What a file says in one state."""
     source = Path(file).read_bytes()
-    noted = Path(importlib.util.cache_from_source(file)).with_suffix(".said.json")
     key = hashlib.sha256(_reader() + source).hexdigest()
-    said = _noted(noted, key)
-    if said is None:
-        said = _parsed(source, file)
-        _note(noted, {"key": key, "digest": said[0], "imports": said[1]})
+    note = read_note(file, "said", key)
+    with suppress(ValueError, KeyError, TypeError):
+        if note is not None:
+            return str(note["digest"]), tuple((int(dots), str(name)) for dots, name in note["imports"])
+    said = _parsed(source, file)
+    write_note(file, "said", key, {"digest": said[0], "imports": said[1]})
     return said
 
 
@@ -156,7 +157,7 @@ def _parsed(source: bytes, file: str) -> _Said:
     with _no_collection():
         words: list[str] = []
         imported: list[tuple[int, str]] = []
-        _describe(ast.parse(source, file), words.append, imported)
+        code_words(ast.parse(source, file), words.append, imported)
         return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16], tuple(dict.fromkeys(imported))
 
 
@@ -166,32 +167,35 @@ def _reader() -> bytes:
     return Path(__file__).read_bytes()
 
 
-def _noted(path: Path, key: str) -> _Said | None:
-    """What a note beside Python's own compiled files says of a source with this `key`; None where it says nothing.
+def read_note(file: str, subject: str, key: str) -> dict[str, Any] | None:
+    """The note that `write_note` left beside Python's own compiled files under the same key; None without one.
 
-    To parse the house takes most of a second, and every start of a stage and every worker wants to know.
+    Parsing all sources takes most of a second, and every start of a stage and every worker needs the result.
     """
     try:
-        note = json.loads(path.read_bytes())
-        if note["key"] != key:
-            return None
-        return str(note["digest"]), tuple((int(dots), str(name)) for dots, name in note["imports"])
+        note = json.loads(_note_path(file, subject).read_bytes())
+        return note if note["key"] == key else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
-def _note(path: Path, note: Mapping[str, Any]) -> None:
-    """Write a note if there is a place for it; a torn one is read as none."""
+def write_note(file: str, subject: str, key: str, note: Mapping[str, Any]) -> None:
+    """Keep a note about a source file where that is possible; one that a crash cut short reads as none."""
     if sys.dont_write_bytecode:
         return
+    path = _note_path(file, subject)
     own = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(exist_ok=True)
-        own.write_bytes(json_bytes(note))
+        own.write_bytes(json_bytes({"key": key, **note}))
         own.replace(path)
     except OSError:
         with suppress(OSError):
             own.unlink()
+
+
+def _note_path(file: str, subject: str) -> Path:
+    return Path(importlib.util.cache_from_source(file)).with_suffix(f".{subject}.json")
 
 
 @contextmanager
@@ -206,7 +210,7 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _describe(node: ast.AST, add: Callable[[str], None], imported: list[tuple[int, str]]) -> None:
+def code_words(node: ast.AST, add: Callable[[str], None], imported: list[tuple[int, str]]) -> None:
     """Add the words of a syntax tree: node types and values in order, no line numbers, no docstrings."""
     if isinstance(node, ast.Import):
         imported.extend((0, alias.name) for alias in node.names)
@@ -218,7 +222,7 @@ def _describe(node: ast.AST, add: Callable[[str], None], imported: list[tuple[in
     for name in node._fields:
         value = getattr(node, name, None)
         if isinstance(value, ast.AST):
-            _describe(value, add, imported)
+            code_words(value, add, imported)
         elif not isinstance(value, list):
             add(repr(value))
         elif not (name == "body" and isinstance(node, ast.If) and _for_types(node.test)):
@@ -226,8 +230,8 @@ def _describe(node: ast.AST, add: Callable[[str], None], imported: list[tuple[in
             for each in value:
                 if not isinstance(each, ast.AST):
                     add(repr(each))
-                elif not _is_prose(each):
-                    _describe(each, add, imported)
+                elif not is_prose(each):
+                    code_words(each, add, imported)
             add("]")
 
 
@@ -236,12 +240,12 @@ def _for_types(test: ast.expr) -> bool:
     return name == "TYPE_CHECKING"
 
 
-def _is_prose(node: ast.AST) -> bool:
+def is_prose(node: ast.AST) -> bool:
     """Whether a statement is a text by itself: a docstring, or one that stands after what it describes."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 
-def _absolute(imported: tuple[int, str], package: str) -> str:
+def absolute_name(imported: tuple[int, str], package: str) -> str:
     """The full name of what a module of `package` imports after so many leading dots."""
     dots, name = imported
     if not dots:

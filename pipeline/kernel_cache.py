@@ -1,0 +1,289 @@
+"""Cache of compiled kernels, addressed by content: checkouts with equal sources share it, in any folder.
+
+Numba's own cache hangs on the path and the bytes of a kernel's file, and does not notice an edited callee in another
+file. Here the key of a kernel digests what its code reaches: the functions, classes and constants that it names,
+theirs in turn, across the project's modules, without comments, docstrings and formatting. The file of an entry also
+depends on the types of the arguments (classes and fields of named tuples included), on Python, on Numba and on the CPU.
+So each file has one possible content, and concurrent processes cannot mix their entries.
+
+`stages/__init__.py` names `KernelLocator` to Numba in the environment; Numba imports it with the first cached kernel.
+"""
+
+from __future__ import annotations
+
+import ast
+import atexit
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+from numba.core import caching, sigutils, types
+
+from pipeline.code import SourceTree, absolute_name, code_words, is_prose, read_note, write_note
+
+UNUSED_DAYS = 30
+"""Entries that no process has loaded for this long are deleted."""
+
+_DAY_SECONDS = 86_400.0
+_PACKAGES = ("pipeline", "stages", "eval")
+
+
+class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
+    """Says to Numba where the compiled code of a function of the project belongs."""
+
+    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
+        self._py_file = py_file
+        self._py_func = py_func
+
+    def get_cache_path(self) -> str:
+        return str(kernel_folder() / self._py_func.__module__)
+
+    def get_source_stamp(self) -> str:
+        return self.get_disambiguator()
+
+    def get_disambiguator(self) -> str:
+        return kernel_key(self._py_func.__module__, self._py_func.__qualname__.partition(".")[0])[:16]
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> KernelLocator | None:
+        """A locator for a function of the project; None for others, which keep Numba's own."""
+        return cls(py_func, py_file) if _file(py_func.__module__) == Path(py_file) else None
+
+
+def kernel_folder() -> Path:
+    """The folder of compiled kernels: NUMBA_CACHE_DIR, or `shapemill/kernels` in the user's cache.
+
+    Where that cannot be written, it is in the source tree, else a temporary folder that ends with the process.
+    """
+    if folder := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(folder)
+    return _default_folder()
+
+
+@cache
+def _default_folder() -> Path:
+    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
+    for path in (user_cache / "shapemill/kernels", Path(__file__).parent / "__pycache__/kernels"):
+        with suppress(OSError, RuntimeError):  # RuntimeError: nobody knows the home folder
+            folder = path.expanduser()
+            folder.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()
+            _prune(folder, time.time())
+            return folder
+    folder = Path(tempfile.mkdtemp(prefix="shapemill-kernels-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _prune(folder: Path, now: float) -> None:
+    """Delete what was not used for UNUSED_DAYS; looks once a day."""
+    stamp = folder / ".pruned"
+    with suppress(OSError):
+        if now - stamp.stat().st_mtime < _DAY_SECONDS:
+            return
+    stamp.touch()
+    for entry in folder.glob("*/*.nb[ci]*"):
+        with suppress(OSError):
+            if now - entry.stat().st_mtime > UNUSED_DAYS * _DAY_SECONDS:
+                entry.unlink()
+
+
+# Entries ------------------------------------------------------------------------------------------------------------
+
+
+def _entry(store: caching.FunctionCache, signature: Any, codegen: Any) -> caching.IndexDataCacheFile:
+    """The index and data files for one signature on one CPU."""
+    arguments, _ = sigutils.normalize_signature(signature)
+    said = repr((numba.__version__, codegen.magic_tuple(), [_type_words(argument) for argument in arguments]))
+    base = f"{store._impl.filename_base}.{hashlib.sha256(said.encode()).hexdigest()[:16]}"
+    return caching.IndexDataCacheFile(store.cache_path, base, store._impl.locator.get_source_stamp())
+
+
+def _type_words(argument: Any) -> Any:
+    """What compiled code can depend on in a type; Numba's name of a named tuple leaves out module and fields."""
+    if isinstance(argument, types.BaseTuple):
+        of = getattr(argument, "instance_class", None)
+        layout = (of.__module__, of.__qualname__, argument.fields) if of else ()
+        return (*layout, [_type_words(item) for item in argument.types])
+    if isinstance(argument, types.Dispatcher):
+        function = argument.dispatcher.py_func
+        return kernel_key(function.__module__, function.__qualname__.partition(".")[0])
+    return str(argument)
+
+
+def _load(store: caching.FunctionCache, signature: Any, context: Any) -> Any:
+    if not isinstance(store._impl.locator, KernelLocator):
+        return _numba_load(store, signature, context)
+    store._cache_file = _entry(store, signature, context.codegen())
+    index = Path(store._cache_file._index_path)
+    try:
+        compiled = _numba_load(store, signature, context)
+        if compiled is not None and time.time() - index.stat().st_mtime > _DAY_SECONDS:
+            for used in index.parent.glob(f"{index.stem}*"):
+                os.utime(used)
+        return compiled
+    except Exception:  # a corrupted entry, which can raise anything: it is compiled again
+        index.unlink(missing_ok=True)
+        return None
+
+
+def _save(store: caching.FunctionCache, signature: Any, compiled: Any) -> None:
+    if isinstance(store._impl.locator, KernelLocator):
+        store._cache_file = _entry(store, signature, compiled.codegen)
+        with suppress(OSError):  # a full disk: the kernel works without an entry
+            _numba_save(store, signature, compiled)
+    else:
+        _numba_save(store, signature, compiled)
+
+
+_numba_load, _numba_save = caching.FunctionCache.load_overload, caching.FunctionCache.save_overload
+caching.FunctionCache.load_overload, caching.FunctionCache.save_overload = _load, _save
+
+
+# Keys ---------------------------------------------------------------------------------------------------------------
+
+
+class _Statement(NamedTuple):
+    """A statement of a module's top level."""
+
+    binds: list[str]
+    """Names that it defines or changes."""
+    loads: list[str]
+    """Names of the module that it reads."""
+    imports: list[tuple[str, str]]
+    """Imports in it: the name bound at the module's top level or "", and the full dotted name."""
+    digest: str
+    """Of its syntax tree; empty for an import, which is no more than what it imports."""
+
+
+@cache
+def kernel_key(module: str, name: str) -> str:
+    """A digest of the code that the function `name` of a module reaches."""
+    reached: set[tuple[str, str]] = set()
+    waiting: list[tuple[str, str]] = [(module, name)]
+    seen = {("", "")}
+    while waiting:
+        wanted = waiting.pop()
+        if wanted in seen:
+            continue
+        seen.add(wanted)
+        module, name = wanted
+        statements = _statements(module)
+        for statement in statements.get("*", ()) if name == "*" else statements.get(name, ()):
+            if statement.digest:
+                reached.add((module, statement.digest))
+            waiting += [(module, loaded) for loaded in statement.loads]
+            for bound, dotted in statement.imports:
+                if name in ("*", bound) or not bound:
+                    reached.add((module, f"{bound}={dotted}"))
+                    waiting.append(_target(dotted))
+    return hashlib.sha256(repr(sorted(reached)).encode()).hexdigest()
+
+
+@cache
+def _target(dotted: str) -> tuple[str, str]:
+    """Module and name of what an import names; `*`, all names, for a module itself; nothing outside the project."""
+    if _file(dotted) is not None:
+        return dotted, "*"
+    module, _, name = dotted.rpartition(".")
+    return (module, name) if _file(module) is not None else ("", "")
+
+
+@cache
+def _file(module: str) -> Path | None:
+    return _tree().file(module) if module else None
+
+
+@cache
+def _tree() -> SourceTree:
+    return SourceTree(_PACKAGES)
+
+
+@cache
+def _statements(module: str) -> dict[str, list[_Statement]]:
+    """The statements of a module's top level by the names that they bind, and all of them under `*`."""
+    file = _file(module)
+    if file is None:
+        return {}
+    named: dict[str, list[_Statement]] = {}
+    for statement in _read(file, module if file.name == "__init__.py" else module.rpartition(".")[0]):
+        for name in ("*", *statement.binds):
+            named.setdefault(name, []).append(statement)
+    return named
+
+
+def _read(file: Path, package: str) -> list[_Statement]:
+    """The statements of a file, from a note beside Python's compiled files where there is one."""
+    source = file.read_bytes()
+    key = hashlib.sha256(_own_source() + source).hexdigest()
+    note = read_note(str(file), "kernels", key)
+    if note is None:
+        body = ast.parse(source, file).body
+        found = [statement for node in body if not is_prose(node) for statement in _parsed(node, package)]
+        here = {name for statement in found for name in statement.binds}
+        note = {"statements": [item._replace(loads=[n for n in item.loads if n in here]) for item in found]}
+        write_note(str(file), "kernels", key, note)
+    return [_Statement(*fields) for fields in note["statements"]]
+
+
+@cache
+def _own_source() -> bytes:
+    return Path(__file__).read_bytes()
+
+
+def _parsed(node: ast.stmt, package: str) -> Iterator[_Statement]:
+    """A statement; one that only imports is one without digest."""
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        imports = list(_imports(node, package))
+        yield _Statement([bound for bound, _ in imports], [], imports, "")
+        return
+    inside = list(ast.walk(node))
+    names = [item for item in inside if isinstance(item, ast.Name)]
+    loads = {item.id for item in names}
+    imports = [
+        ("" if isinstance(node, ast.FunctionDef | ast.ClassDef) else bound, dotted)
+        for item in inside
+        if isinstance(item, ast.Import | ast.ImportFrom)
+        for bound, dotted in _imports(item, package)
+    ]
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        binds = {node.name}
+    elif isinstance(node, ast.Expr):  # a call may change what it is given
+        binds = loads
+    else:
+        binds = {item.id for item in names if isinstance(item.ctx, ast.Store)}
+        binds |= {item.name for item in inside if isinstance(item, ast.FunctionDef | ast.ClassDef)}
+        binds |= {bound for bound, _ in imports}
+        binds |= {_root(item) for item in inside if isinstance(item, ast.Subscript | ast.Attribute) and _stores(item)}
+    words: list[str] = []
+    code_words(node, words.append, [])
+    digest = hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
+    yield _Statement(sorted(binds), sorted(loads), imports, digest)
+
+
+def _imports(node: ast.Import | ast.ImportFrom, package: str) -> Iterator[tuple[str, str]]:
+    for alias in node.names:
+        if isinstance(node, ast.Import):
+            yield alias.asname or alias.name.partition(".")[0], alias.name
+        else:
+            dotted = f"{node.module or ''}.{alias.name}".lstrip(".")
+            yield alias.asname or alias.name, absolute_name((node.level, dotted), package)
+
+
+def _stores(node: ast.Subscript | ast.Attribute) -> bool:
+    return isinstance(node.ctx, ast.Store)
+
+
+def _root(node: ast.expr) -> str:
+    """The name at the base of `name.field[index]`."""
+    while isinstance(node, ast.Subscript | ast.Attribute):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else ""
