@@ -7,6 +7,7 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from pipeline.config import ExistingFile, StrictModel
+from stages.shape.collection.assignment import SplitConfig
 from stages.shape.collection.origin import Credit
 
 MIN_RADIUS_SHARE, MAX_RADIUS_SHARE = 0.004, 0.1
@@ -63,23 +64,14 @@ class GrammarConfig(StrictModel):
     )
 
 
-class GrammarSplitConfig(StrictModel):
-    """How the samples are shared out."""
-
-    val: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes in the validation split.")
-    test: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes in the test split.")
-    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
-    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
-
-
 class GrammarsConfig(StrictModel):
     """Shapes from the grammars of meshes in one piece."""
 
     models: tuple[GrammarConfig, ...] = Field(
         (), description="The meshes; none for a dataset that is made in another way."
     )
-    splits: GrammarSplitConfig = Field(
-        default_factory=GrammarSplitConfig, description="How the samples are shared out; no shape comes twice."
+    splits: SplitConfig = Field(
+        default_factory=SplitConfig, description="How the samples are shared out; no shape comes twice."
     )
 
     @field_validator("models")

@@ -8,7 +8,6 @@ meshes: its text is its derivation, and `stages.grammars.derivation_text.shape_o
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any
@@ -18,15 +17,12 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.errors import ShardFailed
 from pipeline.places import file_digest
-from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.grammars.language import drawing_name, grammar_shards, input_grammars
 from stages.grammars.origins import mesh_origins
 from stages.grammars.settings import GrammarConfig, GrammarsConfig
-from stages.shape.collection.assignment import SPLITS, assign_splits, shard_sizes, shards_of_split
+from stages.shape.collection.assignment import assign_splits, planned_collection, write_listed_samples, write_listings
 from stages.shape.collection.origin import unstated
-from stages.shape.collection.shards import planned_collection
-from stages.shape.sample import Sample, write_sample
 
 BYTES_A_GRAMMAR = 20_000_000
 BYTES_A_SAMPLE = 4_000
@@ -110,16 +106,8 @@ def run_drawing(task: Task) -> Outcome:
     groups: dict[str, list[int]] = {}
     for index, row in enumerate(rows):
         groups.setdefault(row["graph"], []).append(index)
-    split_of = assign_splits(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
-    order = task.rng("order").permutation(len(rows))
-    shards: dict[str, int] = {}
-    for split, name in enumerate(SPLITS):
-        members = order[split_of[order] == split]
-        shard_of = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
-        shards[name] = int(shard_of[-1]) + 1 if len(members) else 0
-        for number in range(shards[name]):
-            with task.output(f"{task.shard.name}.{name}-{number:06d}.jsonl") as stream:
-                stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
+    split_of = assign_splits(list(groups.values()), config.splits, task.rng("splits"))
+    shards = write_listings(task, rows, split_of, config.splits)
     counts = {
         each.name: dict(Counter(row["method"] for row in rows if row["kit"] == each.name)) for each in config.models
     }
@@ -145,7 +133,7 @@ def _drawn(task: Task, config: GrammarConfig, first: int) -> list[dict[str, Any]
                     "kit": config.name,
                     "graph": drawn.digest,
                     "method": method,
-                    "file": "/".join(config.model.parts[-2:]),
+                    "parents": ["/".join(config.model.parts[-2:])],
                     "text": drawn.text,
                 }
             )
@@ -155,16 +143,7 @@ def _drawn(task: Task, config: GrammarConfig, first: int) -> list[dict[str, Any]
 
 def run_collection(task: Task) -> Outcome:
     """Write the samples of one shard."""
-    split, number = task.shard.params["split"], task.shard.params["number"]
-    drawing = drawing_name(task.config.name)
-    listing = task.input("grammars", f"{drawing}.{split}-{number:06d}.jsonl").read_text()
-    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for line in listing.rstrip("\n").split("\n"):
-            row = json.loads(line)
-            lineage = {"method": row["method"], "parents": [row["file"]]}
-            sample = Sample(row["key"], split, "grammars", row["kit"], row["graph"], lineage, text=row["text"])
-            write_sample(writer, sample)
-    return Outcome(writer.samples, {"split": split, "samples": writer.samples})
+    return write_listed_samples(task, "grammars", drawing_name(task.config.name))
 
 
 def report(plan: Plan) -> Sequence[str]:
@@ -198,9 +177,7 @@ def report(plan: Plan) -> Sequence[str]:
 def asked(config: Config) -> Sequence[int]:
     """The shapes of each shard of the collection, if as many are found as are asked for."""
     section = config.section(GrammarsConfig)
-    total = sum(each.instances + each.resized for each in section.models)
-    val, test = round(section.splits.val * total), round(section.splits.test * total)
-    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+    return section.splits.shard_sizes(sum(each.instances + each.resized for each in section.models))
 
 
 def trial(config: Config) -> GrammarsConfig:
@@ -210,9 +187,7 @@ def trial(config: Config) -> GrammarsConfig:
         each.model_copy(update={"instances": min(each.instances, 8), "resized": min(each.resized, 8)})
         for each in section.models
     )
-    return section.model_copy(
-        update={"models": models, "splits": section.splits.model_copy(update={"samples_per_shard": 8})}
-    )
+    return section.model_copy(update={"models": models, "splits": section.splits.for_trial()})
 
 
 def estimate_bytes(plan: Plan) -> int:

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.shape.collection.assignment import ShardConfig
 from stages.shape.physics.settings import Requirements
 
 
@@ -24,13 +25,6 @@ class RandomSamplingConfig(StrictModel):
     samples: int = Field(10_000, ge=3, le=1_000_000_000, description="Shapes in all.")
     val: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the validation split.")
     test: float = Field(0.1, gt=0, lt=0.5, description="Share of shapes, and of structures, in the test split.")
-
-
-class ProgramSplitConfig(StrictModel):
-    """How the samples are shared out."""
-
-    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
-    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 
 class ProgramsConfig(StrictModel):
@@ -60,6 +54,4 @@ class ProgramsConfig(StrictModel):
     require: Requirements = Field(
         default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
     )
-    splits: ProgramSplitConfig = Field(
-        default_factory=ProgramSplitConfig, description="How the samples are shared out."
-    )
+    splits: ShardConfig = Field(default_factory=ShardConfig, description="How the samples are shared out.")

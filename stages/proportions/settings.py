@@ -5,19 +5,11 @@ from __future__ import annotations
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.shape.collection.assignment import SplitConfig
 from stages.shape.physics.settings import Requirements
 
 MOST = 1_000_000
 """No more are made of a kit."""
-
-
-class ProportionSplitConfig(StrictModel):
-    """How the samples are shared out; no two are alike."""
-
-    val: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in validation.")
-    test: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in test.")
-    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
-    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 
 class ProportionsConfig(StrictModel):
@@ -52,6 +44,4 @@ class ProportionsConfig(StrictModel):
     )
     lanes: int = Field(4, ge=1, le=64, description="Shards of one kit that draw beside each other.")
     tries: int = Field(8, ge=1, le=1000, description="Draws at most, as a multiple of the shapes wanted.")
-    splits: ProportionSplitConfig = Field(
-        default_factory=ProportionSplitConfig, description="How the samples are shared out."
-    )
+    splits: SplitConfig = Field(default_factory=SplitConfig, description="How the samples are shared out.")

@@ -13,22 +13,25 @@ from typing import Any
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError, ShardFailed
-from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
 from stages.proportions.drawn import Drawn
 from stages.proportions.faults import warp_fault
-from stages.proportions.settings import MOST, ProportionsConfig, ProportionSplitConfig
+from stages.proportions.settings import MOST, ProportionsConfig
 from stages.proportions.text import proportion_text, read_proportions
 from stages.proportions.warp import lattice_of, warped
-from stages.shape.collection.assignment import SPLITS, assign_splits, shard_sizes, shards_of_split
+from stages.shape.collection.assignment import (
+    SplitConfig,
+    assign_splits,
+    planned_collection,
+    write_listed_samples,
+    write_listings,
+)
 from stages.shape.collection.origin import unstated
-from stages.shape.collection.shards import planned_collection
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
-from stages.shape.sample import Sample, write_sample
 from stages.variations.fallback import resolved_fallback
 from stages.variations.settings import FALLBACK_STABLE_KEY, VariationsConfig
 
@@ -68,7 +71,7 @@ def _wanted(plan: Plan) -> ProportionsConfig:
     if own.samples_per_kit or not chosen:
         return own
     layouts = plan.config.section(VariationsConfig)
-    shared = ProportionSplitConfig(**layouts.splits.model_dump(include=set(ProportionSplitConfig.model_fields)))
+    shared = SplitConfig(**layouts.splits.model_dump(include=set(SplitConfig.model_fields)))
     stable = own.require.stable or chosen[FALLBACK_STABLE_KEY]
     require = own.require.model_copy(update={"stable": stable})
     return own.model_copy(
@@ -150,7 +153,8 @@ def run_choice(task: Task) -> Outcome:
             digest = graph_digest(graph.types, graph.edges)
             for place in drawn.farthest_first(share):
                 parents = ["/".join(path.parts[-2:])]
-                chosen.append({"kit": name, "graph": digest, "parents": parents, "text": own[place]})
+                row = {"kit": name, "graph": digest, "method": "proportions", "parents": parents, "text": own[place]}
+                chosen.append(row)
         for number, row in enumerate(chosen):
             rows.append({"key": f"{name}-{number:06d}", **row})
         counts[name] = len(chosen)
@@ -159,33 +163,14 @@ def run_choice(task: Task) -> Outcome:
             "no exemplar holds together in other proportions, or none differs enough; set proportions.spread or "
             "proportions.apart smaller, or require less, or vary the layout: variations.samples_per_kit"
         )
-    split_of = assign_splits(
-        [[row] for row in range(len(rows))], config.splits.val, config.splits.test, task.rng("splits")
-    )
-    order = task.rng("order").permutation(len(rows))
-    shards: dict[str, int] = {}
-    for split, title in enumerate(SPLITS):
-        members = order[split_of[order] == split]
-        shard_of = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
-        shards[title] = int(shard_of[-1]) + 1 if len(members) else 0
-        for number in range(shards[title]):
-            with task.output(f"{task.shard.name}.{title}-{number:06d}.jsonl") as stream:
-                stream.writelines(json_bytes(rows[row]) for row in members[shard_of == number].tolist())
+    split_of = assign_splits([[row] for row in range(len(rows))], config.splits, task.rng("splits"))
+    shards = write_listings(task, rows, split_of, config.splits)
     return Outcome(0, {"shards": shards, "shapes": counts})
 
 
 def run_collection(task: Task) -> Outcome:
     """Write the samples of one shard."""
-    split, number = task.shard.params["split"], task.shard.params["number"]
-    listing = task.input("proportions", f"{choice_name(task.config.name)}.{split}-{number:06d}.jsonl").read_text()
-    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for row in map(json.loads, listing.splitlines()):
-            lineage = {"method": "proportions", "parents": row["parents"]}
-            write_sample(
-                writer,
-                Sample(row["key"], split, "proportions", row["kit"], row["graph"], lineage, text=row["text"]),
-            )
-    return Outcome(writer.samples, {"split": split, "samples": writer.samples})
+    return write_listed_samples(task, "proportions", choice_name(task.config.name))
 
 
 def report(plan: Plan) -> Sequence[str]:
@@ -221,19 +206,15 @@ def check(config: Config) -> None:
 def asked(config: Config) -> Sequence[int]:
     """The shapes of each shard of the collection, if as many are found as are asked for."""
     section = config.section(ProportionsConfig)
-    total = section.samples_per_kit * len(config.section(ExemplarsConfig).kits)
-    val, test = round(section.splits.val * total), round(section.splits.test * total)
-    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+    return section.splits.shard_sizes(section.samples_per_kit * len(config.section(ExemplarsConfig).kits))
 
 
 def trial(config: Config) -> ProportionsConfig:
     """Few shapes of each kit."""
     section = config.section(ProportionsConfig)
     few = max(32 // max(len(config.section(ExemplarsConfig).kits), 1), 4)
-    splits = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
-    return section.model_copy(
-        update={"samples_per_kit": min(section.samples_per_kit, few), "lanes": 1, "splits": splits}
-    )
+    update = {"samples_per_kit": min(section.samples_per_kit, few), "lanes": 1, "splits": section.splits.for_trial()}
+    return section.model_copy(update=update)
 
 
 def estimate_bytes(plan: Plan) -> int:

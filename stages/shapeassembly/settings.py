@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config import StrictModel
+from stages.shape.collection.assignment import SplitConfig
 from stages.shape.physics.settings import Requirements
 from stages.shapeassembly.extraction.settings import Cleaning, Gates, HierarchyFiles, NamedFiles
 from stages.shapeassembly.sources import existing_programs
@@ -82,15 +83,6 @@ class SampledPrograms(NamedFiles):
         return f"{self.dataset}-models/{self.model}-{self.kit}-{self.seed}"
 
 
-class ShapeAssemblySplitConfig(StrictModel):
-    """How the samples are shared out."""
-
-    val: float = Field(0.1, gt=0, lt=0.5, description="Share of programs in the validation split.")
-    test: float = Field(0.1, gt=0, lt=0.5, description="Share of programs in the test split.")
-    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
-    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
-
-
 class ShapeAssemblyConfig(StrictModel):
     """Shapes from ShapeAssembly programs."""
 
@@ -115,8 +107,8 @@ class ShapeAssemblyConfig(StrictModel):
     require: Requirements = Field(
         default_factory=Requirements, description="What every shape must be physically; others are refused and counted."
     )
-    splits: ShapeAssemblySplitConfig = Field(
-        default_factory=ShapeAssemblySplitConfig,
+    splits: SplitConfig = Field(
+        default_factory=SplitConfig,
         description="How the samples are shared out; programs that are alike up to continuous parameters stand in one "
         "split.",
     )

@@ -34,7 +34,7 @@ def splits_of(
         else:
             groups.setdefault(row["graph"], []).append(len(free))
             free.append(index)
-    split_of[free] = assign_splits(list(groups.values()), config.splits.val, config.splits.test, rng)
+    split_of[free] = assign_splits(list(groups.values()), config.splits, rng)
     for kit, names in listed.items():
         there = {PurePosixPath(row["file"]).stem for row in rows if row["kit"] == kit}
         if there and names and not there & set(names):

@@ -8,22 +8,18 @@ meshes: its text is the canonical program, and `stages.shapeassembly.shape.shape
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from pipeline.config import Config
 from pipeline.errors import ShardFailed
-from pipeline.shards import ShardWriter, json_bytes
+from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from stages.shape.collection.assignment import SPLITS, shard_sizes, shards_of_split
+from stages.shape.collection.assignment import planned_collection, write_listed_samples, write_listings
 from stages.shape.collection.classes import Classes
 from stages.shape.collection.origin import unstated
-from stages.shape.collection.shards import planned_collection
-from stages.shape.sample import Sample, write_sample
 from stages.shapeassembly.acceptance import accepted_rows
 from stages.shapeassembly.extraction.shards import extraction_shards, run_extraction
 from stages.shapeassembly.language import ProgramDecoder, assignment_name
@@ -87,15 +83,7 @@ def run_assignment(task: Task) -> Outcome:
     except ValueError as error:
         raise ShardFailed(f"{error}; the names in the programs make them") from error
     split_of = splits_of(rows, config, task.rng("splits"))
-    order = task.rng("order").permutation(len(rows))
-    shards: dict[str, int] = {}
-    for split, name in enumerate(SPLITS):
-        members = order[split_of[order] == split]
-        shard_of = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
-        shards[name] = int(shard_of[-1]) + 1 if len(members) else 0
-        for number in range(shards[name]):
-            with task.output(f"{task.shard.name}.{name}-{number:06d}.jsonl") as stream:
-                stream.writelines(json_bytes(rows[index]) for index in members[shard_of == number].tolist())
+    shards = write_listings(task, [{**row, "parents": [row["file"]]} for row in rows], split_of, config.splits)
     counts = dict(sorted(Counter(row["kit"] for row in rows).items()))
     with task.output(f"{task.shard.name}.labels.json") as stream:
         stream.write(json_bytes(labels))
@@ -106,25 +94,7 @@ def run_assignment(task: Task) -> Outcome:
 
 def run_collection(task: Task) -> Outcome:
     """Write the samples of one shard."""
-    split, number = task.shard.params["split"], task.shard.params["number"]
-    assignment = assignment_name(task.config.name)
-    listing = task.input("shapeassembly", f"{assignment}.{split}-{number:06d}.jsonl").read_text()
-    with task.output(f"{task.shard.name}.tar") as stream, ShardWriter(stream) as writer:
-        for line in listing.rstrip("\n").split("\n"):
-            write_sample(writer, _sample(json.loads(line), split))
-    return Outcome(writer.samples, {"split": split, "samples": writer.samples})
-
-
-def _sample(row: dict[str, Any], split: str) -> Sample:
-    return Sample(
-        key=row["key"],
-        split=split,
-        producer="shapeassembly",
-        kit=row["kit"],
-        graph=row["graph"],
-        lineage={"method": row["method"], "parents": [row["file"]]},
-        text=row["text"],
-    )
+    return write_listed_samples(task, "shapeassembly", assignment_name(task.config.name))
 
 
 def report(plan: Plan) -> Sequence[str]:
@@ -155,8 +125,7 @@ def asked(config: Config) -> Sequence[int]:
     section = config.section(ShapeAssemblyConfig)
     total = sum((1 + each.edits) * sum(1 for _ in program_texts(each.path, each.folder)) for each in section.programs)
     total += sum(len(each.source) for each in section.hierarchies) + sum(each.samples for each in section.sampled)
-    val, test = round(section.splits.val * total), round(section.splits.test * total)
-    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+    return section.splits.shard_sizes(total)
 
 
 def trial(config: Config) -> ShapeAssemblyConfig:
@@ -164,8 +133,8 @@ def trial(config: Config) -> ShapeAssemblyConfig:
     section = config.section(ShapeAssemblyConfig)
     written = tuple(each.model_copy(update={"samples": min(each.samples, 16)}) for each in section.sampled)
     programs = tuple(each.model_copy(update={"edits": min(each.edits, 1)}) for each in section.programs)
-    splits = section.splits.model_copy(update={"samples_per_shard": 8})
-    return section.model_copy(update={"splits": splits, "programs": programs, "sampled": written})
+    update = {"splits": section.splits.for_trial(), "programs": programs, "sampled": written}
+    return section.model_copy(update=update)
 
 
 STAGE = Stage(

@@ -11,10 +11,10 @@ from typing import Any
 from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
-from stages.shape.collection.assignment import SPLITS, assign_splits, shards_of_split
+from stages.shape.collection.assignment import SPLITS, SplitConfig, assign_shards, assign_splits
 from stages.shape.sample import read_samples, write_sample
 from stages.string_sampling.rounds import ModelRounds, read_pool
-from stages.string_sampling.settings import DreamSplitConfig, StringSamplingConfig
+from stages.string_sampling.settings import StringSamplingConfig
 
 
 def assignment_shard(plan: Plan, models: Sequence[ModelRounds]) -> Shard:
@@ -56,7 +56,7 @@ def run_assignment(task: Task) -> Outcome:
 
     Raises ConfigError where no model has found anything.
     """
-    params, splits = task.shard.params, DreamSplitConfig.model_validate(task.shard.params["splits"])
+    params, splits = task.shard.params, SplitConfig.model_validate(task.shard.params["splits"])
     rows: list[dict[str, Any]] = []
     seen: set[tuple[str, str]] = set()
     counts: Counter[str] = Counter()
@@ -74,20 +74,18 @@ def run_assignment(task: Task) -> Outcome:
         raise ConfigError(
             "no model of string_sampling.sources has dreamt a shape; the rejects say what became of its strings"
         )
-    split_of = assign_splits([[row] for row in range(len(rows))], splits.val, splits.test, task.rng("splits"))
-    order = task.rng("order").permutation(len(rows))
-    shards: dict[str, list[tuple[int, list[str]]]] = {}
-    placed: list[dict[str, Any]] = []
-    for number, split in enumerate(SPLITS):
-        members = order[split_of[order] == number].tolist()
-        shard_of = shards_of_split(len(members), splits.shards, splits.samples_per_shard).tolist()
-        placed += [
-            {**rows[member], "split": split, "shard": shard} for member, shard in zip(members, shard_of, strict=True)
-        ]
-        own: list[list[str]] = [[] for _ in range(max(shard_of, default=-1) + 1)]
-        for member, shard in zip(members, shard_of, strict=True):
-            own[shard].append(rows[member]["lane"])
-        shards[split] = [(len(each), sorted(set(each))) for each in own]
+    split_of = assign_splits([[row] for row in range(len(rows))], splits, task.rng("splits"))
+    rows_of = assign_shards(split_of, splits, task.rng("order"))
+    placed = [
+        {**rows[row], "split": split, "shard": shard}
+        for split, of_shards in rows_of.items()
+        for shard, members in enumerate(of_shards)
+        for row in members.tolist()
+    ]
+    shards = {
+        split: [(len(members), sorted({rows[row]["lane"] for row in members.tolist()})) for members in of_shards]
+        for split, of_shards in rows_of.items()
+    }
     with task.output(f"{task.shard.name}.jsonl") as stream:
         stream.writelines(json_bytes(row) for row in placed)
     return Outcome(0, {"shards": shards, "kits": dict(sorted(counts.items())), "samples_in_all": len(rows)})

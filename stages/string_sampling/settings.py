@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.shape.collection.assignment import SplitConfig
 from stages.shape.physics.settings import Requirements
 
 SamplingMethod = Literal["gaussian", "prior", "perturbation", "linear", "path"]
@@ -45,15 +46,6 @@ class SourceConfig(StrictModel):
     )
 
 
-class DreamSplitConfig(StrictModel):
-    """How the samples are shared out; no two have the same graph."""
-
-    val: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in validation.")
-    test: float = Field(0.1, ge=0, lt=0.5, description="Share of samples in test.")
-    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
-    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
-
-
 class StringSamplingConfig(StrictModel):
     """Shapes that trained models dreamt."""
 
@@ -84,4 +76,4 @@ class StringSamplingConfig(StrictModel):
     draws: int = Field(64, ge=1, le=100_000, description="Strings, or searches for one, that a lane draws in a round.")
     rounds: int = Field(100, ge=1, description="Most rounds of one model.")
     patience: int = Field(3, ge=1, description="Rounds without a new shape after which a model has no more to say.")
-    splits: DreamSplitConfig = Field(default_factory=DreamSplitConfig, description="How the samples are shared out.")
+    splits: SplitConfig = Field(default_factory=SplitConfig, description="How the samples are shared out.")

@@ -13,7 +13,6 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.assignment import shard_sizes
 from stages.string_sampling.collection import assignment_shard, planned_collection, run_assignment, run_collection
 from stages.string_sampling.rounds import model_rounds, run_pool
 from stages.string_sampling.settings import StringSamplingConfig
@@ -91,9 +90,7 @@ def check(config: Config) -> None:
 def asked(config: Config) -> Sequence[int]:
     """The shapes of each shard, if every model finds as many as are wanted."""
     section = config.section(StringSamplingConfig)
-    total = sum(source.samples for source in section.sources)
-    val, test = round(section.splits.val * total), round(section.splits.test * total)
-    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+    return section.splits.shard_sizes(sum(source.samples for source in section.sources))
 
 
 def trial(config: Config) -> StringSamplingConfig:
@@ -101,8 +98,8 @@ def trial(config: Config) -> StringSamplingConfig:
     section = config.section(StringSamplingConfig)
     few = max(32 // max(len(section.sources), 1), 4)
     sources = tuple(source.model_copy(update={"samples": few}) for source in section.sources)
-    splits = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
-    return section.model_copy(update={"sources": sources, "splits": splits, "lanes": 1, "draws": 2 * few})
+    update = {"sources": sources, "splits": section.splits.for_trial(), "lanes": 1, "draws": 2 * few}
+    return section.model_copy(update=update)
 
 
 def estimate_bytes(plan: Plan) -> int:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from pipeline.config import StrictModel
+from stages.shape.collection.assignment import SplitConfig
 from stages.shape.physics.settings import PhysicsConfig, Requirements
 from stages.variations.novelty.features import Axis
 
@@ -188,8 +189,8 @@ class SelectionConfig(StrictModel):
     )
 
 
-class VariantSplitConfig(StrictModel):
-    """How the samples are shared out."""
+class VariantSplitConfig(SplitConfig):
+    """How the samples are divided into splits and shards, and what keeps splits apart."""
 
     by: Literal["family", "graph"] = Field(
         "family",
@@ -205,10 +206,6 @@ class VariantSplitConfig(StrictModel):
         description="Share of the larger surface that two variants have in common, laid upon each other as well as "
         "may be, from which on they are relatives; at 0.8 the point clouds of two splits are told apart.",
     )
-    val: float = Field(0.1, gt=0, lt=0.5, description="Share of samples (by graph: of distinct ones) in validation.")
-    test: float = Field(0.1, gt=0, lt=0.5, description="Share of samples (by graph: of distinct ones) in test.")
-    shards: int = Field(8, ge=1, le=100_000, description="Fewest shards of a split.")
-    samples_per_shard: int = Field(512, ge=1, description="Most samples of a shard.")
 
 
 class VariantRequirements(StrictModel):

@@ -12,7 +12,6 @@ from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.assignment import shard_sizes
 from stages.variations.constraint import unknown_in
 from stages.variations.fallback import resolved_fallback
 from stages.variations.report.measures import described, growth
@@ -97,9 +96,7 @@ def check(config: Config) -> None:
 def asked(config: Config) -> Sequence[int]:
     """The variants of each shard of the collection, if the search finds as many as it is asked for."""
     section = config.section(VariationsConfig)
-    total = section.samples_per_kit * len(config.section(ExemplarsConfig).kits)
-    val, test = round(section.splits.val * total), round(section.splits.test * total)
-    return shard_sizes((total - val - test, val, test), section.splits.shards, section.splits.samples_per_shard)
+    return section.splits.shard_sizes(section.samples_per_kit * len(config.section(ExemplarsConfig).kits))
 
 
 def trial(config: Config) -> VariationsConfig:
@@ -107,8 +104,9 @@ def trial(config: Config) -> VariationsConfig:
     section, kits = config.section(VariationsConfig), len(config.section(ExemplarsConfig).kits)
     if not section.samples_per_kit:
         return section
-    few = section.splits.model_copy(update={"shards": 1, "samples_per_shard": 8})
-    return section.model_copy(update={"samples_per_kit": max(32 // max(kits, 1), 4), "splits": few})
+    return section.model_copy(
+        update={"samples_per_kit": max(32 // max(kits, 1), 4), "splits": section.splits.for_trial()}
+    )
 
 
 STAGE = Stage(

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.stage import Plan, Shard
-from stages.shape.collection.assignment import SPLITS
 from stages.shape.collection.declared import language_of, producers
 
 PRODUCERS = "*/producer.py"
@@ -34,18 +31,6 @@ def collection_shards(plan: Plan, *also: str) -> list[Shard]:
             inputs = (f"{producer}/{name}", *read, *(f"{stage}/{name}" for stage in also))
             shards.append(Shard(name, params, inputs))
     return shards
-
-
-def planned_collection(plan: Plan, counts: Mapping[str, int], inputs: tuple[str, ...]) -> list[Shard]:
-    """What a producer plans once it is known how many shards each split has: the shards of the collection,
-    `<dataset>-<split>-<index>`, made from `inputs`; their params are `job`, `split` and `number`."""
-    return [
-        Shard(
-            f"{plan.config.name}-{split}-{number:06d}", {"job": "collection", "split": split, "number": number}, inputs
-        )
-        for split in SPLITS
-        for number in range(counts[split])
-    ]
 
 
 def sample_count(plan: Plan) -> int:

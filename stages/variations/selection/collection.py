@@ -12,8 +12,7 @@ from pipeline.errors import ConfigError
 from pipeline.shards import ShardWriter, array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.exemplars.settings import ExemplarsConfig
-from stages.shape.collection.assignment import SPLITS, assign_splits, shards_of_split
-from stages.shape.collection.shards import planned_collection
+from stages.shape.collection.assignment import SPLITS, assign_shards, assign_splits, planned_collection
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.sample import Sample, write_sample
@@ -32,7 +31,6 @@ from stages.variations.selection.partition import (
     choose_by_family,
     nearness_of,
     packed_shapes,
-    wanted_sizes,
 )
 from stages.variations.settings import VariationsConfig
 
@@ -89,16 +87,16 @@ def run_assignment(task: Task) -> Outcome:
             rows.append((number, lanes.setdefault(pool.lanes[lane], len(lanes)), index, place))
             parents.append(named[variant])
     split_of = np.concatenate([each.split_of for each in chosen])
-    order = task.rng("order").permutation(total)
-    placed: list[np.ndarray] = []
-    shards: dict[str, int] = {}
-    for split, name in enumerate(SPLITS):
-        members = order[split_of[order] == split]
-        shard = shards_of_split(len(members), config.splits.shards, config.splits.samples_per_shard)
-        shards[name] = int(shard[-1]) + 1 if len(members) else 0
-        columns = np.array(rows)[members], np.full((len(members), 1), split), shard[:, None]
-        placed.append(np.concatenate([*columns, members[:, None]], axis=1))
-    joined = np.concatenate(placed).astype(np.int64)
+    shards = assign_shards(split_of, config.splits, task.rng("order"))
+    joined = np.array(
+        [
+            (*rows[row], SPLITS.index(split), shard, row)
+            for split, rows_of in shards.items()
+            for shard, members in enumerate(rows_of)
+            for row in members.tolist()
+        ],
+        dtype=np.int64,
+    )
     with task.output(f"{task.shard.name}.rows.npy") as stream:
         stream.write(array_bytes(joined[:, :6]))
     with task.output(f"{task.shard.name}.parents.jsonl") as stream:
@@ -107,7 +105,8 @@ def run_assignment(task: Task) -> Outcome:
     with task.output(f"{task.shard.name}.lanes.txt") as stream:
         stream.write("".join(f"{name}\n" for name in lanes).encode())
     graphs = sum(each["graphs"] for each in measures.values())
-    return Outcome(0, {"shards": shards, "variants": total, "graphs": graphs, "kits": measures})
+    counts = {split: len(rows_of) for split, rows_of in shards.items()}
+    return Outcome(0, {"shards": counts, "variants": total, "graphs": graphs, "kits": measures})
 
 
 def _by_family(task: Task, name: str, pool: PoolIndex, ancestry: Ancestry) -> SelectedSamples:
@@ -130,7 +129,7 @@ def _by_graph(task: Task, kits: list[str], pools: list[PoolIndex]) -> list[Selec
         for row, variant in enumerate(chosen.tolist(), start=first):
             groups.setdefault((number, bytes(pool.digests[variant, 0])), []).append(row)
         taken.append(chosen)
-    split_of = assign_splits(list(groups.values()), config.splits.val, config.splits.test, task.rng("splits"))
+    split_of = assign_splits(list(groups.values()), config.splits, task.rng("splits"))
     ends = np.cumsum([len(each) for each in taken])[:-1]
     found = []
     for name, pool, own, splits in zip(kits, pools, taken, np.split(split_of, ends), strict=True):
@@ -144,7 +143,7 @@ def _measures(task: Task, name: str, pool: PoolIndex, chosen: SelectedSamples) -
     config, kit, variants = task.config.section(VariationsConfig), input_kit(task, name), chosen.variants
     taken = pool.counts[variants], pool.features[variants], pool.digests[variants]
     sample = task.rng("edits", name).permutation(variants)[:SAMPLE].tolist()
-    wanted = wanted_sizes(config.samples_per_kit, config.splits)
+    wanted = config.splits.sizes(config.samples_per_kit)
     splits = {
         split: {
             "wanted": wanted[split],

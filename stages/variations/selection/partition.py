@@ -17,7 +17,7 @@ from stages.variations.selection.ancestry import Ancestry
 from stages.variations.selection.families import DISCARDED, Near, cut_families
 from stages.variations.selection.farthest_first import select_diverse
 from stages.variations.selection.shared_surface import PackedShapes
-from stages.variations.settings import VariantSplitConfig, VariationsConfig
+from stages.variations.settings import VariationsConfig
 
 COMPARED = 64
 """So many shapes of val and of test at most are compared with train."""
@@ -35,12 +35,6 @@ class SelectedSamples:
     split_of: Indices
     discarded: int
     nearness: dict[str, dict[str, float]]
-
-
-def wanted_sizes(count: int, splits: VariantSplitConfig) -> dict[str, int]:
-    """How many of `count` samples each split is to get."""
-    val, test = round(splits.val * count), round(splits.test * count)
-    return {"train": count - val - test, "val": val, "test": test}
 
 
 def packed_shapes(task: Task, kit: Kit, pool: PoolIndex, variants: Indices) -> PackedShapes:
@@ -71,7 +65,7 @@ def choose_by_family(
 
     held: int64 (n,), the variants of the pool that are cut, as `candidates` gives them; shapes: theirs, in that order.
     """
-    wanted = wanted_sizes(min(config.samples_per_kit, len(pool)), config.splits)
+    wanted = config.splits.sizes(min(config.samples_per_kit, len(pool)))
     cut = cut_families(_near(pool, ancestry, held, shapes, config.splits.min_shared_surface), len(held), wanted, rng)
     taken = [held[cut.split_of == SPLITS.index(split)] for split in SPLITS]
     able = taken[0]

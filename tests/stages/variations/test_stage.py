@@ -13,7 +13,7 @@ import trimesh
 import yaml
 
 from pipeline.randomness import decision_rng
-from stages.shape.collection.assignment import SPLITS, assign_splits
+from stages.shape.collection.assignment import SPLITS, SplitConfig, assign_splits
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
@@ -122,7 +122,9 @@ def test_by_graph_everything_found_is_shared_out_by_equal_graphs_alone(tmp_path:
     keys = [f"{kit}-{place:06d}" for kit in ("chain", "road") for place in range(kits[kit]["pool"])]
     for row, key in enumerate(keys):
         groups.setdefault((by_key[key].kit, by_key[key].graph), []).append(row)
-    expected = assign_splits(list(groups.values()), 0.2, 0.3, decision_rng(5, "variations", "toy-assignment", "splits"))
+    expected = assign_splits(
+        list(groups.values()), SplitConfig(val=0.2, test=0.3), decision_rng(5, "variations", "toy-assignment", "splits")
+    )
     assert sorted(by_key) == sorted(keys)
     assert [by_key[key].split for key in keys] == [SPLITS[split] for split in expected]
     assert {kit: found["let_go"] for kit, found in kits.items()} == {"chain": 0, "road": 0}
