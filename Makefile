@@ -152,7 +152,7 @@ bench: setup  ## Measure the whole way and every piece beside a public peer, and
 	$(PYTHON) -m pip install -q -r tests/bench/peers.txt || echo 'some peers cannot be built here: measured without' >&2
 	$(PYTHON) -m tests.bench
 kits: setup  ## Write the shipped exemplars anew from their source
-	$(PYTHON) -m stages.exemplars.kits
+	$(PYTHON) datasets/exemplars/source
 keys: setup  ## Write the table of all config keys, configs/README.md, anew from the code
 	$(PYTHON) -m pipeline keys > configs/README.md.tmp
 	mv configs/README.md.tmp configs/README.md

@@ -12,7 +12,7 @@ from stages.shape.arrays import ByteArray, FloatArray, IntArray
 from stages.shape.geometry.pose import transform_points
 from stages.symmetry.pieces import RADIUS, SurfacePiece, repeated_pieces
 from stages.symmetry.sections.slabs import slab_pieces
-from stages.symmetry.surface.grid import CELLS_PER_RADIUS, has_area
+from stages.symmetry.surface.grid import estimate_grid_size, has_area
 from stages.symmetry.surface.soup import Soup
 from stages.symmetry.surface.welding import weld
 
@@ -64,17 +64,6 @@ def search_size(scene: ModelScene) -> int:
     """How large a search for symmetries of the scene would be: `estimate_grid_size`."""
     vertices, faces = _in_the_world(scene)
     return estimate_grid_size(vertices[faces], RADIUS)
-
-
-def estimate_grid_size(corners: FloatArray, radius: float) -> int:
-    """How many triangles (f, 3, 3) have area, and about how many cells they lie in, for a radius as a share of the
-    longest side. A plane at a random slant crosses 3/2 cells of a lattice for each square as wide as a cell."""
-    corners = corners[has_area(corners)]
-    if not len(corners):
-        return 0
-    size = radius / CELLS_PER_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
-    return len(corners) + round(1.5 * area / 2 / size**2)
 
 
 def _in_the_world(scene: ModelScene) -> tuple[FloatArray, IntArray]:

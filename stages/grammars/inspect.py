@@ -10,7 +10,6 @@ import numpy as np
 
 from pipeline.errors import ConfigError
 from pipeline.places import write_file
-from stages.exemplars.cut_surface import estimate_grid_size
 from stages.exemplars.model import Model
 from stages.exemplars.settings import ReadLimits
 from stages.grammars.description import describe_grammar
@@ -21,6 +20,7 @@ from stages.grammars.picture import grammar_sheet, shapes_sheet
 from stages.grammars.read_surface import read_surface
 from stages.grammars.scans.scanned_grid import ScannedCloud, required_points, suitable_radius
 from stages.grammars.settings import MAX_RADIUS_SHARE, GrammarConfig
+from stages.symmetry.surface.grid import estimate_grid_size
 
 SHOWN = 12
 """So many shapes by each method are drawn to see what will come."""

@@ -68,7 +68,7 @@ def run_extraction(task: Task) -> Outcome:
     found = extract_grammar(surface, config.name, config.radius, up, task.rng("sets"), config.upright)
     if len(found.grammar.productions) < 2 and not found.grammar.grids:
         raise ShardFailed(
-            f"{config.model}: nothing in it can be exchanged, {found.transforms} leave no docking site; set "
+            f"{config.model}: nothing in it can be exchanged, {found.transforms} transforms leave no docking site; set "
             f"grammars.models[{config.name}].radius smaller, or take it by its parts: exemplars.kits"
         )
     described = describe_grammar(found)

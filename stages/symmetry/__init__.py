@@ -1,1 +1,1 @@
-"""From one mesh without parts to repeated pieces, by its partial symmetries (symmetry)."""
+"""Partial symmetries of one surface: where a surface repeats, and the pieces that this cuts it into."""

@@ -87,7 +87,8 @@ def _grammar(made: Callable[[], tuple[SurfaceMesh, str]]) -> Found:
     parts = ", ".join(f"{name} {each:.1f}" for name, each in found.seconds.items())
     note = (
         f"{len(source.faces):,} triangles in {spent:.1f} s ({parts}); {len(found.grid):,} cells, {found.transforms} "
-        f"motions, {len(found.docked_pieces)} dockers,, {len(found.grammar.grids)} grids; "
+        f"transforms, {len(found.docked_pieces)} docked pieces, {len(found.grammar.productions)} productions, "
+        f"{len(found.grammar.grids)} grids; "
         f"peak {peak / 1024:.0f} MiB, {before / 1024:.0f} before"
     )
     return len(source.faces), spent, note

@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""From a surface to its shape grammar: docking sites, docked pieces, productions and grids."""

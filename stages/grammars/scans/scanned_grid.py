@@ -131,7 +131,7 @@ def scanned_grid(cloud: ScannedCloud, share: float) -> ScannedGrid:
 
 def suitable_radius(cloud: ScannedCloud, least: float) -> float:
     """The radius of similarity that suits a cloud, at least `least`, as a share of the longest side: with it cells hold
-    twice the points that they must, and noise is half as much as it may be. ConfigError:
+    twice the points that they must, and noise is half as much as it may be. Raises ConfigError for
     points that are no surface."""
     return max(least, float(np.ceil(1000 * max(_shares_that_suit(cloud))) / 1000))
 

@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""Rigid transforms that map parts of a surface onto others, and what they match."""

@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""Cross sections of a surface, and the parallel planes at which it can be cut."""

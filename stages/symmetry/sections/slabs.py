@@ -21,7 +21,7 @@ SAME = 0.06
 
 
 def slab_pieces(vertices: FloatArray, faces: IntArray) -> list[SurfacePiece]:
-    """The pieces of a mesh, vertices (v, 3) and faces (f, 3), cut at its `find_parallel_cuts`;equal_ones_once,
+    """The pieces of a mesh, vertices (v, 3) and faces (f, 3), cut at its `find_parallel_cuts`; equal ones once,
     with all their poses, which are shifts. One piece alone where no sections are alike.
 
     A slab is as many pieces as do not touch each other. Triangles without area are left out.

@@ -1,1 +1,1 @@
-"""TODO: what this folder holds."""
+"""A surface on a sparse voxel grid: its triangles, planes, boundary lines and corners."""

@@ -112,6 +112,17 @@ def surface_grid(corners: FloatArray, share: float) -> SurfaceGrid:
     )
 
 
+def estimate_grid_size(corners: FloatArray, radius: float) -> int:
+    """How many triangles (f, 3, 3) have area, and about how many cells they lie in, for a radius as a share of the
+    longest side. A plane at a random slant crosses 3/2 cells of a lattice for each square as wide as a cell."""
+    corners = corners[has_area(corners)]
+    if not len(corners):
+        return 0
+    size = radius / CELLS_PER_RADIUS * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
+    return len(corners) + round(1.5 * area / 2 / size**2)
+
+
 def has_area(corners: FloatArray) -> BoolArray:
     """Which of triangles (f, 3, 3) have area, bool (f,)."""
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.exemplars.kits.polygon import arch, chamfered, grown, mirrored, rectangle, regular, triangulate
+from shipped_kits.outlines import arch, chamfered, grown, mirrored, rectangle, regular, triangulate
 from stages.shape.arrays import FloatArray
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.exemplars.kits.polygon import grown, rectangle, regular, triangulate
+from shipped_kits.outlines import grown, rectangle, regular, triangulate
 from stages.shape.arrays import ByteArray, FloatArray, IntArray
 
 Color = tuple[int, int, int]

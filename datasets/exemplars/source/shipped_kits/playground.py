@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from stages.exemplars.kits.layout import Layout
-from stages.exemplars.kits.polygon import arch, mirrored, rectangle, regular
-from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, revolved, stacked, swept
+from shipped_kits.kit_shape import Layout
+from shipped_kits.outlines import arch, mirrored, rectangle, regular
+from shipped_kits.solids import Color, Solid, bar, box, extruded, joined, revolved, stacked, swept
 
 PITCH = 4.0
 APOTHEM = 1.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.exemplars.kits.layout import Layout
-from stages.exemplars.kits.solid import Color, Face, Point, Solid
+from shipped_kits.kit_shape import Layout
+from shipped_kits.solids import Color, Face, Point, Solid
 
 BAYS, STOREYS = 5, 3
 BAY, STOREY = 1.2, 1.5

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from stages.exemplars.kits.layout import Layout, glb_bytes
-from stages.exemplars.kits.solid import box, revolved
+from shipped_kits.kit_shape import Layout, glb_bytes
+from shipped_kits.solids import box, revolved
 
 BROWN, DARK = (146, 103, 66), (66, 62, 70)
 

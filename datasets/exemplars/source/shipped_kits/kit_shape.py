@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shipped_kits.solids import Solid, rotation
 from stages.exemplars.formats.colors import linear_from_srgb
-from stages.exemplars.kits.solid import Solid, rotation
 from stages.shape.arrays import FloatArray
 
 if TYPE_CHECKING:

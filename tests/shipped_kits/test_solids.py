@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.exemplars.kits.polygon import arch, rectangle, regular
-from stages.exemplars.kits.solid import Solid, bar, box, extruded, joined, loft, revolved, rotation, stacked, swept
+from shipped_kits.outlines import arch, rectangle, regular
+from shipped_kits.solids import Solid, bar, box, extruded, joined, loft, revolved, rotation, stacked, swept
 
 RED, BLUE = (200, 30, 30), (30, 30, 200)
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.exemplars.kits.layout import Layout
-from stages.exemplars.kits.polygon import arch, chamfered, mirrored, rectangle, regular
-from stages.exemplars.kits.solid import Color, Solid, box, extruded, joined, loft, revolved, stacked
+from shipped_kits.kit_shape import Layout
+from shipped_kits.outlines import arch, chamfered, mirrored, rectangle, regular
+from shipped_kits.solids import Color, Solid, box, extruded, joined, loft, revolved, stacked
 from stages.shape.arrays import FloatArray
 
 PITCH = 3.0

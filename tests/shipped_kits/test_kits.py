@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from shipped_kits.catalogue import KITS, write_kits
+from shipped_kits.kit_shape import Layout
 from stages.exemplars.congruence import comparable_mesh, congruences
-from stages.exemplars.kits.catalogue import KITS, write_kits
-from stages.exemplars.kits.layout import Layout
 from stages.shape.arrays import FloatArray, IntArray
 
-COMMITTED = Path(__file__).parents[4] / "datasets" / "exemplars"
+COMMITTED = Path(__file__).parents[2] / "datasets" / "exemplars"
 
 
 @cache

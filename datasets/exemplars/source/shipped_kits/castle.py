@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.exemplars.kits.layout import Layout
-from stages.exemplars.kits.polygon import arch, chamfered, mirrored, rectangle, regular
-from stages.exemplars.kits.solid import Color, Solid, bar, box, extruded, joined, revolved, stacked
+from shipped_kits.kit_shape import Layout
+from shipped_kits.outlines import arch, chamfered, mirrored, rectangle, regular
+from shipped_kits.solids import Color, Solid, bar, box, extruded, joined, revolved, stacked
 
 PITCH = 5.0
 BITE = 0.03

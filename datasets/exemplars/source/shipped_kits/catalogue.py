@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from pipeline.places import write_file
-from stages.exemplars.kits import castle, facade, playground, space_base, temple
-from stages.exemplars.kits.layout import Layout, glb_bytes
+from shipped_kits import castle, facade, playground, space_base, temple
+from shipped_kits.kit_shape import Layout, glb_bytes
 
 KITS: Mapping[str, Callable[[], dict[str, Layout]]] = {
     "castle": castle.shapes,
