@@ -20,8 +20,8 @@ from stages.proportions.warp import Lattice, lattice_of, warped
 from stages.shape.kit import Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
+from stages.shape.resolved_settings import FALLBACK_KEY, FALLBACK_STABLE_KEY
 from stages.shape.shape import Shape, kit_shape
-from stages.variations.settings import FALLBACK_KEY, FALLBACK_STABLE_KEY
 
 TRIES = 36
 """Draws of a probe, of all exemplars together."""

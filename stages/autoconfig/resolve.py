@@ -30,10 +30,10 @@ from stages.exemplars.settings import STRICTEST, KitConfig
 from stages.shape.kit import Assembly, Kit
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
+from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
 from stages.shape.shape import kit_shape
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
 from stages.variations.requirements.required_labels import spanning_labels
-from stages.variations.settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
 
 
 @dataclass(frozen=True)

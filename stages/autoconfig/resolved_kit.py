@@ -16,7 +16,7 @@ from stages.exemplars.model import Model
 from stages.exemplars.read import read_model
 from stages.exemplars.settings import STRICTEST, KitConfig, ReadLimits
 from stages.shape.geometry.contact_oracle import ContactOracle
-from stages.variations.settings import MAX_COPIED_SHARE_KEY
+from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY
 
 PARTS_KEY = "parts"
 """What `parts` is called among the keys that are chosen for a kit."""

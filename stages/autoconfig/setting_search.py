@@ -14,9 +14,9 @@ from stages.autoconfig.trial_search import MAX_GROWTH_DEGREE, TrialResult, Trial
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.graphs.neighbourhoods import SLOT_LEVELS
 from stages.shape.kit import Assembly, ContactKind, Strictness
+from stages.shape.resolved_settings import RESOLVED_HUB_SHARE
 from stages.variations.novelty.copied_pieces import CopyDetector
 from stages.variations.novelty.low_diversity import NEAR_COPY_SHARE
-from stages.variations.settings import RESOLVED_HUB_SHARE
 
 SUFFICIENT_GRAPHS = 80
 """So many distinct graphs in a probe promise hundreds in a search."""

@@ -12,8 +12,9 @@ from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.autoconfig.settings import AutoconfigConfig
 from stages.exemplars.settings import ExemplarsConfig, KitConfig
+from stages.shape.resolved_settings import REQUIRED_LABELS_KEY
 from stages.variations.fallback import allows_fallback
-from stages.variations.settings import REQUIRED_LABELS_KEY, VariationsConfig
+from stages.variations.settings import VariationsConfig
 
 BYTES_A_KIT = 4_000
 

@@ -1,4 +1,4 @@
-"""What a dataset's card says of the keys that were chosen for its kits."""
+"""The table of resolved settings on a dataset's card."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from pipeline.stage import Plan
 
 
 def resolved_table(plan: Plan) -> Sequence[str]:
-    """What was chosen for each kit whose config left keys open, and why, as a table."""
+    """Return a Markdown table of the settings resolved for each kit, with their reasons; empty if none were."""
     rows = []
     for kit in plan.shards("exemplars"):
         summary = plan.summary("exemplars", kit) or {"resolved": {}}
         for key, value in summary["resolved"].items():
             shown = ", ".join(value) if isinstance(value, list) else value
             rows.append(f"| {kit} | `{key}` | {shown} | {summary['reasons'][key]} |")
-    if not rows:
-        return []
-    return ["\n".join(["| kit | key | chosen | why |", "|---|---|---|---|", *rows])]
+    return ["\n".join(["| kit | key | value | why |", "|---|---|---|---|", *rows])] if rows else []

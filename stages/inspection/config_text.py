@@ -12,7 +12,7 @@ import yaml
 
 from stages.exemplars.model import Model
 from stages.exemplars.settings import KitConfig
-from stages.variations.settings import RESOLVED_HUB_SHARE
+from stages.shape.resolved_settings import RESOLVED_HUB_SHARE
 
 MAX_SAMPLES_REQUESTED = 200
 """Variants that the config asks for, if there are as many."""
@@ -60,7 +60,7 @@ def config_text(
         (3, "grammar", made.grammar, reasons.get("grammar", "")),
         (3, "hubs", None, ""),
         (4, "types", list(made.hubs) or "none", reasons.get("hubs.types", "")),
-        (4, "keep", config.hubs.keep, "hubs are put back behind finished shapes where they fit" if made.hubs else ""),
+        (4, "restore", config.hubs.restore, "put back into finished shapes where they fit" if made.hubs else ""),
         (3, "disconnected", made.disconnected, reasons.get("disconnected", "")),
     ]
     lines = [

@@ -28,7 +28,7 @@ from stages.inspection.observation import describe_observation, observation_line
 from stages.inspection.report import InspectionReport, inspect_models
 from stages.inspection.sample_figure import sample_figure
 from stages.shape.kit import ContactKind, Strictness
-from stages.variations.settings import FALLBACK_STABLE_KEY
+from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
 
 FOLDER = Path("datasets", "inspect")
 """Where the config and the pictures go if nobody says where."""

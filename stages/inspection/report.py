@@ -20,10 +20,10 @@ from stages.inspection.sample_figure import MAX_SHAPES_SHOWN
 from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.physics.judge import unmet
 from stages.shape.physics.settings import Requirements
+from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, STABLE_KEY
 from stages.shape.shape import Shape, kit_shape
 from stages.variations.requirements.hub_restoration import HubRestorer, auto_min_hubs
 from stages.variations.selection.orientation import OrientationFix
-from stages.variations.settings import MAX_COPIED_SHARE_KEY, STABLE_KEY
 
 ACROSS = (
     "cut it across, between bays and storeys with all that passes there: `parts: sections`; or where it is like itself "

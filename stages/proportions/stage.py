@@ -32,8 +32,9 @@ from stages.shape.collection.origin import unstated
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
+from stages.shape.resolved_settings import FALLBACK_STABLE_KEY
 from stages.variations.fallback import resolved_fallback
-from stages.variations.settings import FALLBACK_STABLE_KEY, VariationsConfig
+from stages.variations.settings import VariationsConfig
 
 BYTES_A_SAMPLE = 8_000
 OVERSAMPLED = 2

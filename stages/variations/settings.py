@@ -9,15 +9,8 @@ from pydantic import Field
 from pipeline.config import StrictModel
 from stages.shape.collection.assignment import SplitConfig
 from stages.shape.physics.settings import PhysicsConfig, Requirements
+from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY
 from stages.variations.novelty.features import Axis
-
-RESOLVED_HUB_SHARE = 0.5
-"""What is required of hubs that were chosen and not stated: a mile of rail on which one brick of the road fits is no
-bridge."""
-MAX_COPIED_SHARE_KEY, STABLE_KEY, REQUIRED_LABELS_KEY = "require.max_copied_share", "require.stable", "require.labels"
-"""What these keys of `require` are called among those that are chosen for a kit."""
-FALLBACK_KEY, FALLBACK_STABLE_KEY = "fallback", "proportions.require.stable"
-"""So are called `proportions`, where they come instead of layouts, and what is required of them."""
 
 
 class NoveltyConfig(StrictModel):

@@ -15,9 +15,10 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.geometry.pose import invert, pose_vectors
 from stages.shape.kit import Assembly, Exemplar, Kit, PartType
 from stages.shape.kit_input import input_kit
+from stages.shape.resolved_settings import RESOLVED_HUB_SHARE
 from stages.variations.kernels.structs import FORBIDDEN, NONE
 from stages.variations.requirements.required_labels import spanning_hubs
-from stages.variations.settings import RESOLVED_HUB_SHARE, VariationsConfig
+from stages.variations.settings import VariationsConfig
 
 HUBS_NOT_RESTORED = "no backdrop"
 """Why a variant is refused that does not get back the hubs that are required."""

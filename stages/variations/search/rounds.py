@@ -22,6 +22,7 @@ from stages.shape.geometry.contact_oracle import ContactOracle
 from stages.shape.kit import Kit
 from stages.shape.kit_input import input_kit
 from stages.shape.physics.judge import unmet
+from stages.shape.resolved_settings import MAX_COPIED_SHARE_KEY, REQUIRED_LABELS_KEY, STABLE_KEY, resolved_settings
 from stages.shape.shape import kit_shape
 from stages.variations.constraint import build_repair, build_test, module_of
 from stages.variations.novelty.archive import cell_of
@@ -31,12 +32,7 @@ from stages.variations.requirements.hub_restoration import HUBS_NOT_RESTORED, au
 from stages.variations.requirements.required_labels import LABELS_MISSING, labels_test
 from stages.variations.search.pool import FoundVariants, PoolIndex, write_kept, write_variants
 from stages.variations.search.search import SPARE, Search, Variant
-from stages.variations.settings import (
-    MAX_COPIED_SHARE_KEY,
-    REQUIRED_LABELS_KEY,
-    STABLE_KEY,
-    VariationsConfig,
-)
+from stages.variations.settings import VariationsConfig
 
 ROUND_FIND = 400
 """Most variants that one lane finds in a round before the lanes exchange what they have."""
@@ -193,14 +189,14 @@ def _constrained(
 def _chosen(plan: Plan, kit: str) -> dict[str, Any]:
     """What is required of a variant of `kit` by the keys that can be left open, as stated or as was chosen."""
     require = plan.config.section(VariationsConfig).require
-    built = plan.summary("exemplars", kit) or {"resolved": {}}
+    resolved = resolved_settings(plan, kit)
     found: dict[str, Any] = {}
     for key, said, otherwise in (
         (MAX_COPIED_SHARE_KEY, require.max_copied_share, 1.0),
         (STABLE_KEY, require.stable, False),
         (REQUIRED_LABELS_KEY, require.labels, ()),
     ):
-        value = built["resolved"].get(key, otherwise) if said == "auto" else said
+        value = resolved.get(key, otherwise) if said == "auto" else said
         found[key.removeprefix("require.")] = list(value) if isinstance(value, tuple) else value
     return found
 

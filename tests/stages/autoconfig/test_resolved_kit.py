@@ -115,7 +115,7 @@ def test_under_looser_rules_a_longer_search_says_whether_a_cut_is_a_dataset(
         return SimpleNamespace(is_poor=poor)
 
     monkeypatch.setattr(resolved_kit, "choose", choose)
-    monkeypatch.setattr(resolved_kit, "yield_estimate", forecast)
+    monkeypatch.setattr(resolved_kit, "estimate_yield", forecast)
     first = read_first()
     found = cut(first)
     assert known == [2]
