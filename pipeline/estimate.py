@@ -67,8 +67,8 @@ def plan_lines(config: Config, stages: Mapping[str, Stage], places: Places, work
     yield from _table(used, workers)
     if tried:
         yield (
-            f"about, by a trial of {span(time.monotonic() - start)}: a machine with other work takes longer, and few "
-            "samples may mislead"
+            f"about, by a trial of {span(time.monotonic() - start)}: a machine with other work takes longer, "
+            "and few samples may mislead"
         )
     if any(each.grows for each in used):
         yield "+: and as many more as it takes; a search slows down as it goes on, and ends when it ends"

@@ -1,6 +1,6 @@
 """The two recipes of CONTRIBUTING: a stage and a producer, each one folder, go the whole way with no change elsewhere.
 
-`tests/house` is a house of its own beside the project's: its folder `stages` stands on the PYTHONPATH and nowhere else.
+`tests/house` is a project of its own: its folder `stages` is found by the PYTHONPATH alone.
 """
 
 from __future__ import annotations

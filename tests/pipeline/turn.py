@@ -1,4 +1,4 @@
-"""The mill of the tests: `turn` runs its stages, and `python -m tests.pipeline.turn` is its command line."""
+"""Toy stages: `turn` runs them, and `python -m tests.pipeline.turn` is their command line."""
 
 from __future__ import annotations
 
