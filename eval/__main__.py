@@ -23,9 +23,9 @@ from time import perf_counter
 from eval.engine.dataset_run import DatasetRun, load_dataset_run
 from eval.engine.evaluation import Evaluation, TableResult
 from eval.engine.registry import find_tables
-from pipeline.config import nearest
+from pipeline.config import nearest_word
 from pipeline.errors import ConfigError
-from pipeline.places import write_file
+from pipeline.paths import write_file
 
 ALL = "all"
 REPORT = "report.html"
@@ -68,7 +68,7 @@ def _parser(tables: Mapping[str, Evaluation]) -> argparse.ArgumentParser:
 
 def _known(tables: Mapping[str, Evaluation], name: str) -> str:
     if name not in tables:
-        close = nearest(name, tables)
+        close = nearest_word(name, tables)
         raise ConfigError(f"there is no table {name}; " + (f"did you mean {close}?" if close else ", ".join(tables)))
     return name
 

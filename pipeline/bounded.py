@@ -20,15 +20,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from pipeline.endings import die_with_parent
+from pipeline.termination import die_with_parent
 
-PATIENCE = 10
+CLOCK_SECONDS_PER_CPU_SECOND = 10
 """A child is given up after so many times its CPU seconds by the clock, where nobody says."""
 _PIPE = 1 << 20
 _ANSWER, _REFUSAL, _ESCAPE = b"a", b"r", b"e"
 
 
-class Escaped(Exception):
+class ChildFailed(Exception):
     """The child has given no answer; the message says why, in words that end a sentence about what it worked on."""
 
 
@@ -38,7 +38,7 @@ def in_child(
     cpu_seconds: int,
     memory_mb: int,
     seconds: float | None = None,
-    refusal: type[Exception] = Escaped,
+    refusal: type[Exception] = ChildFailed,
 ) -> bytes:
     """What `work` answers, called in a forked child with at most `cpu_seconds` of CPU and `memory_mb` MB of memory
     beyond what this process has now; and `seconds` by the clock, for it may sleep: ten times its CPU seconds, where
@@ -47,7 +47,7 @@ def in_child(
     Raises `refusal`, with the child's own message, where `work` raises one; Escaped for everything else that can happen
     to it.
     """
-    seconds = PATIENCE * cpu_seconds if seconds is None else seconds
+    seconds = CLOCK_SECONDS_PER_CPU_SECOND * cpu_seconds if seconds is None else seconds
     reader, writer = os.pipe()
     fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, _PIPE)
     parent = os.getpid()
@@ -65,14 +65,14 @@ def in_child(
         os.kill(child, signal.SIGKILL)  # one that has ended waits for us all the same, as nobody else
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if reply is None:
-        raise Escaped(f"it did not end within {seconds:g} s")
+        raise ChildFailed(f"it did not end within {seconds:g} s")
     if not _is_whole(reply):
-        raise Escaped(_end(status, cpu_seconds, memory_mb))
+        raise ChildFailed(_end(status, cpu_seconds, memory_mb))
     kind, content = reply[:1], reply[9:]
     if kind == _ANSWER:
         return content
     message = str(json.loads(content))
-    raise refusal(message) if kind == _REFUSAL else Escaped(message)
+    raise refusal(message) if kind == _REFUSAL else ChildFailed(message)
 
 
 def _is_whole(reply: bytes) -> bool:

@@ -18,13 +18,13 @@ from typing import Annotated
 
 import typer
 
-from pipeline.config import Config, load_config, nearest
-from pipeline.endings import ends_in_order
+from pipeline.config import Config, load_config, nearest_word
 from pipeline.errors import ConfigError, Fatal
-from pipeline.patience import DEFAULT_PATIENCE
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from pipeline.stage import Stage
+from pipeline.stall_timeout import DEFAULT_STALL_MINUTES
+from pipeline.termination import exit_on_signals
 
 app = typer.Typer(
     name="pipeline",
@@ -60,7 +60,7 @@ def run(
     only: Annotated[str, typer.Option(help="make the shards called so, or so-..., and what they read")] = "",
     patience: Annotated[
         float, typer.Option(min=0, help="minutes without progress after which a shard has failed; 0: never")
-    ] = DEFAULT_PATIENCE,
+    ] = DEFAULT_STALL_MINUTES,
     cluster: Annotated[str, typer.Option(help="scheduler of a cluster whose workers make the shards: tcp://...")] = "",
 ) -> None:
     """Make what is missing of one stage."""
@@ -70,10 +70,10 @@ def run(
     part = Slice(*_slice(shards))
     stages = find_stages(context.obj)
     if stage not in stages:
-        close = nearest(stage, stages)
+        close = nearest_word(stage, stages)
         hint = f"did you mean {close}?" if close else f"stages are {', '.join(stages)}"
         raise ConfigError(f"there is no stage {stage}; {hint}")
-    with ends_in_order():
+    with exit_on_signals():
         loaded, places = _load(stages, config, out, seed)
         result = run_stage(
             *(stage, stages, loaded, places, workers, part, retries), only=only, patience=patience, cluster=cluster
@@ -129,11 +129,11 @@ def verify(
     workers: WorkersOption = 1,
 ) -> None:
     """Check every byte against the records, then the finished dataset from its meshes."""
-    from pipeline.check import damaged_shards
+    from pipeline.integrity import corrupted_shards
 
     stages = find_stages(context.obj)
     loaded, places = _load(stages, config, out, seed)
-    damages = list(damaged_shards(loaded, stages, places))
+    damages = list(corrupted_shards(loaded, stages, places))
     for line in damages:
         print(line)
     arguments = ["--config", str(config), "--out", str(out), "--workers", str(workers), *context.args]
@@ -165,17 +165,17 @@ def cluster(
     ] = 8786,
 ) -> None:
     """Start a scheduler and workers of a cluster on this machine, for runs with --cluster; Ctrl-C ends them."""
-    from pipeline.cluster_here import serve
+    from pipeline.local_cluster import serve_cluster
 
-    raise typer.Exit(serve(workers, port))
+    raise typer.Exit(serve_cluster(workers, port))
 
 
 @app.command()
 def keys(context: typer.Context) -> None:
     """Print the table of all config keys as Markdown."""
-    from pipeline.keys import key_tables
+    from pipeline.config_docs import config_tables
 
-    print(key_tables(find_stages(context.obj)), end="")
+    print(config_tables(find_stages(context.obj)), end="")
 
 
 @app.command()
@@ -196,13 +196,13 @@ def _slice(text: str) -> tuple[int, int]:
     return index, count
 
 
-def _load(stages: Mapping[str, Stage], config: Path, out: Path, seed: int | None) -> tuple[Config, Places]:
+def _load(stages: Mapping[str, Stage], config: Path, out: Path, seed: int | None) -> tuple[Config, DatasetPaths]:
     """The dataset's config, which every stage has checked, and its folders."""
     overrides = {} if seed is None else {"seed": seed}
     loaded = load_config(config, {name: stage.config for name, stage in stages.items()}, overrides)
     for stage in stages.values():
         stage.check(loaded)
-    return loaded, Places(out, loaded.name)
+    return loaded, DatasetPaths(out, loaded.name)
 
 
 def _entry(context: typer.Context, module: str) -> Callable[[list[str]], int]:

@@ -154,7 +154,7 @@ def _make_here(job: Job, run: str) -> Report | None:
     if _crew is None or _crew[0] != run:
         if _crew is not None:
             _crew[1].stop(kill=True)
-        _crew = run, Workers(1, job.places.worker_output)
+        _crew = run, Workers(1, job.paths.worker_output)
     workers = _crew[1]
     workers.submit(job)
     while True:

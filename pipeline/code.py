@@ -26,7 +26,7 @@ from pipeline.shards import json_bytes
 _DECLARATIONS = ("language",)
 """Files beside a `stage.py` that others find at run time when they read what the stage has made."""
 
-_CONTRACT = {"pipeline.stage", "pipeline.config", "pipeline.places", "pipeline.registry"}
+_CONTRACT = {"pipeline.stage", "pipeline.config", "pipeline.paths", "pipeline.registry"}
 """What stages see of the mill itself. It changes bytes through the config and the plan alone, which the fingerprint
 holds; with it the whole mill would count."""
 
@@ -34,14 +34,14 @@ _BEHIND_THE_TASK = "pipeline.randomness"
 """What makes bytes of the mill without being imported by a stage: `Task.rng`."""
 
 
-def starts_of(module: str, also: Iterable[str] = ()) -> tuple[str, ...]:
+def entry_points(module: str, also: Iterable[str] = ()) -> tuple[str, ...]:
     """Where the code of a shard begins: the module of its stage, what is declared beside it, and the modules `also`."""
     folder, house = module.rpartition(".")[0], SourceTree([module])
     beside = [f"{folder}.{name}" for name in _DECLARATIONS] if folder else []
     return (module, _BEHIND_THE_TASK, *(each for each in beside if house.file(each) is not None), *also)
 
 
-def reached(starts: Iterable[str]) -> dict[str, str]:
+def transitive_imports(starts: Iterable[str]) -> dict[str, str]:
     """The modules of the project that `starts` reach, themselves among them, and the digest of each.
 
     Raises ValueError for a start without a Python file.
@@ -69,7 +69,7 @@ def reached(starts: Iterable[str]) -> dict[str, str]:
 
 
 def code_digest(modules: Mapping[str, str]) -> str:
-    """One digest of what `reached` answers."""
+    """One digest of what `transitive_imports` answers."""
     return hashlib.sha256(json_bytes(dict(modules))).hexdigest()
 
 

@@ -16,11 +16,11 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.errors import ConfigError
-from pipeline.yaml_text import KeyPath, read_yaml
+from pipeline.yaml_loader import KeyPath, read_yaml
 
-MOST_MISTAKES = 50
+MAX_MISTAKES_SHOWN = 50
 """Mistakes that are told at once."""
-LONGEST_SHOWN = 200
+MAX_CHARACTERS_SHOWN = 200
 """Characters of a value that a message shows."""
 
 Section = TypeVar("Section", bound="StrictModel")
@@ -80,7 +80,7 @@ class Config:
         return replace(self, sections={name: self.sections[name] for name in stages})
 
 
-def nearest(word: str, known: Iterable[str]) -> str | None:
+def nearest_word(word: str, known: Iterable[str]) -> str | None:
     """The one of `known` that `word` is most probably meant to be, or None."""
     matches = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
     return matches[0] if matches else None
@@ -103,7 +103,7 @@ def existing_file(path: Path) -> Path:
             folder = folder.parent
         raise ValueError(f"there is no file {path}; of its folders {folder.resolve()} is the last that is there")
     there = sorted(each.name for each in folder.iterdir() if each.is_file())
-    close = nearest(path.name, there)
+    close = nearest_word(path.name, there)
     hint = f"; the nearest file there is {folder / close}" if close else ""
     raise ValueError(f"there is no file {path}{hint}")
 
@@ -136,9 +136,9 @@ def load_config(
         if section is not None:
             validated[name] = section
     if mistakes or header is None:
-        beyond = len(mistakes) - MOST_MISTAKES
+        beyond = len(mistakes) - MAX_MISTAKES_SHOWN
         more = [f"{path}: and {beyond:,} more mistakes"] if beyond > 0 else []
-        raise ConfigError("\n".join([*mistakes[:MOST_MISTAKES], *more]))
+        raise ConfigError("\n".join([*mistakes[:MAX_MISTAKES_SHOWN], *more]))
     return Config(
         name=header.name,
         version=header.version,
@@ -180,8 +180,8 @@ def _validate(
 
 def _shown(text: str) -> str:
     """`text` as it fits into a line."""
-    plain = "".join(each if each.isprintable() else "\ufffd" for each in text[:LONGEST_SHOWN])
-    return plain if len(text) <= LONGEST_SHOWN else f"{plain}… ({len(text):,} characters)"
+    plain = "".join(each if each.isprintable() else "\ufffd" for each in text[:MAX_CHARACTERS_SHOWN])
+    return plain if len(text) <= MAX_CHARACTERS_SHOWN else f"{plain}… ({len(text):,} characters)"
 
 
 def _where(path: Path, lines: Mapping[KeyPath, int], key: KeyPath) -> str:
@@ -213,7 +213,7 @@ def _explain(schema: Mapping[str, Any], error: Mapping[str, Any]) -> str:
 
 
 def _known(key: str, known: Iterable[str]) -> str:
-    close = nearest(key, known)
+    close = nearest_word(key, known)
     return f"did you mean {close}?" if close else f"known keys are {', '.join(known)}"
 
 

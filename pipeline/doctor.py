@@ -20,7 +20,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
 
-from pipeline.space import byte_size
+from pipeline.disk_space import byte_size
 
 _HERE = Path(__file__).parent
 _LOCK = _HERE.parent / "requirements.lock"

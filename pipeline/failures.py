@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter, deque
 
 from pipeline.errors import Fatal
-from pipeline.journal import Journal
-from pipeline.places import StagePlaces, write_whole
+from pipeline.event_log import EventLog
+from pipeline.paths import StagePaths, write_atomically
 from pipeline.records import fingerprint
 from pipeline.shards import json_bytes
 from pipeline.task import Job, Report
@@ -18,7 +18,7 @@ class Failures:
     """Counts what goes wrong in one run of a stage. `aside`: the shards that were set aside, and why; `alone`: those
     that are to be tried with nothing beside them."""
 
-    def __init__(self, places: StagePlaces, journal: Journal, retries: int, aside: dict[str, str]) -> None:
+    def __init__(self, places: StagePaths, journal: EventLog, retries: int, aside: dict[str, str]) -> None:
         self.aside = aside
         self.alone: deque[Job] = deque()
         self._places = places
@@ -60,4 +60,4 @@ class Failures:
         self._journal.say(f"shard {name} is set aside: {report.message}")
         self._journal.note(report.trace)
         described = {"fingerprint": fingerprint(job.recipe), "message": report.message, "trace": report.trace}
-        write_whole(self._places.failed / f"{name}.json", json_bytes(described))
+        write_atomically(self._places.failed / f"{name}.json", json_bytes(described))

@@ -7,12 +7,12 @@ import shutil
 from collections import Counter
 from pathlib import Path
 
-from pipeline.places import Places, file_digest, read_note, remove, sync_folder, temporary, write_whole
+from pipeline.inventory import Inventory, StageInventory
+from pipeline.paths import DatasetPaths, file_digest, read_json, remove, sync_folder, temporary_path, write_atomically
 from pipeline.shards import json_bytes
-from pipeline.survey import StageSurvey, Survey
 
 
-def finish_stage(survey: Survey, name: str, places: Places) -> None:
+def finish_stage(survey: Inventory, name: str, places: DatasetPaths) -> None:
     """Close a stage whose every planned shard is done; done again, it changes nothing.
 
     Raises ValueError when `publish` names a path outside the output folder or a file that no shard has.
@@ -35,17 +35,17 @@ def finish_stage(survey: Survey, name: str, places: Places) -> None:
             "shards": surveyed.fingerprints,
         }
     )
-    if not surveyed.places.manifest.is_file() or surveyed.places.manifest.read_bytes() != manifest:
-        _write(surveyed.places.manifest, manifest)
+    if not surveyed.paths.manifest.is_file() or surveyed.paths.manifest.read_bytes() != manifest:
+        _write(surveyed.paths.manifest, manifest)
 
 
-def publish(surveyed: StageSurvey, places: Places) -> None:
+def publish(surveyed: StageInventory, places: DatasetPaths) -> None:
     """Bring the output folder to what the stage publishes, and take away what it published before and no more.
 
     Raises ValueError when that is a path outside the output folder or a file that no finished shard has.
     """
     wanted = {_inside(target): file for target, file in sorted(surveyed.stage.publish(surveyed.view).items())}
-    listing = surveyed.places.published
+    listing = surveyed.paths.published
     before = _listed(listing)
     gone = [target for target in before if target not in wanted]
     if set(before) != set(wanted):
@@ -55,15 +55,15 @@ def publish(surveyed: StageSurvey, places: Places) -> None:
         record = surveyed.records.get(file.partition(".")[0])
         if record is None or file not in record.files:
             raise ValueError(f"stage {surveyed.stage.name} publishes {file!r}, which is no file of its shards")
-        _put(surveyed.places.root / file, places.out / target, record.files[file]["sha256"])
+        _put(surveyed.paths.root / file, places.out / target, record.files[file]["sha256"])
     for target in gone:
         _take_away(places.out, target)
     if gone:
         _write(listing, json_bytes(sorted(str(each) for each in wanted)))
 
 
-def _forget_unplanned(surveyed: StageSurvey) -> None:
-    places, planned = surveyed.places, surveyed.fingerprints
+def _forget_unplanned(surveyed: StageInventory) -> None:
+    places, planned = surveyed.paths, surveyed.fingerprints
     # Records first: a record without its files is a shard to be made, files without a record are nothing.
     for folder in (places.records, places.root, places.rejects, places.failed, places.progress):
         for path in folder.iterdir():
@@ -74,7 +74,7 @@ def _forget_unplanned(surveyed: StageSurvey) -> None:
 def _listed(listing: Path) -> list[Path]:
     """What the stage has published before; nothing where that cannot be read any more, and nobody knows of it then."""
     try:
-        return [_inside(each) for each in read_note(listing)]
+        return [_inside(each) for each in read_json(listing)]
     except (ValueError, TypeError):
         return []
 
@@ -82,7 +82,7 @@ def _listed(listing: Path) -> list[Path]:
 def _write(path: Path, content: bytes) -> None:
     if path.is_dir():
         remove(path)
-    write_whole(path, content)
+    write_atomically(path, content)
 
 
 def _inside(target: str) -> Path:
@@ -96,7 +96,7 @@ def _put(source: Path, target: Path, digest: str) -> None:
     if target.is_file() and (source.samefile(target) or file_digest(target) == digest):
         return
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = temporary(target)
+    beside = temporary_path(target)
     beside.unlink(missing_ok=True)
     try:
         os.link(source, beside)

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.places import StagePlaces, read_note
+from pipeline.paths import StagePaths, read_json
 from pipeline.shards import json_bytes
 from pipeline.stage import Shard
 
@@ -37,9 +37,9 @@ class ShardRecord:
 
     def to_bytes(self) -> bytes:
         """The record as one line of JSON, with a digest of itself: plans are made of what it says."""
-        return json_bytes({**asdict(self), "seal": self.seal()})
+        return json_bytes({**asdict(self), "seal": self.checksum()})
 
-    def seal(self) -> str:
+    def checksum(self) -> str:
         """A digest of all that it says."""
         return hashlib.sha256(json_bytes(json.loads(json_bytes(asdict(self))))).hexdigest()
 
@@ -47,7 +47,7 @@ class ShardRecord:
         """Bytes of all its files."""
         return sum(int(each["bytes"]) for each in self.files.values())
 
-    def is_whole(self, places: StagePlaces) -> bool:
+    def is_whole(self, places: StagePaths) -> bool:
         """Whether all its files are there with the recorded size. Whoever reads one looks at its bytes (`Task.input`),
         and so does `make verify` at all."""
         paths = {places.root / name: each["bytes"] for name, each in self.files.items()}
@@ -56,11 +56,11 @@ class ShardRecord:
 
 def read_record(path: Path) -> ShardRecord | None:
     """The record in a file, or None if there is none, or none that this version of the mill wrote, or a damaged one."""
-    written = read_note(path)
+    written = read_json(path)
     try:
         seal = written.pop("seal")
         record = ShardRecord(**written)
-        return record if record.seal() == seal else None
+        return record if record.checksum() == seal else None
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
 

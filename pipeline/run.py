@@ -10,25 +10,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-from pipeline.check import withdraw_damaged
 from pipeline.cluster import ClusterWorkers
 from pipeline.config import Config
+from pipeline.disk_space import byte_size, check_space
 from pipeline.errors import ConfigError, Fatal
+from pipeline.event_log import EventLog, duration_text
 from pipeline.failures import Failures
 from pipeline.finish import finish_stage, publish
-from pipeline.journal import Journal, span
-from pipeline.let_go import let_go
-from pipeline.patience import DEFAULT_PATIENCE, Patience
-from pipeline.places import Places, remove, stops_everything
-from pipeline.reasons import reasons
+from pipeline.integrity import withdraw_corrupted
+from pipeline.inventory import Inventory, StageInventory
+from pipeline.paths import DatasetPaths, fatal_cause, remove
+from pipeline.progress import closing_line, shard_count_text, stage_progress
+from pipeline.prune import prune_inputs
+from pipeline.rebuild_reasons import rebuild_reasons
 from pipeline.registry import upstream
 from pipeline.slices import WHOLE, Slice, locked
-from pipeline.space import byte_size, check_space
 from pipeline.stage import Shard, Stage
-from pipeline.standing import closing_words, counted, standing
-from pipeline.survey import StageSurvey, Survey
+from pipeline.stall_timeout import DEFAULT_STALL_MINUTES, StallWatch
 from pipeline.task import Job, Report
-from pipeline.workers import DIED, Workers
+from pipeline.workers import WORKER_DIED, Workers
 
 _LOOK_EVERY = 0.5
 """Seconds between two looks at how far the running shards are."""
@@ -47,13 +47,13 @@ def run_stage(
     name: str,
     stages: Mapping[str, Stage],
     config: Config,
-    places: Places,
+    places: DatasetPaths,
     workers: int,
     part: Slice = WHOLE,
     retries: int = 2,
     waits: bool = False,
     only: str = "",
-    patience: float = DEFAULT_PATIENCE,
+    patience: float = DEFAULT_STALL_MINUTES,
     cluster: str = "",
 ) -> RunResult:
     """Make all shards of stage `name` that have no matching record; the stages that these read must be finished.
@@ -72,14 +72,14 @@ def run_stage(
     """
     own = places.stage(name)
     own.make()
-    journal = Journal(name, places.log)
+    journal = EventLog(name, places.log)
     try:
         with locked(own, part, waits) as lock:
             return _Run(name, stages, config, places, workers, part, retries, journal, only, patience, cluster).through(
                 lock
             )
     except OSError as error:
-        if stops_everything(error) is None:
+        if fatal_cause(error) is None:
             raise
         raise Fatal(f"{error.strerror}: {error.filename or own.root}") from error
     finally:
@@ -92,11 +92,11 @@ class _Run:
         name: str,
         stages: Mapping[str, Stage],
         config: Config,
-        places: Places,
+        places: DatasetPaths,
         workers: int,
         part: Slice,
         retries: int,
-        journal: Journal,
+        journal: EventLog,
         only: str,
         patience: float,
         cluster: str,
@@ -110,35 +110,35 @@ class _Run:
         self._journal = journal
         self._only = only
         self._cluster = cluster
-        self._survey = Survey(config, stages, places)
+        self._survey = Inventory(config, stages, places)
         self._result = RunResult()
         self._made: set[str] = set()
         self._damaged: dict[str, str] = {}
         self._mended: set[str] = set()
         self._failures = Failures(places.stage(name), journal, retries, self._result.failed)
-        self._patience = Patience(patience, places.stage(name))
+        self._patience = StallWatch(patience, places.stage(name))
         self._shown = 0.0
 
     def through(self, lock: BinaryIO) -> RunResult:
         """Make what is missing, then finish the stage if it is complete."""
         self._check_upstream()
         surveyed = self._survey.stage(self._name)
-        self._take_away(surveyed, surveyed.places.failed, "*")
+        self._take_away(surveyed, surveyed.paths.failed, "*")
         self._take_away_unfinished(surveyed)
         if surveyed.missing:
             self._check_machine()
-            for line in reasons(surveyed):
+            for line in rebuild_reasons(surveyed):
                 self._journal.say(line)
-            remove(surveyed.places.manifest)
+            remove(surveyed.paths.manifest)
             missing = len(self._mine(surveyed))
-            self._journal.say(f"{counted(missing)} to make, {check_space(surveyed, self._places.out)}")
+            self._journal.say(f"{shard_count_text(missing)} to make, {check_space(surveyed, self._places.out)}")
             self._make_missing()
             surveyed = self._survey.stage(self._name)
         if not surveyed.missing:
             fcntl.flock(lock, fcntl.LOCK_EX)
             finish_stage(self._survey, self._name, self._places)
             self._let_go()
-        elif surveyed.stage.publishes_parts:
+        elif surveyed.stage.publishes_incomplete:
             fcntl.flock(lock, fcntl.LOCK_EX)
             publish(surveyed, self._places)
         self._close(surveyed)
@@ -147,13 +147,13 @@ class _Run:
     def _let_go(self) -> None:
         """Where the config says so, take away what the last stage was made of."""
         last = not any(self._name in stage.inputs for stage in self._stages.values())
-        if last and self._survey.config.keep == "dataset" and not self._stages[self._name].publishes_parts:
-            freed = let_go(self._survey, self._stages, self._name)
+        if last and self._survey.config.keep == "dataset" and not self._stages[self._name].publishes_incomplete:
+            freed = prune_inputs(self._survey, self._stages, self._name)
             if freed:
                 self._journal.say(f"{self._name}: {byte_size(freed)} of what lies between taken away")
 
     def _check_upstream(self) -> None:
-        if not self._stages[self._name].reads_inputs(self._survey.config, self._only):
+        if not self._stages[self._name].uses_input(self._survey.config, self._only):
             return
         for each in upstream(self._stages, self._name):
             missing = [] if each == self._name else self._survey.stage(each).missing
@@ -169,21 +169,21 @@ class _Run:
         begins = not self._stages[self._name].inputs
         for each, stage in self._stages.items():
             if each == self._name or (begins and self._name in upstream(self._stages, each)):
-                stage.check_machine(self._survey.config)
+                stage.check_environment(self._survey.config)
 
-    def _take_away_unfinished(self, surveyed: StageSurvey) -> None:
+    def _take_away_unfinished(self, surveyed: StageInventory) -> None:
         """Take away what this part left half written; a worker that was killed could not do it."""
-        for folder in (surveyed.places.root, surveyed.places.rejects, surveyed.places.records):
+        for folder in (surveyed.paths.root, surveyed.paths.rejects, surveyed.paths.records):
             self._take_away(surveyed, folder, ".*.tmp")
-        self._take_away(surveyed, surveyed.places.progress, "*")
+        self._take_away(surveyed, surveyed.paths.progress, "*")
 
-    def _take_away(self, surveyed: StageSurvey, folder: Path, pattern: str) -> None:
+    def _take_away(self, surveyed: StageInventory, folder: Path, pattern: str) -> None:
         mine = {shard.name for index, shard in enumerate(surveyed.shards) if index in self._part}
         for path in folder.glob(pattern):
             if self._part == WHOLE or path.name.lstrip(".").partition(".")[0] in mine:
                 remove(path)
 
-    def _mine(self, surveyed: StageSurvey) -> list[Shard]:
+    def _mine(self, surveyed: StageInventory) -> list[Shard]:
         done, failed, chosen = surveyed.records, self._result.failed, self._chosen(surveyed)
         return [
             shard
@@ -191,7 +191,7 @@ class _Run:
             if index in self._part and shard.name in chosen and shard.name not in done and shard.name not in failed
         ]
 
-    def _chosen(self, surveyed: StageSurvey) -> set[str]:
+    def _chosen(self, surveyed: StageInventory) -> set[str]:
         """The shards that were asked for and those that they read. Raises ConfigError where there is none."""
         chosen = {
             each.name for each in surveyed.shards if not self._only or f"{each.name}-".startswith(f"{self._only}-")
@@ -229,7 +229,7 @@ class _Run:
         finally:
             self._take_away_unfinished(surveyed)
 
-    def _check_plan(self, surveyed: StageSurvey) -> None:
+    def _check_plan(self, surveyed: StageInventory) -> None:
         # Without this, a plan that draws a number or reads a clock would have its shards made for ever.
         for shard in surveyed.missing:
             if shard.name in self._made:
@@ -245,10 +245,10 @@ class _Run:
         to what was made again just before.
         """
         for source, message in self._damaged.items():
-            if not withdraw_damaged(self._places, source):
+            if not withdraw_corrupted(self._places, source):
                 continue  # another run has made it again
             stage, _, shard = source.partition("/")
-            if shard in self._survey.stage(stage).let_go:
+            if shard in self._survey.stage(stage).pruned:
                 message = f"{source} was let go of"
             if source in self._mended:
                 raise Fatal(f"{message}, and {shard} was made again just now: disk or memory cannot be trusted")
@@ -256,7 +256,7 @@ class _Run:
             self._mended.add(source)
         self._damaged.clear()
         self._made.clear()
-        self._survey.forget()
+        self._survey.reread()
         for each in upstream(self._stages, self._name):
             if each != self._name and self._survey.stage(each).missing:
                 run_stage(
@@ -266,10 +266,10 @@ class _Run:
                     patience=self._patience.seconds / 60,
                     cluster=self._cluster,
                 )
-                self._survey.forget()
+                self._survey.reread()
         self._check_upstream()
 
-    def _make(self, workers: Workers | ClusterWorkers, ready: deque[Job], surveyed: StageSurvey) -> None:
+    def _make(self, workers: Workers | ClusterWorkers, ready: deque[Job], surveyed: StageInventory) -> None:
         """Make the `ready` shards, each until it is done or set aside."""
         alone = self._failures.alone
         while ready or alone or workers.jobs:
@@ -285,11 +285,11 @@ class _Run:
             if time.monotonic() - self._shown >= _LOOK_EVERY:
                 self._shown = time.monotonic()
                 running = [job.shard.name for job in workers.jobs]
-                self._journal.show(standing(surveyed, running, len(self._result.failed)))
+                self._journal.show(stage_progress(surveyed, running, len(self._result.failed)))
 
     def _take_in(self, job: Job, report: Report | None, ready: deque[Job]) -> None:
         if report is None:
-            self._failures.death(job, DIED, ready)
+            self._failures.death(job, WORKER_DIED, ready)
         elif report.status == "done":
             self._result.made += 1
             self._made.add(job.shard.name)
@@ -303,16 +303,16 @@ class _Run:
         """End a shard that shows no sign of work, with its worker."""
         workers.end(job)
         self._patience.begin_anew(job.shard.name)
-        message = f"it made no progress for {span(self._patience.seconds)}, and its worker was ended"
+        message = f"it made no progress for {duration_text(self._patience.seconds)}, and its worker was ended"
         self._journal.say(f"shard {job.shard.name}: {message}")
         self._failures.failure(job, Report(job.shard.name, "failed", message), ready)
 
-    def _close(self, surveyed: StageSurvey) -> None:
+    def _close(self, surveyed: StageInventory) -> None:
         self._journal.close()
         result = self._result
         result.left = len(surveyed.missing) - len(result.failed)
         # Of a stage that the config has no use for nobody wants to hear.
         say = self._journal.say if surveyed.shards else self._journal.note
-        say(closing_words(surveyed, result.made, result.failed, result.left))
+        say(closing_line(surveyed, result.made, result.failed, result.left))
         for line in surveyed.stage.report(surveyed.view):
             self._journal.say(line)

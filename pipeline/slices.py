@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from pipeline.errors import ConfigError
-from pipeline.places import StagePlaces
+from pipeline.paths import StagePaths
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,12 @@ WHOLE = Slice()
 
 
 @contextmanager
-def locked(own: StagePlaces, part: Slice, waits: bool) -> Iterator[BinaryIO]:
+def locked(own: StagePaths, part: Slice, waits: bool) -> Iterator[BinaryIO]:
     """One run at a time: a whole run excludes every other, a slice the same slice and whole runs.
 
     `waits` for the other run to end; else raises ConfigError while there is one.
     """
-    with open(own.mill / "lock", "ab") as whole, open(own.mill / f"lock-{part.index}-{part.count}", "ab") as slot:
+    with open(own.engine / "lock", "ab") as whole, open(own.engine / f"lock-{part.index}-{part.count}", "ab") as slot:
         at_once = 0 if waits else fcntl.LOCK_NB
         try:
             fcntl.flock(whole, at_once | (fcntl.LOCK_EX if part.count == 1 else fcntl.LOCK_SH))

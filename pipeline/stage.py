@@ -169,11 +169,11 @@ class Stage:
     report: Callable[[Plan], Sequence[str]] = _no_report
     publish: Callable[[Plan], Mapping[str, str]] = _nothing_published
     check: Callable[[Config], None] = _nothing_wrong
-    check_machine: Callable[[Config], None] = _nothing_wrong
-    asked: Callable[[Config], Sequence[int]] = _nothing_asked
+    check_environment: Callable[[Config], None] = _nothing_wrong
+    requested_samples: Callable[[Config], Sequence[int]] = _nothing_asked
     sections: tuple[str, ...] = ()
-    trial: Callable[[Config], StrictModel] | None = None
+    trial_config: Callable[[Config], StrictModel] | None = None
     whole_section: bool = True
-    publishes_parts: bool = False
-    stays: bool = False
-    reads_inputs: Callable[[Config, str], bool] = _always
+    publishes_incomplete: bool = False
+    keep_output: bool = False
+    uses_input: Callable[[Config, str], bool] = _always

@@ -6,23 +6,23 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from pipeline.config import Config
-from pipeline.journal import span
-from pipeline.places import Places, read_note
-from pipeline.reasons import reasons
-from pipeline.space import byte_size
+from pipeline.disk_space import byte_size
+from pipeline.event_log import duration_text
+from pipeline.inventory import Inventory, StageInventory
+from pipeline.paths import DatasetPaths, read_json
+from pipeline.rebuild_reasons import rebuild_reasons
 from pipeline.stage import Stage
-from pipeline.survey import StageSurvey, Survey
 
 _HEADER = ("stage", "done", "failed", "samples", "rejects", "time", "left", "memory", "disk")
 
 
-def status_lines(config: Config, stages: Mapping[str, Stage], places: Places, workers: int) -> Iterator[str]:
+def status_lines(config: Config, stages: Mapping[str, Stage], places: DatasetPaths, workers: int) -> Iterator[str]:
     """A table with a row for each stage, then its rejects by reason, its own report and the shards set aside.
 
     `time` is worker time; `left` is for `workers` workers, from the mean of the finished shards; `memory` is the
     largest that any worker of the stage has held.
     """
-    survey = Survey(config, stages, places)
+    survey = Inventory(config, stages, places)
     rows: list[tuple[str, ...]] = [_HEADER]
     notes: list[str] = []
     for name, stage in stages.items():
@@ -34,7 +34,7 @@ def status_lines(config: Config, stages: Mapping[str, Stage], places: Places, wo
         failures = _failures(surveyed)
         rejects = sum((Counter(record.rejects) for record in surveyed.records.values()), Counter[str]())
         rows.append(_row(surveyed, len(failures), sum(rejects.values()), workers))
-        notes += [f"{name}: {line}" for line in reasons(surveyed)]
+        notes += [f"{name}: {line}" for line in rebuild_reasons(surveyed)]
         notes += [f"{name}: {line}" for line in stage.report(surveyed.view)]
         notes += [f"{name}: {count:,} rejected: {reason}" for reason, count in rejects.most_common()]
         notes += [f"{name}: {shard} is set aside: {message}" for shard, message in failures.items()]
@@ -49,7 +49,7 @@ def status_lines(config: Config, stages: Mapping[str, Stage], places: Places, wo
     yield from notes
 
 
-def _row(surveyed: StageSurvey, failed: int, rejects: int, workers: int) -> tuple[str, ...]:
+def _row(surveyed: StageInventory, failed: int, rejects: int, workers: int) -> tuple[str, ...]:
     records = surveyed.records.values()
     seconds = sum(record.seconds for record in records)
     left = seconds / len(records) * len(surveyed.missing) / workers if records else 0.0
@@ -60,18 +60,18 @@ def _row(surveyed: StageSurvey, failed: int, rejects: int, workers: int) -> tupl
         str(failed),
         f"{sum(record.samples for record in records):,}",
         f"{rejects:,}",
-        span(seconds),
-        "?" if unknown else span(left),
+        duration_text(seconds),
+        "?" if unknown else duration_text(left),
         byte_size(max((record.peak_bytes for record in records), default=0)),
-        byte_size(sum(each.bytes_on_disk() for name, each in surveyed.records.items() if name not in surveyed.let_go)),
+        byte_size(sum(each.bytes_on_disk() for name, each in surveyed.records.items() if name not in surveyed.pruned)),
     )
 
 
-def _failures(surveyed: StageSurvey) -> dict[str, str]:
+def _failures(surveyed: StageInventory) -> dict[str, str]:
     """The message of each shard that was set aside and has not been made since."""
     failures = {}
     for shard in surveyed.missing:
-        noted = read_note(surveyed.places.failed / f"{shard.name}.json")
+        noted = read_json(surveyed.paths.failed / f"{shard.name}.json")
         if isinstance(noted, dict) and noted.get("fingerprint") == surveyed.fingerprints[shard.name]:
             failures[shard.name] = str(noted["message"])
     return failures

@@ -15,18 +15,18 @@ from typing import BinaryIO, Literal
 
 import numpy as np
 
-from pipeline.code import reached
+from pipeline.code import transitive_imports
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
-from pipeline.places import (
-    Places,
-    StagePlaces,
+from pipeline.paths import (
+    DatasetPaths,
+    StagePaths,
+    fatal_cause,
     file_digest,
     remove,
-    stops_everything,
     sync_folder,
-    temporary,
-    write_whole,
+    temporary_path,
+    write_atomically,
 )
 from pipeline.randomness import decision_rng
 from pipeline.records import ShardRecord, fingerprint, read_record
@@ -49,7 +49,7 @@ class Job:
     run_shard: Callable[[Task], Outcome]
     shard: Shard
     config: Config
-    places: Places
+    paths: DatasetPaths
     recipe: Mapping[str, str]
     inputs: Mapping[str, str]
     starts: tuple[str, ...] = ()
@@ -86,7 +86,7 @@ def make_shard(job: Job) -> Report:
         trace = traceback.format_exc()
         if task.damage is not None:
             return task.damage
-        culprit = stops_everything(error)
+        culprit = fatal_cause(error)
         if culprit is not None:
             return Report(job.shard.name, "fatal", str(culprit), trace)
         if isinstance(error, Fatal):
@@ -99,7 +99,7 @@ def make_shard(job: Job) -> Report:
 
 def _check_code(job: Job) -> None:
     """Raises Fatal where the code is not what it was when the run began: workers import late, and fresh ones anew."""
-    now = reached(job.starts)
+    now = transitive_imports(job.starts)
     edited = sorted(module for module, _ in set(now.items()) ^ set(job.code.items()))
     if edited:
         raise Fatal(f"the code was edited while stage {job.stage} ran ({', '.join(dict.fromkeys(edited))})")
@@ -110,7 +110,7 @@ class _ShardTask:
 
     def __init__(self, job: Job) -> None:
         self._job = job
-        self._places: StagePlaces = job.places.stage(job.stage)
+        self._places: StagePaths = job.paths.stage(job.stage)
         self._streams: dict[str, BinaryIO] = {}
         self._read: dict[str, str] = {}
         self._rejects: Counter[str] = Counter()
@@ -132,7 +132,7 @@ class _ShardTask:
 
     def input(self, stage: str, file: str) -> Path:
         source, name = f"{stage}/{file.partition('.')[0]}", f"{stage}/{file}"
-        path = self._job.places.stage(stage).root / file
+        path = self._job.paths.stage(stage).root / file
         if source not in self.shard.inputs:
             raise ShardFailed(f"{self._job.stage}/{self.shard.name} reads {file}, but {source} is not among its inputs")
         if name not in self._job.inputs:
@@ -143,7 +143,7 @@ class _ShardTask:
         return path
 
     def published(self, file: str) -> Path:
-        return self._job.places.published(file)
+        return self._job.paths.published(file)
 
     def _check(self, path: Path, name: str, source: str) -> None:
         """Raises ShardFailed, and notes the damage, where an input is not what its record says."""
@@ -161,12 +161,12 @@ class _ShardTask:
             raise ValueError(f"file {file!r} of shard {self.shard.name} must be named {self.shard.name}.<anything>")
         if file in self._streams:
             raise ValueError(f"file {file!r} is opened twice")
-        self._streams[file] = open(temporary(self._places.root / file), "wb")
+        self._streams[file] = open(temporary_path(self._places.root / file), "wb")
         return self._streams[file]
 
     def reject(self, item: str, reason: str, detail: str = "", count: int = 1) -> None:
         if self._reject_stream is None:
-            self._reject_stream = open(temporary(self._reject_path), "wb")
+            self._reject_stream = open(temporary_path(self._reject_path), "wb")
         refused = {"item": item, "reason": reason, "detail": detail, "count": count}
         self._reject_stream.write(json_bytes(refused))
         self._rejects[reason] += count
@@ -214,16 +214,16 @@ class _ShardTask:
         for name in files:
             if (self._places.root / name).is_dir():
                 remove(self._places.root / name)
-            os.replace(temporary(self._places.root / name), self._places.root / name)
+            os.replace(temporary_path(self._places.root / name), self._places.root / name)
         if self._reject_stream is not None:
-            os.replace(temporary(self._reject_path), self._reject_path)
+            os.replace(temporary_path(self._reject_path), self._reject_path)
         else:
             remove(self._reject_path)
         for name in old.files if old else ():
             if name not in files:
                 remove(self._places.root / name)
         sync_folder(self._places.root)
-        write_whole(record_path, content)
+        write_atomically(record_path, content)
         self._forget_progress()
 
     def withdraw(self) -> None:
@@ -232,7 +232,7 @@ class _ShardTask:
         if self._reject_stream is not None:
             streams[self._reject_path] = self._reject_stream
         for path, stream in streams.items():
-            temporary(path).unlink(missing_ok=True)
+            temporary_path(path).unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # closing flushes, which fails again on a full disk
                 stream.close()
         self._forget_progress()
@@ -244,7 +244,7 @@ class _ShardTask:
     def _finish(stream: BinaryIO, path: Path) -> dict[str, str | int]:
         if not stream.closed:
             stream.close()
-        beside = temporary(path)
+        beside = temporary_path(path)
         with open(beside, "rb+") as written:
             os.fsync(written.fileno())
         return {"sha256": file_digest(beside), "bytes": beside.stat().st_size}

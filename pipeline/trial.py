@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError
-from pipeline.places import Places
+from pipeline.inventory import Inventory, StageInventory
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Shard, Stage
-from pipeline.survey import StageSurvey, Survey
 from pipeline.task import Job
 from pipeline.workers import Workers
 
@@ -39,18 +39,18 @@ def short_config(config: Config, stages: Mapping[str, Stage]) -> Config:
     """The config with the section for a short run of each stage that has one."""
     sections = dict(config.sections)
     for name, stage in stages.items():
-        if stage.trial is not None:
-            sections[name] = stage.trial(config)
+        if stage.trial_config is not None:
+            sections[name] = stage.trial_config(config)
     return replace(config, sections=sections)
 
 
-def run_trial(config: Config, stages: Mapping[str, Stage], places: Places) -> dict[str, Costs]:
+def run_trial(config: Config, stages: Mapping[str, Stage], places: DatasetPaths) -> dict[str, Costs]:
     """What each stage of a short config costs, measured in one worker each below `places`.
 
     The first shard of a stage is made twice: what the second time takes less, a worker pays once. Raises ConfigError
     where a shard fails: so would the run.
     """
-    survey = Survey(config, stages, places)
+    survey = Inventory(config, stages, places)
     costs: dict[str, Costs] = {}
     for name in stages:
         places.stage(name).make()
@@ -62,7 +62,7 @@ def run_trial(config: Config, stages: Mapping[str, Stage], places: Places) -> di
     return costs
 
 
-def costs_of(surveyed: StageSurvey, seconds: Mapping[str, float], warm_up: float = 0.0) -> Costs:
+def costs_of(surveyed: StageInventory, seconds: Mapping[str, float], warm_up: float = 0.0) -> Costs:
     """What the finished shards of a stage have cost, where each has taken so many `seconds`."""
     with_samples = {shard.name for shard in surveyed.shards if _holds_samples(shard)}
     own = {name: record for name, record in surveyed.records.items() if name in with_samples}
@@ -80,7 +80,7 @@ def costs_of(surveyed: StageSurvey, seconds: Mapping[str, float], warm_up: float
     )
 
 
-def _measured(survey: Survey, surveyed: StageSurvey, workers: Workers) -> Costs:
+def _measured(survey: Inventory, surveyed: StageInventory, workers: Workers) -> Costs:
     seconds: dict[str, float] = {}
     warm_up = 0.0
     chosen: set[str] = set()

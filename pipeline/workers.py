@@ -19,10 +19,10 @@ from typing import Any
 from joblib.externals.loky.backend.utils import kill_process_tree
 from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor, TerminatedWorkerError
 
-from pipeline.endings import die_with_parent
 from pipeline.task import Job, Report, make_shard
+from pipeline.termination import die_with_parent
 
-DIED = "its worker process died (out of memory, or a crash in a native library)"
+WORKER_DIED = "its worker process died (out of memory, or a crash in a native library)"
 
 _RECYCLED_AFTER = 64
 """Shards that a worker makes before a fresh process takes its place: native libraries leak."""

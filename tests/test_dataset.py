@@ -21,7 +21,7 @@ from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
 from stages.strings.alphabet import make_alphabet
 from stages.strings.grammar_check import check_string
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stated import stated
 
 STAGES = ("exemplars", "variations", "validity", "strings", "points", "sketches", "package")
@@ -63,7 +63,7 @@ def start(stage: str, config: Path, out: Path, workers: int) -> subprocess.Popen
 
 def make(config: Path, out: Path, workers: int) -> None:
     for stage in STAGES:
-        code, printed = mill("run", stage, "--config", config, "--out", out, "--workers", workers)
+        code, printed = shapemill("run", stage, "--config", config, "--out", out, "--workers", workers)
         assert code == 0, printed
 
 
@@ -110,7 +110,7 @@ def test_a_kill_in_each_stage_and_another_go_make_the_same_folder(made: tuple[Pa
     alive = []
     for stage in STAGES:
         alive.append(kill_while_it_works(stage, config, killed))
-        code, printed = mill("run", stage, "--config", config, "--out", killed, "--workers", 2)
+        code, printed = shapemill("run", stage, "--config", config, "--out", killed, "--workers", 2)
         assert code == 0, printed
     assert sum(alive) >= 4, "too many stages were over before the kill"
     assert digests(killed) == digests(one)
@@ -139,13 +139,13 @@ def test_every_table_about_kits_can_be_made_of_it_and_stands_in_the_report(
 def test_verify_finds_nothing_wrong_and_then_a_flipped_byte(made: tuple[Path, Path]) -> None:
     config, one = made
     asked = ("verify", "--config", config, "--out", one)
-    code, printed = mill(*asked, "--samples", 10)
+    code, printed = shapemill(*asked, "--samples", 10)
     assert code == 0, printed
     shard = next((one / "small" / "data" / "val").glob("*.tar"))
     content = bytearray(shard.read_bytes())
     content[len(content) // 2] ^= 1
     shard.write_bytes(bytes(content))
-    code, printed = mill(*asked)
+    code, printed = shapemill(*asked)
     content[len(content) // 2] ^= 1
     shard.write_bytes(bytes(content))
     assert code == 1

@@ -1,6 +1,6 @@
 """The two recipes of CONTRIBUTING: a stage and a producer, each one folder, go the whole way with no change elsewhere.
 
-`tests/house` is a project of its own: its folder `stages` is found by the PYTHONPATH alone.
+`tests/example_project` is a project of its own: its folder `stages` is found by the PYTHONPATH alone.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ WHOLE_WAY = """
 import sys
 from pathlib import Path
 from pipeline.config import load_config
-from pipeline.places import Places
+from pipeline.paths import Places
 from pipeline.registry import find_stages
 from pipeline.run import run_stage
 from stages.package.verify import main

@@ -11,12 +11,12 @@ import pytest
 import yaml
 
 from pipeline.config import Config, load_config
-from pipeline.places import Places
+from pipeline.inventory import Inventory, StageInventory
+from pipeline.paths import DatasetPaths
 from pipeline.records import ShardRecord
 from pipeline.registry import find_stages
 from pipeline.stage import Shard, Stage
 from pipeline.status import status_lines
-from pipeline.survey import StageSurvey, Survey
 from pipeline.trial import short_config
 
 STAGES = ("programs", "points", "sketches", "validity", "package")
@@ -30,15 +30,15 @@ def dataset_of(samples: int, folder: Path) -> tuple[Config, Mapping[str, Stage]]
     return load_config(path, {name: stage.config for name, stage in stages.items()}), stages
 
 
-def finish(surveyed: StageSurvey) -> int:
+def finish(surveyed: StageInventory) -> int:
     """Write the records of all shards that are planned and have none; how many these are."""
-    surveyed.places.make()
+    surveyed.paths.make()
     for shard in surveyed.missing:
-        (surveyed.places.records / f"{shard.name}.json").write_bytes(record_of(surveyed, shard).to_bytes())
+        (surveyed.paths.records / f"{shard.name}.json").write_bytes(record_of(surveyed, shard).to_bytes())
     return len(surveyed.missing)
 
 
-def record_of(surveyed: StageSurvey, shard: Shard) -> ShardRecord:
+def record_of(surveyed: StageInventory, shard: Shard) -> ShardRecord:
     samples, split = int(shard.params.get("samples", 0)), shard.params.get("split")
     told: dict[str, Any] = {"split": split, "samples": samples, "tried": samples, "backend": "none", "renderer": "none"}
     told |= {"rooted": samples, "stable": samples, "path": f"{shard.name}.tar", "members": ["glb"], "bytes": 1}
@@ -60,8 +60,8 @@ def record_of(surveyed: StageSurvey, shard: Shard) -> ShardRecord:
 @pytest.mark.slow
 def test_status_of_a_hundred_thousand_samples_is_told_from_records_in_seconds(tmp_path: Path) -> None:
     config, stages = dataset_of(100_000, tmp_path)
-    places = Places(tmp_path, config.name)
-    survey = Survey(config, stages, places)
+    places = DatasetPaths(tmp_path, config.name)
+    survey = Inventory(config, stages, places)
     for name in STAGES:
         while finish(survey.stage(name)):
             survey.refresh(name)
@@ -74,6 +74,6 @@ def test_status_of_a_hundred_thousand_samples_is_told_from_records_in_seconds(tm
 
 def test_a_trial_of_a_million_shapes_plans_no_more_shards_than_the_run(tmp_path: Path) -> None:
     config, stages = dataset_of(1_000_000, tmp_path)
-    tried = stages["programs"].asked(short_config(config, stages))
-    assert len(tried) == len(stages["programs"].asked(config)) == 1955
+    tried = stages["programs"].requested_samples(short_config(config, stages))
+    assert len(tried) == len(stages["programs"].requested_samples(config)) == 1955
     assert max(tried) <= 8

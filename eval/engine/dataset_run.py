@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.config import Config, load_config
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from stages.package.layout import MANIFEST
 
@@ -43,9 +43,9 @@ class DatasetRun:
         return self.out / f"{self.config.name}-eval"
 
     @property
-    def places(self) -> Places:
+    def paths(self) -> DatasetPaths:
         """The mill's folders of the dataset."""
-        return Places(self.out, self.config.name)
+        return DatasetPaths(self.out, self.config.name)
 
     @cached_property
     def manifest(self) -> Mapping[str, Any]:

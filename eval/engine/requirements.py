@@ -20,8 +20,8 @@ def _kits(subject: DatasetRun) -> str:
     asked = [name for name, each in producers().items() if each.asked(subject.config)]
     if not any(language_of(name).graphs for name in asked):
         return f"{subject.config.name} is made of {', '.join(asked) or 'nothing'}, whose samples are no shape graphs"
-    if not any(subject.places.stage("exemplars").root.glob("*.json")):
-        return f"the kits are not in {subject.places.stage('exemplars').root}; make exemplars"
+    if not any(subject.paths.stage("exemplars").root.glob("*.json")):
+        return f"the kits are not in {subject.paths.stage('exemplars').root}; make exemplars"
     return ""
 
 
@@ -30,7 +30,7 @@ KITS = Requirement("kits read by stage exemplars", _kits)
 
 
 def _exemplars(subject: DatasetRun) -> str:
-    if any(subject.places.stage("grammars").root.glob("*.json")):
+    if any(subject.paths.stage("grammars").root.glob("*.json")):
         return ""
     return _kits(subject)
 
@@ -40,7 +40,7 @@ EXEMPLARS = Requirement("the exemplars of shapes", _exemplars)
 
 
 def _search(subject: DatasetRun) -> str:
-    records = subject.places.stage("variations").records
+    records = subject.paths.stage("variations").records
     if subject.config.keep == "dataset":
         return "what the search found was let go of; keep: all in the config, and make variations"
     return "" if any(records.glob("*-pool.json")) else f"no search has left its records in {records}; make variations"
@@ -87,7 +87,7 @@ CURVE_PROGRAM = Requirement("a dataset of a curve program", _program)
 def _programs(subject: DatasetRun) -> str:
     if subject.config.keep == "dataset":
         return "the programs were let go of; keep: all in the config, and make shapeassembly"
-    root = subject.places.stage("shapeassembly").root
+    root = subject.paths.stage("shapeassembly").root
     return "" if any(root.glob("*-train-*.tar")) else f"the programs are not in {root}; make shapeassembly"
 
 

@@ -17,8 +17,8 @@ from pydantic import BaseModel, ConfigDict
 from eval.engine.dataset_run import DatasetRun
 from eval.engine.evaluation import Chart, TableResult
 from eval.engine.table import Table
-from pipeline.code import code_digest, reached
-from pipeline.places import file_digest, write_file
+from pipeline.code import code_digest, transitive_imports
+from pipeline.paths import file_digest, write_file
 from pipeline.shards import json_bytes
 from stages.package.made_with import library_versions
 
@@ -66,7 +66,10 @@ def cached_sections(
 
         def each_part() -> Iterator[TableResult]:
             for part in parts(subject, asked):
-                code, read = code_digest(reached([module, *part.code])), [digest(path) for path in part.reads]
+                code, read = (
+                    code_digest(transitive_imports([module, *part.code])),
+                    [digest(path) for path in part.reads],
+                )
                 names = vars(own.parse_args([])) if part.options is None else part.options
                 chosen = {name: getattr(asked, name) for name in names}
                 described = {**common, "options": chosen, "part": part.name, "code": code, "reads": read}

@@ -74,7 +74,7 @@ def made_shapes(subject: DatasetRun, kit: str, split: str) -> Iterator[Assembly]
     if subject.config.keep == "dataset":
         raise ConfigError("the shapes were let go of; keep: all in the config, and make dataset")
     for producer in producers():
-        folder = subject.places.stage(producer).root
+        folder = subject.paths.stage(producer).root
         for shard in sorted(folder.glob(f"{subject.config.name}-{split}-*.tar")):
             found = (sample.assembly for sample in read_samples(shard) if sample.kit == kit)
             yield from (each for each in found if each.stretches is None)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from eval.engine.table import Cell, Table
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.shards import read_shard
 from stages.exemplars.language import LANGUAGE
 from stages.shape.arrays import FloatArray
@@ -57,7 +57,7 @@ class Dream:
     margin: float
 
 
-def finished_shapes(folder: Path, places: Places, splits: Sequence[str]) -> Iterator[tuple[str, Dream]]:
+def finished_shapes(folder: Path, places: DatasetPaths, splits: Sequence[str]) -> Iterator[tuple[str, Dream]]:
     """The kit's name and the shape of each sample of these splits of a finished dataset of kits in `folder`, whose
     mill's folders are `places`; of those whose parts are all as the kit has them."""
     anew = LANGUAGE.anew(places)

@@ -54,7 +54,7 @@ def category_programs(subject: DatasetRun, category: str, split: str) -> list[As
 
 def program_shards(subject: DatasetRun, split: str) -> list[Path]:
     """The files of all programs in a split of the dataset."""
-    return sorted(subject.places.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
+    return sorted(subject.paths.stage("shapeassembly").root.glob(f"{subject.config.name}-{split}-*.tar"))
 
 
 def read_by_all(

@@ -38,7 +38,7 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from stages.strings.kit_strings import KitStrings
     from stages.strings.settings import StringsConfig
 
-    kits = dataset_kits(subject.places)
+    kits = dataset_kits(subject.paths)
     edges = subject.config.section(StringsConfig).edges
     writers = {name: KitStrings(kit, edges) for name, kit in kits.items()}
     judged, clusters, open_graphs, lines, strips = [], [], [], {}, []

@@ -22,7 +22,7 @@ def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from stages.shape.shape import Shape
     from stages.strings.compression import Codebook
 
-    anew, samples = LANGUAGE.anew(subject.places), dict[str, list[Stored]]()
+    anew, samples = LANGUAGE.anew(subject.paths), dict[str, list[Stored]]()
     for shard in sorted((subject.folder / "data").glob("*/*.tar")):
         for _key, members in read_shard(shard):
             record = json.loads(members["json"])
@@ -30,7 +30,7 @@ def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
             if not shape.is_stretched:
                 samples.setdefault(record["kit"], []).append(Stored(shape.assembly, members["json"], members["glb"]))
     rows, pictures = [], []
-    for name, kit in dataset_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.paths).items():
         stored = samples.get(name, [])
         for edges in EDGES if stored else ():
             book = Codebook(kit, edges)

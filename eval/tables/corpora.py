@@ -20,9 +20,9 @@ def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from stages.exemplars.language import dataset_kits
     from stages.strings.settings import Edges
 
-    folder = subject.places.stage("variations").root
+    folder = subject.paths.stage("variations").root
     rows = []
-    for name, kit in dataset_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.paths).items():
         finds = read_finds(folder, name)
         groups = {
             f"{name}, inputs": [each.assembly for each in kit.exemplars],

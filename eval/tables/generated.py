@@ -33,21 +33,21 @@ def _dreamt(subject: DatasetRun) -> str:
 def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     from eval.engine.pictures import shape_picture
     from eval.generated.generated_shapes import Dream, dream_row, dreams_table, finished_shapes
-    from pipeline.places import Places
+    from pipeline.paths import DatasetPaths
     from stages.exemplars.language import dataset_kits
     from stages.shape.shape import kit_shape
 
     learnt: dict[str, list[Dream]] = {}
     for parent in _parents(subject):
-        for name, each in finished_shapes(subject.out / parent, Places(subject.out, parent), ("train",)):
+        for name, each in finished_shapes(subject.out / parent, DatasetPaths(subject.out, parent), ("train",)):
             if len(known := learnt.setdefault(name, [])) < asked.dreams:
                 known.append(each)
     dreamt: dict[str, list[Dream]] = {}
-    for name, each in finished_shapes(subject.folder, subject.places, ("train", "val", "test")):
+    for name, each in finished_shapes(subject.folder, subject.paths, ("train", "val", "test")):
         if len(made := dreamt.setdefault(name, [])) < asked.dreams:
             made.append(each)
     rows, strips = [], []
-    for name, kit in dataset_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.paths).items():
         groups = {f"{name}, learnt": learnt.get(name, []), f"{name}, dreamt": dreamt.get(name, [])}
         base = groups[f"{name}, learnt"]
         for title, shapes in groups.items():

@@ -22,8 +22,8 @@ def _answer(subject: DatasetRun, _: Namespace) -> TableResult:
     from stages.exemplars.language import dataset_kits
     from stages.strings.settings import StringsConfig
 
-    strings, folder = subject.config.section(StringsConfig), subject.places.stage("variations").root
-    kits = dataset_kits(subject.places)
+    strings, folder = subject.config.section(StringsConfig), subject.paths.stage("variations").root
+    kits = dataset_kits(subject.paths)
     found = {name: grown(kit, folder, strings, subject.config.seed) for name, kit in kits.items()}
     lines = {
         name: [(0.0, float(each.inputs.graphs)), *((float(n), float(s.graphs)) for n, s in each.generations.items())]

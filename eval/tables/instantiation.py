@@ -46,7 +46,7 @@ def _answer(subject: DatasetRun, asked: Namespace) -> TableResult:
     compared: list[tuple[str, str, Sequence[Attempt]]] = []
     strips: list[ImageRow] = []
     models, seed = [each for each in string_vaes(subject.models) if each.seed == 0], subject.config.seed
-    for name, kit in dataset_kits(subject.places).items():
+    for name, kit in dataset_kits(subject.paths).items():
         train, test = (_lines(subject, name, split) for split in ("train", "test"))
         if not test:
             continue

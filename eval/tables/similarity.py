@@ -42,9 +42,9 @@ def _exemplars(subject: DatasetRun) -> dict[str, list[FloatArray]]:
 
     found = {
         name: [triangles_of(kit_shape(kit, each.assembly)) for each in kit.exemplars]
-        for name, kit in dataset_kits(subject.places).items()
+        for name, kit in dataset_kits(subject.paths).items()
     }
-    for name, grammar in load_grammars(subject.places).items():
+    for name, grammar in load_grammars(subject.paths).items():
         found[name] = [grammar.exemplar.vertices[grammar.exemplar.faces]]
     return found
 

@@ -62,7 +62,7 @@ def _look_at(subject: DatasetRun, searches: int, trained: TrainedModel[TrainedSt
     from stages.strings.settings import StringsConfig
     from stages.training.string_vae.latent_sampling import SAMPLING_METHODS
 
-    model, seed, kits = trained.model, subject.config.seed, dataset_kits(subject.places)
+    model, seed, kits = trained.model, subject.config.seed, dataset_kits(subject.paths)
     train, test = (corpus_strings(subject.corpus, trained.kit, split, model) for split in ("train", "test"))
     strips: list[ImageRow] = []
     if not trained.seed and trained.kit in kits:

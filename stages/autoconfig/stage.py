@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from pipeline.config import Config
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.autoconfig.settings import AutoconfigConfig

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.exemplars.language import LANGUAGE, dataset_kits
 from stages.shape.assembly_faults import geometry_faults
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
 
-def _anew(sample: Packaged, places: Places) -> Iterator[str]:
+def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
     """Contacts, grammar and penetration, from the mesh as it stands in the file."""
     if sample.record["language"] == LANGUAGE.name:
         yield from geometry_faults(dataset_kits(places)[sample.record["kit"]], sample.members)

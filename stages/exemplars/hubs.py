@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.config import nearest
+from pipeline.config import nearest_word
 from pipeline.errors import ConfigError
 from stages.exemplars.observed_grammar import observe_neighbourhoods
 from stages.exemplars.settings import KitConfig
@@ -23,7 +23,7 @@ def hub_types(config: KitConfig, types: Sequence[PartType]) -> tuple[int, ...]:
     wanted = config.resolved().hubs
     for name in wanted:
         if name not in names:
-            near = nearest(name, names)
+            near = nearest_word(name, names)
             hint = f"did you mean {near!r}?" if near else f"its types are {', '.join(names)}"
             raise ConfigError(f"kit {config.name}: `hubs` names {name!r}, which is no part type of it; {hint}")
     return tuple(sorted(names.index(name) for name in wanted))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan
 from stages.shape.arrays import IntArray
 from stages.shape.collection.language import Anew, Language, Source
@@ -69,7 +69,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def dataset_kits(places: Places) -> dict[str, Kit]:
+def dataset_kits(places: DatasetPaths) -> dict[str, Kit]:
     """The kits of a dataset out of the mill's folder."""
     made = places.stage("exemplars").root
     return {
@@ -79,7 +79,7 @@ def dataset_kits(places: Places) -> dict[str, Kit]:
     }
 
 
-def _anew(places: Places) -> Anew:
+def _anew(places: DatasetPaths) -> Anew:
     """The kit's meshes at the poses of the record."""
     kits = dataset_kits(places)
 

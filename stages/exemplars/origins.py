@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.config import Config
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from stages.exemplars.settings import ExemplarsConfig
 from stages.shape.collection.origin import Origin
 

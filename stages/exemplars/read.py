@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.bounded import Escaped, in_child
+from pipeline.bounded import ChildFailed, in_child
 from pipeline.errors import ConfigError
 from stages.exemplars.model import Model, pack_model, unpack_model
 from stages.exemplars.scene_file import parse_model
@@ -27,7 +27,7 @@ def read_model(path: Path, segmentation: Segmentation = "auto", limits: ReadLimi
             refusal=ConfigError,
         )
         return unpack_model(path, content)
-    except Escaped as error:
+    except ChildFailed as error:
         raise ConfigError(
             f"{path}: cannot be read: {error}; export it again, simpler if it is large, or raise exemplars.limits in "
             "the config"

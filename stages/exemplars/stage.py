@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.exemplars.origins import exemplar_origins
 from stages.exemplars.settings import ExemplarsConfig
@@ -88,7 +88,7 @@ def report(plan: Plan) -> Sequence[str]:
 STAGE = Stage(
     name="exemplars",
     module=__name__,
-    stays=True,
+    keep_output=True,
     config=ExemplarsConfig,
     inputs=("autoconfig",),
     plan=plan,

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.shape.graphs.neighbourhoods import STRICTNESS, admits
 from stages.shape.kit import Grammar, Multiset, Strictness
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.grammars.derivation_text import format_derivation, parse_derivation, placed_terminals, surface_digest
 from stages.grammars.files import load_grammars
 from stages.grammars.language import LANGUAGE
@@ -12,7 +12,7 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
 
-def _anew(sample: Packaged, places: Places) -> Iterator[str]:
+def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
     """The text is read, and written again, and the surface that it makes is the one of which the record has a
     digest."""
     record = sample.record

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.grammars.derivation_text import DerivationError, parse_derivation, placed_terminals
 from stages.grammars.files import load_grammar
 from stages.grammars.grammar import ShapeGrammar

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
 from stages.grammars.derivation import ENDS, Derivation, NonTerminal
 from stages.grammars.grammar import Grid, Production, ShapeGrammar
@@ -82,7 +82,7 @@ def _grid(said: Mapping[str, Any]) -> Grid:
     )
 
 
-def load_grammars(places: Places) -> dict[str, ShapeGrammar]:
+def load_grammars(places: DatasetPaths) -> dict[str, ShapeGrammar]:
     """The grammars of a dataset out of the mill's folder."""
     made = places.stage("grammars").root
     return {

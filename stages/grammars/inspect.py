@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import ConfigError
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.exemplars.model import Model
 from stages.exemplars.settings import ReadLimits
 from stages.grammars.description import describe_grammar

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.config import Config
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
 from stages.grammars.derivation_text import exemplar_shape, shape_of_text
 from stages.grammars.files import load_grammar, load_grammars
@@ -67,7 +67,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"grammars/{name}" for name in grammar_shards(plan.config))
 
 
-def _anew(places: Places) -> Anew:
+def _anew(places: DatasetPaths) -> Anew:
     grammars = load_grammars(places)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:

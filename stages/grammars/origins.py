@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.stage import Plan
 from stages.grammars.settings import GrammarsConfig
 from stages.shape.collection.origin import Origin

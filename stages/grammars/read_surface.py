@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.bounded import Escaped, in_child
+from pipeline.bounded import ChildFailed, in_child
 from pipeline.errors import ConfigError
 from stages.exemplars.formats.enclosure import Enclosure
 from stages.exemplars.formats.ply import read_ply_points
@@ -56,7 +56,7 @@ def read_cloud(path: Path, limits: ReadLimits | None = None) -> ScannedCloud | N
         content = in_child(
             lambda: _packed(path), cpu_seconds=limits.cpu_seconds, memory_mb=limits.memory_mb, refusal=ConfigError
         )
-    except Escaped as error:
+    except ChildFailed as error:
         raise ConfigError(
             f"{path}: cannot be read: {error}; thin the cloud out, or raise exemplars.limits in the config"
         ) from None

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.config import Config
 from pipeline.errors import ShardFailed
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.grammars.language import drawing_name, grammar_shards, input_grammars
 from stages.grammars.origins import mesh_origins
@@ -198,13 +198,13 @@ def estimate_bytes(plan: Plan) -> int:
 STAGE = Stage(
     name="grammars",
     module=__name__,
-    stays=True,
+    keep_output=True,
     config=GrammarsConfig,
     inputs=(),
     plan=planned_shards,
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
     report=report,
-    asked=asked,
-    trial=trial,
+    requested_samples=asked,
+    trial_config=trial,
 )

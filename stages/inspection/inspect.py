@@ -13,7 +13,7 @@ from typing import get_args
 from pydantic import ValidationError
 
 from pipeline.errors import ConfigError
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.autoconfig.resolve import REQUIREMENT_KEYS
 from stages.autoconfig.settings import AutoconfigConfig
 from stages.exemplars.kit_figure import kit_figure

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, BinaryIO, cast
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.stage import Outcome, Task
 from stages.package.card import Story, card, citation
 from stages.package.classes import counted_classes, table_bytes

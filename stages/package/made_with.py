@@ -13,7 +13,7 @@ from typing import Any
 
 import pipeline
 import stages
-from pipeline.code import code_digest, reached
+from pipeline.code import code_digest, transitive_imports
 
 PROJECT = Path(pipeline.__file__).parent.parent / "pyproject.toml"
 
@@ -25,7 +25,9 @@ def code_version(*besides: ModuleType) -> str:
     It is a function of what the code says alone, comments and docstrings aside, so that the same code says the same in
     a checkout, in a fresh clone and in a copy without history, and an edited file says so by itself.
     """
-    digest = code_digest(reached(name for package in (pipeline, stages, *besides) for name in _modules(package)))
+    digest = code_digest(
+        transitive_imports(name for package in (pipeline, stages, *besides) for name in _modules(package))
+    )
     return f"{_project()['version']}+{digest[:12]}"
 
 

@@ -186,5 +186,5 @@ STAGE = Stage(
     report=report,
     publish=publish,
     check=check_producers,
-    check_machine=check_machine,
+    check_environment=check_machine,
 )

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.randomness import decision_rng
-from pipeline.yaml_text import read_yaml
+from pipeline.yaml_loader import read_yaml
 from stages.package.findings import Findings
 from stages.package.layout import MANIFEST
 from stages.package.verify_files import Row, Tally, check_classes, check_files, check_index, check_splits, read_schema

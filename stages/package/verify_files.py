@@ -11,7 +11,7 @@ from typing import Any
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from stages.package.croissant import INDEX
 from stages.package.findings import Findings
 from stages.package.layout import CHECKSUMS, CLASSES, CROISSANT, MANIFEST, SCHEMA

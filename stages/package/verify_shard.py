@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.shards import read_shard
 from stages.package.findings import Findings
 from stages.package.index import index_row, tar_bytes
@@ -45,7 +45,7 @@ def check_shard(
     places of the samples that are held against what they were made from by other means, which takes long.
     """
     findings, rows, tally, path = Findings(), list[Row](), Tally(), str(shard["path"])
-    places = Places(folder.resolve().parent, folder.resolve().name)
+    places = DatasetPaths(folder.resolve().parent, folder.resolve().name)
     spoken = {name: each.anew(places) for name, each in languages().items()}
     validator = validator_of(schema)
     wanted = [each["name"] for each in manifest["members"]]
@@ -110,7 +110,7 @@ def shard_samples(path: Path) -> Iterator[tuple[str, int, dict[str, bytes]]]:
             yield key, offset, members
 
 
-def _faults(sample: Packaged, manifest: Mapping[str, Any], places: Places | None) -> Iterator[tuple[str, str]]:
+def _faults(sample: Packaged, manifest: Mapping[str, Any], places: DatasetPaths | None) -> Iterator[tuple[str, str]]:
     """The faults of a sample with the checks that find them; with `places` it is looked at by other means, too."""
     try:
         yield from (("samples", what) for what in array_faults(sample, manifest["members"]))
@@ -166,7 +166,7 @@ class Added:
     fields: Mapping[str, Any]
 
 
-def _made(places: Places, path: str) -> dict[str, dict[str, Added]]:
+def _made(places: DatasetPaths, path: str) -> dict[str, dict[str, Added]]:
     """What each stage has made for the samples of a shard, by key, where the mill's folder still has it."""
     name, _, number = Path(path).stem.rpartition("-")
     shard = f"{places.dataset}-{name.rpartition('-')[2]}-{number}"

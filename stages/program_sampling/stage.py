@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Rejected, ShardFailed
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from stages.program_sampling.settings import ProgramSamplingConfig
@@ -114,5 +114,5 @@ STAGE = Stage(
     estimate_bytes=estimate_bytes,
     report=report,
     sections=("shapeassembly",),
-    trial=trial,
+    trial_config=trial,
 )

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.errors import ConfigError, ShardFailed
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.programs.description import program_markdown
 from stages.programs.editing import interpolate, mix
 from stages.programs.files import named_values, random_shapes, shape_glb

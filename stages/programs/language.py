@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
 from stages.programs.program import find_program, shape_from_text
 from stages.programs.settings import ProgramsConfig
@@ -37,7 +37,7 @@ def _speaker(task: Task) -> Parameters:
     return Parameters(task.config.section(ProgramsConfig).program)
 
 
-def _anew(_: Places) -> Anew:
+def _anew(_: DatasetPaths) -> Anew:
     return lambda record, _: upright(shape_from_text(record["kit"], record["text"]))
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.config import nearest
+from pipeline.config import nearest_word
 from pipeline.errors import ConfigError
 from stages.programs.conditions import Condition
 from stages.programs.curves.part import Part
@@ -149,6 +149,6 @@ def program_module(name: str) -> str:
         return f"{__package__}.library.{name}"
     if "." in name and all(step.isidentifier() for step in name.split(".")):
         return name
-    close = nearest(name, names)
+    close = nearest_word(name, names)
     hint = f"did you mean {close}?" if close else f"programs are {', '.join(names) or 'none'}"
     raise ConfigError(f"there is no program {name[:1000]!r}; {hint}")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.config import nearest
+from pipeline.config import nearest_word
 from stages.programs.parameters import Parameter, ParameterError, Value
 from stages.shape.arrays import BoolArray, FloatArray
 
@@ -94,7 +94,7 @@ class Schema:
         or a value out of range."""
         for name in chosen:
             if name not in self.by_name:
-                close = nearest(name, self.by_name)
+                close = nearest_word(name, self.by_name)
                 hint = f"did you mean {close} ({self.by_name[close].range})?" if close else "see the table of them"
                 raise ParameterError(f"there is no parameter {name!r}; {hint}")
         return {

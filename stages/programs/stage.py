@@ -207,6 +207,6 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=lambda plan: sum(BYTES_PER_SAMPLE * int(each.params["samples"]) for each in planned_shards(plan)),
     report=report,
-    asked=asked,
-    trial=trial,
+    requested_samples=asked,
+    trial_config=trial,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.exemplars.language import dataset_kits
 from stages.proportions.faults import warp_fault
 from stages.proportions.language import LANGUAGE
@@ -13,7 +13,7 @@ from stages.shape.collection.audit import Audit
 from stages.shape.collection.packaged import Packaged
 
 
-def _anew(sample: Packaged, places: Places) -> Iterator[str]:
+def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
     """The text is read, and written again; the shape that it makes holds together as the exemplar does."""
     record = sample.record
     if record["language"] != LANGUAGE.name:

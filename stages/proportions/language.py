@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan
 from stages.exemplars.language import Kits, dataset_kits
 from stages.proportions.text import shape_of_text
@@ -38,7 +38,7 @@ def _reads(plan: Plan) -> tuple[str, ...]:
     return tuple(f"exemplars/{name}" for name in plan.shards("exemplars"))
 
 
-def _anew(places: Places) -> Anew:
+def _anew(places: DatasetPaths) -> Anew:
     kits = dataset_kits(places)
 
     def shape(record: Mapping[str, Any], _: IntArray) -> Shape:

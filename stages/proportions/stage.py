@@ -234,6 +234,6 @@ STAGE = Stage(
     estimate_bytes=estimate_bytes,
     report=report,
     check=check,
-    asked=asked,
-    trial=trial,
+    requested_samples=asked,
+    trial_config=trial,
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.programs.files import shape_glb
 from stages.programs.sheets import shape_picture
 from stages.recovery.reading import RecoveryInput

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.bounded import Escaped, in_child
+from pipeline.bounded import ChildFailed, in_child
 from stages.shape.arrays import BoolArray, ByteArray, FloatArray
 from stages.training.recovery.drawings import fit_to_square
 
@@ -144,7 +144,7 @@ def _read_apart(read: Callable[[], Any], path: Path) -> Any:
 
     try:
         found = in_child(content, cpu_seconds=CPU_SECONDS, memory_mb=MEMORY_MB, refusal=InputError)
-    except Escaped as error:
+    except ChildFailed as error:
         raise InputError(f"{path} cannot be read: {error}") from None
     return np.load(io.BytesIO(found), allow_pickle=False)
 

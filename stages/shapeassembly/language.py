@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
 from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.sample import Sample
@@ -47,7 +47,7 @@ def _speaker(task: Task) -> ProgramDecoder:
     return ProgramDecoder(json.loads(listed.read_bytes()))
 
 
-def _anew(places: Places) -> Anew:
+def _anew(places: DatasetPaths) -> Anew:
     """The executed program, its labels those of its category as the dataset lists them."""
     labels: dict[str, list[str]] = {}
     path = places.out / places.dataset / "classes.json"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.stage import Plan
 from stages.shape.collection.origin import Origin
 from stages.shapeassembly.extraction.settings import NamedFiles

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from stages.shapeassembly.syntax.limits import MAX_TEXT_CHARACTERS
 
 

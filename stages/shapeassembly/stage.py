@@ -146,6 +146,6 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
     report=report,
-    asked=asked,
-    trial=trial,
+    requested_samples=asked,
+    trial_config=trial,
 )

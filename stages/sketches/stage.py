@@ -89,5 +89,5 @@ STAGE = Stage(
     run_shard=run_shard,
     estimate_bytes=estimate_bytes,
     report=report,
-    check_machine=check_machine,
+    check_environment=check_machine,
 )

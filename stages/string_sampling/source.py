@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipeline.errors import ConfigError, Rejected, ShardFailed
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.shards import array_bytes, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
 from stages.shape.graphs.canonical import graph_digest

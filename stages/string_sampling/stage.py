@@ -118,7 +118,7 @@ STAGE = Stage(
     estimate_bytes=estimate_bytes,
     report=report,
     check=check,
-    asked=asked,
-    trial=trial,
+    requested_samples=asked,
+    trial_config=trial,
     whole_section=False,
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.shape.arrays import IntArray, TypeArray
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.declared import languages
@@ -52,7 +52,7 @@ def string_faults(sample: Packaged) -> Iterator[str]:
         yield "the first line of its txt is not the canonical spanning tree"
 
 
-def _anew(sample: Packaged, places: Places) -> Iterator[str]:
+def _anew(sample: Packaged, places: DatasetPaths) -> Iterator[str]:
     """Which contacts are faces is asked of the kit again, but of stretched parts it does not know."""
     if not languages()[sample.record["language"]].graphs or _edges(sample) != "faces" or sample.shape.is_stretched:
         return

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, cast, get_args
 
-from pipeline.code import code_digest, reached
+from pipeline.code import code_digest, transitive_imports
 from pipeline.errors import ShardFailed
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Task
@@ -134,7 +134,7 @@ def run_round(task: Task) -> Outcome:
     header = {
         **described,
         "step": trainee.step,
-        "code": code_digest(reached(_modules(params))),
+        "code": code_digest(transitive_imports(_modules(params))),
         "device": device.type,
         "precision": precision,
         "figures": figures,

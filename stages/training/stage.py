@@ -228,8 +228,8 @@ STAGE = Stage(
     publish=publish,
     check=check,
     sections=("programs", "sketches"),
-    trial=trial,
+    trial_config=trial,
     whole_section=False,
-    publishes_parts=True,
-    reads_inputs=uses_samples,
+    publishes_incomplete=True,
+    uses_input=uses_samples,
 )

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from torch import Generator, Tensor, nn
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.stage import Task
 
 

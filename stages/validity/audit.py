@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.shape.collection.audit import Audit
 from stages.shape.collection.declared import languages
 from stages.shape.collection.packaged import Packaged
@@ -36,7 +36,7 @@ def contradictions(sample: Packaged) -> Iterator[str]:
         yield "its json names a weakest part that is not there"
 
 
-def judged_anew(sample: Packaged, _: Places) -> Iterator[str]:
+def judged_anew(sample: Packaged, _: DatasetPaths) -> Iterator[str]:
     """A sentence for each field that statics finds otherwise, and for contacts that are none."""
     shape, recorded = sample.shape, sample.record["physics"]
     judge = judge_of(shape.meshes, shape.up, _config(sample))

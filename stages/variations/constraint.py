@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pkgutil import iter_modules
 
-from pipeline.config import nearest
+from pipeline.config import nearest_word
 from stages.shape.kit import Assembly, Kit
 from stages.variations.requirements.named_labels import named_labels
 from stages.variations.requirements.resizing import Resizer
@@ -58,7 +58,7 @@ def unknown_in(asked: Mapping[str, Labels]) -> str | None:
     known = find_constraints()
     for name, labels in asked.items():
         if name not in known:
-            return f"{name!r} is no constraint; did you mean {nearest(name, known) or ', '.join(known)!r}?"
+            return f"{name!r} is no constraint; did you mean {nearest_word(name, known) or ', '.join(known)!r}?"
         constraint = known[name]
         allowed = (*constraint.needs, *constraint.may)
         wrong = next((each for each in labels if each not in allowed), None)

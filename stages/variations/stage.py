@@ -124,6 +124,6 @@ STAGE = Stage(
     ),
     report=report,
     check=check,
-    asked=asked,
-    trial=trial,
+    requested_samples=asked,
+    trial_config=trial,
 )

@@ -12,7 +12,7 @@ from pathlib import Path
 from joblib.externals.loky.process_executor import ProcessPoolExecutor
 
 from tests.bench.measure import Measure
-from tests.pipeline.turn import turn
+from tests.pipeline.toy_run import run_toy_stages
 
 SHARDS = 400
 FEW = 20
@@ -47,7 +47,7 @@ def _mill(out: Path, shards: int) -> float:
     config = out / "mill.yaml"
     config.write_text(f"name: mill\nsalt:\n  bags: {shards}\n")
     start = time.perf_counter()
-    turn(config, out, "salt")
+    run_toy_stages(config, out, "salt")
     return time.perf_counter() - start
 
 

@@ -25,7 +25,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.records import read_record
 from stages.inspection.config_text import dataset_name
 
@@ -123,10 +123,12 @@ def _made(config: Path, folder: Path, minutes: float) -> tuple[Ended, list[str]]
         if ended.late:
             break
     whole = Ended(spent, peak, ended.said, ended.complained, ended.late)
-    chosen = read_record(Places(folder, config.stem).stage("proportions").records / f"{config.stem}-choice.json")
+    chosen = read_record(DatasetPaths(folder, config.stem).stage("proportions").records / f"{config.stem}-choice.json")
     if chosen is not None:
         return whole, [f"{sum(chosen.summary['shapes'].values()):,} in other proportions", *[""] * 4]
-    record = read_record(Places(folder, config.stem).stage("variations").records / f"{config.stem}-assignment.json")
+    record = read_record(
+        DatasetPaths(folder, config.stem).stage("variations").records / f"{config.stem}-assignment.json"
+    )
     if record is None:
         return whole, ["stopped at the limit" if ended.late else _why(ended), *[""] * 4]
     (found,) = record.summary["kits"].values()

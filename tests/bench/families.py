@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit, read_kit
 from stages.exemplars.read import read_model

@@ -21,7 +21,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from pipeline.config import load_config
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from pipeline.registry import find_stages
 from stages.autoconfig.trial_search import type_counts
 from stages.exemplars.build import build_kit

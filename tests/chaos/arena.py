@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from pipeline.places import remove
+from pipeline.paths import remove
 from pipeline.records import read_record
 from pipeline.shards import json_bytes
 from tests.chaos.running import Run

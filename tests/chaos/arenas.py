@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.check import damaged_shards
 from pipeline.config import load_config
-from pipeline.places import Places
+from pipeline.integrity import corrupted_shards
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from tests.chaos.arena import Arena, Step
 from tests.stated import stated
@@ -164,5 +164,5 @@ def damaged(arena: Arena) -> list[str]:
     found = []
     for dataset in arena.sections:
         config = load_config(arena.config(dataset), {name: stage.config for name, stage in stages.items()})
-        found += list(damaged_shards(config, stages, Places(arena.out, config.name)))
+        found += list(corrupted_shards(config, stages, DatasetPaths(arena.out, config.name)))
     return found

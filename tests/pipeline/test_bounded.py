@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipeline.bounded import Escaped, in_child
+from pipeline.bounded import ChildFailed, in_child
 
 
 class Refused(Exception):
@@ -62,16 +62,16 @@ def test_refusal_keeps_its_class_and_its_words() -> None:
     ],
 )
 def test_escape_is_one_sentence(work: Callable[[], bytes], told: str) -> None:
-    with pytest.raises(Escaped) as caught:
+    with pytest.raises(ChildFailed) as caught:
         in_child(work, cpu_seconds=10, memory_mb=200)
     assert str(caught.value).startswith(told)
     assert "KeyError" not in str(caught.value)
 
 
 def test_child_that_loops_or_sleeps_is_ended() -> None:
-    with pytest.raises(Escaped, match="it took more than 1 s of CPU"):
+    with pytest.raises(ChildFailed, match="it took more than 1 s of CPU"):
         in_child(loop, cpu_seconds=1, memory_mb=200, seconds=60)
-    with pytest.raises(Escaped, match=r"it did not end within 0.5 s"):
+    with pytest.raises(ChildFailed, match=r"it did not end within 0.5 s"):
         in_child(sleep, cpu_seconds=1, memory_mb=200, seconds=0.5)
 
 

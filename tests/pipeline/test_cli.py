@@ -10,14 +10,14 @@ import pytest
 
 from pipeline.registry import find_stages
 from tests.pipeline.conftest import WriteConfig, made
-from tests.pipeline.turn import PACKAGE, turn
+from tests.pipeline.toy_run import PACKAGE, run_toy_stages
 
 ROOT = Path(__file__).resolve().parents[2]
 WORK = Path(".work/mill")
 
 
 def mill(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tests.pipeline.turn", *(str(each) for each in arguments)]
+    command = [sys.executable, "-m", "tests.pipeline.toy_run", *(str(each) for each in arguments)]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
@@ -43,7 +43,7 @@ def test_run_and_status_go_through_the_whole_mill(tmp_path: Path, write_config: 
 
 def test_status_names_the_shards_that_are_set_aside(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest1-1": "fails"}})
-    turn(config, tmp_path / "out", "salt", "grain", "flour")
+    run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")
     status = mill("status", "--config", config, "--out", tmp_path / "out")
     assert "flour: harvest1-1 is set aside: the stones are blunt" in status.stdout
     assert [line.split()[1:3] for line in status.stdout.splitlines() if line.startswith("flour ")] == [["5/6", "1"]]
@@ -51,7 +51,7 @@ def test_status_names_the_shards_that_are_set_aside(tmp_path: Path, write_config
 
 def test_seed_of_the_command_line_stands_in_place_of_the_configs(tmp_path: Path, write_config: WriteConfig) -> None:
     mill("run", "grain", "--config", write_config(), "--out", tmp_path / "asked", "--seed", 11)
-    turn(write_config(seed=11), tmp_path / "written", "grain")
+    run_toy_stages(write_config(seed=11), tmp_path / "written", "grain")
     assert made(tmp_path / "asked") == made(tmp_path / "written")
 
 
@@ -84,7 +84,7 @@ def test_wrong_config_exits_with_2_before_any_work(tmp_path: Path, write_config:
 
 def test_verify_finds_a_flipped_byte_and_the_next_run_mends_it(tmp_path: Path, write_config: WriteConfig) -> None:
     config, out = write_config(), tmp_path / "out"
-    turn(config, out)
+    run_toy_stages(config, out)
     whole = made(out)
     asked = ("verify", "--config", config, "--out", out)
     good = mill(*asked, "--samples", 3)
@@ -98,12 +98,12 @@ def test_verify_finds_a_flipped_byte_and_the_next_run_mends_it(tmp_path: Path, w
     bad = mill(*asked)
     assert bad.returncode == 1
     assert "loaf-harvest0-1.bin is damaged; the next run makes loaf-harvest0-1 again" in bad.stdout
-    assert turn(config, out)["bread"].made == 1
+    assert run_toy_stages(config, out)["bread"].made == 1
     assert made(out) == whole
 
 
 def test_verify_of_an_unfinished_dataset_fails(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "out", "salt", "grain")
+    run_toy_stages(write_config(), tmp_path / "out", "salt", "grain")
     done = mill("verify", "--config", write_config(), "--out", tmp_path / "out")
     assert done.returncode == 1
     assert "flour: 6 of 6 shards are not made, first harvest0-0" in done.stdout
@@ -115,7 +115,7 @@ def test_inspect_passes_its_arguments_on() -> None:
 
 
 def test_clean_removes_the_work_and_leaves_the_dataset(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "out")
+    run_toy_stages(write_config(), tmp_path / "out")
     assert mill("clean", "--config", write_config(), "--out", tmp_path / "out").returncode == 0
     assert sorted(path.name for path in (tmp_path / "out").rglob("*") if path.is_file()) == [
         f"{index}.bin" for index in range(4)

@@ -15,7 +15,7 @@ import pytest
 from pipeline.errors import ConfigError
 from tests.pipeline.conftest import WriteConfig, made
 from tests.pipeline.test_failures import alive, descendants, mill, wait_until
-from tests.pipeline.turn import turn
+from tests.pipeline.toy_run import run_toy_stages
 
 pytest.importorskip("distributed")
 
@@ -61,8 +61,8 @@ def test_cluster_makes_the_same_bytes_though_workers_die_and_a_shard_kills_its_o
     tmp_path: Path, write_config: WriteConfig, cluster: Cluster
 ) -> None:
     out = tmp_path / "out"
-    turn(write_config(), tmp_path / "calm", "salt", "grain", "flour")
-    turn(write_config(), out, "salt", "grain")
+    run_toy_stages(write_config(), tmp_path / "calm", "salt", "grain", "flour")
+    run_toy_stages(write_config(), out, "salt", "grain")
     trouble = {"harvest0-0": "stops once", "harvest1-0": "dies", "harvest2-1": "dies once"}
     config = write_config(flour={"seconds": 0.1, "trouble": trouble})
     command = [*mill(config, out, "flour"), "--cluster", cluster.address]
@@ -77,7 +77,7 @@ def test_cluster_makes_the_same_bytes_though_workers_die_and_a_shard_kills_its_o
     tried = {shard: (tmp_path / "marks" / shard).read_text() for shard in trouble}
     assert tried["harvest1-0"] == "xxxx", "three times beside others, once alone"
     assert tried["harvest0-0"] == tried["harvest2-1"] == "xx", "a death costs a shard one more try"
-    turn(write_config(), out, "flour")
+    run_toy_stages(write_config(), out, "flour")
     assert made(out) == made(tmp_path / "calm"), "a run that moves from a cluster to this machine"
 
 
@@ -87,16 +87,16 @@ def test_shard_ends_with_the_run_that_wanted_it_and_the_cluster_stays(
 ) -> None:
     out, small = tmp_path / "out", {"fields": 1, "wanted": 1}
     config = write_config(grain=small, flour={"trouble": {"harvest0-0": "sleeps"}})
-    turn(config, out, "salt", "grain", cluster=cluster.address)
+    run_toy_stages(config, out, "salt", "grain", cluster=cluster.address)
     with subprocess.Popen([*mill(config, out, "flour"), "--cluster", cluster.address], cwd=ROOT) as run:
         wait_until(lambda: (tmp_path / "marks/harvest0-0").exists())
         makers = cluster.pids("LokyProcess")
         run.kill()
     assert makers
     wait_until(lambda: not set(makers) <= set(cluster.pids("LokyProcess")), seconds=30)
-    result = turn(config, out, "flour", cluster=cluster.address, patience=0.1, retries=0)["flour"]
+    result = run_toy_stages(config, out, "flour", cluster=cluster.address, patience=0.1, retries=0)["flour"]
     assert result.failed == {"harvest0-0": "it made no progress for 6s, and its worker was ended"}
-    assert not turn(write_config(grain=small), out, "flour", cluster=cluster.address)["flour"].failed
+    assert not run_toy_stages(write_config(grain=small), out, "flour", cluster=cluster.address)["flour"].failed
 
 
 @pytest.mark.slow
@@ -106,7 +106,7 @@ def test_scheduler_that_goes_away_is_told_and_the_run_goes_on_here(
     monkeypatch.setattr("pipeline.cluster._ANSWERS_WITHIN", 3.0)
     out, mine = tmp_path / "out", Cluster()
     config = write_config(flour={"seconds": 0.1})
-    turn(config, out, "salt", "grain")
+    run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(
         [*mill(config, out, "flour"), "--cluster", mine.address], cwd=ROOT, stderr=subprocess.PIPE, text=True
     ) as run:
@@ -120,9 +120,9 @@ def test_scheduler_that_goes_away_is_told_and_the_run_goes_on_here(
         assert "Traceback" not in said
     assert mine.process.wait(timeout=60) == 1
     with pytest.raises(ConfigError, match=f"no scheduler answers at {mine.address}"):
-        turn(config, out, "flour", cluster=mine.address)
-    turn(config, out, "flour")
-    turn(config, tmp_path / "calm", "salt", "grain", "flour")
+        run_toy_stages(config, out, "flour", cluster=mine.address)
+    run_toy_stages(config, out, "flour")
+    run_toy_stages(config, tmp_path / "calm", "salt", "grain", "flour")
     assert made(out) == made(tmp_path / "calm")
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.code import _read, reached, starts_of
+from pipeline.code import _read, entry_points, transitive_imports
 from pipeline.config import Config
 from pipeline.errors import Fatal
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from pipeline.run import RunResult, run_stage
 
@@ -65,7 +65,7 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
 
 
 def names(*starts: str) -> set[str]:
-    return {each for each in reached(starts) if not each.startswith("pipeline")}
+    return {each for each in transitive_imports(starts) if not each.startswith("pipeline")}
 
 
 def test_every_way_of_importing_is_followed_wherever_it_stands(write: Write) -> None:
@@ -92,7 +92,7 @@ def test_package_may_lie_in_several_folders(write: Write, tmp_path: Path) -> Non
 
 def test_start_that_is_not_there_is_told(write: Write) -> None:
     with pytest.raises(ValueError, match=r"no Python file of module house\.none"):
-        reached(["house.none"])
+        transitive_imports(["house.none"])
 
 
 PLAIN = "import os\n\ndef height(steps):\n    return 0.5 * steps\n"
@@ -107,27 +107,27 @@ PLAIN = "import os\n\ndef height(steps):\n    return 0.5 * steps\n"
 )
 def test_comment_docstring_and_format_change_nothing(write: Write, edited: str) -> None:
     write("house/stairs.py", PLAIN)
-    before = reached(["house.stairs"])
+    before = transitive_imports(["house.stairs"])
     write("house/stairs.py", edited)
-    assert reached(["house.stairs"]) == before
+    assert transitive_imports(["house.stairs"]) == before
 
 
 def test_import_for_types_alone_does_not_count(write: Write) -> None:
     text = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from house.hall import Hall\nelse:\n    Hall = 1\n"
     write("house/stairs.py", text)
     write("house/hall.py", "")
-    before = reached(["house.stairs"])
+    before = transitive_imports(["house.stairs"])
     assert set(before) == {"house", "house.stairs"}
     write("house/stairs.py", text.replace("import Hall", "import Hall, Door"))
-    assert reached(["house.stairs"]) == before
+    assert transitive_imports(["house.stairs"]) == before
 
 
 @pytest.mark.parametrize("edited", ["0.25 * steps", "0.5 * -steps", "'0.5' * steps", "0.5 * step"])
 def test_each_word_of_code_counts(write: Write, edited: str) -> None:
     write("house/stairs.py", PLAIN)
-    before = reached(["house.stairs"])
+    before = transitive_imports(["house.stairs"])
     write("house/stairs.py", PLAIN.replace("0.5 * steps", edited))
-    after = reached(["house.stairs"])
+    after = transitive_imports(["house.stairs"])
     assert {module for module in before if before[module] != after[module]} == {"house.stairs"}
 
 
@@ -136,14 +136,14 @@ def test_what_a_folder_declares_beside_its_stage_counts(write: Write) -> None:
     write("house/stone/language.py", "import house.words")
     write("house/stone/other.py", "")
     write("house/words.py", "")
-    start = starts_of("house.stone.stage")
+    start = entry_points("house.stone.stage")
     assert names(*start) == {"house", "house.stone", "house.stone.stage", "house.stone.language", "house.words"}
 
 
 def grind(out: Path, sharpens: bool = False) -> RunResult:
     stages = find_stages("house")
     section = stages["stone"].config.model_validate({"sharpens": sharpens})
-    return run_stage("stone", stages, Config("mill", "1.0.0", 0, {"stone": section}, out), Places(out, "mill"), 1)
+    return run_stage("stone", stages, Config("mill", "1.0.0", 0, {"stone": section}, out), DatasetPaths(out, "mill"), 1)
 
 
 @pytest.fixture
@@ -176,19 +176,19 @@ def test_edit_while_a_stage_runs_stops_it_before_a_shard_is_committed(mill: Writ
 
 def test_of_the_mill_only_what_makes_bytes_counts() -> None:
     for name, stage in find_stages().items():
-        mill = {each for each in reached(starts_of(stage.module)) if each.partition(".")[0] == "pipeline"}
+        mill = {each for each in transitive_imports(entry_points(stage.module)) if each.partition(".")[0] == "pipeline"}
         # package writes a digest of all code into the manifest, training one of a model's into its weights
         own = {"pipeline.code"} if name in ("package", "training") else set()
         # files of strangers are read in a child process, by these or by what they are made with
         reads = ("autoconfig", "exemplars", "grammars", "shapeassembly", "program_sampling", "abstraction", "training")
-        own |= {"pipeline.bounded", "pipeline.endings"} if name in reads else set()
+        own |= {"pipeline.bounded", "pipeline.termination"} if name in reads else set()
         assert mill == {"pipeline", "pipeline.errors", "pipeline.randomness", "pipeline.shards"} | own, name
 
 
 def test_chair_does_not_know_the_vase() -> None:
     library = {f"stages.programs.library.{each}" for each in ("cabinet", "ceiling_lamp", "chair", "table", "vase")}
-    assert not library & names(*starts_of("stages.programs.stage"))
-    chair = names(*starts_of("stages.programs.stage", ["stages.programs.library.chair"]))
+    assert not library & names(*entry_points("stages.programs.stage"))
+    chair = names(*entry_points("stages.programs.stage", ["stages.programs.library.chair"]))
     assert library & chair == {"stages.programs.library.chair"}
     assert {"stages.programs.curves.part", "stages.programs.sampling"} <= chair
 
@@ -206,7 +206,7 @@ class TestNotes:
             _read.cache_clear()
             if text:
                 write("house/mill.py", text)
-            return reached(["house.mill"])
+            return transitive_imports(["house.mill"])
 
         return said
 

@@ -10,13 +10,13 @@ import pytest
 
 from pipeline.config import Config, StrictModel
 from pipeline.errors import Fatal
-from pipeline.places import Places, file_digest, remove
+from pipeline.paths import DatasetPaths, file_digest, remove
 from pipeline.records import read_record
 from pipeline.run import run_stage
 from pipeline.stage import Outcome, Shard, Stage, Task
 from pipeline.status import status_lines
 from tests.pipeline.conftest import WriteConfig, made, record_times
-from tests.pipeline.turn import STAGES, load, turn
+from tests.pipeline.toy_run import STAGES, load, run_toy_stages
 
 WORK = Path(".work/mill")
 
@@ -52,40 +52,40 @@ def test_damage_is_named_and_mended_and_the_bytes_are_those_of_an_undisturbed_ru
     remade: tuple[str, ...],
 ) -> None:
     out = tmp_path / "out"
-    turn(write_config(), out, workers=workers)
+    run_toy_stages(write_config(), out, workers=workers)
     before = dict(record_times(out))
     config = write_config(**edited)
     for shard in damaged:
         flip(next((out / WORK).glob(f"{shard}.*")), 3)
-    turn(config, out, workers=workers)
+    run_toy_stages(config, out, workers=workers)
     log = (out / WORK / "log.txt").read_text()
     for shard in damaged:
         named = next((out / WORK).glob(f"{shard}.*")).relative_to(out / WORK)
         assert f"{named} is damaged: its sha256 is not the one in its record; {named.stem} is made again" in log
     assert again(before, out) == {*damaged, *(name for name in before if name.startswith(remade))}
-    turn(config, tmp_path / "calm")
+    run_toy_stages(config, tmp_path / "calm")
     assert made(out) == made(tmp_path / "calm")
 
 
 def test_damage_in_the_running_stage_itself_is_mended(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
-    turn(write_config(), out, "grain")
+    run_toy_stages(write_config(), out, "grain")
     whole, before = made(out), dict(record_times(out))
     flip(out / WORK / "grain/harvest1-0.tar")
     (out / WORK / "grain/harvest2-1.tar").unlink()
-    turn(write_config(), out, "grain")
+    run_toy_stages(write_config(), out, "grain")
     assert again(before, out) == {"grain/harvest1-0", "grain/harvest2-1"}
     assert made(out) == whole
 
 
 def test_input_that_comes_back_with_other_bytes_is_read_again(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
-    turn(write_config(), out)
+    run_toy_stages(write_config(), out)
     before = dict(record_times(out))
     path = out / WORK / "salt/records/bag-0.json"
     flip(out / WORK / "salt/bag-0.txt", 0)
     path.unlink()
-    turn(write_config(), out)
+    run_toy_stages(write_config(), out)
     assert again(before, out) == {"salt/bag-0"}, "the same bytes came back"
 
     record = read_record(path)
@@ -93,18 +93,18 @@ def test_input_that_comes_back_with_other_bytes_is_read_again(tmp_path: Path, wr
     flip(out / WORK / "salt/bag-0.txt", 0)
     files = {"bag-0.txt": {"sha256": file_digest(out / WORK / "salt/bag-0.txt"), "bytes": 5}}
     path.write_bytes(replace(record, files=files).to_bytes())
-    assert turn(write_config(), out)["bread"].made == 6
+    assert run_toy_stages(write_config(), out)["bread"].made == 6
     assert "6 shards are made again: what it is made from has other bytes" in (out / WORK / "log.txt").read_text()
 
 
 def test_record_with_a_flipped_byte_has_its_shard_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
-    turn(write_config(), out)
+    run_toy_stages(write_config(), out)
     whole = made(out)
     path = out / WORK / "grain/records/harvest0-1.json"
     path.write_bytes(path.read_bytes().replace(b'"grains":4', b'"grains":5'))
     assert json.loads(path.read_bytes())["summary"] == {"grains": 5}
-    results = turn(write_config(), out)
+    results = run_toy_stages(write_config(), out)
     assert {name: result.made for name, result in results.items()} == {"salt": 0, "grain": 1, "flour": 0, "bread": 0}
     assert made(out) == whole
 
@@ -133,9 +133,9 @@ def test_disk_that_damages_what_was_made_again_just_now_stops_everything(tmp_pat
         ),
     }
     config = Config("mill", "1.0.0", 0, {"first": StrictModel(), "second": Other()}, tmp_path / "mill.yaml")
-    run_stage("first", stages, config, Places(tmp_path, "mill"), workers=1)
+    run_stage("first", stages, config, DatasetPaths(tmp_path, "mill"), workers=1)
     with pytest.raises(Fatal, match=r"first/a\.txt is damaged: .*, and a was made again just now: disk or memory"):
-        run_stage("second", stages, config, Places(tmp_path, "mill"), workers=1)
+        run_stage("second", stages, config, DatasetPaths(tmp_path, "mill"), workers=1)
 
 
 def in_place_of(path: Path, what: str) -> None:
@@ -157,43 +157,43 @@ SPOILT = ("half", "not UTF-8", "a list", "text", "deep", "long number", "empty",
 
 def test_record_that_is_none_any_more_has_its_shard_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
     out = tmp_path / "out"
-    turn(write_config(salt={"bags": len(SPOILT)}), out, "salt")
+    run_toy_stages(write_config(salt={"bags": len(SPOILT)}), out, "salt")
     whole = made(out)
     for number, what in enumerate(SPOILT):
         in_place_of(out / WORK / f"salt/records/bag-{number}.json", what)
     in_place_of(out / WORK / "salt/mill/manifest.json", "a folder")
-    assert turn(write_config(salt={"bags": len(SPOILT)}), out, "salt")["salt"].made == len(SPOILT)
+    assert run_toy_stages(write_config(salt={"bags": len(SPOILT)}), out, "salt")["salt"].made == len(SPOILT)
     assert made(out) == whole
 
 
 def test_other_notes_of_the_mill_may_be_spoilt_too(tmp_path: Path, write_config: WriteConfig) -> None:
     out, config = tmp_path / "out", write_config(salt={"bags": 2})
-    turn(config, out, "salt")
+    run_toy_stages(config, out, "salt")
     whole, stage = made(out), out / WORK / "salt"
     for what in SPOILT:
         (stage / "mill/published.json").write_bytes(b"[]")
         (stage / "failed/bag-1.json").write_bytes(b"{}")
         for note in ("mill/manifest.json", "mill/published.json", "failed/bag-1.json"):
             in_place_of(stage / note, what)
-        list(status_lines(load(config), STAGES, Places(out, "mill"), workers=1))
-        turn(config, out, "salt")
+        list(status_lines(load(config), STAGES, DatasetPaths(out, "mill"), workers=1))
+        run_toy_stages(config, out, "salt")
         remove(stage / "mill/published.json")
         assert made(out) == whole, what
     (stage / "records/bag-1.json").unlink()
     for what in SPOILT:
         (stage / "failed/bag-1.json").write_bytes(b"{}")
         in_place_of(stage / "failed/bag-1.json", what)
-        lines = list(status_lines(load(config), STAGES, Places(out, "mill"), workers=1))
+        lines = list(status_lines(load(config), STAGES, DatasetPaths(out, "mill"), workers=1))
         assert any(line.split()[:3] == ["salt", "1/2", "0"] for line in lines), what
         remove(stage / "failed/bag-1.json")
 
 
 def test_folder_in_place_of_a_shard_is_taken_for_damage(tmp_path: Path, write_config: WriteConfig) -> None:
     out, config = tmp_path / "out", write_config(grain={"fields": 1, "wanted": 8})
-    turn(config, out, "grain")
+    run_toy_stages(config, out, "grain")
     whole = made(out)
     in_place_of(out / WORK / "grain/harvest0-0.tar", "a folder")
-    assert turn(config, out, "grain")["grain"].made == 1
+    assert run_toy_stages(config, out, "grain")["grain"].made == 1
     assert made(out) == whole
 
 
@@ -201,9 +201,9 @@ def test_listing_that_names_a_file_elsewhere_takes_nothing_away_there(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:
     out, outside, small = tmp_path / "out", tmp_path / "precious.txt", {"fields": 1, "wanted": 1}
-    turn(write_config(grain=small), out)
+    run_toy_stages(write_config(grain=small), out)
     outside.write_text("mine")
     (out / WORK / "bread/mill/published.json").write_text('["../precious.txt"]')
-    turn(write_config(grain=small), out)
+    run_toy_stages(write_config(grain=small), out)
     assert outside.read_text() == "mine"
     assert json.loads((out / WORK / "bread/mill/published.json").read_bytes()) == ["mill/loaves/0.bin"]

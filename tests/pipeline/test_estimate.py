@@ -9,7 +9,7 @@ import pytest
 from pipeline.config import Config, StrictModel
 from pipeline.errors import ConfigError
 from pipeline.estimate import plan_lines
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 
@@ -52,7 +52,7 @@ def write_nothing(task: Task) -> Outcome:
 
 CORN = Stage(
     "corn", __name__, CornConfig, (), corn_plan, write_samples, lambda _: 0,
-    asked=corn_asked, trial=lambda config: CornConfig(wanted=20),
+    requested_samples=corn_asked, trial_config=lambda config: CornConfig(wanted=20),
 )  # fmt: skip
 FLOUR = Stage("flour", __name__, StrictModel, ("corn",), flour_plan, write_samples, lambda _: 0)
 IDLE = Stage("idle", __name__, StrictModel, (), lambda _: [], write_nothing, lambda _: 0)
@@ -64,7 +64,7 @@ def config(wanted: int = 400) -> Config:
     return Config("mill", "1.0.0", 3, sections, Path("mill.yaml"))
 
 
-def planned(places: Places, asked: Config) -> tuple[dict[str, list[str]], list[str]]:
+def planned(places: DatasetPaths, asked: Config) -> tuple[dict[str, list[str]], list[str]]:
     """The table's rows by stage, without their times, and the lines about it."""
     lines = list(plan_lines(asked, STAGES, places, workers=2))
     first = next(number for number, line in enumerate(lines) if line.startswith("stage"))
@@ -74,7 +74,7 @@ def planned(places: Places, asked: Config) -> tuple[dict[str, list[str]], list[s
 
 
 def test_a_trial_of_few_samples_is_scaled_to_what_is_asked_and_leaves_nothing(tmp_path: Path) -> None:
-    rows, notes = planned(Places(tmp_path, "mill"), config())
+    rows, notes = planned(DatasetPaths(tmp_path, "mill"), config())
     assert rows == {
         "corn": ["4", "400", "400.0 kB"],
         "flour": ["5", "400", "401.0 kB"],  # a label is written once, for twenty samples or for 400
@@ -86,7 +86,7 @@ def test_a_trial_of_few_samples_is_scaled_to_what_is_asked_and_leaves_nothing(tm
 
 
 def test_what_is_made_is_counted_and_needs_no_trial(tmp_path: Path) -> None:
-    places, asked = Places(tmp_path, "mill"), config(250)
+    places, asked = DatasetPaths(tmp_path, "mill"), config(250)
     for name in STAGES:
         run_stage(name, STAGES, asked, places, workers=1)
     rows, notes = planned(places, asked)
@@ -95,7 +95,7 @@ def test_what_is_made_is_counted_and_needs_no_trial(tmp_path: Path) -> None:
 
 
 def test_what_is_made_of_a_stage_tells_what_the_rest_will_take(tmp_path: Path) -> None:
-    places, asked = Places(tmp_path, "mill"), config(250)
+    places, asked = DatasetPaths(tmp_path, "mill"), config(250)
     for name in STAGES:
         run_stage(name, STAGES, asked, places, workers=1)
     for name in ("corn-1", "label"):
@@ -111,5 +111,5 @@ def test_a_trial_that_fails_is_told_as_what_the_run_would_meet(tmp_path: Path) -
 
     stages = {**STAGES, "flour": Stage("flour", __name__, StrictModel, ("corn",), flour_plan, fail, lambda _: 0)}
     with pytest.raises(ConfigError, match="the trial of flour failed, as the run would: ValueError: the stones are"):
-        list(plan_lines(config(), stages, Places(tmp_path, "mill"), workers=2))
+        list(plan_lines(config(), stages, DatasetPaths(tmp_path, "mill"), workers=2))
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]

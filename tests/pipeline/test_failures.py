@@ -18,14 +18,14 @@ import pytest
 
 from pipeline.errors import ConfigError, Fatal
 from tests.pipeline.conftest import WriteConfig, made
-from tests.pipeline.turn import turn
+from tests.pipeline.toy_run import run_toy_stages
 
 ROOT = Path(__file__).resolve().parents[2]
 WORK = Path(".work/mill")
 
 
 def mill(config: Path, out: Path, stage: str, workers: int = 1) -> list[str]:
-    command = [sys.executable, "-m", "tests.pipeline.turn", "run", stage]
+    command = [sys.executable, "-m", "tests.pipeline.toy_run", "run", stage]
     return [*command, "--config", str(config), "--out", str(out), "--workers", str(workers)]
 
 
@@ -51,9 +51,9 @@ def alive(pids: set[int]) -> bool:
 
 def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"seconds": 0.1})
-    turn(config, tmp_path / "whole", workers=2)
+    run_toy_stages(config, tmp_path / "whole", workers=2)
     out = tmp_path / "killed"
-    turn(config, out, "salt", "grain")
+    run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(mill(config, out, "flour", workers=2), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
         flour = out / WORK / "flour"
         wait_until(lambda: list(flour.glob("records/*.json")) and list(flour.glob(".*.tmp")))
@@ -63,15 +63,15 @@ def test_killed_run_goes_on_to_the_same_bytes_and_leaves_no_worker(tmp_path: Pat
     assert len(workers) >= 2
     wait_until(lambda: not alive(workers), seconds=10)
     assert 0 < len(list(flour.glob("records/*.json"))) < 6
-    result = turn(config, out)["flour"]
+    result = run_toy_stages(config, out)["flour"]
     assert 0 < result.made < 6
     assert made(out) == made(tmp_path / "whole")
 
 
 def test_shard_whose_worker_dies_once_is_made_by_another(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "calm", "salt", "grain", "flour")
+    run_toy_stages(write_config(), tmp_path / "calm", "salt", "grain", "flour")
     config = write_config(flour={"trouble": {"harvest1-0": "dies once"}})
-    results = turn(config, tmp_path / "troubled", "salt", "grain", "flour", workers=2)
+    results = run_toy_stages(config, tmp_path / "troubled", "salt", "grain", "flour", workers=2)
     assert not results["flour"].failed
     shards = [made(tmp_path / out)[str(WORK / "flour/harvest1-0.tar")] for out in ("calm", "troubled")]
     assert shards[0] == shards[1]
@@ -82,7 +82,7 @@ def test_shard_that_keeps_killing_its_worker_is_set_aside_and_the_rest_is_made(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:
     config = write_config(flour={"trouble": {"harvest0-1": "dies"}})
-    turn(config, tmp_path / "out", "salt", "grain")
+    run_toy_stages(config, tmp_path / "out", "salt", "grain")
     run = subprocess.run(
         mill(config, tmp_path / "out", "flour", workers=2), cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -94,12 +94,12 @@ def test_shard_that_keeps_killing_its_worker_is_set_aside_and_the_rest_is_made(
     assert not list(flour.glob(".*.tmp"))
     assert "worker process died" in json.loads((flour / "failed/harvest0-1.json").read_bytes())["message"]
     with pytest.raises(ConfigError, match="bread reads flour, and 1 of its 6 shards"):
-        turn(config, tmp_path / "out", "bread")
+        run_toy_stages(config, tmp_path / "out", "bread")
 
 
 def test_shard_that_fails_once_is_made_at_the_second_try(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest0-1": "fails once"}})
-    assert not turn(config, tmp_path / "out", "salt", "grain", "flour")["flour"].failed
+    assert not run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")["flour"].failed
     assert (tmp_path / "marks/harvest0-1").read_text() == "xx"
 
 
@@ -107,21 +107,21 @@ def test_failing_shard_is_tried_three_times_then_set_aside_until_the_next_run(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:
     config = write_config(flour={"trouble": {"harvest2-0": "fails"}})
-    result = turn(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
+    result = run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
     assert result.failed == {"harvest2-0": "the stones are blunt"}
     assert result.made == 5
     assert (tmp_path / "marks/harvest2-0").read_text() == "xxx"
     failed = tmp_path / "out" / WORK / "flour/failed/harvest2-0.json"
     assert "ShardFailed: the stones are blunt" in json.loads(failed.read_bytes())["trace"]
-    assert turn(config, tmp_path / "out", "flour")["flour"].failed == result.failed
+    assert run_toy_stages(config, tmp_path / "out", "flour")["flour"].failed == result.failed
     assert (tmp_path / "marks/harvest2-0").read_text() == "xxxxxx"
-    assert not turn(write_config(), tmp_path / "out", "flour")["flour"].failed
+    assert not run_toy_stages(write_config(), tmp_path / "out", "flour")["flour"].failed
     assert not failed.exists()
 
 
 def test_shard_refused_as_a_whole_is_not_tried_again(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest2-0": "refuses"}})
-    result = turn(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
+    result = run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")["flour"]
     assert result.failed == {"harvest2-0": "stones in the grain"}
     assert (tmp_path / "marks/harvest2-0").read_text() == "x"
 
@@ -129,7 +129,7 @@ def test_shard_refused_as_a_whole_is_not_tried_again(tmp_path: Path, write_confi
 def test_no_space_stops_everything_and_leaves_whole_files(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest0-1": "no space"}})
     with pytest.raises(Fatal, match=r"shard harvest0-1 of flour: .*No space left on device"):
-        turn(config, tmp_path / "out", "salt", "grain", "flour")
+        run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour")
     flour = tmp_path / "out" / WORK / "flour"
     assert [path.name for path in flour.glob("*.tar")] == ["harvest0-0.tar"]
     assert not [path for path in flour.rglob("*") if path.suffix == ".tmp"]
@@ -138,7 +138,7 @@ def test_no_space_stops_everything_and_leaves_whole_files(tmp_path: Path, write_
 
 def test_file_over_the_limit_of_the_machine_stops_everything(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"trouble": {"harvest0-1": "big"}})
-    turn(config, tmp_path / "out", "salt", "grain")
+    run_toy_stages(config, tmp_path / "out", "salt", "grain")
     run = subprocess.run(
         mill(config, tmp_path / "out", "flour"),
         cwd=ROOT,
@@ -158,7 +158,7 @@ def test_file_over_the_limit_of_the_machine_stops_everything(tmp_path: Path, wri
 def test_full_disk_stops_everything_and_the_next_run_goes_on(tmp_path: Path, write_config: WriteConfig) -> None:
     disk, config = tmp_path / "disk", write_config(flour={"trouble": {"harvest0-1": "big"}})
     disk.mkdir()
-    turn(config, tmp_path / "out", "salt", "grain")
+    run_toy_stages(config, tmp_path / "out", "salt", "grain")
     flour = " ".join(mill(config, disk / "out", "flour"))
     script = f"mount -t tmpfs -o size=8m none {disk} || exit 77; cp -a {tmp_path}/out {disk}/out; {flour}; code=$?; "
     script += f"find {disk}/out -name '*.tmp'; ls {disk}/out/.work/mill/flour; exit $code"
@@ -180,23 +180,23 @@ def test_full_disk_stops_everything_and_the_next_run_goes_on(tmp_path: Path, wri
 def test_folder_that_cannot_be_written_stops_everything(tmp_path: Path, write_config: WriteConfig) -> None:
     tmp_path.joinpath("out").mkdir(mode=0o500)
     with pytest.raises(Fatal, match="cannot make folders"):
-        turn(write_config(), tmp_path / "out", "salt")
+        run_toy_stages(write_config(), tmp_path / "out", "salt")
 
 
 def test_out_that_is_a_file_is_told(tmp_path: Path, write_config: WriteConfig) -> None:
     (tmp_path / "out").write_text("not a folder")
     with pytest.raises(Fatal, match=r"cannot make folders under .*out"):
-        turn(write_config(), tmp_path / "out", "salt")
+        run_toy_stages(write_config(), tmp_path / "out", "salt")
 
 
 def test_second_run_in_the_same_place_is_refused(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(flour={"seconds": 0.5})
     out = tmp_path / "out"
-    turn(config, out, "salt", "grain")
+    run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(mill(config, out, "flour"), cwd=ROOT, stderr=subprocess.DEVNULL) as run:
         wait_until(lambda: list((out / WORK / "flour").glob(".*.tmp")))
         with pytest.raises(ConfigError, match="another run is at work"):
-            turn(config, out, "flour")
+            run_toy_stages(config, out, "flour")
         run.kill()
 
 
@@ -206,7 +206,7 @@ def test_signal_ends_the_run_with_its_workers_stopped_ones_too_and_leaves_whole_
 ) -> None:
     config = write_config(flour={"seconds": 0.5})
     out = tmp_path / "out"
-    turn(config, out, "salt", "grain")
+    run_toy_stages(config, out, "salt", "grain")
     with subprocess.Popen(
         mill(config, out, "flour"),
         cwd=ROOT,

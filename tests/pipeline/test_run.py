@@ -10,43 +10,43 @@ from typing import Any
 
 import pytest
 
-from pipeline.check import damaged_shards
 from pipeline.config import Config, StrictModel
 from pipeline.errors import ConfigError
-from pipeline.places import Places
+from pipeline.integrity import corrupted_shards
+from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.slices import Slice
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
 from tests.pipeline.conftest import WriteConfig, made, record_times
-from tests.pipeline.turn import turn
+from tests.pipeline.toy_run import run_toy_stages
 
 WORK = Path(".work/mill")
 
 
 def test_one_and_two_workers_make_the_same_bytes(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
-    turn(config, tmp_path / "one", workers=1)
-    turn(config, tmp_path / "two", workers=2)
+    run_toy_stages(config, tmp_path / "one", workers=1)
+    run_toy_stages(config, tmp_path / "two", workers=2)
     assert len(made(tmp_path / "one")) > 30
     assert made(tmp_path / "one") == made(tmp_path / "two")
 
 
 def test_another_seed_makes_other_bytes(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "three", "grain")
-    turn(write_config(seed=4), tmp_path / "four", "grain")
+    run_toy_stages(write_config(), tmp_path / "three", "grain")
+    run_toy_stages(write_config(seed=4), tmp_path / "four", "grain")
     first, second = (tmp_path / out / WORK / "grain/harvest0-0.tar" for out in ("three", "four"))
     assert first.read_bytes() != second.read_bytes()
 
 
 def test_shards_of_one_stage_draw_different_numbers(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "out", "grain")
+    run_toy_stages(write_config(), tmp_path / "out", "grain")
     tars = [path.read_bytes() for path in (tmp_path / "out" / WORK / "grain").glob("*.tar")]
     assert len({tar[512:] for tar in tars}) == len(tars) == 6
 
 
 def test_plan_grows_until_enough_is_made_and_no_further(tmp_path: Path, write_config: WriteConfig) -> None:
     # Four good grains a shard, two shards a harvest: 20 are reached with the third harvest.
-    result = turn(write_config(grain={"wanted": 20}), tmp_path / "out", "grain")["grain"]
+    result = run_toy_stages(write_config(grain={"wanted": 20}), tmp_path / "out", "grain")["grain"]
     assert result.made == 6
     names = sorted(path.name for path in (tmp_path / "out" / WORK / "grain").glob("*.tar"))
     assert names == [f"harvest{harvest}-{field}.tar" for harvest in range(3) for field in range(2)]
@@ -54,15 +54,15 @@ def test_plan_grows_until_enough_is_made_and_no_further(tmp_path: Path, write_co
 
 def test_second_run_makes_nothing_and_touches_nothing(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
-    turn(config, tmp_path / "out")
+    run_toy_stages(config, tmp_path / "out")
     times = record_times(tmp_path / "out")
-    results = turn(config, tmp_path / "out")
+    results = run_toy_stages(config, tmp_path / "out")
     assert [result.made for result in results.values()] == [0, 0, 0, 0]
     assert record_times(tmp_path / "out") == times
 
 
 def test_rejects_are_counted_by_reason_and_listed(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "out", "grain")
+    run_toy_stages(write_config(), tmp_path / "out", "grain")
     grain = tmp_path / "out" / WORK / "grain"
     record = json.loads((grain / "records/harvest0-1.json").read_bytes())
     assert record["rejects"] == {"hollow": 2}
@@ -76,9 +76,9 @@ def test_rejects_are_counted_by_reason_and_listed(tmp_path: Path, write_config: 
 def test_config_edit_rebuilds_the_stages_that_read_it_and_nothing_else(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:
-    turn(write_config(), tmp_path / "out")
+    run_toy_stages(write_config(), tmp_path / "out")
     before = record_times(tmp_path / "out")
-    results = turn(write_config(flour={"fineness": 3.0}), tmp_path / "out")
+    results = run_toy_stages(write_config(flour={"fineness": 3.0}), tmp_path / "out")
     assert {name: result.made for name, result in results.items()} == {"salt": 0, "grain": 0, "flour": 6, "bread": 6}
     after = record_times(tmp_path / "out")
     assert {name for name in before if before[name] == after[name]} == {
@@ -87,25 +87,25 @@ def test_config_edit_rebuilds_the_stages_that_read_it_and_nothing_else(
 
 
 def test_edited_config_gives_the_bytes_of_a_fresh_run(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "edited")
+    run_toy_stages(write_config(), tmp_path / "edited")
     edited = write_config(grain={"wanted": 10}, flour={"fineness": 3.0})
-    turn(edited, tmp_path / "edited")
-    turn(edited, tmp_path / "fresh")
+    run_toy_stages(edited, tmp_path / "edited")
+    run_toy_stages(edited, tmp_path / "fresh")
     assert made(tmp_path / "edited") == made(tmp_path / "fresh")
 
 
 def test_edit_and_edit_back_gives_the_first_bytes_again(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "out")
+    run_toy_stages(write_config(), tmp_path / "out")
     first = made(tmp_path / "out")
-    turn(write_config(salt={"spoons": 2}), tmp_path / "out")
+    run_toy_stages(write_config(salt={"spoons": 2}), tmp_path / "out")
     assert made(tmp_path / "out") != first
-    turn(write_config(), tmp_path / "out")
+    run_toy_stages(write_config(), tmp_path / "out")
     assert made(tmp_path / "out") == first
 
 
 def test_shards_no_longer_planned_are_removed(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(salt={"bags": 3}), tmp_path / "out", "salt")
-    turn(write_config(salt={"bags": 1}), tmp_path / "out", "salt")
+    run_toy_stages(write_config(salt={"bags": 3}), tmp_path / "out", "salt")
+    run_toy_stages(write_config(salt={"bags": 1}), tmp_path / "out", "salt")
     salt = tmp_path / "out" / WORK / "salt"
     assert [path.name for path in salt.glob("*.txt")] == ["bag-0.txt"]
     assert [path.name for path in (salt / "records").iterdir()] == ["bag-0.json"]
@@ -113,40 +113,40 @@ def test_shards_no_longer_planned_are_removed(tmp_path: Path, write_config: Writ
 
 def test_missing_or_shortened_file_is_made_again(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
-    turn(config, tmp_path / "out", "grain")
+    run_toy_stages(config, tmp_path / "out", "grain")
     whole = made(tmp_path / "out")
     grain = tmp_path / "out" / WORK / "grain"
     (grain / "harvest0-0.tar").unlink()
     (grain / "harvest2-1.tar").write_bytes(b"short")
-    assert turn(config, tmp_path / "out", "grain")["grain"].made == 2
+    assert run_toy_stages(config, tmp_path / "out", "grain")["grain"].made == 2
     assert made(tmp_path / "out") == whole
 
 
 def test_unreadable_record_counts_as_none(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
-    turn(config, tmp_path / "out", "grain")
+    run_toy_stages(config, tmp_path / "out", "grain")
     record = tmp_path / "out" / WORK / "grain/records/harvest0-0.json"
     record.write_bytes(record.read_bytes()[:40])
-    assert turn(config, tmp_path / "out", "grain")["grain"].made == 1
+    assert run_toy_stages(config, tmp_path / "out", "grain")["grain"].made == 1
 
 
 def test_files_left_half_written_are_removed(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
-    turn(config, tmp_path / "out", "grain")
+    run_toy_stages(config, tmp_path / "out", "grain")
     whole = made(tmp_path / "out")
     grain = tmp_path / "out" / WORK / "grain"
     (grain / ".harvest0-0.tar.tmp").write_bytes(b"half")
     (grain / "records/.harvest9-9.json.tmp").write_bytes(b"half")
     (grain / "progress/harvest0-0").write_text("1 6")
-    turn(config, tmp_path / "out", "grain")
+    run_toy_stages(config, tmp_path / "out", "grain")
     assert made(tmp_path / "out") == whole
 
 
 def test_stage_does_not_start_before_the_stages_it_reads_are_done(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
-    turn(config, tmp_path / "out", "salt")
+    run_toy_stages(config, tmp_path / "out", "salt")
     with pytest.raises(ConfigError, match=r"bread reads grain, and 2 of its 2 .* harvest0-0.* run stage grain first"):
-        turn(config, tmp_path / "out", "bread")
+        run_toy_stages(config, tmp_path / "out", "bread")
 
 
 def test_shards_that_read_nothing_of_other_stages_do_not_wait_for_them(tmp_path: Path) -> None:
@@ -163,9 +163,9 @@ def test_shards_that_read_nothing_of_other_stages_do_not_wait_for_them(tmp_path:
         lambda _: shards,
         make,
         lambda _: 0,
-        reads_inputs=lambda _, only: only != "stone",
+        uses_input=lambda _, only: only != "stone",
     )
-    stages, places = {"dough": dough, "oven": oven}, Places(tmp_path, "mill")
+    stages, places = {"dough": dough, "oven": oven}, DatasetPaths(tmp_path, "mill")
     config = Config("mill", "1.0.0", 3, {"dough": LoomsConfig(), "oven": LoomsConfig()}, tmp_path / "mill.yaml")
     with pytest.raises(ConfigError, match="run stage dough first"):
         run_stage("oven", stages, config, places, 1)
@@ -174,18 +174,18 @@ def test_shards_that_read_nothing_of_other_stages_do_not_wait_for_them(tmp_path:
 
 def test_disk_too_small_is_told_before_the_start(tmp_path: Path, write_config: WriteConfig) -> None:
     with pytest.raises(ConfigError, match=r"salt needs about 900\.0 TB .* a sample.*are free"):
-        turn(write_config(salt={"spoons": 900_000}), tmp_path / "out", "salt")
+        run_toy_stages(write_config(salt={"spoons": 900_000}), tmp_path / "out", "salt")
     assert not list((tmp_path / "out" / WORK / "salt").glob("*.txt"))
 
 
 def test_parts_of_a_job_array_together_make_the_whole(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config(salt={"bags": 5})
-    turn(config, tmp_path / "whole", "salt")
-    first = turn(config, tmp_path / "parts", "salt", part=Slice(1, 2))["salt"]
+    run_toy_stages(config, tmp_path / "whole", "salt")
+    first = run_toy_stages(config, tmp_path / "parts", "salt", part=Slice(1, 2))["salt"]
     assert (first.made, first.left) == (3, 2)
     salt = tmp_path / "parts" / WORK / "salt"
     assert not (salt / "mill/manifest.json").exists()
-    second = turn(config, tmp_path / "parts", "salt", part=Slice(2, 2))["salt"]
+    second = run_toy_stages(config, tmp_path / "parts", "salt", part=Slice(2, 2))["salt"]
     assert (second.made, second.left) == (2, 0)
     assert made(tmp_path / "parts") == made(tmp_path / "whole")
 
@@ -201,25 +201,25 @@ def test_plan_that_answers_differently_each_time_is_refused(tmp_path: Path) -> N
     )
     config = Config("mill", "1.0.0", 0, {"restless": StrictModel()}, tmp_path / "mill.yaml")
     with pytest.raises(ValueError, match="shard a was made just now, and is planned otherwise since"):
-        run_stage("restless", {"restless": restless}, config, Places(tmp_path, "mill"), workers=1)
+        run_stage("restless", {"restless": restless}, config, DatasetPaths(tmp_path, "mill"), workers=1)
 
 
 def test_published_files_follow_the_config(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "out")
+    run_toy_stages(write_config(), tmp_path / "out")
     loaves = tmp_path / "out/mill/loaves"
     assert sorted(path.name for path in loaves.iterdir()) == ["0.bin", "1.bin", "2.bin", "3.bin"]
     assert loaves.joinpath("1.bin").samefile(tmp_path / "out" / WORK / "bread/loaf-harvest0-1.bin")
     (loaves / "mine.txt").write_text("a user's own")
-    turn(write_config(bread={"loaves": 2}), tmp_path / "out")
+    run_toy_stages(write_config(bread={"loaves": 2}), tmp_path / "out")
     assert sorted(path.name for path in loaves.iterdir()) == ["0.bin", "1.bin", "mine.txt"]
 
 
 def test_published_file_that_went_missing_is_put_back(tmp_path: Path, write_config: WriteConfig) -> None:
     config = write_config()
-    turn(config, tmp_path / "out")
+    run_toy_stages(config, tmp_path / "out")
     whole = made(tmp_path / "out")
     (tmp_path / "out/mill/loaves/0.bin").unlink()
-    turn(config, tmp_path / "out", "bread")
+    run_toy_stages(config, tmp_path / "out", "bread")
     assert made(tmp_path / "out") == whole
 
 
@@ -237,7 +237,7 @@ def stage_of(shards: list[Shard], **more: Any) -> dict[str, Stage]:
 
 
 def weave(folder: Path, stages: dict[str, Stage], workers: int = 1, only: str = "", **section: str) -> int:
-    return run_stage("looms", stages, woven(folder, **section), Places(folder, "mill"), workers, only=only).made
+    return run_stage("looms", stages, woven(folder, **section), DatasetPaths(folder, "mill"), workers, only=only).made
 
 
 def woven(folder: Path, **section: str) -> Config:
@@ -273,13 +273,13 @@ def test_stage_may_publish_what_is_whole_before_all_is_made(tmp_path: Path) -> N
     def whole(plan: Plan) -> dict[str, str]:
         return {f"woven/{name}": f"{name}.json" for name in ("a", "b") if plan.summary("looms", name) is not None}
 
-    stages = stage_of([Shard("a"), Shard("b")], publish=whole, publishes_parts=True)
+    stages = stage_of([Shard("a"), Shard("b")], publish=whole, publishes_incomplete=True)
     weave(tmp_path, stages, only="a")
     assert [path.name for path in (tmp_path / "woven").iterdir()] == ["a"]
-    places = Places(tmp_path, "mill")
-    assert list(damaged_shards(woven(tmp_path), stages, places)) == [], "what nobody has asked for is no damage"
+    places = DatasetPaths(tmp_path, "mill")
+    assert list(corrupted_shards(woven(tmp_path), stages, places)) == [], "what nobody has asked for is no damage"
     (tmp_path / "woven/a").unlink()
-    (altered,) = damaged_shards(woven(tmp_path), stages, places)
+    (altered,) = corrupted_shards(woven(tmp_path), stages, places)
     assert altered == f"looms: {tmp_path}/woven/a is not what the stage made"
     weave(tmp_path, stages)
     assert sorted(path.name for path in (tmp_path / "woven").iterdir()) == ["a", "b"]

@@ -12,7 +12,7 @@ import pytest
 
 from pipeline.config import Config
 from pipeline.errors import ConfigError, Fatal, Rejected, ShardFailed
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.records import read_record
 from pipeline.stage import Outcome, Shard, Task
 from pipeline.task import Job, Report, make_shard
@@ -24,7 +24,7 @@ FLOUR_DIGEST = hashlib.sha256(b"flour").hexdigest()
 
 @pytest.fixture
 def make(tmp_path: Path) -> Callable[[Body], Report]:
-    places = Places(tmp_path, "toy")
+    places = DatasetPaths(tmp_path, "toy")
     for name in ("earlier", "own"):
         places.stage(name).make()
     (places.stage("earlier").root / "in.txt").write_text("flour")

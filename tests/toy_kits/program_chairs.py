@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.programs.files import shape_glb
 from stages.programs.program import find_program
 from stages.programs.schema import Values

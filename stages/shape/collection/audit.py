@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.shape.collection.packaged import Packaged
 
 
@@ -13,7 +13,7 @@ def _nothing(_: Packaged) -> Iterator[str]:
     return iter(())
 
 
-def _nothing_anew(_: Packaged, __: Places) -> Iterator[str]:
+def _nothing_anew(_: Packaged, __: DatasetPaths) -> Iterator[str]:
     return iter(())
 
 
@@ -28,4 +28,4 @@ class Audit:
     """
 
     faults: Callable[[Packaged], Iterator[str]] = _nothing
-    anew: Callable[[Packaged, Places], Iterator[str]] = _nothing_anew
+    anew: Callable[[Packaged, DatasetPaths], Iterator[str]] = _nothing_anew

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Plan, Task
 from stages.shape.arrays import IntArray
 from stages.shape.sample import Sample
@@ -64,5 +64,5 @@ class Language:
     speaker: Callable[[Task], Speaker]
     graphs: bool
     text: str
-    anew: Callable[[Places], Anew]
+    anew: Callable[[DatasetPaths], Anew]
     coordinates: str = ""

@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from stages.recovery.recover import PRETRAINED_FOLDER
 from stages.training.checkpoint import CheckpointError, checkpoint_bytes, load_checkpoint
 from stages.training.recovery.trained import RECOVERY_KIND, load_recovery, quantized_to_bytes

@@ -14,7 +14,7 @@ import numpy.typing as npt
 import torch
 from torch import Generator, Tensor
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.shards import json_bytes
 from pipeline.stage import Outcome, Task
 from stages.programs.program import Program, find_program

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.config import load_config
-from pipeline.places import Places, write_file
+from pipeline.paths import DatasetPaths, write_file
 from pipeline.randomness import decision_rng
 from pipeline.records import read_record
 from pipeline.registry import find_stages
@@ -92,7 +92,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("datasets"), help="the output folder of the run")
     asked = parser.parse_args()
     config = load_config(asked.config, {name: stage.config for name, stage in find_stages().items()})
-    places = Places(asked.out, config.name)
+    places = DatasetPaths(asked.out, config.name)
     shards = sorted(places.stage("variations").root.glob(f"{config.name}-*-*.tar"))
     if not shards:
         parser.error(f"{places.work} holds no variations; make them with: make variations CONFIG={asked.config}")

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from pipeline.config import nearest
+from pipeline.config import nearest_word
 from pipeline.errors import ConfigError
 from stages.shape.arrays import BoolArray
 from stages.shape.kit import Kit
@@ -20,7 +20,7 @@ def named_labels(kit: Kit, names: Iterable[str], key: str) -> BoolArray:
     names = list(names)
     for name in names:
         if name not in kit.labels:
-            close = nearest(name, kit.labels)
+            close = nearest_word(name, kit.labels)
             told = f"did you mean {close}?" if close else f"it has {', '.join(kit.labels)}"
             raise ConfigError(f"{key}: kit {kit.name} has no parts called {name}; {told}")
     found: BoolArray = np.isin(kit.labels, names)

@@ -22,7 +22,7 @@ from stages.exemplars.language import dataset_kits
 from stages.shape.kit import Assembly
 from stages.strings.compression import Codebook
 from stages.strings.settings import StringsConfig
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stated import stated
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,7 +46,7 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> DatasetRun:
     config = {"name": "small", "seed": 3, "exemplars": {"kits": kits}, "variations": variations}
     (folder / "small.yaml").write_text(yaml.safe_dump(config))
     for stage in ("autoconfig", "exemplars", "variations", "strings"):
-        code, said = mill("run", stage, "--config", folder / "small.yaml", "--out", folder, "--workers", 1)
+        code, said = shapemill("run", stage, "--config", folder / "small.yaml", "--out", folder, "--workers", 1)
         assert code == 0, said
     return load_dataset_run(folder / "small.yaml", folder)
 
@@ -67,8 +67,8 @@ def test_a_collection_grows_by_what_is_new_in_each_step() -> None:
 
 
 def test_growth_agrees_with_the_records_of_the_search(subject: DatasetRun) -> None:
-    places = subject.places.stage("variations")
-    for name, kit in dataset_kits(subject.places).items():
+    places = subject.paths.stage("variations")
+    for name, kit in dataset_kits(subject.paths).items():
         found = grown(kit, places.root, StringsConfig(), 3)
         records = [read_record(path) for path in sorted(places.records.glob(f"{name}-r*-pool.json"))]
         summary = records[-1].summary
@@ -87,7 +87,7 @@ def test_growth_agrees_with_the_records_of_the_search(subject: DatasetRun) -> No
 
 
 def test_a_shape_is_one_generation_above_the_highest_of_its_parents(subject: DatasetRun) -> None:
-    folder = subject.places.stage("variations").root
+    folder = subject.paths.stage("variations").root
     parents = {
         f"{path.name.removesuffix('.lineage.jsonl')}-{number}": json.loads(line)["parents"]
         for path in folder.glob("castle-r*.lineage.jsonl")
@@ -120,7 +120,7 @@ def test_growth_is_a_table_of_what_has_been_searched(subject: DatasetRun, tmp_pa
 
 
 def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: DatasetRun) -> None:
-    for kit in dataset_kits(subject.places).values():
+    for kit in dataset_kits(subject.paths).values():
         for exemplar in kit.exemplars:
             shapes = [exemplar.assembly]
             rows = {
@@ -136,7 +136,7 @@ def test_a_tree_is_shorter_than_the_whole_graph_by_its_cycle_numbers(subject: Da
 
 
 def test_shapes_in_pieces_are_counted_as_without_strings(subject: DatasetRun) -> None:
-    kit = dataset_kits(subject.places)["castle"]
+    kit = dataset_kits(subject.paths)["castle"]
     whole = kit.exemplars[0].assembly
     apart = Assembly(whole.types, whole.poses, whole.edges[:10])
     row = dict(zip(COLUMNS, corpus_row("two", kit, [whole, apart], "tree", np.random.default_rng(1)), strict=True))
@@ -156,8 +156,8 @@ def test_corpora_is_a_table_of_inputs_and_variants(subject: DatasetRun) -> None:
 
 
 def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: DatasetRun) -> None:
-    for name, kit in dataset_kits(subject.places).items():
-        finds = [each.assembly for each in read_finds(subject.places.stage("variations").root, name)]
+    for name, kit in dataset_kits(subject.paths).items():
+        finds = [each.assembly for each in read_finds(subject.paths.stage("variations").root, name)]
         for edges in ("all", "tree"):
             book = Codebook(kit, edges)
             trips = [round_trip(book, each) for each in finds]
@@ -172,7 +172,7 @@ def test_every_shape_of_a_search_comes_back_from_its_bytes(subject: DatasetRun) 
 
 def test_a_shape_that_does_not_come_back_is_told(subject: DatasetRun) -> None:
     """A part that touches another in a way that the kit has not seen: a tree cannot find that contact again."""
-    kit = dataset_kits(subject.places)["castle"]
+    kit = dataset_kits(subject.paths)["castle"]
     whole = kit.exemplars[0].assembly
     touching = {tuple(each) for each in whole.edges.tolist()}
     apart = next(pair for pair in combinations(range(len(whole)), 2) if pair not in touching)

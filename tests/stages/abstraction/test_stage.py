@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from tests.mill import mill
+from tests.command import shapemill
 
 
 def made(folder: Path, name: str, asked: dict[str, Any], stages: tuple[str, ...]) -> tuple[Path, Path]:
@@ -20,7 +20,7 @@ def made(folder: Path, name: str, asked: dict[str, Any], stages: tuple[str, ...]
     config = folder / f"{name}.yaml"
     config.write_text(yaml.safe_dump({"name": name, "seed": 5, "license": "MIT", **sections}))
     for stage in stages:
-        code, printed = mill("run", stage, "--config", config, "--out", folder, "--workers", 1)
+        code, printed = shapemill("run", stage, "--config", config, "--out", folder, "--workers", 1)
         assert code == 0, printed
     return config, folder / ".work" / name / "abstraction"
 

@@ -12,7 +12,7 @@ import yaml
 
 from stages.inspection.inspect import main
 from stages.shape.sample import read_samples
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stages.variations.test_stage import write_model
 from tests.stated import stated
 from tests.toy_kits.chains_and_rings import ROAD, ring
@@ -27,7 +27,7 @@ def run(folder: Path, stages: tuple[str, ...], out: str = "out") -> str:
     printed = ""
     for stage in stages:
         arguments = ("--config", folder / "toy.yaml", "--out", folder / out, "--workers", 1)
-        code, said = mill("run", stage, *arguments)
+        code, said = shapemill("run", stage, *arguments)
         assert code == 0, said
         printed += said
     return printed

@@ -12,7 +12,7 @@ from PIL import Image
 
 from pipeline.config import Config, load_config
 from pipeline.errors import ConfigError
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.status import status_lines
 from stages.autoconfig.stage import STAGE as AUTOCONFIG
@@ -44,7 +44,7 @@ def write_config(folder: Path, kits: list[dict[str, Any]]) -> Config:
 
 def run(folder: Path, config: Config, out: str = "out") -> tuple[str, ...]:
     """The shards that were set aside."""
-    return tuple(run_stage("exemplars", STAGES, config, Places(folder / out, config.name), 1).failed)
+    return tuple(run_stage("exemplars", STAGES, config, DatasetPaths(folder / out, config.name), 1).failed)
 
 
 def files(folder: Path, out: str = "out") -> dict[str, bytes]:
@@ -94,7 +94,7 @@ def test_the_record_says_what_was_found(made: tuple[Path, Config]) -> None:
 
 def test_people_are_told_a_line_for_each_kit(made: tuple[Path, Config]) -> None:
     folder, config = made
-    lines = "\n".join(status_lines(config, STAGES, Places(folder / "out", "toy"), 1))
+    lines = "\n".join(status_lines(config, STAGES, DatasetPaths(folder / "out", "toy"), 1))
     assert "row: 3 + 5 parts of 1 types, 2 neighbourhoods, 1 dockings" in lines
 
 

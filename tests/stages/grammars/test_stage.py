@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stages.symmetry.planted import mesh, wall
 
 CONFIG = """\
@@ -34,7 +34,7 @@ def test_a_mesh_becomes_shards_of_other_walls_and_the_run_says_that_there_are_no
 ) -> None:
     config = tmp_path / "walls.yaml"
     config.write_text(CONFIG.format(model=model, resized=9))
-    code, said = mill("run", "grammars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    code, said = shapemill("run", "grammars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code == 0, said
     assert "3 samples" in said
     assert "wall: 3 of 11 shapes that are asked for" in said

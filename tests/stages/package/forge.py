@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from pipeline.shards import ShardWriter, array_bytes, bytes_array, json_bytes
 from stages.package.croissant import INDEX
 from stages.package.index import index_row, tar_bytes, write_index

@@ -16,7 +16,7 @@ import pyarrow.parquet
 import pytest
 import yaml
 
-from pipeline.places import Places, file_digest
+from pipeline.paths import DatasetPaths, file_digest
 from pipeline.run import run_stage
 from pipeline.shards import bytes_array, read_shard
 from stages.package.verify_samples import empty_values
@@ -235,7 +235,7 @@ def test_a_sample_that_one_stage_has_refused_is_left_out_and_counted(toy_folder:
 def test_a_new_title_makes_card_and_picture_again_and_no_shard(toy_folder: Path, tmp_path: Path) -> None:
     shutil.copytree(toy_folder.parent, tmp_path / "out")
     config = replace(toy_config(), title="Other")
-    result = run_stage("package", TOY_STAGES, config, Places(tmp_path / "out", "toy"), 1)
+    result = run_stage("package", TOY_STAGES, config, DatasetPaths(tmp_path / "out", "toy"), 1)
     assert result.made == 2
     before, after = digests(toy_folder), digests(tmp_path / "out/toy")
     changed = {file for file in after if after[file] != before[file]}

@@ -29,7 +29,7 @@ def flip(path: Path, place: int) -> None:
 
 def rewrite(folder: Path, file: str, change: Callable[[str], str]) -> None:
     """Change a text file and its checksum, as who makes a dataset wrongly would."""
-    from pipeline.places import file_digest
+    from pipeline.paths import file_digest
 
     before = file_digest(folder / file)
     (folder / file).write_text(change((folder / file).read_text()))
@@ -94,7 +94,7 @@ def test_croissant_and_manifest_must_name_the_same_shards(folder: Path) -> None:
 
 def test_samples_that_break_the_rules_are_found(folder: Path) -> None:
     """A shard with whole bytes and wrong contents: a null in a JSON, a label that is not its part's type."""
-    from pipeline.places import file_digest
+    from pipeline.paths import file_digest
     from pipeline.shards import ShardWriter, array_bytes, bytes_array, read_shard
 
     samples = list(read_shard(folder / SHARD))

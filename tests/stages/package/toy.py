@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.config import Config, StrictModel
 from pipeline.errors import Rejected
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -208,6 +208,6 @@ def toy_config(shards: int = 4) -> Config:
 def make_toy(out: Path, config: Config, workers: int = 1) -> Path:
     """Run every stage below `out`; the dataset's folder."""
     for name in TOY_STAGES:
-        result = run_stage(name, TOY_STAGES, config, Places(out, config.name), workers)
+        result = run_stage(name, TOY_STAGES, config, DatasetPaths(out, config.name), workers)
         assert not result.failed, result.failed
     return out / config.name

@@ -17,9 +17,9 @@ import yaml
 
 from pipeline.config import load_config
 from pipeline.errors import ConfigError
-from pipeline.places import Places
+from pipeline.inventory import Inventory
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
-from pipeline.survey import Survey
 from pipeline.task import Report, make_shard
 from stages.programs.conditions import Condition
 from stages.programs.curves import Part, box
@@ -81,8 +81,8 @@ def make(folder: Path, program: str, samples: int, *stages: str) -> tuple[list[R
     path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section, **small}))
     found = find_stages()
     config = load_config(path, {name: stage.config for name, stage in found.items()})
-    places, reports = Places(folder / "out", "toy"), []
-    survey = Survey(config, found, places)
+    places, reports = DatasetPaths(folder / "out", "toy"), []
+    survey = Inventory(config, found, places)
     for stage in stages or ("programs",):
         places.stage(stage).make()
         surveyed = survey.stage(stage)

@@ -14,7 +14,7 @@ from stages.programs.effect import has_effect
 from stages.programs.program import find_program, shape_from_text
 from stages.programs.sampling import structure_digest
 from stages.shape.sample import Sample, read_samples
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stages.programs.stool import PROGRAM as STOOL_PROGRAM
 
 STOOL, RACK = "tests.stages.programs.stool", "tests.stages.programs.rack"
@@ -32,7 +32,7 @@ def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[in
     path = folder / "toy.yaml"
     path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "programs": section}))
     out = folder / f"out-{workers}"
-    code, printed = mill("run", "programs", "--config", path, "--out", out, "--workers", workers)
+    code, printed = shapemill("run", "programs", "--config", path, "--out", out, "--workers", workers)
     return code, printed, out / ".work" / "toy" / "programs"
 
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from stages.shape.sample import Sample, read_samples
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stages.proportions.stools import MESHES, STOOL
 from tests.stated import stated
 from tests.toy_kits.chains_and_rings import write_model
@@ -37,7 +37,7 @@ def write_config(folder: Path, **section: object) -> Path:
 def run(config: Path, out: Path, *stages: str, workers: int = 1) -> str:
     printed = ""
     for stage in stages:
-        code, said = mill("run", stage, "--config", config, "--out", out, "--workers", workers)
+        code, said = shapemill("run", stage, "--config", config, "--out", out, "--workers", workers)
         assert code == 0, said
         printed += said
     return printed
@@ -60,16 +60,16 @@ def test_a_dataset_of_stools_goes_the_whole_way_and_is_the_same_with_two_workers
     run(config, tmp_path / "two", *STAGES, workers=2)
     assert [(each.key, each.text) for each in samples(tmp_path / "two")] == [(each.key, each.text) for each in found]
     run(config, tmp_path / "one", "validity", "abstraction", "strings", "points", "sketches", "package")
-    code, said = mill("verify", "--config", config, "--out", tmp_path / "one")
+    code, said = shapemill("verify", "--config", config, "--out", tmp_path / "one")
     assert code == 0, said
 
 
 def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
     config = write_config(tmp_path, apart=0.4)
-    code, said = mill("run", "autoconfig", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    code, said = shapemill("run", "autoconfig", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code == 0, said
-    mill("run", "exemplars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
-    code, said = mill("run", "proportions", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    shapemill("run", "exemplars", "--config", config, "--out", tmp_path / "out", "--workers", 1)
+    code, said = shapemill("run", "proportions", "--config", config, "--out", tmp_path / "out", "--workers", 1)
     assert code != 0
     assert "set proportions.spread or proportions.apart smaller" in said
 
@@ -77,6 +77,6 @@ def test_a_run_that_finds_too_few_says_what_would_help(tmp_path: Path) -> None:
 def test_no_proportions_without_exemplars(tmp_path: Path) -> None:
     path = tmp_path / "stools.yaml"
     path.write_text(yaml.safe_dump({"name": "stools", "seed": 1, "proportions": {"samples_per_kit": 3}}))
-    code, said = mill("plan", "--config", path, "--out", tmp_path / "out")
+    code, said = shapemill("plan", "--config", path, "--out", tmp_path / "out")
     assert code == 2
     assert "exemplars.kits" in said

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.shards import ShardWriter
 from stages.exemplars.language import LANGUAGE
 from stages.package.glb import glb_bytes
@@ -85,7 +85,7 @@ def test_samples_carry_stretches_where_there_are_any(kit: Kit, tmp_path: Path) -
 
 
 def test_a_record_says_pose_and_stretch_in_one_matrix(kit: Kit, tmp_path: Path) -> None:
-    places = Places(tmp_path, "dataset")
+    places = DatasetPaths(tmp_path, "dataset")
     root = places.stage("exemplars").root
     root.mkdir(parents=True)
     with (root / "toy.json").open("wb") as text, (root / "toy.tar").open("wb") as arrays:

@@ -21,7 +21,7 @@ from stages.shapeassembly.analysis.structure import signature
 from stages.shapeassembly.settings import ProgramFiles, ShapeAssemblyConfig
 from stages.shapeassembly.shape import shape_of_text
 from stages.shapeassembly.splits import splits_of
-from tests.mill import mill
+from tests.command import shapemill
 
 EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 CHAIR = next(path.read_text() for path in EXAMPLES if path.stem == "chair-slats")
@@ -46,7 +46,7 @@ def make(folder: Path, section: dict[str, object], workers: int = 1) -> tuple[in
     path = folder / "toy.yaml"
     path.write_text(yaml.safe_dump({"name": "toy", "seed": 5, "shapeassembly": section}))
     out = folder / f"out-{workers}"
-    code, printed = mill("run", "shapeassembly", "--config", path, "--out", out, "--workers", workers)
+    code, printed = shapemill("run", "shapeassembly", "--config", path, "--out", out, "--workers", workers)
     return code, printed, out / ".work" / "toy" / "shapeassembly"
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.config import Config, StrictModel
 from pipeline.errors import ConfigError
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import RunResult, run_stage
 from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -93,7 +93,7 @@ def toys(flat: bool = False, **keys: object) -> Config:
 def turn(out: Path, flat: bool = False, **keys: object) -> dict[str, RunResult]:
     """Run all stages in this process."""
     config = toys(flat, **keys)
-    return {name: run_stage(name, STAGES, config, Places(out, "toys"), workers=1) for name in STAGES}
+    return {name: run_stage(name, STAGES, config, DatasetPaths(out, "toys"), workers=1) for name in STAGES}
 
 
 def made(out: Path, **keys: object) -> dict[str, list[tuple[str, dict[str, bytes]]]]:
@@ -144,7 +144,7 @@ def test_the_records_and_the_report_say_what_drew(tmp_path):
     drawn = {(each["summary"]["backend"], each["summary"]["renderer"]) for each in records}
     assert len(records) == 2
     assert drawn == {("raster", RasterRenderer.name)}
-    status = list(status_lines(toys(), STAGES, Places(tmp_path, "toys"), workers=1))
+    status = list(status_lines(toys(), STAGES, DatasetPaths(tmp_path, "toys"), workers=1))
     assert f"sketches: 2 shards drawn by raster, {RasterRenderer.name}" in status
 
 

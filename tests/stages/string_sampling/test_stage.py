@@ -13,7 +13,7 @@ import yaml
 
 from eval.engine.dataset_run import load_dataset_run
 from eval.engine.registry import find_tables
-from pipeline.places import Places, file_digest
+from pipeline.paths import DatasetPaths, file_digest
 from stages.exemplars.language import dataset_kits
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Kit
@@ -21,7 +21,7 @@ from stages.shape.sample import Sample, read_samples
 from stages.strings.alphabet import make_alphabet
 from stages.strings.compiled_grammar import compile_grammar, patterns_json
 from stages.strings.decoder import decode
-from tests.mill import mill
+from tests.command import shapemill
 from tests.pipeline.conftest import made
 from tests.stages.string_sampling.trained_model import publish_model
 from tests.stated import stated
@@ -60,7 +60,7 @@ def run(config: Path, out: Path, *stages: str, workers: int = 1) -> tuple[int, s
     """Run stages until one fails; the last exit code and all that was printed."""
     printed = ""
     for stage in stages:
-        code, said = mill("run", stage, "--config", config, "--out", out, "--workers", workers)
+        code, said = shapemill("run", stage, "--config", config, "--out", out, "--workers", workers)
         printed += said
         if code:
             return code, printed
@@ -87,11 +87,11 @@ def with_kit(bare: Path, folder: Path) -> Path:
 
 
 def kit_in(out: Path) -> Kit:
-    return dataset_kits(Places(out, "dreamt"))["chain"]
+    return dataset_kits(DatasetPaths(out, "dreamt"))["chain"]
 
 
 def samples(out: Path) -> list[Sample]:
-    root = Places(out, "dreamt").stage("string_sampling").root
+    root = DatasetPaths(out, "dreamt").stage("string_sampling").root
     return [each for path in sorted(root.glob("dreamt-*-0*.tar")) for each in read_samples(path)]
 
 
@@ -123,7 +123,7 @@ def test_shapes_are_new_different_and_say_where_they_are_from(dreamt: tuple[Path
 
 
 def test_what_is_refused_is_counted_by_its_reason(dreamt: tuple[Path, str]) -> None:
-    records = Places(dreamt[0], "dreamt").stage("string_sampling").records
+    records = DatasetPaths(dreamt[0], "dreamt").stage("string_sampling").records
     lanes = [json.loads(path.read_bytes()) for path in sorted(records.glob("s00-*-lane*.json"))]
     refused = {reason for lane in lanes for reason in lane["rejects"]}
     assert {"known: train", "duplicate"} <= refused
@@ -140,7 +140,7 @@ def test_bytes_are_the_same_with_two_workers(dreamt: tuple[Path, str], bare: Pat
 
 def test_known_shapes_are_kept_and_marked_where_they_are_asked_for(bare: Path, tmp_path: Path) -> None:
     config = write_config(tmp_path, known="keep", rounds=2)
-    kit = dataset_kits(Places(bare, "dreamt"))["chain"]
+    kit = dataset_kits(DatasetPaths(bare, "dreamt"))["chain"]
     publish_model(tmp_path, "learnt", kit, [string_of(4)])
     assert run(config, tmp_path, *STAGES)[0] == 0
     marks = {each.lineage["string"]: each.lineage["known"] for each in samples(tmp_path)}
@@ -153,7 +153,7 @@ def test_dreamt_shapes_go_the_whole_way(dreamt: tuple[Path, str], bare: Path) ->
     folder, config = dreamt[0], bare / "dreamt.yaml"
     code, said = run(config, folder, *SERVED)
     assert code == 0, said
-    code, said = mill("verify", "--config", config, "--out", folder, "--samples", "all")
+    code, said = shapemill("verify", "--config", config, "--out", folder, "--samples", "all")
     assert code == 0, said
     card = (folder / "dreamt/README.md").read_text()
     assert "models that have learnt the strings of other shapes write new ones" in card

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.shape.collection.packaged import Packaged
 from stages.shape.collection.pairs import CONTACTS, pair_bytes
 from stages.shape.graphs.canonical import graph_digest
@@ -41,9 +41,9 @@ def sample(strings: list[str], said: Edges | None) -> Packaged:
 
 
 @pytest.fixture(scope="module")
-def places(tmp_path_factory: pytest.TempPathFactory) -> Places:
+def places(tmp_path_factory: pytest.TempPathFactory) -> DatasetPaths:
     """The mill's folders with the kit in them."""
-    found = Places(tmp_path_factory.mktemp("made"), "blocks")
+    found = DatasetPaths(tmp_path_factory.mktemp("made"), "blocks")
     folder = found.stage("exemplars").root
     folder.mkdir(parents=True)
     with open(folder / "cubes.json", "wb") as text, open(folder / "cubes.tar", "wb") as tar:
@@ -53,7 +53,7 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> Places:
 
 @pytest.mark.parametrize(("edges", "said"), [("all", None), ("all", "all"), ("faces", "faces"), ("tree", "tree")])
 def test_strings_of_each_kind_are_good_where_the_config_says_so(
-    edges: Edges, said: Edges | None, places: Places
+    edges: Edges, said: Edges | None, places: DatasetPaths
 ) -> None:
     found = sample(written(edges), said)
     assert list(string_faults(found)) == []
@@ -65,7 +65,7 @@ def test_strings_of_another_kind_are_found(edges: Edges, said: Edges) -> None:
     assert list(string_faults(sample(written(edges), said))) == ["line 1 of its txt stands for another graph"]
 
 
-def test_strings_that_tell_of_all_contacts_are_no_strings_of_faces(places: Places) -> None:
+def test_strings_that_tell_of_all_contacts_are_no_strings_of_faces(places: DatasetPaths) -> None:
     found = sample(written("all"), "faces")
     assert list(AUDIT.anew(found, places)) == ["its txt does not tell of its face contacts"]
     faces = written("faces")

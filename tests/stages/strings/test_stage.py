@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from pipeline.config import Config, StrictModel
-from pipeline.places import Places
+from pipeline.inventory import Inventory
+from pipeline.paths import DatasetPaths
 from pipeline.run import RunResult, run_stage
 from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from pipeline.survey import Survey
 from pipeline.task import make_shard
 from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit import Assembly, Grammar, Kit, PartType
@@ -118,8 +118,8 @@ def config(flaw: str = "", count: int = 8, edges: Edges = "all") -> Config:
 
 def make_here(wanted: Config, out: Path, stages: Sequence[str] = tuple(STAGES)) -> dict[str, str]:
     """Make stages in this process; the shards that failed, with what they said."""
-    places, failed = Places(out, wanted.name), {}
-    survey = Survey(wanted, STAGES, places)
+    places, failed = DatasetPaths(out, wanted.name), {}
+    survey = Inventory(wanted, STAGES, places)
     for name in stages:
         places.stage(name).make()
         surveyed = survey.stage(name)
@@ -137,7 +137,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The output folder of a run of the stage with one worker."""
     out = tmp_path_factory.mktemp("strings")
     assert make_here(config(), out, ("exemplars", "variations")) == {}
-    assert run_stage("strings", STAGES, config(), Places(out, "toys"), workers=1) == RunResult(made=4)
+    assert run_stage("strings", STAGES, config(), DatasetPaths(out, "toys"), workers=1) == RunResult(made=4)
     return out
 
 
@@ -146,7 +146,7 @@ def lines(out: Path, file: str) -> list[str]:
 
 
 def test_each_sample_has_its_canonical_string_and_distinct_random_ones(made: Path) -> None:
-    work = Places(made, "toys").work
+    work = DatasetPaths(made, "toys").work
     for shard in SPLITS:
         samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
         written = dict(read_shard(work / "strings" / f"{shard}.tar"))
@@ -166,7 +166,7 @@ def test_each_sample_has_its_canonical_string_and_distinct_random_ones(made: Pat
 
 
 def test_shapes_of_one_graph_have_one_canonical_string(made: Path) -> None:
-    work = Places(made, "toys").work / "strings"
+    work = DatasetPaths(made, "toys").work / "strings"
     first, again = (
         dict(read_shard(work / f"{shard}.tar"))[f"{shard}-0"]["txt"].decode().splitlines()
         for shard in ("toys-train-000000", "toys-train-000001")
@@ -179,7 +179,7 @@ def test_the_corpus_has_every_string_once_in_the_file_of_its_kit_and_split(made:
     files = {each.name for each in (made / "toys-corpus").iterdir()}
     corpus = {f"{kit}-{split}.txt" for kit in KITS for split in ("train", "val")}
     assert files == corpus | {"vocabulary.json", "statistics.json"}
-    work = Places(made, "toys").work
+    work = DatasetPaths(made, "toys").work
     expected: dict[str, list[str]] = {}
     for shard, split in SPLITS.items():
         for sample, (_, members) in zip(
@@ -219,7 +219,7 @@ def test_the_statistics_agree_with_the_files(made: Path) -> None:
 
 
 def test_the_report_counts_the_corpus(made: Path) -> None:
-    survey = Survey(config(), STAGES, Places(made, "toys"))
+    survey = Inventory(config(), STAGES, DatasetPaths(made, "toys"))
     total = sum(len(lines(made, f"{kit}-{split}.txt")) for kit in KITS for split in ("train", "val"))
     report = STAGE.report(survey.stage("strings").view)
     assert len(report) == 1 + len(KITS)
@@ -231,7 +231,7 @@ def test_the_report_counts_the_corpus(made: Path) -> None:
 def test_one_worker_two_workers_and_this_process_make_the_same_bytes(made: Path, tmp_path: Path) -> None:
     assert make_here(config(), tmp_path / "here") == {}
     assert make_here(config(), tmp_path / "two", ("exemplars", "variations")) == {}
-    run_stage("strings", STAGES, config(), Places(tmp_path / "two", "toys"), workers=2)
+    run_stage("strings", STAGES, config(), DatasetPaths(tmp_path / "two", "toys"), workers=2)
     for path in sorted((made / ".work" / "toys" / "strings").glob("*.*")):
         for other in ("two", "here"):
             assert (tmp_path / other / ".work" / "toys" / "strings" / path.name).read_bytes() == path.read_bytes()
@@ -258,7 +258,7 @@ def test_a_sample_filed_under_a_wrong_graph_fails_its_shard(tmp_path: Path) -> N
 
 def test_a_shape_that_is_not_connected_is_refused_and_counted(tmp_path: Path) -> None:
     assert make_here(config("not connected"), tmp_path) == {}
-    survey = Survey(config("not connected"), STAGES, Places(tmp_path, "toys"))
+    survey = Inventory(config("not connected"), STAGES, DatasetPaths(tmp_path, "toys"))
     records = survey.stage("strings").records
     for shard in SPLITS:
         assert records[shard].rejects == {"shape graph is not connected": 1}
@@ -267,7 +267,7 @@ def test_a_shape_that_is_not_connected_is_refused_and_counted(tmp_path: Path) ->
 
 def corpus_file(out: Path, name: str) -> str:
     """A file of the corpus that is not published yet."""
-    return (Places(out, "toys").work / "strings" / f"corpus.{name}").read_text()
+    return (DatasetPaths(out, "toys").work / "strings" / f"corpus.{name}").read_text()
 
 
 @pytest.fixture(scope="module")
@@ -279,7 +279,7 @@ def trees(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_strings_of_trees_have_no_cycles_and_say_so(trees: Path) -> None:
-    work = Places(trees, "toys").work
+    work = DatasetPaths(trees, "toys").work
     for shard in SPLITS:
         samples = {each.key: each for each in read_samples(work / "variations" / f"{shard}.tar")}
         for key, members in read_shard(work / "strings" / f"{shard}.tar"):
@@ -304,12 +304,12 @@ def test_a_string_that_several_graphs_share_stands_once_in_a_corpus_of_trees(tmp
     assert len(set(train)) == len(train)
     assert statistics["chain"]["val"]["elsewhere_dropped"] > 0
     assert statistics["chain"]["train"]["elsewhere_dropped"] == 0
-    survey = Survey(config("rings in val", edges="tree", count=40), STAGES, Places(tmp_path, "toys"))
+    survey = Inventory(config("rings in val", edges="tree", count=40), STAGES, DatasetPaths(tmp_path, "toys"))
     assert "that stand in another split dropped" in STAGE.report(survey.stage("strings").view)[0]
 
 
 def test_the_card_says_what_strings_stand_for_and_how_long_they_are(trees: Path) -> None:
-    survey = Survey(config(edges="tree"), STAGES, Places(trees, "toys"))
+    survey = Inventory(config(edges="tree"), STAGES, DatasetPaths(trees, "toys"))
     meaning, table = MEMBERS.card(survey.stage("strings").view)
     assert meaning.startswith(EDGE_DESCRIPTIONS["tree"])
     castle = next(line for line in table.splitlines() if line.startswith("| castle |"))

@@ -16,7 +16,7 @@ from stages.shapeassembly import parse
 from stages.training.checkpoint import CheckpointError
 from stages.training.program_lm.trained import load_program_lm
 from stages.training.program_vae.trained import load_program_vae
-from tests.mill import mill
+from tests.command import shapemill
 
 EXAMPLES = sorted(Path("datasets/exemplars/programs").glob("*.txt"))
 
@@ -44,7 +44,7 @@ def test_models_of_programs_are_trained_and_read_again(tmp_path: Path) -> None:
     config.write_text(yaml.safe_dump({"name": "toy", "seed": 5, **sections}))
     out = tmp_path / "out"
     for stage in ("shapeassembly", "training"):
-        code, printed = mill("run", stage, "--config", config, "--out", out, "--workers", 1)
+        code, printed = shapemill("run", stage, "--config", config, "--out", out, "--workers", 1)
         assert code == 0, printed
     counts = json.loads((out / ".work/toy/training/furniture-program_vae.json").read_text())["counts"]
     assert counts["train"]["programs"] >= 5
@@ -103,7 +103,7 @@ def dreamt(folder: Path, out: Path, model: str, asked: tuple[int, ...]) -> None:
         made = folder / f"out{workers}"
         shutil.copytree(out / "toy-models", made / "toy-models")
         for stage in ("program_sampling", "shapeassembly"):
-            code, printed = mill("run", stage, "--config", config, "--out", made, "--workers", workers)
+            code, printed = shapemill("run", stage, "--config", config, "--out", made, "--workers", workers)
             assert code == 0, printed
         work = made / ".work/dreamt"
         written = [

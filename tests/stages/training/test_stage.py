@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from safetensors import safe_open
 
-from pipeline.places import Places
-from pipeline.survey import Survey
+from pipeline.inventory import Inventory
+from pipeline.paths import DatasetPaths
 from stages.training.model_folder import MODEL_FILES
 from tests.pipeline.conftest import made
 from tests.stages.training.toy_training import STAGES, config, train
@@ -116,7 +116,7 @@ def test_training_ends_when_rounds_in_a_row_are_no_better(tmp_path: Path) -> Non
     wanted = config({"rounds": 9, "patience": 1, "learning_rate": 0.9, "steps": 3})
     result = train(wanted, tmp_path)
     assert not result.failed
-    survey = Survey(wanted, STAGES, Places(tmp_path, "toys")).stage("training")
+    survey = Inventory(wanted, STAGES, DatasetPaths(tmp_path, "toys")).stage("training")
     losses = [survey.records[shard.name].summary["loss"] for shard in survey.shards if shard.params["job"] == "round"]
     best = losses.index(min(losses))
     assert len(losses) < 9

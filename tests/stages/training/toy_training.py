@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 
 from pipeline.config import Config, StrictModel
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import RunResult, run_stage
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -139,5 +139,5 @@ def config(*models: Mapping[str, Any]) -> Config:
 def train(wanted: Config, out: Path, workers: int = 1, only: str = "") -> RunResult:
     """Run all three stages."""
     for name in ("exemplars", "strings"):
-        run_stage(name, STAGES, wanted, Places(out, wanted.name), 1)
-    return run_stage("training", STAGES, wanted, Places(out, wanted.name), workers, only=only)
+        run_stage(name, STAGES, wanted, DatasetPaths(out, wanted.name), 1)
+    return run_stage("training", STAGES, wanted, DatasetPaths(out, wanted.name), workers, only=only)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import Config, StrictModel
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.shards import ShardWriter, read_shard
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -82,7 +82,7 @@ def judged(out: Path, *samples: Sample) -> tuple[dict[str, dict[str, Any]], dict
         sections["programs"] = ProgramsConfig(program=samples[0].kit)
     config = Config(name="toys", version="1.0.0", seed=5, sections=sections, path=Path("toys.yaml"))
     for name in stages:
-        assert not run_stage(name, stages, config, Places(out, "toys"), workers=1).failed
+        assert not run_stage(name, stages, config, DatasetPaths(out, "toys"), workers=1).failed
     found = read_shard(next(out.rglob("validity/**/toys-train-000000.tar")))
     record = json.loads(next(out.rglob("validity/**/records/toys-train-000000.json")).read_text())
     return {

@@ -18,7 +18,7 @@ from stages.shape.graphs.canonical import graph_digest
 from stages.shape.kit_files import load_kit
 from stages.shape.sample import read_samples
 from stages.variations.selection.shared_surface import PackedShapes
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stated import stated
 from tests.toy_kits.chains_and_rings import CHAIN, ROAD, Placed, chain, pose, ring, write_model
 
@@ -35,7 +35,9 @@ def make(folder: Path, out: str, workers: int, **variations: object) -> str:
     (folder / "toy.yaml").write_text(yaml.safe_dump(config))
     printed = ""
     for stage in ("exemplars", "variations"):
-        code, said = mill("run", stage, "--config", folder / "toy.yaml", "--out", folder / out, "--workers", workers)
+        code, said = shapemill(
+            "run", stage, "--config", folder / "toy.yaml", "--out", folder / out, "--workers", workers
+        )
         assert code == 0, said
         printed += said
     return printed
@@ -195,7 +197,9 @@ def test_only_towers_that_bear_the_required_push_and_have_their_storey_are_kept(
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     for stage in ("exemplars", "variations"):
-        code, printed = mill("run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1)
+        code, printed = shapemill(
+            "run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1
+        )
         assert code == 0, printed
     samples = [sample for shard in collection(tmp_path, "out") for sample in read_samples(shard)]
     assert max(len(sample.assembly) - 2 for sample in samples) == 6
@@ -224,7 +228,9 @@ def test_chains_on_which_the_required_plate_does_not_fit_are_refused(tmp_path: P
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
     for stage in ("exemplars", "variations"):
-        _, printed = mill("run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1)
+        _, printed = shapemill(
+            "run", stage, "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out", "--workers", 1
+        )
     assert "the search found no variant of any kit" in printed
     records = "".join(path.read_text() for path in (tmp_path / "out").rglob("variations/records/*lane*.json"))
     assert "no backdrop" in records
@@ -238,7 +244,7 @@ def test_hubs_that_no_kit_puts_back_cannot_be_required(tmp_path: Path) -> None:
         "variations": {"require": {"hubs": 1}},
     }
     (tmp_path / "toy.yaml").write_text(yaml.safe_dump(config))
-    code, printed = mill("run", "exemplars", "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out")
+    code, printed = shapemill("run", "exemplars", "--config", tmp_path / "toy.yaml", "--out", tmp_path / "out")
     assert code == 2
     assert "kit chain puts none back" in printed
     assert not (tmp_path / "out").exists()

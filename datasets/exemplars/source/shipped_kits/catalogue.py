@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from pipeline.places import write_file
+from pipeline.paths import write_file
 from shipped_kits import castle, facade, playground, space_base, temple
 from shipped_kits.kit_shape import Layout, glb_bytes
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.bounded import Escaped, in_child
+from pipeline.bounded import ChildFailed, in_child
 from pipeline.errors import Rejected
 from stages.shapeassembly.extraction.hierarchy import UNREADABLE, Box, PartHierarchy, PartNode
 from stages.shapeassembly.extraction.readers.grass import GrassFile, read_grass
@@ -54,7 +54,7 @@ def _content(work: Callable[[], bytes], path: Path) -> bytes:
         return in_child(told, cpu_seconds=MAX_CPU_SECONDS, memory_mb=MAX_MEMORY_MB, refusal=_Refused)
     except _Refused as error:
         raise Rejected(*json.loads(str(error))) from None
-    except Escaped as error:
+    except ChildFailed as error:
         raise Rejected(UNREADABLE, f"{path.name}: cannot be read: {error}; export it again, simpler") from None
 
 

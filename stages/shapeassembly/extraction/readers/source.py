@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from pipeline.errors import Rejected
-from pipeline.places import file_digest
+from pipeline.paths import file_digest
 from stages.shapeassembly.extraction.hierarchy import PartHierarchy
 from stages.shapeassembly.extraction.readers.child_process import read_grass_in_child, read_in_child
 from stages.shapeassembly.extraction.readers.glb import read_glb

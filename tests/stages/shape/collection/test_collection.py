@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.shards import bytes_array
 from stages.package.verify_samples import read_packaged, read_record, sample_faults
 from stages.package.verify_shard import shard_samples
 from stages.programs.language import LANGUAGE
 from stages.shapeassembly import execute, parse
-from tests.mill import mill
+from tests.command import shapemill
 from tests.stated import stated
 
 STAGES = (
@@ -61,7 +61,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[str, ...
     folder = tmp_path_factory.mktemp("stools")
     arguments = config_of(folder, STOOLS)
     for stage in STAGES:
-        code, printed = mill("run", stage, *arguments)
+        code, printed = shapemill("run", stage, *arguments)
         assert code == 0, printed
     return folder / "out", arguments
 
@@ -96,7 +96,7 @@ def test_samples_of_a_program_have_programs_of_their_boxes(made: tuple[Path, tup
 
 
 def test_a_dataset_of_a_program_is_verified_and_has_no_corpus(made: tuple[Path, tuple[str, ...]]) -> None:
-    code, printed = mill("verify", *made[1])
+    code, printed = shapemill("verify", *made[1])
     assert code == 0, printed
     assert "geometry" in printed
     assert not (made[0] / "toy-corpus").exists()
@@ -109,7 +109,7 @@ def test_the_card_explains_every_parameter(made: tuple[Path, tuple[str, ...]]) -
 
 
 def test_verify_sees_a_surface_that_the_text_does_not_make(made: tuple[Path, tuple[str, ...]]) -> None:
-    samples, anew = samples_of(made[0]), {"program": LANGUAGE.anew(Places(made[0], "toy"))}
+    samples, anew = samples_of(made[0]), {"program": LANGUAGE.anew(DatasetPaths(made[0], "toy"))}
     manifest = json.loads((made[0] / "toy" / "manifest.json").read_text())
     key, members = next(iter(samples.items()))
     other = next(each for each in samples.values() if each["txt"] != members["txt"])
@@ -152,7 +152,7 @@ def test_a_row_of_the_index_finds_its_sample(made: tuple[Path, tuple[str, ...]])
 
 
 def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
-    code, printed = mill("run", "exemplars", *config_of(tmp_path, {}))
+    code, printed = shapemill("run", "exemplars", *config_of(tmp_path, {}))
     assert code == 2
     ways = (
         "programs.program",
@@ -166,6 +166,6 @@ def test_a_config_that_makes_no_shapes_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_config_that_makes_shapes_in_two_ways_is_refused(tmp_path: Path) -> None:
-    code, printed = mill("run", "exemplars", *config_of(tmp_path, {**STOOLS, **KITS}))
+    code, printed = shapemill("run", "exemplars", *config_of(tmp_path, {**STOOLS, **KITS}))
     assert code == 2
     assert "this has programs.program and exemplars.kits" in printed

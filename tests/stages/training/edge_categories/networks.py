@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 
 from pipeline.config import Config, StrictModel
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import RunResult, run_stage
 from pipeline.shards import ShardWriter, json_bytes
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
@@ -215,5 +215,5 @@ def config(strings: Mapping[str, Any] | None = None, **changes: Any) -> Config:
 def train_networks(wanted: Config, out: Path) -> RunResult:
     """Run all stages."""
     for name in ("exemplars", "variations"):
-        run_stage(name, STAGES, wanted, Places(out, wanted.name), 1)
-    return run_stage("training", STAGES, wanted, Places(out, wanted.name), 1)
+        run_stage(name, STAGES, wanted, DatasetPaths(out, wanted.name), 1)
+    return run_stage("training", STAGES, wanted, DatasetPaths(out, wanted.name), 1)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.places import Places
+from pipeline.inventory import Inventory
+from pipeline.paths import DatasetPaths
 from pipeline.shards import bytes_array
-from pipeline.survey import Survey
 from stages.training.edge_categories.batches import LabelledStrings
 from stages.training.edge_categories.trained import load_edge_categories
 from tests.stages.training.edge_categories.networks import STAGES, config, kit, network, space, train_networks, writer
@@ -62,5 +62,5 @@ def test_model_is_published_and_read_beside_its_kit(out: Path) -> None:
 
 def test_second_run_trains_nothing_and_other_strings_are_made_ready_anew(out: Path) -> None:
     assert train_networks(config(), out).made == 0
-    survey = Survey(config({"strings_per_shape": 2}), STAGES, Places(out, "nets")).stage("training")
+    survey = Inventory(config({"strings_per_shape": 2}), STAGES, DatasetPaths(out, "nets")).stage("training")
     assert "toy-edge_categories" not in survey.records, "they are drawn by that number"

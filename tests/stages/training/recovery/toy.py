@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.config import Config
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.run import RunResult, run_stage
 from pipeline.shards import json_bytes
 from stages.exemplars.settings import ExemplarsConfig
@@ -45,4 +45,6 @@ def train(wanted: Config, out: Path, workers: int = 1) -> RunResult:
     """Run the stage `training`; there are no kits."""
     STAGE.check(wanted)
     stages = {name: replace(stage, plan=lambda _: []) for name, stage in STAGES.items() if name != "training"}
-    return run_stage("training", {**stages, "training": STAGES["training"]}, wanted, Places(out, wanted.name), workers)
+    return run_stage(
+        "training", {**stages, "training": STAGES["training"]}, wanted, DatasetPaths(out, wanted.name), workers
+    )

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from pipeline.config import Config, StrictModel
-from pipeline.places import Places
+from pipeline.inventory import Inventory
+from pipeline.paths import DatasetPaths
 from pipeline.records import ShardRecord, fingerprint, read_record, recipe
 from pipeline.stage import Outcome, Plan, Shard, Stage, Task
-from pipeline.survey import Survey
 
 
 class Empty(StrictModel):
@@ -31,9 +31,9 @@ def stage(name: str, *shards: Shard, inputs: tuple[str, ...] = (), config: type[
     return Stage(name, __name__, config, inputs, lambda _: list(shards), nothing, lambda _: 0)
 
 
-def survey(out: Path, *stages: Stage) -> Survey:
+def survey(out: Path, *stages: Stage) -> Inventory:
     config = Config("toy", "1.0.0", 0, {each.name: each.config() for each in stages}, Path("toy.yaml"))
-    return Survey(config, {each.name: each for each in stages}, Places(out, "toy"))
+    return Inventory(config, {each.name: each for each in stages}, DatasetPaths(out, "toy"))
 
 
 def prints(out: Path, *stages: Stage) -> dict[str, str]:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.check import damaged_shards
-from pipeline.places import Places
+from pipeline.integrity import corrupted_shards
+from pipeline.inventory import Inventory
+from pipeline.paths import DatasetPaths
 from pipeline.status import status_lines
-from pipeline.survey import Survey
 from tests.pipeline.conftest import WriteConfig, made, record_times
-from tests.pipeline.turn import STAGES, load, turn
+from tests.pipeline.toy_run import STAGES, load, run_toy_stages
 
 WORK = Path(".work/mill")
 LAST = "bread"
@@ -29,23 +29,23 @@ def finished(out: Path) -> dict[str, bytes]:
 
 
 def test_the_dataset_is_the_same_and_another_run_finds_nothing_to_do(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "all")
+    run_toy_stages(write_config(), tmp_path / "all")
     config, out = write_config(keep="dataset"), tmp_path / "out"
-    turn(config, out)
+    run_toy_stages(config, out)
     assert between(tmp_path / "all")
     assert not between(out)
     assert finished(out) == finished(tmp_path / "all")
     before = made(out)
-    assert all(not result.made for result in turn(config, out).values())
+    assert all(not result.made for result in run_toy_stages(config, out).values())
     assert made(out) == before
 
 
 def test_verify_finds_it_whole_and_status_counts_what_is_on_the_disk(tmp_path: Path, write_config: WriteConfig) -> None:
     config, out = write_config(keep="dataset"), tmp_path / "out"
-    turn(config, out)
+    run_toy_stages(config, out)
     loaded = load(config)
-    assert not list(damaged_shards(loaded, STAGES, Places(out, loaded.name)))
-    rows = {line.split()[0]: line.split() for line in status_lines(loaded, STAGES, Places(out, loaded.name), 1)}
+    assert not list(corrupted_shards(loaded, STAGES, DatasetPaths(out, loaded.name)))
+    rows = {line.split()[0]: line.split() for line in status_lines(loaded, STAGES, DatasetPaths(out, loaded.name), 1)}
     assert rows["grain"][-2:] == ["0", "B"]
     assert rows["grain"][1].split("/")[0] == rows["grain"][1].split("/")[1] != "0"
 
@@ -55,11 +55,11 @@ def test_what_is_needed_again_is_made_again_and_goes_again(
     tmp_path: Path, write_config: WriteConfig, workers: int
 ) -> None:
     edited = {"salt": {"spoons": 2}}
-    turn(write_config(**edited), tmp_path / "all")
+    run_toy_stages(write_config(**edited), tmp_path / "all")
     out = tmp_path / "out"
-    turn(write_config(keep="dataset"), out)
+    run_toy_stages(write_config(keep="dataset"), out)
     before = dict(record_times(out))
-    turn(write_config(keep="dataset", **edited), out, workers=workers)
+    run_toy_stages(write_config(keep="dataset", **edited), out, workers=workers)
     assert finished(out) == finished(tmp_path / "all")
     assert not between(out)
     again = {name.partition("/")[0] for name, at in record_times(out).items() if before[name] != at}
@@ -68,34 +68,34 @@ def test_what_is_needed_again_is_made_again_and_goes_again(
 
 
 def test_keep_all_brings_it_back(tmp_path: Path, write_config: WriteConfig) -> None:
-    turn(write_config(), tmp_path / "all")
+    run_toy_stages(write_config(), tmp_path / "all")
     out = tmp_path / "out"
-    turn(write_config(keep="dataset"), out)
-    turn(write_config(keep="all"), out)
+    run_toy_stages(write_config(keep="dataset"), out)
+    run_toy_stages(write_config(keep="all"), out)
     kept = {path: content for path, content in made(out).items() if not path.endswith("let-go.json")}
     assert kept == made(tmp_path / "all")
 
 
 def test_a_kill_while_files_go_leaves_records_that_count(tmp_path: Path, write_config: WriteConfig) -> None:
     """The note is there before the first file goes; what is left goes at the end of the next run."""
-    turn(write_config(), tmp_path / "all")
+    run_toy_stages(write_config(), tmp_path / "all")
     config, out = write_config(keep="dataset"), tmp_path / "out"
-    turn(config, out)
+    run_toy_stages(config, out)
     there = [path.relative_to(tmp_path / "all") for path in between(tmp_path / "all")]
     for path in there[::2]:
         (out / path).write_bytes((tmp_path / "all" / path).read_bytes())
-    assert all(not result.made for result in turn(config, out).values())
+    assert all(not result.made for result in run_toy_stages(config, out).values())
     assert not between(out)
 
 
 def test_a_note_that_is_spoilt_costs_time_and_nothing_else(tmp_path: Path, write_config: WriteConfig) -> None:
     config, out = write_config(keep="dataset"), tmp_path / "out"
-    turn(config, out)
+    run_toy_stages(config, out)
     before = finished(out)
     note = out / WORK / "grain/mill/let-go.json"
     os.truncate(note, 7)
     loaded = load(config)
-    assert Survey(loaded, STAGES, Places(out, loaded.name)).stage("grain").missing
-    turn(config, out)
+    assert Inventory(loaded, STAGES, DatasetPaths(out, loaded.name)).stage("grain").missing
+    run_toy_stages(config, out)
     assert finished(out) == before
     assert not between(out)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import ConfigError
-from pipeline.places import Places, write_file
+from pipeline.paths import DatasetPaths, write_file
 
 
 def test_a_file_comes_with_its_folders_and_its_path(tmp_path: Path) -> None:
@@ -35,11 +35,11 @@ def test_a_file_that_cannot_be_written_is_named_and_leaves_nothing(tmp_path: Pat
 
 @pytest.mark.parametrize("file", ["", "/etc/passwd", "../other/file", "a/../b", "a//b", ".work/a/file", "./a"])
 def test_what_other_datasets_publish_is_looked_for_below_the_output_folder_alone(file: str, tmp_path: Path) -> None:
-    places = Places(tmp_path, "one")
+    places = DatasetPaths(tmp_path, "one")
     assert places.published("other-models/a/weights") == tmp_path / "other-models/a/weights"
     with pytest.raises(ValueError, match="no file below the output folder"):
         places.published(file)
 
 
 def test_a_trial_finds_what_is_published_beside_the_dataset_itself(tmp_path: Path) -> None:
-    assert Places(tmp_path / "trial", "one", tmp_path).published("other/file") == tmp_path / "other/file"
+    assert DatasetPaths(tmp_path / "trial", "one", tmp_path).published("other/file") == tmp_path / "other/file"

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from pipeline.journal import Standing, span
-from pipeline.places import StagePlaces
-from pipeline.space import byte_size
-from pipeline.survey import StageSurvey
+from pipeline.disk_space import byte_size
+from pipeline.event_log import Progress, duration_text
+from pipeline.inventory import StageInventory
+from pipeline.paths import StagePaths
 
 
-def standing(surveyed: StageSurvey, running: Iterable[str], failed: int) -> Standing:
+def stage_progress(surveyed: StageInventory, running: Iterable[str], failed: int) -> Progress:
     """How far the stage is while the shards `running` are made and so many have `failed`."""
     records = surveyed.records
-    share = {name: _how_far(surveyed.places, name) for name in running} | dict.fromkeys(records, 1.0)
+    share = {name: _how_far(surveyed.paths, name) for name in running} | dict.fromkeys(records, 1.0)
     work = {shard.name: int(shard.params.get("samples", 0)) for shard in surveyed.shards}
-    return Standing(
+    return Progress(
         planned=len(surveyed.shards),
         done=sum(share.values()),
         failed=failed,
@@ -26,13 +26,13 @@ def standing(surveyed: StageSurvey, running: Iterable[str], failed: int) -> Stan
     )
 
 
-def closing_words(surveyed: StageSurvey, made: int, failed: Mapping[str, str], left: int) -> str:
+def closing_line(surveyed: StageInventory, made: int, failed: Mapping[str, str], left: int) -> str:
     """What a run says of the stage when it ends: `made` shards are new, `failed` are set aside, so many are `left`."""
     records = surveyed.records.values()
     text = f"{len(records):,} of {len(surveyed.shards):,} shards, {sum(each.samples for each in records):,} samples"
     text += f", {byte_size(sum(each.bytes_on_disk() for each in records))}"
-    text += f", {counted(made)} made now" if made else ", nothing to make"
-    text += f" ({span(sum(each.seconds for each in records))} of worker time in all)"
+    text += f", {shard_count_text(made)} made now" if made else ", nothing to make"
+    text += f" ({duration_text(sum(each.seconds for each in records))} of worker time in all)"
     if failed:
         text += f"; {len(failed)} set aside: {', '.join(failed)}"
     if left:
@@ -40,12 +40,12 @@ def closing_words(surveyed: StageSurvey, made: int, failed: Mapping[str, str], l
     return text
 
 
-def counted(shards: int) -> str:
+def shard_count_text(shards: int) -> str:
     """So many shards, in words."""
     return f"{shards:,} shard{'' if shards == 1 else 's'}"
 
 
-def _how_far(places: StagePlaces, shard: str) -> float:
+def _how_far(places: StagePaths, shard: str) -> float:
     try:
         done, total = (places.progress / shard).read_text().split()
         return min(int(done) / int(total), 1.0)

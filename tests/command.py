@@ -9,7 +9,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pipeline.cli import main
 
 
-def mill(*arguments: object) -> tuple[int, str]:
+def shapemill(*arguments: object) -> tuple[int, str]:
     """The exit code of `python -m pipeline` with these arguments, and all that it printed."""
     printed, before, code = io.StringIO(), sys.argv, 0
     sys.argv = ["pipeline", *map(str, arguments)]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipeline.code import code_digest, reached, starts_of
+from pipeline.code import code_digest, entry_points, transitive_imports
 from pipeline.config import Config
-from pipeline.places import Places, StagePlaces, read_note
+from pipeline.paths import DatasetPaths, StagePaths, read_json
 from pipeline.records import ShardRecord, fingerprint, read_record, recipe
 from pipeline.registry import upstream
 from pipeline.stage import Plan, Shard, Stage
@@ -20,20 +20,20 @@ _SHARD_NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass
-class StageSurvey:
+class StageInventory:
     """One stage: its plan as far as it is known, the recipe and the fingerprint of each shard, the records that match
     and those that do not, the shards with matching records whose files were let go of, and the digest of each module
     that its code reaches."""
 
     stage: Stage
     config: Config
-    places: StagePlaces
+    paths: StagePaths
     view: Plan
     shards: list[Shard] = field(default_factory=list)
     recipes: dict[str, dict[str, str]] = field(default_factory=dict)
     fingerprints: dict[str, str] = field(default_factory=dict)
     records: dict[str, ShardRecord] = field(default_factory=dict)
-    let_go: set[str] = field(default_factory=set)
+    pruned: set[str] = field(default_factory=set)
     outdated: dict[str, ShardRecord] = field(default_factory=dict)
     code: dict[str, str] = field(default_factory=dict)
 
@@ -48,27 +48,27 @@ class StageSurvey:
         return all(each.removeprefix(own) in self.records for each in shard.inputs if each.startswith(own))
 
 
-class Survey:
+class Inventory:
     """Plans and records of the stages of a dataset, each read when first asked for."""
 
-    def __init__(self, config: Config, stages: Mapping[str, Stage], places: Places) -> None:
+    def __init__(self, config: Config, stages: Mapping[str, Stage], places: DatasetPaths) -> None:
         self.config = config
         self._stages = stages
         self._places = places
-        self._surveyed: dict[str, StageSurvey] = {}
+        self._surveyed: dict[str, StageInventory] = {}
         self._reached: dict[tuple[str, ...], dict[str, str]] = {}
 
-    def stage(self, name: str) -> StageSurvey:
+    def stage(self, name: str) -> StageInventory:
         """What is known of stage `name`."""
         if name not in self._surveyed:
             reads = upstream(self._stages, name)
             config = self.config.only(dict.fromkeys([*reads, *self._stages[name].sections]))
             view = _View(self, name, config, frozenset(reads))
-            self._surveyed[name] = StageSurvey(self._stages[name], config, self._places.stage(name), view)
+            self._surveyed[name] = StageInventory(self._stages[name], config, self._places.stage(name), view)
             self.refresh(name)
         return self._surveyed[name]
 
-    def refresh(self, name: str) -> StageSurvey:
+    def refresh(self, name: str) -> StageInventory:
         """Ask the plan of stage `name` and read its records, again and again until neither brings news.
 
         Raises ValueError for a plan that breaks its contract.
@@ -96,11 +96,11 @@ class Survey:
     def accept(self, name: str, shard: str) -> None:
         """Take in the record of a shard that was made just now."""
         surveyed = self._surveyed[name]
-        record = read_record(surveyed.places.records / f"{shard}.json")
+        record = read_record(surveyed.paths.records / f"{shard}.json")
         if record is not None and record.fingerprint == surveyed.fingerprints[shard]:
             surveyed.records[shard] = record
 
-    def forget(self) -> None:
+    def reread(self) -> None:
         """Read plans and records anew when next asked: those of any stage may be others now."""
         self._surveyed.clear()
 
@@ -117,10 +117,10 @@ class Survey:
             run_shard=surveyed.stage.run_shard,
             shard=shard,
             config=surveyed.config if surveyed.stage.whole_section else _without(surveyed.config, name),
-            places=self._places,
+            paths=self._places,
             recipe=surveyed.recipes[shard.name],
             inputs=inputs,
-            starts=starts_of(surveyed.stage.module, shard.code),
+            starts=entry_points(surveyed.stage.module, shard.code),
             code=self._code(surveyed.stage, shard),
         )
 
@@ -132,7 +132,7 @@ class Survey:
         """The code of a shard, as it was when first asked for: a run is of one state of the code."""
         key = (stage.module, *shard.code)
         if key not in self._reached:
-            self._reached[key] = reached(starts_of(stage.module, shard.code))
+            self._reached[key] = transitive_imports(entry_points(stage.module, shard.code))
         return self._reached[key]
 
     def _input_fingerprint(self, name: str, known: Mapping[str, str], shard: Shard, wanted: str) -> str:
@@ -144,23 +144,23 @@ class Survey:
             raise ValueError(f"plan of {name}: shard {shard.name} reads {wanted}, which is not planned before it")
         return fingerprints[other]
 
-    def _read_records(self, surveyed: StageSurvey) -> bool:
+    def _read_records(self, surveyed: StageInventory) -> bool:
         before = set(surveyed.records)
         matching: dict[str, ShardRecord] = {}
         surveyed.outdated.clear()
-        surveyed.let_go.clear()
-        seals = read_note(surveyed.places.let_go) if self.config.keep == "dataset" else None
+        surveyed.pruned.clear()
+        seals = read_json(surveyed.paths.pruned) if self.config.keep == "dataset" else None
         seals = seals if isinstance(seals, dict) else {}
         for name, wanted in surveyed.fingerprints.items():
             record = surveyed.records.get(name)
             if record is None or record.fingerprint != wanted:
-                record = read_record(surveyed.places.records / f"{name}.json")
+                record = read_record(surveyed.paths.records / f"{name}.json")
             if record is None:
                 continue
-            there = record.is_whole(surveyed.places)
-            gone = not there and seals.get(name) == record.seal()
+            there = record.is_whole(surveyed.paths)
+            gone = not there and seals.get(name) == record.checksum()
             if gone:
-                surveyed.let_go.add(name)
+                surveyed.pruned.add(name)
             whole = record.fingerprint == wanted and (there or gone)
             if whole and self._read_what_is_there(surveyed.stage.name, matching, record):
                 matching[name] = record
@@ -188,13 +188,13 @@ def _without(config: Config, stage: str) -> Config:
 class _View:
     """The Plan that a stage's functions see."""
 
-    def __init__(self, survey: Survey, name: str, config: Config, reads: frozenset[str]) -> None:
+    def __init__(self, survey: Inventory, name: str, config: Config, reads: frozenset[str]) -> None:
         self._survey = survey
         self._name = name
         self._reads = reads
         self.config = config
 
-    def _stage(self, stage: str) -> StageSurvey:
+    def _stage(self, stage: str) -> StageInventory:
         if stage not in self._reads:
             raise ValueError(f"plan of {self._name} looks at stage {stage}, which is not among its inputs")
         # Its own survey is under way while the plan is asked; what is known so far is what the plan may know.

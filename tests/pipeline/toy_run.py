@@ -1,4 +1,4 @@
-"""Toy stages: `turn` runs them, and `python -m tests.pipeline.turn` is their command line."""
+"""Toy stages: `run_toy_stages` runs them, and `python -m tests.pipeline.toy_run` is their command line."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 
 from pipeline.cli import main
 from pipeline.config import Config, load_config
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from pipeline.registry import find_stages
 from pipeline.run import RunResult, run_stage
 from pipeline.slices import WHOLE, Slice
 
-PACKAGE = "tests.pipeline.mill_stages"
+PACKAGE = "tests.pipeline.toy_stages"
 STAGES = find_stages(PACKAGE)
 
 
@@ -21,12 +21,12 @@ def load(config: Path) -> Config:
     return load_config(config, {name: stage.config for name, stage in STAGES.items()})
 
 
-def turn(
+def run_toy_stages(
     config: Path, out: Path, *stages: str, workers: int = 1, part: Slice = WHOLE, **how: Any
 ) -> dict[str, RunResult]:
     """Run `stages` (all of them, if none is named) in order, in this process and its workers."""
     loaded = load(config)
-    places = Places(out, loaded.name)
+    places = DatasetPaths(out, loaded.name)
     return {name: run_stage(name, STAGES, loaded, places, workers, part, **how) for name in stages or STAGES}
 
 

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 from pipeline.errors import ConfigError
-from pipeline.survey import StageSurvey
+from pipeline.inventory import StageInventory
 
 
 def byte_size(count: float) -> str:
@@ -18,7 +18,7 @@ def byte_size(count: float) -> str:
     return f"{count:.1f} TB"
 
 
-def check_space(surveyed: StageSurvey, out: Path) -> str:
+def check_space(surveyed: StageInventory, out: Path) -> str:
     """What the stage still needs on disk, in words. Raises ConfigError when `out` has less than that free."""
     estimate = surveyed.stage.estimate_bytes(surveyed.view)
     needed = max(0, estimate - sum(record.bytes_on_disk() for record in surveyed.records.values()))

@@ -18,9 +18,9 @@ from pipeline.errors import ConfigError
 KeyPath = tuple[str | int, ...]
 
 
-LONGEST = 1_000_000
-DEEPEST = 40
-MOST_VALUES = 50_000
+MAX_CHARACTERS = 1_000_000
+MAX_DEPTH = 40
+MAX_VALUES = 50_000
 
 _CONTROLS = frozenset(map(chr, (*range(9), 11, 12, *range(14, 32), 127)))
 
@@ -74,9 +74,9 @@ def _text(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise ConfigError(f"{path}: is {'a folder' if path.is_dir() else 'no regular file'}; name one config file")
     with open(path, encoding="utf-8") as stream:
-        text = stream.read(LONGEST + 1)
-    if len(text) > LONGEST:
-        raise ConfigError(f"{path}: is longer than {LONGEST:,} characters, which no config is")
+        text = stream.read(MAX_CHARACTERS + 1)
+    if len(text) > MAX_CHARACTERS:
+        raise ConfigError(f"{path}: is longer than {MAX_CHARACTERS:,} characters, which no config is")
     return text
 
 
@@ -102,13 +102,13 @@ def _look_through(path: Path, text: str) -> None:
         elif isinstance(event, yaml.CollectionStartEvent):
             open_since.append((event.anchor, count))
             count += 1
-            if len(open_since) > DEEPEST:
-                raise ConfigError(f"{where}: nests deeper than {DEEPEST}, which no config does")
+            if len(open_since) > MAX_DEPTH:
+                raise ConfigError(f"{where}: nests deeper than {MAX_DEPTH}, which no config does")
         elif isinstance(event, yaml.CollectionEndEvent):
             anchor, before = open_since.pop()
             sizes[anchor] = count - before
-        if count > MOST_VALUES:
-            raise ConfigError(f"{where}: holds more than {MOST_VALUES:,} values by here, which no config does")
+        if count > MAX_VALUES:
+            raise ConfigError(f"{where}: holds more than {MAX_VALUES:,} values by here, which no config does")
 
 
 def _collect(path: Path, node: yaml.Node, place: KeyPath, lines: dict[KeyPath, int]) -> None:

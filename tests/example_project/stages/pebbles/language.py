@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.places import Places
+from pipeline.paths import DatasetPaths
 from stages.shape.collection.language import Anew, Language, Source
 from stages.shape.kit import Assembly, PartMesh
 from stages.shape.sample import Sample
@@ -44,7 +44,7 @@ class Heaps:
         return [("a pebble", heap("1.0"))]
 
 
-def _anew(_: Places) -> Anew:
+def _anew(_: DatasetPaths) -> Anew:
     return lambda record, _: upright(heap(record["text"]))
 
 

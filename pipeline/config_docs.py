@@ -15,7 +15,7 @@ from pipeline.config import DatasetFacts, StrictModel
 from pipeline.stage import Stage
 
 
-def key_tables(stages: Mapping[str, Stage]) -> str:
+def config_tables(stages: Mapping[str, Stage]) -> str:
     """One table for the dataset's own facts and one for each stage's section, as a Markdown page."""
     page = [
         "# What a config may say",

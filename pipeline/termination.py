@@ -19,7 +19,7 @@ def die_with_parent() -> None:
 
 
 @contextmanager
-def ends_in_order() -> Iterator[None]:
+def exit_on_signals() -> Iterator[None]:
     """Inside, SIGTERM and SIGHUP raise SystemExit with 128 and their number, once: whoever ends a group of processes
     often signals twice. A signal that is ignored (`nohup`) stays ignored."""
 

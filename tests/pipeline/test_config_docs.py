@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pipeline.keys import key_tables
+from pipeline.config_docs import config_tables
 from tests.pipeline.test_config import Bakery
 from tests.stages.shape.collection.absent import ABSENT_STAGES
 
@@ -12,7 +12,9 @@ from tests.stages.shape.collection.absent import ABSENT_STAGES
 def test_keys_of_entries_of_several_kinds_say_whose_they_are() -> None:
     """What all kinds know stands once, before what each knows besides."""
     stage = replace(next(iter(ABSENT_STAGES.values())), config=Bakery)
-    rows = [line.strip("| ").split(" | ") for line in key_tables({"bakery": stage}).splitlines() if "`bakery." in line]
+    rows = [
+        line.strip("| ").split(" | ") for line in config_tables({"bakery": stage}).splitlines() if "`bakery." in line
+    ]
     assert ["`bakery.small[]`", "list of keys below", "", "Small things"] in [
         [each.strip() for each in row] for row in rows
     ]

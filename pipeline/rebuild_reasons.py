@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 
-from pipeline.places import read_note
+from pipeline.inventory import StageInventory
+from pipeline.paths import read_json
 from pipeline.records import ShardRecord
-from pipeline.survey import StageSurvey
 
 _NAMED = {
     "code": "code",
@@ -17,7 +17,7 @@ _NAMED = {
 }
 
 
-def reasons(surveyed: StageSurvey) -> list[str]:
+def rebuild_reasons(surveyed: StageInventory) -> list[str]:
     """A line for each reason, or set of reasons, for which shards that were made once are made again."""
     counts: Counter[str] = Counter()
     for shard in surveyed.missing:
@@ -27,7 +27,7 @@ def reasons(surveyed: StageSurvey) -> list[str]:
     return [f"{count} shard{'s are' if count > 1 else ' is'} made again: {why}" for why, count in counts.items()]
 
 
-def _changes(surveyed: StageSurvey, old: ShardRecord) -> str:
+def _changes(surveyed: StageInventory, old: ShardRecord) -> str:
     new = surveyed.recipes[old.shard]
     changed = {kind: name for kind, name in _NAMED.items() if old.recipe.get(kind) != new[kind]}
     edited = _edited(surveyed) if "code" in changed else []
@@ -35,13 +35,13 @@ def _changes(surveyed: StageSurvey, old: ShardRecord) -> str:
         changed["code"] += f" ({', '.join(edited)})"
     if changed:
         return f"changed: {', '.join(changed.values())}"
-    return "what it is made from has other bytes" if old.is_whole(surveyed.places) else "a file is gone"
+    return "what it is made from has other bytes" if old.is_whole(surveyed.paths) else "a file is gone"
 
 
-def _edited(surveyed: StageSurvey) -> list[str]:
+def _edited(surveyed: StageInventory) -> list[str]:
     """The modules that are not as they were when the stage was last finished, as far as that is known."""
     try:
-        before = read_note(surveyed.places.manifest)["code"].items()
+        before = read_json(surveyed.paths.manifest)["code"].items()
         return sorted({module for module, _ in before ^ surveyed.code.items()})
     except (TypeError, KeyError, AttributeError):
         return []

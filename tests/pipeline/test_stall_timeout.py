@@ -11,24 +11,24 @@ from pathlib import Path
 import pytest
 
 from pipeline import workers
-from pipeline.patience import Patience
-from pipeline.places import Places
+from pipeline.inventory import Inventory
+from pipeline.paths import DatasetPaths
 from pipeline.stage import Shard
-from pipeline.survey import Survey
+from pipeline.stall_timeout import StallWatch
 from pipeline.task import Job
 from pipeline.workers import Workers
 from tests.pipeline.conftest import WriteConfig
 from tests.pipeline.test_failures import alive, descendants, wait_until
-from tests.pipeline.turn import STAGES, load, turn
+from tests.pipeline.toy_run import STAGES, load, run_toy_stages
 
 WORK = Path(".work/mill")
 
 
 @pytest.fixture
 def bag(tmp_path: Path, write_config: WriteConfig) -> Job:
-    places = Places(tmp_path / "out", "mill")
+    places = DatasetPaths(tmp_path / "out", "mill")
     places.stage("salt").make()
-    survey = Survey(load(write_config()), STAGES, places)
+    survey = Inventory(load(write_config()), STAGES, places)
     survey.stage("salt")
     return survey.job("salt", Shard("bag-0", {"samples": 1}))
 
@@ -40,7 +40,7 @@ def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_
         grain={"fields": 2, "wanted": 1}, flour={"trouble": {"harvest0-0": "stops once", "harvest0-1": "sleeps"}}
     )
     before = descendants(os.getpid())
-    results = turn(config, tmp_path / "out", "salt", "grain", "flour", workers=2, patience=0.12, retries=1)
+    results = run_toy_stages(config, tmp_path / "out", "salt", "grain", "flour", workers=2, patience=0.12, retries=1)
     message = "it made no progress for 7s, and its worker was ended"
     assert results["flour"].failed == {"harvest0-1": message}
     assert results["flour"].made == 1
@@ -54,8 +54,8 @@ def test_shard_without_progress_is_ended_tried_again_and_set_aside_and_the_rest_
 
 
 def test_what_counts_as_progress_is_that_something_changes(bag: Job) -> None:
-    places = bag.places.stage("salt")
-    patience, start, growing = Patience(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
+    places = bag.paths.stage("salt")
+    patience, start, growing = StallWatch(0.025, places), time.monotonic(), places.root / ".bag-0.txt.tmp"
     (places.progress / "bag-0").write_text("1 4")
     while time.monotonic() - start < 4:
         growing.write_bytes(b"a" * int(10 * (time.monotonic() - start)))
@@ -73,13 +73,13 @@ def test_what_counts_as_progress_is_that_something_changes(bag: Job) -> None:
 
 
 def test_patience_of_0_has_no_end(bag: Job) -> None:
-    patience = Patience(0, bag.places.stage("salt"))
+    patience = StallWatch(0, bag.paths.stage("salt"))
     time.sleep(0.6)
     assert not patience.lost_with([bag])
 
 
 def test_time_in_which_the_mill_was_stopped_is_not_counted(bag: Job) -> None:
-    patience = Patience(0.05, bag.places.stage("salt"))
+    patience = StallWatch(0.05, bag.paths.stage("salt"))
     patience.lost_with([bag])
     time.sleep(4)
     assert not patience.lost_with([bag])
@@ -87,7 +87,7 @@ def test_time_in_which_the_mill_was_stopped_is_not_counted(bag: Job) -> None:
 
 def test_idle_worker_that_was_stopped_does_not_hold_the_end(bag: Job, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "_SECONDS_TO_GO", 0.5)
-    crew, before = Workers(1, bag.places.worker_output), descendants(os.getpid())
+    crew, before = Workers(1, bag.paths.worker_output), descendants(os.getpid())
     crew.submit(bag)
     assert [report and report.status for _, report in crew.finished(None)] == ["done"]
     worker = {pid for pid in descendants(os.getpid()) - before if "LokyProcess" in _command(pid)}

@@ -232,8 +232,8 @@ def test_every_config_key_says_what_it_is() -> None:
 
 
 def test_table_of_config_keys_is_what_the_models_say() -> None:
-    from pipeline.keys import key_tables
+    from pipeline.config_docs import config_tables
     from pipeline.registry import find_stages
 
     table = (ROOT / "configs" / "README.md").read_text()
-    assert table == key_tables(find_stages()), "run `make keys`"
+    assert table == config_tables(find_stages()), "run `make keys`"

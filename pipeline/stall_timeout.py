@@ -11,19 +11,19 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from pipeline.places import StagePlaces
+from pipeline.paths import StagePaths
 from pipeline.task import Job
 
-DEFAULT_PATIENCE = 60.0
+DEFAULT_STALL_MINUTES = 60.0
 """Minutes. A shard is minutes of work at most; on a machine that is too busy, some that tell nothing take many."""
 
 _Signs = tuple[str, tuple[tuple[str, int], ...]]
 
 
-class Patience:
+class StallWatch:
     """Watches the running shards of one stage; 0 minutes is patience without end."""
 
-    def __init__(self, minutes: float, places: StagePlaces) -> None:
+    def __init__(self, minutes: float, places: StagePaths) -> None:
         self.seconds = minutes * 60
         self._places = places
         self._every = min(max(self.seconds / 20, 0.5), 30.0)

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import time
 
-from pipeline.endings import die_with_parent, ends_in_order
+from pipeline.termination import die_with_parent, exit_on_signals
 
 _ENVIRONMENT = {
     # Deaths are counted by the mill, shard by shard: the scheduler's own count blames whatever a dead worker held.
@@ -17,11 +17,11 @@ _ENVIRONMENT = {
 }
 
 
-def serve(workers: int, port: int) -> int:
+def serve_cluster(workers: int, port: int) -> int:
     """Start a scheduler on `port` of this machine alone, and `workers` workers of one thread each, and stay until a
     signal ends them all. The exit code: 1 where the scheduler has ended by itself."""
     address = f"tcp://127.0.0.1:{port}"
-    with ends_in_order(), tempfile.TemporaryDirectory(prefix="shapemill-cluster-") as folder:
+    with exit_on_signals(), tempfile.TemporaryDirectory(prefix="shapemill-cluster-") as folder:
         alone = ["--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
         scheduler = _start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), *alone)
         one = ["--nthreads", "1", "--no-nanny", "--memory-limit", "0", "--local-directory", folder]

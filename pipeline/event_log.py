@@ -18,7 +18,7 @@ _LINE_EVERY = 20.0
 """Seconds between two lines where there is no terminal."""
 
 
-def span(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """A length of time for people: `8s`, `4m10s`, `2h05m`."""
     whole = round(seconds)
     if whole < 60:
@@ -29,7 +29,7 @@ def span(seconds: float) -> str:
 
 
 @dataclass(frozen=True)
-class Standing:
+class Progress:
     """How far a stage is.
 
     planned: shards as far as they are known; done: those that are finished, running ones by how far they are; failed:
@@ -46,7 +46,7 @@ class Standing:
     rejects: int
 
 
-class Journal:
+class EventLog:
     """The bar, the lines and the log of one stage's run. Nothing is shown of a stage that has nothing to do."""
 
     def __init__(self, stage: str, log: Path) -> None:
@@ -75,11 +75,11 @@ class Journal:
         except OSError:
             pass
 
-    def show(self, standing: Standing) -> None:
+    def show(self, standing: Progress) -> None:
         """Say how far the stage is: in the bar, or by a line now and then."""
         now = time.monotonic()
         left = self._left.after(standing.worked, standing.work, now)
-        text = figures(standing, now - self._start, left)
+        text = progress_text(standing, now - self._start, left)
         if sys.stderr.isatty():
             if self._bar is None:
                 self._bar = tqdm(bar_format=self._stage, dynamic_ncols=True, leave=False)
@@ -99,7 +99,7 @@ class Journal:
             self._bar = None
 
 
-def figures(standing: Standing, seconds: float, left: float | None) -> str:
+def progress_text(standing: Progress, seconds: float, left: float | None) -> str:
     """What is told of a stage that has run for `seconds` and needs about `left` more, if that can be told."""
     if standing.work:
         told = [f"{int(standing.worked):,} of {standing.work:,} samples, {int(standing.done):,}"]
@@ -112,7 +112,7 @@ def figures(standing: Standing, seconds: float, left: float | None) -> str:
         told.append(f"{standing.rejects:,} rejects")
     if standing.failed:
         told.append(f"{standing.failed} set aside")
-    told.append(f"{span(seconds)} gone")
+    told.append(f"{duration_text(seconds)} gone")
     if left is not None:
-        told.append(f"about {span(left)} left")
+        told.append(f"about {duration_text(left)} left")
     return ", ".join(told)

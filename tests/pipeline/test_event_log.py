@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 
 from pipeline.config import Config, StrictModel
-from pipeline.journal import Standing, figures
-from pipeline.places import Places
+from pipeline.event_log import Progress, progress_text
+from pipeline.paths import DatasetPaths
 from pipeline.run import run_stage
 from pipeline.stage import Outcome, Stage
 from pipeline.time_left import TimeLeft
 from tests.pipeline.conftest import WriteConfig
-from tests.pipeline.turn import turn
+from tests.pipeline.toy_run import run_toy_stages
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -64,19 +64,19 @@ def test_nothing_is_told_of_work_that_is_not_counted_or_is_over() -> None:
 
 
 def test_figures_count_samples_where_the_plan_says_how_many_there_will_be() -> None:
-    known = Standing(planned=24, done=12, failed=1, work=1200, worked=512.6, samples=500, rejects=7)
-    assert figures(known, 41.0, 58.2) == (
+    known = Progress(planned=24, done=12, failed=1, work=1200, worked=512.6, samples=500, rejects=7)
+    assert progress_text(known, 41.0, 58.2) == (
         "512 of 1,200 samples, 12 of 24 shards, 7 rejects, 1 set aside, 41s gone, about 58s left"
     )
-    grows = Standing(planned=8, done=6.4, failed=0, work=0, worked=0.0, samples=0, rejects=0)
-    assert figures(grows, 41.0, None) == "6.4 of 8 shards, 41s gone"
+    grows = Progress(planned=8, done=6.4, failed=0, work=0, worked=0.0, samples=0, rejects=0)
+    assert progress_text(grows, 41.0, None) == "6.4 of 8 shards, 41s gone"
 
 
 def seen_on_a_terminal(*arguments: object) -> str:
     """All that the mill of the tests writes to a terminal."""
     ours, theirs = pty.openpty()
     termios.tcsetwinsize(theirs, (40, 120))
-    command = [sys.executable, "-m", "tests.pipeline.turn", *(str(each) for each in arguments)]
+    command = [sys.executable, "-m", "tests.pipeline.toy_run", *(str(each) for each in arguments)]
     running = subprocess.Popen(command, cwd=ROOT, stdout=theirs, stderr=theirs)
     os.close(theirs)
     written = bytearray()
@@ -94,7 +94,7 @@ def test_a_terminal_shows_a_bar_with_samples_while_it_works_and_none_afterwards(
     tmp_path: Path, write_config: WriteConfig
 ) -> None:
     config = write_config(flour={"seconds": 0.3})
-    turn(config, tmp_path / "out", "grain")
+    run_toy_stages(config, tmp_path / "out", "grain")
     shown = seen_on_a_terminal("run", "flour", "--config", config, "--out", tmp_path / "out", "--workers", 2)
     assert "of 24 samples" in shown
     assert "% |" in shown
@@ -107,5 +107,5 @@ def test_a_terminal_shows_a_bar_with_samples_while_it_works_and_none_afterwards(
 def test_a_stage_without_a_plan_says_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     idle = Stage("idle", 1, StrictModel, (), lambda _: [], lambda _: Outcome(0), lambda _: 0)
     config = Config("mill", "1.0.0", 0, {"idle": StrictModel()}, tmp_path / "mill.yaml")
-    assert run_stage("idle", {"idle": idle}, config, Places(tmp_path, "mill"), workers=1).left == 0
+    assert run_stage("idle", {"idle": idle}, config, DatasetPaths(tmp_path, "mill"), workers=1).left == 0
     assert capfd.readouterr() == ("", "")

@@ -32,7 +32,7 @@ _FATAL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, er
 
 
 @dataclass(frozen=True)
-class StagePlaces:
+class StagePaths:
     """The folders of one stage."""
 
     root: Path
@@ -54,32 +54,32 @@ class StagePlaces:
         return self.root / "progress"
 
     @property
-    def mill(self) -> Path:
+    def engine(self) -> Path:
         return self.root / "mill"
 
     @property
     def manifest(self) -> Path:
-        return self.mill / "manifest.json"
+        return self.engine / "manifest.json"
 
     @property
     def published(self) -> Path:
-        return self.mill / "published.json"
+        return self.engine / "published.json"
 
     @property
-    def let_go(self) -> Path:
-        return self.mill / "let-go.json"
+    def pruned(self) -> Path:
+        return self.engine / "let-go.json"
 
     def make(self) -> None:
         """Make the folders. Raises Fatal when the disk does not let us."""
         try:
-            for folder in (self.records, self.rejects, self.failed, self.progress, self.mill):
+            for folder in (self.records, self.rejects, self.failed, self.progress, self.engine):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise Fatal(f"cannot make folders under {self.root}: {error.strerror}") from error
 
 
 @dataclass(frozen=True)
-class Places:
+class DatasetPaths:
     """The folders of one dataset under an output folder.
 
     shelf: where what other datasets have published is looked for, the output folder itself if not said.
@@ -101,8 +101,8 @@ class Places:
     def worker_output(self) -> Path:
         return self.work / "workers.txt"
 
-    def stage(self, name: str) -> StagePlaces:
-        return StagePlaces(self.work / name)
+    def stage(self, name: str) -> StagePaths:
+        return StagePaths(self.work / name)
 
     def published(self, file: str) -> Path:
         """Where a dataset publishes a file, `<folder>/<file>` below the output folder, whether it is there or not.
@@ -114,7 +114,7 @@ class Places:
         return (self.shelf or self.out) / file
 
 
-def temporary(path: Path) -> Path:
+def temporary_path(path: Path) -> Path:
     """Where `path` is written before it is whole: beside it, so that the rename is atomic."""
     return path.with_name(f".{path.name}.tmp")
 
@@ -136,9 +136,9 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes) -> None:
     """Write a small file so that it is there whole or not at all, after a power cut too."""
-    beside = temporary(path)
+    beside = temporary_path(path)
     try:
         with open(beside, "wb") as stream:
             stream.write(content)
@@ -151,7 +151,7 @@ def write_whole(path: Path, content: bytes) -> None:
     sync_folder(path.parent)
 
 
-def read_note(path: Path) -> Any:
+def read_json(path: Path) -> Any:
     """The JSON in a file of the mill's own; None where there is none, or none any more: the disk has spoilt it.
 
     Raises PermissionError.
@@ -171,7 +171,7 @@ def write_file(path: Path, content: bytes) -> Path:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, content)
+        write_atomically(path, content)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written there: {error.strerror}") from None
     return path
@@ -183,7 +183,7 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def stops_everything(error: BaseException | None) -> OSError | None:
+def fatal_cause(error: BaseException | None) -> OSError | None:
     """The error in the chain of causes of `error` that no other shard would survive either: disk full, no right."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in _FATAL:
